@@ -1,0 +1,140 @@
+"""What a contact solve returns: fields, how it converged, and the way to disk and back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asperity.arrays import Field, Mask
+from asperity.conditions import ContactConditions
+from asperity.errors import BadInput, require_positive
+from asperity.grid import Grid
+from asperity.lubricant import Lubricant
+from asperity.surface.model import Surface
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How hard to solve.
+
+    Parameters
+    ----------
+    tolerance : bound on residual, load error and change, each relative
+    max_iterations : Newton steps allowed on each grid level
+    contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
+        some per cent per factor of ten, so it belongs beside every CLR.
+    """
+
+    tolerance: float = 1e-4
+    max_iterations: int = 200
+    contact_film: float = 5e-9
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 0.1:
+            raise BadInput(f"tolerance must lie between 0 and 0.1, got {self.tolerance:g}; 1e-4 is the default")
+        if self.max_iterations < 1:
+            raise BadInput(f"max_iterations must be at least 1, got {self.max_iterations}")
+        require_positive("contact film", self.contact_film, "m")
+
+
+class Status(StrEnum):
+    """How a solve ended."""
+
+    CONVERGED = "converged"
+    OUT_OF_ITERATIONS = "out of iterations"
+    STALLED = "stalled"
+
+
+@dataclass(frozen=True, slots=True)
+class Iteration:
+    """One Newton step: grid cells, step number on that grid, and the three relative figures that must become small."""
+
+    cells: tuple[int, int]
+    number: int
+    residual: float
+    load_error: float
+    change: float
+
+
+@dataclass(frozen=True, slots=True)
+class Convergence:
+    """How the solve went: status, every step on every grid level, and the time it took [s]."""
+
+    status: Status
+    history: tuple[Iteration, ...]
+    tolerance: float
+    seconds: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether residual, load error and change all met the tolerance on the finest grid."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def iterations(self) -> int:
+        """Newton steps on all grid levels together."""
+        return len(self.history)
+
+    def explain(self) -> str:
+        """One sentence on how the solve ended."""
+        last = self.history[-1]
+        return (
+            f"{self.status} after {self.iterations} steps in {self.seconds:.2f} s: residual {last.residual:.1e}, "
+            f"load error {last.load_error:.1e}, change {last.change:.1e}; tolerance {self.tolerance:.0e}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSolution:
+    """A solved contact.
+
+    `pressure` [Pa], `gap` [m] between the deformed surfaces and `in_contact` have shape (nx, ny) on `grid`;
+    `rigid_approach` [m] is the approach of the bodies at the contact centre, h0 in h = h0 + x^2/(2R) + deflection - roughness.
+    What was solved travels along: conditions, lubricant (None when dry), surface and options.
+    """
+
+    conditions: ContactConditions
+    lubricant: Lubricant | None
+    surface: Surface
+    options: Options
+    pressure: Field
+    gap: Field
+    in_contact: Mask
+    rigid_approach: float
+    convergence: Convergence
+    attributes: Mapping[str, str] = field(default_factory=dict)  # free text kept with the run, such as its case
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of all fields: the surface's."""
+        return self.surface.grid
+
+    @property
+    def cavitated(self) -> Mask:
+        """Cells in which the oil has ruptured (no pressure, no contact); all False in a dry contact."""
+        if self.lubricant is None:
+            return np.zeros(self.pressure.shape, dtype=bool)
+        return (self.pressure <= 0.0) & ~self.in_contact
+
+    @property
+    def p_cap(self) -> float | None:
+        """The pressure no cell exceeds [Pa], None when elastic."""
+        return self.conditions.hardness
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The solution as an xarray dataset with CF attributes; all that `load_solution` needs is in it."""
+        from asperity.ehl.storage import solution_to_dataset
+
+        return solution_to_dataset(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the solution as netCDF, whole or not at all, and return the path."""
+        from asperity.ehl.storage import save_solution
+
+        return save_solution(self, Path(path))

@@ -1,0 +1,68 @@
+"""How density grows with pressure: one frozen, callable law a class."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from asperity.errors import require_positive
+from asperity.arrays import Field
+
+
+class DensityLaw(Protocol):
+    """What the solver asks of a density law."""
+
+    @property
+    def rho0(self) -> float:
+        """Density at ambient pressure [kg/m^3]."""
+        ...
+
+    def __call__(self, pressure: Field) -> Field:
+        """Density [kg/m^3] at a pressure [Pa]."""
+        ...
+
+    def slope(self, pressure: Field) -> Field:
+        """d(rho)/dp [kg/m^3/Pa] at a pressure [Pa]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class DowsonHigginson:
+    """Density that levels off at high pressure: ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8."""
+
+    rho0: float  # density at ambient pressure [kg/m^3]
+
+    def __post_init__(self) -> None:
+        require_positive("density rho0", self.rho0, "kg/m^3")
+
+    def __call__(self, pressure: Field) -> Field:
+        """ρ(p) [kg/m^3]."""
+        return self.rho0 * (1.0 + 0.6e-9 * pressure / (1.0 + 1.7e-9 * pressure))
+
+    def slope(self, pressure: Field) -> Field:
+        """dρ/dp [kg/m^3/Pa]."""
+        return self.rho0 * 0.6e-9 / (1.0 + 1.7e-9 * pressure) ** 2
+
+
+@dataclass(frozen=True, slots=True)
+class Incompressible:
+    """Density that does not change: ρ = ρ₀."""
+
+    rho0: float  # density [kg/m^3]
+
+    def __post_init__(self) -> None:
+        require_positive("density rho0", self.rho0, "kg/m^3")
+
+    def __call__(self, pressure: Field) -> Field:
+        """ρ [kg/m^3]."""
+        return np.full_like(pressure, self.rho0)
+
+    def slope(self, pressure: Field) -> Field:
+        """dρ/dp = 0."""
+        return np.zeros_like(pressure)
+
+
+DENSITY_LAWS: dict[str, type[DowsonHigginson] | type[Incompressible]] = {
+    "dowson-higginson": DowsonHigginson,
+    "incompressible": Incompressible,
+}

@@ -1,0 +1,83 @@
+"""How viscosity grows with pressure: one frozen, callable law a class."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from asperity.errors import require_positive
+from asperity.arrays import Field
+
+
+class ViscosityLaw(Protocol):
+    """What the solver asks of a viscosity law."""
+
+    @property
+    def eta0(self) -> float:
+        """Viscosity at ambient pressure [Pa s]."""
+        ...
+
+    def __call__(self, pressure: Field) -> Field:
+        """Viscosity [Pa s] at a pressure [Pa]."""
+        ...
+
+    def log_slope(self, pressure: Field) -> Field:
+        """d(ln eta)/dp [1/Pa] at a pressure [Pa]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Barus:
+    """Viscosity that grows exponentially with pressure: η = η₀ exp(α p). Source: the paper's Eq 10."""
+
+    eta0: float  # viscosity at ambient pressure [Pa s]
+    alpha: float  # pressure-viscosity coefficient [1/Pa]
+
+    def __post_init__(self) -> None:
+        require_positive("viscosity eta0", self.eta0, "Pa s")
+        require_positive("pressure-viscosity coefficient alpha", self.alpha, "1/Pa")
+
+    def __call__(self, pressure: Field) -> Field:
+        """η(p) [Pa s]."""
+        return self.eta0 * np.exp(self.alpha * pressure)
+
+    def log_slope(self, pressure: Field) -> Field:
+        """d(ln η)/dp = α [1/Pa]."""
+        return np.full_like(pressure, self.alpha)
+
+
+@dataclass(frozen=True, slots=True)
+class Roelands:
+    """Viscosity that levels off against Barus: η = η₀ exp((ln η₀ + 9.67) ((1 + p/p₀)^z − 1)), z = α p₀/(ln η₀ + 9.67).
+
+    Source: Roelands (1966), isothermal form with α matched at ambient pressure.
+    """
+
+    eta0: float  # viscosity at ambient pressure [Pa s]
+    alpha: float  # pressure-viscosity coefficient at ambient pressure [1/Pa]
+    p0: float = 1.96e8  # Roelands' reference pressure [Pa]
+
+    def __post_init__(self) -> None:
+        require_positive("viscosity eta0", self.eta0, "Pa s")
+        require_positive("pressure-viscosity coefficient alpha", self.alpha, "1/Pa")
+        require_positive("Roelands' reference pressure p0", self.p0, "Pa")
+
+    @property
+    def _scale(self) -> float:
+        return float(np.log(self.eta0) + 9.67)
+
+    @property
+    def exponent(self) -> float:
+        """z."""
+        return self.alpha * self.p0 / self._scale
+
+    def __call__(self, pressure: Field) -> Field:
+        """η(p) [Pa s]."""
+        return self.eta0 * np.exp(self._scale * ((1.0 + pressure / self.p0) ** self.exponent - 1.0))
+
+    def log_slope(self, pressure: Field) -> Field:
+        """d(ln η)/dp [1/Pa]."""
+        return self.alpha * (1.0 + pressure / self.p0) ** (self.exponent - 1.0)
+
+
+VISCOSITY_LAWS: dict[str, type[Barus] | type[Roelands]] = {"barus": Barus, "roelands": Roelands}

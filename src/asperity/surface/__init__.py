@@ -1,0 +1,1 @@
+"""Rough surfaces: generated, measured, prepared and described."""
