@@ -24,7 +24,10 @@ class Surface:
 
     def __post_init__(self) -> None:
         if self.heights.shape != self.grid.cells:
-            raise BadInput(f"heights must have the grid's shape {self.grid.cells}, got {self.heights.shape}; resample them onto the grid")
+            raise BadInput(
+                f"heights must have the grid's shape {self.grid.cells}, got {self.heights.shape}; "
+                "resample them onto the grid"
+            )
         missing = int(np.count_nonzero(~np.isfinite(self.heights)))
         if missing:
             raise BadInput(f"surface has {missing} heights that are not finite; fill or crop them first")
@@ -35,6 +38,61 @@ class Surface:
         return float(np.std(self.heights))
 
 
+@dataclass(frozen=True, slots=True)
+class MeasuredSurface:
+    """A measured map as its file gives it, apart from the unit.
+
+    `heights` [m], shape (nx, ny) on `grid`, NaN where the instrument saw nothing; `grid` is centred on zero and
+    repeats along neither axis. `name` and `format` of the file; `notes` say in a sentence each what looks odd.
+
+    Raises
+    ------
+    BadInput
+        if the shape is not the grid's, or no height is known.
+    """
+
+    heights: Field
+    grid: Grid
+    name: str
+    format: str
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.heights.shape != self.grid.cells:
+            raise BadInput(f"{self.name} must have its grid's shape {self.grid.cells}, got {self.heights.shape}")
+        if not np.isfinite(self.heights).any():
+            raise BadInput(f"{self.name} holds no valid height among its {self.heights.size}; measure it again")
+
+    @property
+    def missing(self) -> float:
+        """Share of the cells without a height, 0 to 1."""
+        return float(np.mean(~np.isfinite(self.heights)))
+
+    @property
+    def sq(self) -> float:
+        """Root-mean-square height about the mean [m], missing cells left out."""
+        return float(np.nanstd(self.heights))
+
+    @property
+    def surface(self) -> Surface:
+        """The same heights as a `Surface`; missing cells raise `BadInput`."""
+        return Surface(self.heights, self.grid)
+
+
 def flat_surface(grid: Grid) -> Surface:
     """A perfectly smooth surface."""
     return Surface(np.zeros(grid.cells), grid)
+
+
+def length_text(metres: float) -> str:
+    """A length as people write it: three digits and the unit that suits its size."""
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
+        if abs(metres) >= 0.9995 * size:
+            return f"{metres / size:.4g} {unit}"
+    return f"{metres / 1e-9:.4g} nm"
+
+
+def area_text(metres: tuple[float, float]) -> str:
+    """Two lengths as one size: 358 x 179 um."""
+    unit, size = next(((u, s) for u, s in (("mm", 1e-3), ("um", 1e-6)) if max(metres) >= s), ("nm", 1e-9))
+    return f"{metres[0] / size:.4g} x {metres[1] / size:.4g} {unit}"

@@ -1,0 +1,154 @@
+"""ISO 25178-2 parameters of a rough surface, and the description of a measured file that the command line prints."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.grid import Grid
+from asperity.surface.model import MeasuredSurface, Surface
+from asperity.surface.prepare import Form, level
+from asperity.surface.read import read_surface
+
+_DECAYED = 0.2  # ISO 25178-2: the autocorrelation at which Sal and Str are read
+_DIRECTIONS = 180  # rays over half a turn; the autocorrelation is the same backwards
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceParameters:
+    """Areal parameters of ISO 25178-2, about the mean of the cells that are known.
+
+    `sa`, `sq` arithmetic and root mean square height [m]; `ssk`, `sku` skewness and kurtosis (0 and 3 for Gaussian
+    heights); `sdq` root mean square gradient, from differences of neighbouring cells; `sal` the shortest distance over
+    which the autocorrelation falls to 0.2 [m]; `str_` that distance over the longest one (1 isotropic, towards 0 with
+    a lay). Where the autocorrelation stays above 0.2 within half the map in some direction, `str_` is an upper bound
+    and `str_bounded` is true. NaN: ssk, sku, sal and str_ of a flat surface, sal and str_ where nothing decays.
+    """
+
+    sa: float
+    sq: float
+    ssk: float
+    sku: float
+    sdq: float
+    sal: float
+    str_: float
+    str_bounded: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceDescription:
+    """A measured file: as read, levelled (the map to draw), its parameters after levelling, and what was done."""
+
+    path: Path
+    measured: MeasuredSurface
+    levelled: MeasuredSurface
+    parameters: SurfaceParameters
+    steps: tuple[str, ...]
+
+    def scalars(self) -> dict[str, object]:
+        """What `asperity surface --json` prints for the file: SI numbers, None for what is not a number."""
+        numbers = {key.rstrip("_"): value for key, value in asdict(self.parameters).items()}
+        known = {key: None if value != value else value for key, value in numbers.items()}
+        for length in ("sa", "sq", "sal"):
+            known[f"{length}_m"] = known.pop(length)
+        return {
+            "file": str(self.path),
+            "format": self.measured.format,
+            "cells": list(self.measured.grid.cells),
+            "pixel_m": list(self.measured.grid.spacing),
+            "size_m": list(self.measured.grid.extent),
+            "missing": self.measured.missing,
+            **known,
+            "steps": list(self.steps),
+            "notes": list(self.measured.notes),
+        }
+
+
+def describe_surface(
+    path: str | Path, *, form: Form = "quadratic", unit: str | None = None, lateral_unit: str | None = None
+) -> SurfaceDescription:
+    """Read a measured file, level it, and compute its parameters; missing cells are left out, not filled.
+
+    Raises
+    ------
+    UnreadableFile, BadInput
+        as `read_surface` and `level` do.
+    """
+    measured = read_surface(path, unit=unit, lateral_unit=lateral_unit)
+    levelled, step = level(measured, form)
+    return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), (step,))
+
+
+def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
+    """The parameters of a surface as it is; a measured one wants its form removed first (`level`)."""
+    heights = surface.heights - np.nanmean(surface.heights)
+    sq = float(np.sqrt(np.nanmean(heights**2)))
+    if sq == 0.0:
+        return SurfaceParameters(0.0, 0.0, np.nan, np.nan, 0.0, np.nan, np.nan, False)
+    sal, texture, bounded = _texture(heights, surface.grid)
+    return SurfaceParameters(
+        sa=float(np.nanmean(np.abs(heights))),
+        sq=sq,
+        ssk=float(np.nanmean(heights**3)) / sq**3,
+        sku=float(np.nanmean(heights**4)) / sq**4,
+        sdq=_gradient(heights, surface.grid),
+        sal=sal,
+        str_=texture,
+        str_bounded=bounded,
+    )
+
+
+def _gradient(heights: Field, grid: Grid) -> float:
+    squares = 0.0
+    for axis, (spacing, repeats) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
+        steps = np.roll(heights, -1, axis) - heights if repeats else np.diff(heights, axis=axis)
+        squares += float(np.nanmean(steps**2)) / spacing**2
+    return float(np.sqrt(squares))
+
+
+def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]]:
+    """ISO 25178-2 3.2.x f_ACF for lags up to half the map, zero lag in the middle, and where the middle is.
+
+    Each lag is the mean over the pairs of cells that are both known; an axis that repeats is not padded.
+    """
+    from scipy.fft import irfft2, next_fast_len, rfft2
+
+    reach = (grid.cells[0] // 2, grid.cells[1] // 2)
+    shape = [
+        n if repeats else next_fast_len(n + m, real=True)
+        for n, m, repeats in zip(grid.cells, reach, grid.periodic, strict=True)
+    ]
+    known = np.isfinite(heights)
+    sums = irfft2(np.abs(rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape)
+    pairs = np.rint(irfft2(np.abs(rfft2(known.astype(float), shape)) ** 2, shape))
+    lags = np.ix_(*(np.arange(-m, m + 1) % size for m, size in zip(reach, shape, strict=True)))
+    means = np.divide(sums[lags], pairs[lags], out=np.zeros_like(sums[lags]), where=pairs[lags] > 0)
+    return means / means[reach], reach
+
+
+def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
+    """Sal, Str, and whether Str is only an upper bound: the autocorrelation along rays from zero lag."""
+    from scipy.ndimage import map_coordinates
+
+    correlation, middle = _autocorrelation(heights, grid)
+    angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+    cosines, sines = np.cos(angles)[:, None] / grid.spacing[0], np.sin(angles)[:, None] / grid.spacing[1]
+    # the ray ends where it leaves the known lags; its samples are half a cell apart, at most
+    ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
+    radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * ends
+    along = map_coordinates(
+        correlation, [middle[0] + radii * cosines, middle[1] + radii * sines], order=3, mode="nearest"
+    )
+    below = along < _DECAYED
+    decays = below.any(axis=1)
+    if not decays.any():
+        return float("nan"), float("nan"), False
+    ray = np.flatnonzero(decays)
+    after = np.argmax(below[ray], axis=1)
+    high, low = along[ray, after - 1], along[ray, after]
+    inner, outer = radii[ray, after - 1], radii[ray, after]
+    distances = ends[:, 0].copy()
+    distances[ray] = inner + (outer - inner) * (high - _DECAYED) / (high - low)
+    shortest = float(np.min(distances[ray]))
+    return shortest, shortest / float(np.max(distances)), not bool(decays.all())

@@ -1,0 +1,156 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.grid import Grid
+from asperity.surface import MeasuredSurface, gaussian_surface, level, prepare_surface
+
+
+def measured(heights, pixel=1e-6):
+    half = tuple(n * pixel / 2.0 for n in heights.shape)
+    grid = Grid(heights.shape, tuple(-h for h in half), half, periodic=(False, False))
+    return MeasuredSurface(heights, grid, "map.x3p", "x3p")
+
+
+def rough(cells=(300, 240), seed=2, pixel=1e-6, length=8e-6):
+    grid = Grid(cells, (0.0, 0.0), (cells[0] * pixel, cells[1] * pixel))
+    return gaussian_surface(grid, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)).heights
+
+
+def contact(cells=(96, 64), size=(120e-6, 80e-6), periodic=(False, True)):
+    return Grid(cells, (-0.7 * size[0], -0.5 * size[1]), (0.3 * size[0], 0.5 * size[1]), periodic)
+
+
+def form_on(cells):
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, cells[0]), np.linspace(0.0, 1.0, cells[1]), indexing="ij")
+    return 76e-3 + 1e-6 * (30.0 * x - 12.0 * y + 5.0 * x**2 - 7.0 * x * y + 3.0 * y**2)
+
+
+def test_a_pure_form_leaves_nothing_whatever_is_missing():
+    heights = form_on((120, 90))
+    heights[10:30, 40:60] = np.nan
+    levelled, step = level(measured(heights), "quadratic")
+    assert np.nanmax(np.abs(levelled.heights)) < 1e-15
+    np.testing.assert_array_equal(np.isnan(levelled.heights), np.isnan(heights))
+    assert "quadratic form" in step
+
+
+def test_form_removal_takes_the_form_and_not_the_roughness():
+    roughness = rough()
+    bare, _ = level(measured(roughness), "quadratic")
+    formed, _ = level(measured(roughness + form_on(roughness.shape)), "quadratic")
+    np.testing.assert_allclose(formed.heights, bare.heights, atol=1e-14)
+
+
+def test_a_plane_leaves_curvature_and_none_leaves_tilt():
+    cells = (60, 50)
+    x = np.linspace(-1.0, 1.0, cells[0])[:, None] * np.ones(cells[1])
+    assert level(measured(x * 1e-6), "none")[0].sq == pytest.approx(np.std(x * 1e-6))
+    assert level(measured(x * 1e-6), "plane")[0].sq < 1e-20
+    assert level(measured(x**2 * 1e-6), "plane")[0].sq == pytest.approx(np.std(x**2 * 1e-6))
+
+
+def test_the_centre_of_the_map_becomes_the_contact():
+    heights = rough()
+    grid = contact((120, 80), periodic=(False, False))
+    prepared = prepare_surface(measured(heights), grid, form="none")
+    middle = heights[90:210, 80:160]
+    np.testing.assert_allclose(prepared.surface.heights, middle - middle.mean(), atol=1e-12)
+
+
+def test_interpolation_follows_a_wave():
+    x, y = np.meshgrid(np.arange(300) - 149.5, np.arange(240) - 119.5, indexing="ij")
+
+    def wave(x, y):
+        return 1e-6 * np.cos(2.0 * np.pi * x / 20e-6) * np.cos(2.0 * np.pi * y / 24e-6)
+
+    grid = Grid((200, 160), (-60e-6, -40e-6), (60e-6, 40e-6), periodic=(False, False))
+    prepared = prepare_surface(measured(wave(x * 1e-6, y * 1e-6)), grid, form="none")
+    expected = wave(grid.x[:, None], grid.y[None, :])
+    np.testing.assert_allclose(prepared.surface.heights, expected - expected.mean(), atol=2e-9)
+
+
+@pytest.mark.parametrize(("wavelength", "passed"), [(40e-6, 0.94), (10e-6, 0.5), (3.7e-6, 0.0)])
+def test_a_coarser_grid_gets_no_waves_it_cannot_show(wavelength, passed):
+    x = (np.arange(400) - 199.5)[:, None] * np.ones(200) * 1e-6
+    heights = np.cos(2.0 * np.pi * x / wavelength)
+    grid = Grid((48, 16), (-120e-6, -40e-6), (120e-6, 40e-6), periodic=(False, False))  # 5 um cells: 10 um at 50 %
+    resampled = prepare_surface(measured(heights), grid, form="none").surface.heights
+    # ISO 16610-61: the Gaussian passes exp(-ln 2 (cut-off/wavelength)^2); its phase on the cells as sampled
+    expected = 0.5 ** ((10e-6 / wavelength) ** 2) * np.cos(2.0 * np.pi * grid.x / wavelength)
+    assert 0.5 ** ((10e-6 / wavelength) ** 2) == pytest.approx(passed, abs=0.03)
+    np.testing.assert_allclose(resampled[4:-4, 8], (expected - expected.mean())[4:-4], atol=0.02)
+
+
+def test_the_ends_of_a_repeating_axis_meet():
+    heights = rough(seed=4)
+    grid = contact()
+    prepared = prepare_surface(measured(heights), grid).surface.heights
+    steps = np.std(np.diff(prepared, axis=1))
+    assert np.std(prepared[:, 0] - prepared[:, -1]) < 1.5 * steps
+    open_ended = prepare_surface(measured(heights), replace(grid, periodic=(False, False))).surface.heights
+    assert np.std(open_ended[:, 0] - open_ended[:, -1]) > 5.0 * steps
+
+
+@pytest.mark.parametrize("grooved", [False, True])
+def test_closing_the_ends_keeps_the_roughness_of_both_scattered_and_grooved_surfaces(grooved):
+    blended, untouched = [], []
+    for seed in range(6):
+        heights = rough(seed=seed, length=4e-6)
+        if grooved:
+            heights = heights[:, :1] * np.ones(heights.shape[1])
+        closed = prepare_surface(measured(heights), contact((120, 80)), form="none").surface.heights
+        blended.append(np.var(closed[:, :10]))
+        untouched.append(np.var(closed[:, 10:]))
+    assert np.mean(blended) == pytest.approx(np.mean(untouched), rel=0.1)
+
+
+def test_holes_are_filled_from_around_them():
+    truth = rough(length=20e-6)
+    holed = truth.copy()
+    holed[np.random.default_rng(1).random(holed.shape) < 0.1] = np.nan
+    grid = contact((120, 80))
+    whole, filled = (prepare_surface(measured(h), grid, form="none") for h in (truth, holed))
+    assert np.std(filled.surface.heights - whole.surface.heights) < 0.01 * whole.surface.sq
+    assert any("missing cells" in step and "10 %" in step for step in filled.steps)
+
+
+def test_too_many_holes_are_refused():
+    heights = rough()
+    heights[:, 100:150] = np.nan
+    with pytest.raises(BadInput, match=r"misses .* % of the cells"):
+        prepare_surface(measured(heights), contact())
+
+
+def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_and_tiled_when_asked():
+    small = measured(rough((80, 130)))
+    with pytest.raises(BadInput, match=r"80 x 130 um, smaller than the contact's 120 x 80 um.*smaller grid"):
+        prepare_surface(small, contact())
+    tiled = prepare_surface(small, contact((120, 80)), fit="tile", form="none")
+    heights = tiled.surface.heights
+    # 20 cells stand out on either side: they mirror what lies inside of the map's edge
+    np.testing.assert_allclose(heights[:20], heights[20:40][::-1], atol=1e-12)
+    assert any("mirrored" in step for step in tiled.steps)
+
+
+def test_scaling_gives_the_sq_asked_for_and_nothing_else_changes():
+    as_measured, scaled = (prepare_surface(measured(rough()), contact(), sq=sq) for sq in (None, 2.5e-6))
+    assert scaled.surface.sq == pytest.approx(2.5e-6, rel=1e-12)
+    factor = 2.5e-6 / as_measured.surface.sq
+    np.testing.assert_allclose(scaled.surface.heights, factor * as_measured.surface.heights, rtol=1e-9)
+    assert all(abs(p.surface.heights.mean()) < 1e-18 for p in (as_measured, scaled))
+
+
+@pytest.mark.parametrize(
+    ("option", "said"), [({"form": "cubic"}, "form"), ({"fit": "stretch"}, "fit"), ({"sq": -1e-6}, "sq")]
+)
+def test_unknown_options_are_refused(option, said):
+    with pytest.raises(BadInput, match=said):
+        prepare_surface(measured(rough()), contact(), **option)
+
+
+def test_a_flat_map_cannot_be_scaled():
+    with pytest.raises(BadInput, match="flat"):
+        prepare_surface(measured(np.full((300, 240), 1e-3)), contact(), sq=1e-6)

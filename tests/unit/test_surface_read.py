@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput, UnreadableFile
+from asperity.surface import read_surface
+from asperity.surface.read import library
+
+
+def xyz(path, cells=(20, 12), pixel=(2.0, 3.0)):
+    rows = [f"{i * pixel[0]} {j * pixel[1]} {i + 100 * j}\n" for j in range(cells[1]) for i in range(cells[0])]
+    path.write_text("".join(rows))
+    return path
+
+
+def hills(cells=(24, 16)):
+    x, y = np.meshgrid(np.arange(cells[0]), np.arange(cells[1]), indexing="ij")
+    return 1e-6 * (np.sin(x / 3.0) + 0.1 * y)
+
+
+@pytest.fixture
+def x3p(tmp_path):
+    import x3pio
+
+    heights = hills()
+    heights[3, 5] = np.nan
+    x3pio.write(tmp_path / "map.x3p", heights.T, x_scale=2e-6, y_scale=3e-6)
+    return tmp_path / "map.x3p", heights
+
+
+def test_x_comes_first_missing_is_nan_and_lengths_are_metres(x3p):
+    path, heights = x3p
+    measured = read_surface(path)
+    np.testing.assert_allclose(measured.heights, heights, rtol=1e-12)
+    assert measured.grid.cells == (24, 16)
+    assert measured.grid.spacing == pytest.approx((2e-6, 3e-6))
+    assert measured.missing == pytest.approx(1.0 / (24 * 16))
+    assert any("not square" in note for note in measured.notes)
+
+
+def test_sdf_gives_the_same_surface_as_x3p(tmp_path):
+    import sdfio
+
+    sdfio.write(tmp_path / "map.sdf", hills().T, x_scale=2e-6, y_scale=2e-6)
+    measured = read_surface(tmp_path / "map.sdf")
+    np.testing.assert_allclose(measured.heights, hills(), atol=1e-12)
+    assert measured.grid.spacing == pytest.approx((2e-6, 2e-6))
+
+
+def test_a_file_without_units_asks_for_them_and_takes_them(tmp_path):
+    path = xyz(tmp_path / "points.txt")
+    with pytest.raises(BadInput, match=r"names no units.*lateral_unit"):
+        read_surface(path)
+    measured = read_surface(path, unit="nm", lateral_unit="um")
+    assert measured.grid.spacing == pytest.approx((2e-6, 3e-6))
+    assert measured.heights[7, 3] == pytest.approx(307e-9)
+
+
+def test_units_that_a_file_states_are_not_overridden(x3p):
+    with pytest.raises(BadInput, match="states its own unit"):
+        read_surface(x3p[0], unit="um", lateral_unit="um")
+
+
+def test_a_unit_that_is_no_length_is_refused(tmp_path):
+    with pytest.raises(BadInput, match="'furlong'"):
+        read_surface(xyz(tmp_path / "points.txt"), unit="furlong", lateral_unit="um")
+
+
+@pytest.mark.parametrize("unit", ["km", "pm"])
+def test_an_implausible_pixel_is_noted(tmp_path, unit):
+    measured = read_surface(xyz(tmp_path / "points.txt", pixel=(2.0, 2.0)), unit="um", lateral_unit=unit)
+    assert sum("check the lateral unit" in note for note in measured.notes) == 2
+
+
+def refused(path, said):
+    with pytest.raises(UnreadableFile, match=said) as caught:
+        read_surface(path)
+    message = str(caught.value)
+    assert path.name in message
+    assert "\n" not in message
+    assert len(message) < 300
+
+
+def test_a_missing_file(tmp_path):
+    refused(tmp_path / "nowhere.opd", "does not exist")
+
+
+def test_a_folder(tmp_path):
+    refused(tmp_path, "cannot be opened")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("empty.opd", b"", "empty"),
+        ("text.opd", b"this is not a Wyko file\n" * 40, "something else"),
+        ("noise.al3d", np.random.default_rng(1).bytes(5000), "something else"),
+        ("noise.bin", np.random.default_rng(2).bytes(2 * 1201 * 1201), "no format"),
+        ("archive.x3p", b"PK\x03\x04" + b"x" * 300, "zip"),
+        ("words.txt", b"once upon a time\n" * 30, "txt"),
+        ("cut.xyz", b"0 0 1\n1 0 2\n0 1 3\n1 ", "xyz"),
+    ],
+)
+def test_a_file_that_is_not_what_it_says(tmp_path, name, content, said, capfd):
+    path = tmp_path / name
+    path.write_bytes(content)
+    refused(path, said)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.7, 0.99])
+def test_a_truncated_file(x3p, share):
+    path, _ = x3p
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    refused(path, "x3p")
+
+
+def test_a_wrong_name_is_told_from_the_right_one(tmp_path):
+    import sdfio
+
+    sdfio.write(tmp_path / "map.opd", hills().T, x_scale=2e-6, y_scale=2e-6)
+    refused(tmp_path / "map.opd", r"looks like sdf inside; rename it to \.sdf")
+
+
+def test_nothing_but_missing_cells(tmp_path):
+    import x3pio
+
+    x3pio.write(tmp_path / "blind.x3p", np.full((16, 16), np.nan), x_scale=1e-6, y_scale=1e-6)
+    refused(tmp_path / "blind.x3p", "no valid height")
+
+
+def test_a_map_of_a_few_points(tmp_path):
+    with pytest.raises(UnreadableFile, match="3 x 4 heights, too few"):
+        read_surface(xyz(tmp_path / "few.xyz", cells=(3, 4)), unit="um", lateral_unit="um")
+
+
+def test_a_profile_is_refused(tmp_path):
+    import x3pio
+
+    path = tmp_path / "line.hfm"
+    path.write_text("".join(f"{0.0005 * i:.4f} {np.sin(i):.5f}\n" for i in range(200)))
+    refused(path, "profile")
+    x3pio.write(tmp_path / "row.x3p", hills((40, 1)).T, x_scale=1e-6, y_scale=1e-6)
+    refused(tmp_path / "row.x3p", "row.x3p")
+
+
+def test_the_library_stays_quiet_about_mpi():
+    assert library().__name__ == "SurfaceTopography"

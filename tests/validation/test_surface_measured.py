@@ -1,0 +1,107 @@
+"""The developers' measured files, where they are at hand, against their README and one another."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput, UnreadableFile
+from asperity.grid import Grid
+from asperity.surface import describe_surface, prepare_surface, read_surface
+
+FILES = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces"
+pytestmark = pytest.mark.skipif(not FILES.is_dir(), reason="the developers' measured surfaces are not on this machine")
+HERTZ = 55.9e-6  # half-width of the paper's contact at 500 N
+
+
+def paper_grid(cells=256):
+    return Grid((cells, cells), (-4.5 * HERTZ, -1.6 * HERTZ), (1.9 * HERTZ, 1.6 * HERTZ))
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "pixel", "sq", "missing"),
+    [
+        ("milled_1.opd", (736, 480), 1.634e-6, 1.89e-6, 0.0023),
+        ("isotropic.al3d", (200, 296), 0.438e-6, 0.259e-6, 0.0),
+        ("isotropic_iso5436.x3p", (200, 296), 0.438e-6, 0.259e-6, 0.0),
+        ("isotropic_iso25178.x3p", (200, 296), 0.438e-6, 0.259e-6, 0.0),
+        ("isotropic_iso1.sdf", (200, 296), 0.438e-6, 0.259e-6, 0.0),
+        ("ground_lay.plu", (768, 576), 1.66e-6, 0.018e-6, 0.0),
+    ],
+)
+def test_a_file_reads_as_its_readme_says(name, cells, pixel, sq, missing):
+    found = describe_surface(FILES / name).scalars()
+    assert tuple(found["cells"]) == cells
+    assert found["pixel_m"][0] == pytest.approx(pixel, rel=1e-3)
+    assert found["sq_m"] == pytest.approx(sq, rel=0.02)
+    assert found["missing"] == pytest.approx(missing, abs=1e-4)
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+
+
+def test_four_formats_of_one_surface_hold_the_same_heights():
+    heights = read_surface(FILES / "isotropic.al3d").heights
+    for name in ("isotropic_iso5436.x3p", "isotropic_iso25178.x3p", "isotropic_iso1.sdf"):
+        np.testing.assert_allclose(read_surface(FILES / name).heights, heights, atol=1e-12)
+
+
+def test_a_point_list_reads_once_its_units_are_given():
+    found = describe_surface(FILES / "nanovea_test1.txt", unit="um", lateral_unit="mm").scalars()
+    assert found["sq_m"] == pytest.approx(4.47e-6, rel=0.01)
+    assert found["pixel_m"] == pytest.approx([5e-6, 5e-6])
+
+
+@pytest.mark.parametrize("name", ["bullet_land.x3p", "stylus_4p8mm.hfm", "wear_track_C1.csv"])
+def test_what_is_no_readable_map_is_refused_in_a_sentence(name, capfd):
+    with pytest.raises(UnreadableFile, match=name):
+        read_surface(FILES / name)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "share"), [("milled_1.opd", 0.9), ("isotropic.al3d", 0.4), ("isotropic_iso1.sdf", 0.99)]
+)
+def test_a_file_cut_short_is_refused(tmp_path, name, share):
+    content = (FILES / name).read_bytes()
+    (tmp_path / name).write_bytes(content[: int(share * len(content))])
+    with pytest.raises(UnreadableFile, match=name):
+        read_surface(tmp_path / name)
+
+
+def test_another_formats_name_is_told(tmp_path):
+    disguised = tmp_path / "disguised.opd"
+    disguised.write_bytes((FILES / "isotropic.al3d").read_bytes())
+    with pytest.raises(UnreadableFile, match=r"looks like al3d inside; rename it to \.al3d"):
+        read_surface(disguised)
+
+
+def test_the_milled_surface_covers_the_papers_contact():
+    prepared = prepare_surface(read_surface(FILES / "milled_1.opd"), paper_grid())
+    heights = prepared.surface.heights
+    assert np.std(heights[:, 0] - heights[:, -1]) < 2.0 * np.std(np.diff(heights, axis=1))
+    assert [step.split()[0] for step in prepared.steps] == [
+        "removed",
+        "cut",
+        "filled",
+        "resampled",
+        "blended",
+        "removed",
+    ]
+    assert prepare_surface(read_surface(FILES / "milled_1.opd"), paper_grid(), sq=1e-6).surface.sq == pytest.approx(
+        1e-6
+    )
+
+
+def test_the_prepared_surface_does_not_depend_on_the_cells():
+    measured = read_surface(FILES / "milled_1.opd")
+    coarse, fine = (prepare_surface(measured, paper_grid(n)).surface for n in (128, 384))
+    difference = fine.heights[1::3, 1::3] - coarse.heights
+    assert np.std(difference) < 0.05 * fine.sq  # the coarse one lacks waves below 2.8 um
+
+
+def test_the_small_surface_is_refused_and_tiles_when_asked():
+    small = read_surface(FILES / "isotropic.al3d")
+    with pytest.raises(BadInput, match=r"87\.61 x 129\.7 um, smaller than the contact's 357\.8 x 178\.9 um"):
+        prepare_surface(small, paper_grid())
+    tiled = prepare_surface(small, paper_grid(512), fit="tile")
+    assert tiled.surface.sq == pytest.approx(0.259e-6, rel=0.05)
