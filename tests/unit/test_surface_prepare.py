@@ -97,14 +97,14 @@ def test_the_ends_of_a_repeating_axis_meet():
 @pytest.mark.parametrize("grooved", [False, True])
 def test_closing_the_ends_keeps_the_roughness_of_both_scattered_and_grooved_surfaces(grooved):
     blended, untouched = [], []
-    for seed in range(6):
+    for seed in range(24):
         heights = rough(seed=seed, length=4e-6)
         if grooved:
             heights = heights[:, :1] * np.ones(heights.shape[1])
         closed = prepare_surface(measured(heights), contact((120, 80)), form="none").surface.heights
         blended.append(np.var(closed[:, :10]))
         untouched.append(np.var(closed[:, 10:]))
-    assert np.mean(blended) == pytest.approx(np.mean(untouched), rel=0.1)
+    assert np.mean(blended) / np.mean(untouched) == pytest.approx(1.0, abs=0.1)
 
 
 def test_holes_are_filled_from_around_them():

@@ -214,7 +214,7 @@ def _close(heights: Field, axis: int, cells: int, shared: int) -> Field:
     """
     rows = np.moveaxis(heights, axis, 0)
     start, beyond = rows[:shared], rows[cells : cells + shared]
-    rho = float(np.clip(np.mean(start * beyond) / max(np.std(start) * np.std(beyond), np.finfo(float).tiny), 0.0, 1.0))
+    rho = float(np.clip(np.mean(start * beyond) / max(np.std(start) * np.std(beyond), np.finfo(float).tiny), -0.5, 1.0))
     t = (np.arange(shared) + 0.5)[:, None] / shared
     own = t * t * (3.0 - 2.0 * t)
     other = 1.0 - own
