@@ -1,0 +1,476 @@
+"""One HTML page from solved runs: what was found, how, how well, and what the model leaves out.
+
+The page is self-contained and loads nothing. Numbers are those of `Run.scalars`, in display units; figures come from
+`asperity.report.figures`. Nothing is solved or fitted here.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from importlib.metadata import version
+from math import floor, log10
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from asperity.conditions import ContactConditions
+from asperity.coupling import VibrationModel
+from asperity.ehl.solution import ContactSolution
+from asperity.ehl.storage import require_writable, whole_file
+from asperity.errors import BadInput
+from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.report import figures
+
+if TYPE_CHECKING:
+    from asperity.run import Run
+
+NOT_FOUND = "–"
+
+PAPER = {
+    "authors": "Xu, C., Fan, Q., Zhang, Q., Tong, Y., Wang, S., & Wu, T.",
+    "year": 2025,
+    "title": "Vibration-Based Wear Evolution Characterisation of Lubricated Rolling-Sliding Contact",
+    "journal": "Lubricants",
+    "place": "13(2), 78",
+    "doi": "10.3390/lubricants13020078",
+}
+
+
+def write_report(runs: Sequence["Run"], path: str | Path, *, title: str | None = None) -> Path:
+    """Write one self-contained HTML page about one or several runs, whole or not at all.
+
+    Parameters
+    ----------
+    runs : at least one; several are put side by side and drawn against their roughness
+    path : the file to write; its folder must exist
+    title : heading of the page; without it, the page says what it shows
+
+    Returns
+    -------
+    Path
+        The file written. The same runs and asperity version give the same bytes.
+
+    Raises
+    ------
+    BadInput
+        for no runs, or a path that cannot be written to.
+    """
+    path = Path(path)
+    if not runs:
+        raise BadInput("a report needs at least one run, got none; name the run files to show")
+    require_writable(path)  # before the figures are drawn
+    with whole_file(path) as part:
+        part.write_text(render_page(runs, title=title), encoding="utf-8", newline="\n")
+    return path
+
+
+def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
+    """The page as HTML text."""
+    environment = Environment(
+        loader=PackageLoader("asperity.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    scalars = [run.scalars() for run in runs]
+    labels = _labels(scalars)
+    return environment.get_template("page.html.j2").render(
+        title=title or _title(scalars),
+        version=version("asperity"),
+        runs=[_RunView(run, label, f"run-{n}") for n, (run, label) in enumerate(zip(runs, labels, strict=True), 1)],
+        overview=_overview(runs, scalars) if len(runs) > 1 else [],
+        numbers=[quantity.row(scalars) for quantity in QUANTITIES],
+        conditions=_side_by_side([_conditions(run) for run in runs]),
+        lubricated=any(run.solution.lubricant is not None for run in runs),
+        imbalance=_span([one["mass_flux_imbalance"] for one in scalars]),
+        paper=PAPER,
+    )
+
+
+# Numbers -------------------------------------------------------------------------------------------------------------
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def power_of_ten(value: float, digits: int = 1) -> str:
+    """1.3e-05 as 1.3×10⁻⁵."""
+    mantissa, exponent = f"{value:.{digits}e}".split("e")
+    return "0" if value == 0.0 else f"{mantissa}×10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+
+
+def with_deviation(value: float, deviation: float | None) -> tuple[str, str]:
+    """A value and its standard deviation, both to the deviation's second digit and the same power of ten.
+
+    Without a deviation the value has four digits, and the second text is empty.
+    """
+    exponent = floor(log10(abs(value))) if value != 0.0 and not 1e-2 <= abs(value) < 1e6 else 0
+    power = f"×10{str(exponent).translate(SUPERSCRIPTS)}" if exponent else ""
+    scaled = value / 10.0**exponent
+    if deviation is None or not 0.0 < deviation < float("inf"):
+        return f"{scaled:.4g}{power}", ""
+    spread = deviation / 10.0**exponent
+    decimals = max(0, 1 - floor(log10(spread)))
+    return f"{scaled:.{decimals}f}{power}", f"± {spread:.{decimals}f}{power}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def _signed(value: float, form: str) -> str:
+    return format(value, form).replace("-", "−")
+
+
+def _span(shares: Sequence[Any]) -> str:
+    lowest, highest = _percent(min(shares)), _percent(max(shares))
+    return lowest if lowest == highest else f"{lowest} to {highest}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    name: str
+    meaning: str
+    unit: str
+    cells: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One line of the table: the key of `Run.scalars`, how it is shown, and what it means."""
+
+    key: str
+    name: str
+    unit: str
+    meaning: str
+    scale: float = 1.0
+    form: str | Callable[[float], str] = ".3f"
+    deviation: str | None = None
+
+    def show(self, scalars: Mapping[str, Any]) -> str:
+        """The value in display units, without its unit."""
+        value = scalars[self.key]
+        if value is None:
+            return NOT_FOUND
+        if isinstance(value, bool):
+            return "yes" if value else "NO"
+        value = value * self.scale
+        if self.deviation is not None:
+            return " ".join(with_deviation(value, scalars[self.deviation])).rstrip()
+        return self.form(value) if callable(self.form) else format(value, self.form)
+
+    def row(self, scalars: Sequence[Mapping[str, Any]]) -> _Row:
+        """The line of the table for several runs."""
+        return _Row(self.name, self.meaning, self.unit, [self.show(one) for one in scalars])
+
+
+QUANTITIES = (
+    Quantity("clr", "Load share of asperities, CLR", "%", "asperity load over the whole load", 100.0, ".1f"),
+    Quantity(
+        "car", "Contact area share in the Hertz zone, CAR", "%", "contact cells in |x| ≤ a over all there", 100.0, ".1f"
+    ),
+    Quantity(
+        "car_domain", "Contact area of the whole domain", "%", "over the Hertz area; counts |x| > a too", 100.0, ".1f"
+    ),
+    Quantity("sq_m", "Composite roughness, Sq", "µm", "root-mean-square height before deformation", 1e6),
+    Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap in the Hertz zone", 1e6),
+    Quantity("h_central_m", "Central film", "µm", "mean gap in |x| ≤ a/10", 1e6),
+    Quantity("h_mean_m", "Mean film", "µm", "mean gap in the Hertz zone", 1e6),
+    Quantity("lambda_ratio", "Film ratio, Λ", "", "film of the smooth contact over Sq", 1.0, ".2f"),
+    Quantity("p_max_pa", "Largest pressure", "GPa", "oil and asperities together", 1e-9),
+    Quantity("crf_hz", "Contact resonance frequency, CRF", "Hz", "of one simulated record", deviation="crf_std_hz"),
+    Quantity(
+        "crfa", "Resonance amplitude, CRFA", "(m/s²)²/Hz", "acceleration density at the CRF", deviation="crfa_std"
+    ),
+    Quantity("converged", "Converged", "", "residual, load error and change all below the tolerance"),
+    Quantity("iterations", "Newton steps", "", "on all grid levels together", 1.0, ".0f"),
+    Quantity("reynolds_residual", "Reynolds residual", "", "how well the flow equation is met", 1.0, power_of_ten),
+    Quantity("load_error", "Load error", "", "carried against applied load", 1.0, power_of_ten),
+    Quantity(
+        "mass_flux_imbalance", "Oil-flow imbalance", "%", "oil lost or re-created over oil that enters", 100.0, ".1f"
+    ),
+    Quantity("seconds", "Time to solve", "s", "wall clock", 1.0, ".2f"),
+)
+TILES = {
+    "clr": "Load share, CLR",
+    "car": "Area share, CAR",
+    "h_mean_m": "Mean film",
+    "lambda_ratio": "Film ratio, Λ",
+    "crf_hz": "Resonance, CRF",
+    "crfa": "Amplitude, CRFA",
+}
+
+
+# One run -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Tile:
+    name: str
+    value: str
+    rest: str  # deviation and unit
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """A figure as the page needs it; `width` and `height` in CSS pixels keep its place while it loads."""
+
+    uri: str
+    width: int
+    height: int
+    alt: str
+    caption: str
+
+
+def _picture(figure: Figure, caption: str, alt: str) -> _Picture:
+    text = re.sub(r"^.*?(?=<svg)", "", figures.svg(figure), flags=re.DOTALL)  # an image needs no XML prologue
+    width, height = figure.get_size_inches() * 96.0
+    uri = "data:image/svg+xml," + quote(re.sub(r"\s*\n\s*", " ", text), safe=" ='/:;,.()+-*!@?&$[]{}|~^`")
+    return _Picture(uri, round(float(width)), round(float(height)), alt, caption)
+
+
+class _RunView:
+    """What the template shows of one run."""
+
+    def __init__(self, run: "Run", label: str, anchor: str) -> None:
+        scalars = run.scalars()
+        self.label = label
+        self.anchor = anchor
+        self.verdict = run.verdict()
+        self.converged = bool(scalars["converged"])
+        self.ending = run.solution.convergence.explain().capitalize()
+        self.tiles = [_tile(quantity, scalars) for quantity in QUANTITIES if quantity.key in TILES]
+        self.pictures = _run_pictures(run, scalars)
+        self.notes = [note[:1].upper() + note[1:] for note in (*run.notes, *_silence(run))]
+        self.case_text = run.case.text
+
+
+def _tile(quantity: Quantity, scalars: Mapping[str, Any]) -> _Tile:
+    value, _, deviation = quantity.show(scalars).partition(" ")
+    unit = "" if value == NOT_FOUND else quantity.unit
+    return _Tile(TILES[quantity.key], value, f"{deviation} {unit}".strip())
+
+
+def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
+    solution = run.solution
+    shares = figures.zone_shares(solution)
+    dry = solution.lubricant is None
+    zone = "The dashed lines bound the Hertz zone |x| ≤ a; oil enters from the left."
+    return [
+        _picture(
+            figures.contact_map(solution),
+            "Contact state, shares of the Hertz zone. A cell counts as contact where the gap is at most "
+            f"{solution.options.contact_film * 1e9:g} nm. {zone}",
+            f"Map of the contact: asperities touch on {_percent(shares.contact)} of the Hertz zone, "
+            + (
+                "the rest is open."
+                if dry
+                else f"oil fills {_percent(shares.film)}, {_percent(shares.cavitated)} has cavitated."
+            ),
+        ),
+        _picture(
+            figures.film_map(solution),
+            "Gap between the deformed surfaces. The colours end at the Hertz zone's 99th percentile.",
+            f"Map of the film thickness: mean {scalars['h_mean_m'] * 1e6:.3f} µm in the Hertz zone, "
+            f"smallest {scalars['h_min_m'] * 1e6:.3f} µm.",
+        ),
+        _picture(
+            figures.pressure_map(solution),
+            "Pressure, carried by oil and asperities together.",
+            f"Map of the pressure: at most {scalars['p_max_pa'] * 1e-9:.3f} GPa; Hertz's would be "
+            f"{solution.conditions.hertz.p_max * 1e-9:.3f} GPa.",
+        ),
+        _picture(
+            figures.centre_line(solution),
+            "Pressure and gap along rolling through the middle. The gap's axis ends where the Hertz zone's gaps do.",
+            "Curves along rolling: pressure with the dashed Hertz ellipse, and below it the gap with contact marked.",
+        ),
+        _picture(
+            figures.roughness_map(solution),
+            "The composite roughness of both surfaces before they deform, material up.",
+            f"Map of the roughness heights, Sq {scalars['sq_m'] * 1e6:.3f} µm.",
+        ),
+        _picture(
+            figures.height_distribution(solution.surface.heights),
+            "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
+            f"Histogram of the heights, Sq {scalars['sq_m'] * 1e6:.3f} µm, beside a Gaussian curve.",
+        ),
+        *_spectrum_picture(run),
+        _picture(
+            figures.convergence_history(solution.convergence),
+            f"How the solver got there: {solution.convergence.explain()}.",
+            f"Residual, load error and change against the Newton step: {solution.convergence.explain()}.",
+        ),
+    ]
+
+
+def _spectrum_picture(run: "Run") -> list[_Picture]:
+    vibration = run.vibration
+    if vibration is None or vibration.spectrum is None:
+        return []
+    (low, high), words = vibration.band_hz, run.resonance_in_words()
+    spectrum = vibration.spectrum
+    caption = (
+        f"Acceleration spectrum of a simulated record of {spectrum.duration_s:g} s, resolution "
+        f"{spectrum.resolution_hz:.3g} Hz: {words}. Searched from {low:.0f} to {high:.0f} Hz, where this contact can "
+        f"resonate; asperities that carry the whole load would give {vibration.full_load_crf_hz:.0f} Hz."
+    )
+    alt = f"Acceleration spectrum around the search band {low:.0f} to {high:.0f} Hz: {words}."
+    return [_picture(figures.spectrum(vibration), caption, alt)]
+
+
+def _silence(run: "Run") -> list[str]:
+    """Why a figure is not there."""
+    if run.vibration is None or run.vibration.spectrum is not None:
+        return []
+    return [f"There is no spectrum to show: {run.vibration.resonance.reason}."]
+
+
+# Several runs --------------------------------------------------------------------------------------------------------
+
+
+def _labels(scalars: Sequence[Mapping[str, Any]]) -> list[str]:
+    rough = [f"Sq {one['sq_m'] * 1e6:.2f} µm" for one in scalars]
+    return rough if len(rough) == 1 else [f"{number}. {label}" for number, label in enumerate(rough, 1)]
+
+
+def _title(scalars: Sequence[Mapping[str, Any]]) -> str:
+    rough = [one["sq_m"] * 1e6 for one in scalars]
+    if len(rough) == 1:
+        return f"Rough lubricated contact, Sq {rough[0]:.2f} µm"
+    return f"Rough lubricated contact: {len(rough)} runs, Sq {min(rough):.2f} to {max(rough):.2f} µm"
+
+
+def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> list[_Picture]:
+    full_load = {run.vibration.full_load_crf_hz for run in runs if run.vibration is not None}
+    unfinished = " Hollow markers are runs that did not converge." if not all(s["converged"] for s in scalars) else ""
+    return [
+        _picture(
+            figures.shares_against_roughness(scalars),
+            "Share of the load (CLR) and of the Hertz zone (CAR) that asperities take, one surface each." + unfinished,
+            "CLR and CAR against Sq: "
+            + "; ".join(
+                f"at {s['sq_m'] * 1e6:.2f} µm CLR {_percent(s['clr'])} and CAR {_percent(s['car'])}" for s in scalars
+            ) + ".",
+        ),
+        _picture(
+            figures.resonance_against_roughness(scalars, full_load.pop() if len(full_load) == 1 else None),
+            "Contact resonance frequency with two standard deviations of its fit." + unfinished,
+            "CRF against Sq: "
+            + "; ".join(
+                f"at {s['sq_m'] * 1e6:.2f} µm " + ("not found" if s["crf_hz"] is None else f"{s['crf_hz']:.0f} Hz")
+                for s in scalars
+            ) + ".",
+        ),
+    ]  # fmt: skip
+
+
+# Conditions ----------------------------------------------------------------------------------------------------------
+
+LAW_FIELDS = {
+    "eta0": ("η₀", 1.0, "Pa s"),
+    "alpha": ("α", 1e9, "1/GPa"),
+    "p0": ("p₀", 1e-6, "MPa"),
+    "rho0": ("ρ₀", 1.0, "kg/m³"),
+}
+
+
+def _law(law: object, table: Mapping[str, type]) -> str:
+    name = next(name for name, kind in table.items() if type(law) is kind)
+    values = []
+    for field in fields(law):  # type: ignore[arg-type]
+        symbol, scale, unit = LAW_FIELDS[field.name]
+        values.append(f"{symbol} = {getattr(law, field.name) * scale:.4g} {unit}")
+    return ", ".join([name, *values])
+
+
+def _pair(values: tuple[float, float], unit: str = "", scale: float = 1.0) -> str:
+    texts = dict.fromkeys(f"{value * scale:.4g} {unit}".rstrip() for value in values)
+    return " and ".join(texts) if len(texts) > 1 else f"{next(iter(texts))} (both)"
+
+
+def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
+    pair, hertz, hardness = conditions.pair, conditions.hertz, conditions.hardness
+    contact = f"{conditions.geometry} contact, effective radius {conditions.radius_along_rolling * 1e3:.4g} mm"
+    load = f"{conditions.load:.4g} N"
+    if conditions.length is not None:
+        contact += f", length {conditions.length * 1e3:.4g} mm"
+        load += f" ({conditions.line_load * 1e-3:.4g} N/mm)"
+    first, second = conditions.surface_speeds
+    return {
+        "Contact": contact,
+        "Load": load,
+        "Speeds": f"{first:.4g} and {second:.4g} m/s: entrainment {conditions.entrainment_speed:.4g} m/s, "
+        f"slide-to-roll {conditions.slide_to_roll:.3g}",
+        "Young's moduli": _pair(pair.youngs_moduli, "GPa", 1e-9),
+        "Poisson's ratios": _pair(pair.poisson_ratios),
+        "Reduced modulus": f"E* = {pair.reduced_modulus * 1e-9:.5g} GPa (E′ = 2 E* = "
+        f"{pair.effective_modulus * 1e-9:.5g} GPa)",
+        "Pressure cap (hardness)": "none: purely elastic" if hardness is None else f"{hardness * 1e-9:.4g} GPa",
+        "Hertz (smooth, dry)": f"half-width a = {hertz.half_widths[0] * 1e6:.2f} µm, largest pressure "
+        f"{hertz.p_max * 1e-9:.4f} GPa",
+    }
+
+
+def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:
+    if lubricant is None:
+        return {"Lubricant": "none: dry contact"}
+    return {
+        "Viscosity law": _law(lubricant.viscosity, VISCOSITY_LAWS),
+        "Density law": _law(lubricant.density, DENSITY_LAWS),
+        "Rheology": _law(lubricant.rheology, RHEOLOGY_LAWS),
+    }
+
+
+def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
+    grid, a = solution.grid, solution.conditions.hertz.half_widths[0]
+    (nx, ny), (dx, dy) = grid.cells, grid.spacing
+    return {
+        "Grid": f"{nx} × {ny} cells of {dx * 1e6:.3g} × {dy * 1e6:.3g} µm",
+        "Domain": f"x from {_signed(grid.lower[0] / a, '.2f')} a to {_signed(grid.upper[0] / a, '.2f')} a, "
+        f"y from {_signed(grid.lower[1] / a, '.2f')} a to {_signed(grid.upper[1] / a, '.2f')} a"
+        + (", repeating in y" if grid.periodic[1] else ""),
+        "Contact threshold": f"gap of at most {solution.options.contact_film * 1e9:.4g} nm",
+        "Tolerance": power_of_ten(solution.options.tolerance),
+    }
+
+
+def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
+    if model is None:
+        return {"Vibration": "not asked for"}
+    return {
+        "Oscillator": f"mass {model.mass:.4g} kg, damping ratio {model.damping_ratio:.3g}, stiffness law "
+        f"{model.stiffness_law}",
+        "Excitation": f"white noise of RMS height Sq behind a low pass at {model.cutoff_reference_hz:.4g} Hz × "
+        f"(CAR/{model.car_reference:.3g})^{model.cutoff_exponent:.3g}, seed {model.seed}",
+        "Record": f"{model.duration_s:.4g} s at {model.rate_hz * 1e-3:.4g} kHz; resonance by {model.method}",
+    }
+
+
+def _conditions(run: "Run") -> dict[str, str]:
+    solution = run.solution
+    return {
+        **_contact_rows(solution.conditions),
+        **_lubricant_rows(solution.lubricant),
+        "Roughness": f"Sq {solution.surface.sq * 1e6:.4g} µm",
+        **_numerical_rows(solution),
+        **_vibration_rows(run.case.vibration),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Condition:
+    name: str
+    cells: list[str]
+
+    @property
+    def varies(self) -> bool:
+        return len(set(self.cells)) > 1
+
+
+def _side_by_side(columns: Sequence[Mapping[str, str]]) -> list[_Condition]:
+    names = dict.fromkeys(name for column in columns for name in column)
+    return [_Condition(name, [column.get(name, NOT_FOUND) for column in columns]) for name in names]

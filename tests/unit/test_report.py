@@ -1,0 +1,444 @@
+"""The report page: it loads nothing, says every number with its unit, and hides no failure."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from asperity.case import load_case
+from asperity.coupling import contact_vibration
+from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Status
+from asperity.ehl.state import ContactState
+from asperity.errors import BadInput
+from asperity.grid import Grid
+from asperity.hertz import line_gap, line_pressure
+from asperity.report import figures, page, surface_map, write_report
+from asperity.run import Run
+from asperity.surface import MeasuredSurface, Surface, SurfaceDescription, flat_surface, surface_parameters
+
+CASE = """
+[contact]
+geometry = "line"
+radius = "5.4 mm"
+length = "10 mm"
+load = "500 N"
+entrainment_speed = "1.91 m/s"
+slip = 0.2
+[material]
+youngs_modulus = "200 GPa"
+poisson_ratio = 0.3
+hardness = "2 GPa"
+[lubricant]
+viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
+density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
+rheology = { law = "newtonian" }
+[surface]
+kind = "gaussian"
+sq = "1.25 um"
+correlation_length = "40 um"
+seed = 7
+[grid]
+cells = [32, 24]
+x = [-4.5, 1.9]
+y = [-1.6, 1.6]
+[vibration]
+mass = "0.1 kg"
+damping_ratio = 0.02
+duration = "1 s"
+"""
+HISTORY = tuple(
+    Iteration((n, n * 3 // 4), k, 10.0 ** (-k / 2 - 1), 10.0 ** (-k - 1), 10.0 ** (-k / 3 - 1))
+    for n in (16, 32)
+    for k in range(6)
+)
+
+
+def solution_like(case, surface=None, status=Status.CONVERGED):
+    """Fields a solver could have returned: Hertz's, with contact where the roughness is highest."""
+    surface = surface or case.surface()
+    x = surface.grid.x[:, None]
+    half_width, p_max = case.conditions.hertz.half_widths[0], case.conditions.hertz.p_max
+    gap = line_gap(x, half_width, case.conditions.radius_along_rolling) + 0.7e-6 - surface.heights
+    touching = (gap <= 5e-9) & (np.abs(x) < 2.0 * half_width)
+    pressure = line_pressure(x, half_width, p_max) * np.ones(surface.grid.cells) + 0.4e9 * touching
+    return ContactSolution(
+        conditions=case.conditions,
+        lubricant=case.lubricant,
+        surface=surface,
+        options=case.options,
+        pressure=pressure,
+        gap=np.maximum(gap, 5e-9),
+        in_contact=touching,
+        rigid_approach=0.0,
+        convergence=Convergence(status, HISTORY, 1e-4, 1.234),
+    )
+
+
+def run_like(text=CASE, *, status=Status.CONVERGED, surface=None, notes=(), **numbers):
+    case = load_case(text, stored=surface)
+    state = ContactState(**{
+        "car": 0.3712, "car_domain": 0.6034, "clr": 0.5423, "sq": 1.25e-6, "h_min": 4.9e-9, "h_central": 0.512e-6,
+        "h_mean": 0.634e-6, "lambda_ratio": 0.584, "p_max": 1.987e9, "reynolds_residual": 3.1e-6,
+        "load_error": 2.3e-7, "mass_flux_imbalance": 0.694,
+        **numbers,
+    })  # fmt: skip
+    vibration = None if case.vibration is None else contact_vibration(state, case.conditions, case.vibration)
+    solution = solution_like(case, case.stored, status)
+    return Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes)
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, and the text of each table row, cell by cell."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.html = html
+        self.tags = []
+        self.rows = []
+        self.text = ""
+        self.in_cell = False
+        self.feed(html)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+            self.in_cell = True
+
+    def handle_endtag(self, tag):
+        self.in_cell = self.in_cell and tag not in ("td", "th")
+
+    def handle_data(self, data):
+        self.text += data
+        if self.in_cell:
+            self.rows[-1][-1] += data
+
+    def images(self):
+        return [attributes for tag, attributes in self.tags if tag == "img"]
+
+
+@pytest.fixture(scope="module")
+def single():
+    return Page(page.render_page([run_like(notes=("filled 0.2 % missing cells",))]))
+
+
+@pytest.fixture(scope="module")
+def several():
+    runs = [
+        run_like(sq=0.5e-6, car=0.05, clr=0.11),
+        run_like(status=Status.STALLED),
+        run_like(CASE.replace("500 N", "400 N"), sq=3e-6, car=0.6, clr=0.92, mass_flux_imbalance=0.2),
+    ]
+    return Page(page.render_page(runs))
+
+
+@pytest.mark.parametrize("which", ["single", "several"])
+def test_page_loads_nothing(which, request):
+    shown = request.getfixturevalue(which)
+    assert not {tag for tag, _ in shown.tags} & {"script", "iframe", "object", "embed", "video", "audio"}
+    for tag, attributes in shown.tags:
+        for name in ("src", "href", "srcset", "data", "poster", "action"):
+            target = attributes.get(name, "data:")
+            linked = tag == "a" and target.startswith(("#", "https://doi.org/"))  # a link loads nothing by itself
+            assert linked or target.startswith("data:"), (tag, name, target[:80])
+    assert "url(" not in re.sub(r'src="data:[^"]*"', "", shown.html)
+    assert "@import" not in shown.html
+    for image in shown.images():
+        drawing = unquote(image["src"])
+        for target in re.findall(r'href="([^"]*)"', drawing) + re.findall(r"url\(([^)]*)\)", drawing):
+            assert target.startswith(("#", "data:image/png;base64,")), target[:80]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit"),
+    [
+        ("Load share of asperities", "54.2", "%"),
+        ("Contact area share in the Hertz zone", "37.1", "%"),
+        ("Contact area of the whole domain", "60.3", "%"),
+        ("Composite roughness", "1.250", "µm"),
+        ("Smallest film", "0.005", "µm"),
+        ("Central film", "0.512", "µm"),
+        ("Mean film", "0.634", "µm"),
+        ("Film ratio", "0.58", ""),
+        ("Largest pressure", "1.987", "GPa"),
+        ("Reynolds residual", "3.1×10⁻⁶", ""),
+        ("Load error", "2.3×10⁻⁷", ""),
+        ("Oil-flow imbalance", "69.4", "%"),
+        ("Newton steps", "12", ""),
+        ("Time to solve", "1.23", "s"),
+        ("Converged", "yes", ""),
+    ],
+)
+def test_every_number_is_there_with_its_unit(single, name, value, unit):
+    (row,) = [row for row in single.rows if row[0].startswith(name)]
+    assert row[1:] == [value, unit]
+
+
+def test_resonance_is_given_with_its_standard_deviation(single):
+    resonance = run_like().vibration.resonance
+    (row,) = [row for row in single.rows if row[0].startswith("Contact resonance frequency")]
+    value, deviation = (float(text) for text in row[1].split(" ± "))
+    assert value == pytest.approx(resonance.crf_hz, abs=0.06)
+    assert deviation == pytest.approx(resonance.crf_std, rel=0.05)
+    assert row[2] == "Hz"
+    (row,) = [row for row in single.rows if row[0].startswith("Resonance amplitude")]
+    assert row[2] == "(m/s²)²/Hz"
+    assert "±" in row[1]
+
+
+def test_conditions_are_those_of_the_paper(single):
+    rows = dict(row for row in single.rows if len(row) == 2)
+    assert rows["Load"] == "500 N (50 N/mm)"
+    assert rows["Hertz (smooth, dry)"] == "half-width a = 55.93 µm, largest pressure 0.5691 GPa"  # physics of the paper
+    assert rows["Reduced modulus"] == "E* = 109.89 GPa (E′ = 2 E* = 219.78 GPa)"
+    assert rows["Viscosity law"] == "barus, η₀ = 0.096 Pa s, α = 18.2 1/GPa"
+    assert rows["Domain"] == "x from −4.50 a to 1.90 a, y from −1.60 a to 1.60 a, repeating in y"
+
+
+def test_only_what_differs_is_told_apart(several):
+    rows = several.html.split('<tr class="varies">')[1:]
+    names = [re.search(r"<th[^>]*>([^<]*)<", row)[1] for row in rows]
+    assert names == ["Load", "Hertz (smooth, dry)", "Grid"]  # the grid is given in half-widths
+    assert next(row for row in several.rows if row[0] == "Load")[1:] == ["500 N (50 N/mm)"] * 2 + ["400 N (40 N/mm)"]
+    assert next(row for row in several.rows if row[0] == "Rheology")[1:] == ["newtonian"]
+
+
+def test_unconverged_run_is_loud(several):
+    assert "NOT CONVERGED" in several.html
+    assert "stalled after 12 steps" in several.html.lower()
+    header = next(row for row in several.rows if row[0] == "Quantity")
+    assert ["not converged" in cell for cell in header[1:4]] == [False, True, False]
+    assert next(row for row in several.rows if row[0].startswith("Converged"))[1:4] == ["yes", "NO", "yes"]
+    assert any("NOT CONVERGED" in unquote(image["src"]) for image in several.images())
+    verdicts = [a["class"] for tag, a in several.tags if tag == "section" and "verdict" in a["class"]]
+    assert verdicts == ["verdict", "verdict unfinished", "verdict"]
+
+
+def test_converged_run_raises_no_alarm(single):
+    assert "not converged" not in single.text.lower()
+
+
+def test_text_from_outside_is_escaped():
+    hostile = CASE.replace('kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', "")
+    hostile = hostile.replace("[surface]", '[surface]\nfile = "<script>alert(1)</script>.opd"')
+    surface = load_case(CASE).surface()
+    shown = Page(page.render_page([run_like(hostile, surface=surface, notes=("<img src=x>",))], title="<b>&</b>"))
+    assert not [tag for tag, _ in shown.tags if tag in ("script", "b")]
+    assert all(image["src"].startswith("data:") for image in shown.images())
+    assert "<script>alert(1)</script>.opd" in shown.text
+    assert "<img src=x>" in shown.text
+    assert "<b>&</b>" in shown.text
+
+
+def test_several_runs_are_drawn_against_roughness(single, several):
+    def drawn(shown, title):
+        return sum(title in unquote(image["src"]) for image in shown.images())
+
+    for title in ("Load and area share of asperities", ">Contact resonance frequency<"):
+        assert drawn(single, title) == 0
+        assert drawn(several, title) == 1
+    assert drawn(several, "Film thickness") == 3
+    assert "20.0 % to 69.4 %" in several.text  # oil-flow imbalance over the runs
+
+
+def test_page_can_be_read_without_seeing_it(several):
+    assert ("html", {"lang": "en"}) in several.tags
+    assert all(len(image["alt"]) > 30 for image in several.images())
+    assert all("scope" in attributes for tag, attributes in several.tags if tag == "th")
+    identifiers = [attributes["id"] for _, attributes in several.tags if "id" in attributes]
+    assert len(identifiers) == len(set(identifiers))
+    targets = {a["href"][1:] for tag, a in several.tags if tag == "a" and a["href"].startswith("#")}
+    assert targets <= set(identifiers)
+
+
+def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
+    assert "Filled 0.2 % missing cells" in single.text
+    for limit in (
+        "Oil is not conserved",
+        "A snapshot",
+        "Isothermal",
+        "Newtonian",
+        "Perfectly plastic",
+        "Stiffness of a",
+    ):
+        assert limit in single.text
+    assert "10.3390/lubricants13020078" in single.text
+    assert run_like().case.text in single.text
+
+
+def test_silent_dry_and_deaf_runs_have_a_page_too():
+    smooth = CASE.replace('kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', 'kind = "flat"')
+    silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))
+    assert "There is no spectrum to show" in silent.text
+    assert next(row for row in silent.rows if row[0].startswith("Film ratio"))[1] == "–"
+    assert next(row for row in silent.rows if row[0].startswith("Contact resonance"))[1] == "–"
+
+    dry = re.sub(r"\[lubricant\].*?(?=\[surface\])", "", CASE, flags=re.DOTALL)
+    deaf = 'lubricant = "none"\n' + dry.split("[vibration]")[0]
+    shown = Page(page.render_page([run_like(deaf, lambda_ratio=None, mass_flux_imbalance=0.0)]))
+    assert "none: dry contact" in shown.text
+    assert "Oil is not conserved" not in shown.text
+    assert "cavitated" not in unquote(shown.images()[0]["src"])
+
+
+def test_same_run_gives_the_same_bytes(tmp_path, single):
+    out = write_report([run_like(notes=("filled 0.2 % missing cells",))], tmp_path / "report.html")
+    assert out.read_text("utf-8") == single.html
+
+
+def test_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise KeyboardInterrupt
+
+    out = tmp_path / "report.html"
+    out.write_text("the old one")
+    monkeypatch.setattr(page, "render_page", fail)
+    with pytest.raises(KeyboardInterrupt):
+        write_report([run_like()], out)
+    assert out.read_text() == "the old one"
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_report_needs_a_run_and_a_folder(tmp_path):
+    with pytest.raises(BadInput, match="at least one run"):
+        write_report([], tmp_path / "report.html")
+    with pytest.raises(BadInput, match="nowhere"):
+        write_report([run_like()], tmp_path / "nowhere" / "report.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "shown"),
+    [
+        (3461.23, 2.345, ("3461.2", "± 2.3")),
+        (3461.23, 23.45, ("3461", "± 23")),
+        (0.0088412, 0.0004712, ("8.84×10⁻³", "± 0.47×10⁻³")),
+        (3461.23, None, ("3461", "")),
+        (3461.23, float("nan"), ("3461", "")),
+    ],
+)
+def test_value_and_deviation_end_at_the_same_digit(value, deviation, shown):
+    assert page.with_deviation(value, deviation) == shown
+
+
+# Figures -------------------------------------------------------------------------------------------------------------
+
+
+MAP = ["x along rolling [µm]", "y [µm]"]
+ROUGH = "composite roughness Sq [µm]"
+
+
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("contact_map", MAP),
+        ("film_map", [*MAP, "film thickness [µm]"]),
+        ("pressure_map", [*MAP, "pressure [GPa]"]),
+        ("roughness_map", [*MAP, "height, material up [µm]"]),
+        ("centre_line", ["pressure [GPa]", "x along rolling [µm]", "gap [µm]"]),
+        ("height_distribution", ["height above the mean [µm]", "density [1/µm]"]),
+        ("convergence_history", ["Newton step", "relative size [-]"]),
+        ("spectrum", ["frequency [Hz]", "acceleration density [(m/s²)²/Hz]"]),
+        ("shares_against_roughness", [ROUGH, "taken by asperities [%]"]),
+        ("resonance_against_roughness", [ROUGH, "contact resonance [Hz]"]),
+    ],
+)
+def test_every_axis_has_a_label_with_its_unit(name, labels):
+    run = run_like()
+    shown = {
+        "height_distribution": (run.solution.surface.heights,),
+        "convergence_history": (run.solution.convergence,),
+        "spectrum": (run.vibration,),
+        "shares_against_roughness": ([run.scalars()],),
+        "resonance_against_roughness": ([run.scalars()], 3800.0),
+    }
+    figure = getattr(figures, name)(*shown.get(name, (run.solution,)))
+    written = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+    assert written == labels
+
+
+def test_contact_is_drawn_where_it_is():
+    solution = run_like().solution
+    touching = np.zeros(solution.grid.cells, dtype=bool)
+    touching[3, 20] = True
+    axes = figures.contact_map(replace(solution, in_contact=touching)).axes[0]
+    (image,) = axes.images
+    left, right, bottom, top = image.get_extent()
+    colours = image.get_array()
+    rows, columns = colours.shape[:2]
+    (spot,) = np.argwhere(np.all(np.isclose(colours, to_rgb(figures.CONTACT_COLOUR)), axis=2))
+    assert image.origin == "lower"
+    assert left + (spot[1] + 0.5) / columns * (right - left) == pytest.approx(solution.grid.x[3] * 1e6)
+    assert bottom + (spot[0] + 0.5) / rows * (top - bottom) == pytest.approx(solution.grid.y[20] * 1e6)
+
+
+def test_shares_count_cells_of_the_hertz_zone_only():
+    solution = run_like().solution
+    a = solution.conditions.hertz.half_widths[0]
+    inside = np.flatnonzero(np.abs(solution.grid.x) <= a)
+    touching = np.ones(solution.grid.cells, dtype=bool)
+    touching[inside] = False
+    touching[inside[0], :6] = True  # a quarter of one column
+    pressure = np.ones(solution.grid.cells)
+    pressure[inside[1]] = 0.0
+    shares = figures.zone_shares(replace(solution, in_contact=touching, pressure=pressure))
+    assert shares.contact == pytest.approx(0.25 / inside.size)
+    assert shares.cavitated == pytest.approx(1.0 / inside.size)
+    assert sum(shares) == pytest.approx(1.0)
+
+
+def test_hertz_is_dashed_beside_the_solved_pressure():
+    solution = run_like().solution
+    upper, lower = figures.centre_line(solution).axes
+    hertz = next(line for line in upper.lines if line.get_label().startswith("Hertz"))
+    assert hertz.get_linestyle() == "--"
+    area = np.trapezoid(hertz.get_ydata(), hertz.get_xdata()) * 1e9 * 1e-6
+    assert area == pytest.approx(solution.conditions.line_load, rel=0.05)  # on cells of a fifth of the half-width
+    row = int(np.argmin(np.abs(solution.grid.y)))
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), solution.gap[:, row] * 1e6)
+
+
+def test_resonance_is_marked_where_it_was_found():
+    vibration = run_like().vibration
+    (axes,) = figures.spectrum(vibration).axes
+    marks = {line.get_label(): line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2}
+    assert marks["CRF ± 2 std"] == vibration.resonance.crf_hz
+    assert marks["CRF at full load"] == vibration.full_load_crf_hz
+    fitted = next(line for line in axes.lines if line.get_label() == "fitted resonance")
+    peak = fitted.get_xdata()[np.argmax(fitted.get_ydata())]
+    assert peak == pytest.approx(vibration.resonance.crf_hz, rel=2e-3)
+
+
+def test_highest_point_has_neither_curve_nor_interval():
+    run = run_like(CASE + 'method = "peak"\n')
+    (axes,) = figures.spectrum(run.vibration).axes
+    labels = {line.get_label() for line in axes.lines}
+    assert "CRF" in labels
+    assert "fitted resonance" not in labels
+
+
+def test_surface_map_is_a_png_and_nothing_else(tmp_path):
+    heights = 1e-6 * np.random.default_rng(1).standard_normal((40, 30))
+    heights[5, 7] = np.nan
+    grid = Grid((40, 30), (0.0, 0.0), (40e-6, 30e-6), (False, False))
+    surface = MeasuredSurface(heights, grid, "ring $1$.x3p", "X3P")
+    described = SurfaceDescription(Path(surface.name), surface, surface, surface_parameters(surface), ())
+    out = surface_map(described, tmp_path / "map.png")
+    assert out.read_bytes().startswith(b"\x89PNG")
+    assert out.read_bytes() == surface_map(described, tmp_path / "again.png").read_bytes()
+    with pytest.raises(BadInput, match="png"):
+        surface_map(described, tmp_path / "map.jpg")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["again.png", "map.png"]
+
+
+def test_flat_surface_can_be_drawn():
+    surface = flat_surface(load_case(CASE).grid)
+    assert isinstance(surface, Surface)
+    assert "perfectly smooth" in figures.svg(figures.height_distribution(surface.heights))
