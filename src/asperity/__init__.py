@@ -1,0 +1,128 @@
+"""asperity hears how a lubricated contact wears.
+
+Mixed-EHL contact, load sharing of asperities and oil, contact resonance. Every public name is reached from here and
+loaded when it is first used, so that `import asperity` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from asperity.case import Case, load_case
+    from asperity.conditions import ContactConditions, ElasticPair
+    from asperity.coupling import Vibration, VibrationModel, contact_vibration
+    from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
+    from asperity.ehl.solve import solve_contact
+    from asperity.ehl.state import ContactState, contact_state
+    from asperity.ehl.storage import load_solution
+    from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+    from asperity.grid import Grid
+    from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
+    from asperity.report import write_report
+    from asperity.run import Run, load_run, solve_case
+    from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+    from asperity.surface import (
+        Surface,
+        SurfaceParameters,
+        flat_surface,
+        gaussian_surface,
+        prepare_surface,
+        read_surface,
+        self_affine_surface,
+        surface_parameters,
+    )
+    from asperity.vibration import ContactOscillator, acceleration
+    from asperity.wear.indicators import Resonance, contact_resonance
+
+_NAMES = {
+    "case": ("Case", "load_case"),
+    "conditions": ("ContactConditions", "ElasticPair"),
+    "coupling": ("Vibration", "VibrationModel", "contact_vibration"),
+    "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
+    "ehl.solve": ("solve_contact",),
+    "ehl.state": ("ContactState", "contact_state"),
+    "ehl.storage": ("load_solution",),
+    "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
+    "grid": ("Grid",),
+    "lubricant": ("Barus", "DowsonHigginson", "Incompressible", "Lubricant", "Newtonian", "Roelands"),
+    "report": ("write_report",),
+    "run": ("Run", "load_run", "solve_case"),
+    "signals": ("Signal", "Spectrum", "power_spectrum", "smooth"),
+    "surface": (
+        "Surface",
+        "SurfaceParameters",
+        "flat_surface",
+        "gaussian_surface",
+        "prepare_surface",
+        "read_surface",
+        "self_affine_surface",
+        "surface_parameters",
+    ),
+    "vibration": ("ContactOscillator", "acceleration"),
+    "wear.indicators": ("Resonance", "contact_resonance"),
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
+
+__all__ = [
+    "AsperityError",
+    "BadInput",
+    "Barus",
+    "Case",
+    "ContactConditions",
+    "ContactOscillator",
+    "ContactSolution",
+    "ContactState",
+    "Convergence",
+    "DowsonHigginson",
+    "ElasticPair",
+    "Grid",
+    "Incompressible",
+    "Iteration",
+    "Lubricant",
+    "Newtonian",
+    "NotConverged",
+    "Options",
+    "Resonance",
+    "Roelands",
+    "Run",
+    "Signal",
+    "Spectrum",
+    "Status",
+    "Surface",
+    "SurfaceParameters",
+    "UnreadableFile",
+    "Vibration",
+    "VibrationModel",
+    "acceleration",
+    "contact_resonance",
+    "contact_state",
+    "contact_vibration",
+    "flat_surface",
+    "gaussian_surface",
+    "load_case",
+    "load_run",
+    "load_solution",
+    "power_spectrum",
+    "prepare_surface",
+    "read_surface",
+    "self_affine_surface",
+    "smooth",
+    "solve_case",
+    "solve_contact",
+    "surface_parameters",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("asperity")
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME, "__version__"})

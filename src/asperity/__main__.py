@@ -1,0 +1,5 @@
+"""`python -m asperity`."""
+
+from asperity.cli import main
+
+main()

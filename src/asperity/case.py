@@ -1,0 +1,675 @@
+"""The case file: a contact written down in TOML with units, turned into the objects that the solvers take, and back.
+
+Units live here and nowhere deeper. What is wrong with a file is said in one sentence that names the file, the key,
+the value and the remedy. Solving a case is left to `asperity.run`.
+"""
+
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, field, fields, replace
+from decimal import Decimal
+from difflib import get_close_matches
+from functools import cache, cached_property, partial
+from pathlib import Path
+from tokenize import TokenError
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar, cast, get_args
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    PositiveFloat,
+    PositiveInt,
+    Strict,
+    ValidationError,
+    create_model,
+)
+
+from asperity.conditions import ContactConditions, ElasticPair, Geometry
+from asperity.coupling import VibrationModel
+from asperity.ehl.solution import Options
+from asperity.errors import BadInput, UnreadableFile
+from asperity.grid import Grid
+from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.surface import (
+    Surface,
+    flat_surface,
+    gaussian_surface,
+    prepare_surface,
+    read_surface,
+    self_affine_surface,
+)
+
+if TYPE_CHECKING:
+    import pint
+
+SHORTEST_INLET = 4.0  # half-widths; a shorter inlet starves the film (0.448 um at 1.9, 0.722 um at 4.5; docs/paper.md)
+
+_MEASURES = {  # SI unit -> what it measures, and how one is written
+    "m": ("a length", "5.4 mm"),
+    "N": ("a force", "500 N"),
+    "m/s": ("a speed", "2 m/s"),
+    "Pa": ("a pressure", "2 GPa"),
+    "1/Pa": ("an inverse pressure", "18.2 1/GPa"),
+    "Pa s": ("a viscosity", "0.096 Pa s"),
+    "kg/m^3": ("a density", "0.88 g/cm^3"),
+    "kg": ("a mass", "0.1 kg"),
+    "s": ("a time", "2 s"),
+    "Hz": ("a frequency", "50 kHz"),
+}
+_LAW_UNITS = {"eta0": "Pa s", "alpha": "1/Pa", "p0": "Pa", "rho0": "kg/m^3"}  # parameters not listed are plain numbers
+_VIBRATION_UNITS = {"mass": "kg", "rate_hz": "Hz", "duration_s": "s", "cutoff_reference_hz": "Hz"}
+_WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
+
+
+class Amount(float):
+    """A positive quantity in SI that remembers how it was written, so that a case is restated in its author's units."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> "Amount":
+        """`value` in SI, `text` with its unit."""
+        amount = super().__new__(cls, value)
+        amount.text = text
+        return amount
+
+
+@cache
+def _units() -> "pint.UnitRegistry[Decimal]":
+    from pint import UnitRegistry
+
+    return UnitRegistry(non_int_type=Decimal)  # decimal: 5.4 mm is the float nearest to 0.0054, not a product of floats
+
+
+def _amount(unit: str, value: object) -> Amount:
+    """A quantity with its unit, in `unit`."""
+    import pint
+
+    measure, example = _MEASURES[unit]
+    expected = f'must be {measure} such as "{example}"'
+    if isinstance(value, Amount):
+        return value
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        raise BadInput(f"{expected}, got the bare number {value}; give it its unit")
+    written = _WRITTEN.fullmatch(value) if isinstance(value, str) else None
+    if written is None:
+        raise BadInput(f"{expected}, got {_shown(value)}")
+    number, unit_text = written[1], " ".join(written[2].split())
+    if not unit_text:
+        raise BadInput(f"{expected}, got {_shown(value)} without a unit")
+    if unit == "Hz" and "Hz" not in unit_text:  # rpm and rad/s would slip through as inverse times, a factor 2 pi off
+        raise BadInput(f"{expected}, got {_shown(value)}, which is not in hertz")
+    try:
+        si = float(_units().Quantity(Decimal(number), unit_text).to(unit).magnitude)
+    except pint.UndefinedUnitError:
+        raise BadInput(f"{expected}, got {_shown(value)}, whose unit is not known; capitals matter") from None
+    except pint.DimensionalityError:
+        raise BadInput(f"{expected}, got {_shown(value)}, which is something else") from None
+    except (pint.PintError, ValueError, TypeError, AssertionError, ArithmeticError, SyntaxError, TokenError):
+        raise BadInput(f"{expected}, got {_shown(value)}, whose unit cannot be read") from None
+    if not 0.0 < si < math.inf:
+        raise BadInput(f"must be positive and finite, got {_shown(value)}; correct its sign or value")
+    return Amount(si, f"{number} {unit_text}")
+
+
+def _restated(value: float, unit: str) -> Amount:
+    """A default of the library, written out with its unit."""
+    return Amount(value, f"{value:g} {unit}" if float(f"{value:g}") == value else f"{value!r} {unit}")
+
+
+def _shown(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def _twice(value: object) -> object:
+    """One value for both bodies or both directions."""
+    return value if isinstance(value, list | tuple) else (value, value)
+
+
+def _none(value: object) -> object:
+    """Let the word none leave an optional thing out: `--set material.hardness=none`."""
+    return None if value == "none" else value
+
+
+def _type(unit: str) -> Any:
+    return Annotated[float, PlainValidator(partial(_amount, unit))]
+
+
+Length: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "m"))]
+Force: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "N"))]
+Speed: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "m/s"))]
+Pressure: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "Pa"))]
+Number: TypeAlias = Annotated[float, Strict()]
+Count: TypeAlias = Annotated[PositiveInt, Strict()]
+Seed: TypeAlias = Annotated[int, Strict(), Field(ge=0)]
+_Twice = BeforeValidator(_twice)
+_Optional = BeforeValidator(_none)
+
+
+L = TypeVar("L")
+S = TypeVar("S", bound="Section")
+
+
+class Section(BaseModel):
+    """A table of the case file; keys that are not fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, serialize_by_alias=True)
+
+
+def _solvable(geometry: object) -> object:
+    if geometry in get_args(Geometry) and geometry != "line":
+        raise BadInput(f'is "{geometry}", which cannot be solved yet; only "line" can')
+    return geometry
+
+
+class ContactSection(Section):
+    """[contact]: geometry, load and motion."""
+
+    geometry: Annotated[Literal["line"], BeforeValidator(_solvable)]
+    radius: Length
+    length: Length
+    load: Force
+    entrainment_speed: Speed
+    slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
+
+
+class MaterialSection(Section):
+    """[material]: the two bodies."""
+
+    youngs_modulus: Annotated[tuple[Pressure, Pressure], _Twice]
+    poisson_ratio: Annotated[tuple[Number, Number], _Twice]
+    hardness: Annotated[Pressure | None, _Optional] = None
+    boundary_friction: Annotated[PositiveFloat, Strict()] | None = None  # read by the friction model to come
+
+
+class GaussianSection(Section):
+    """[surface] kind = "gaussian"."""
+
+    kind: Literal["gaussian"]
+    sq: Length
+    correlation_length: Annotated[tuple[Length, Length], _Twice]
+    seed: Seed = 0
+
+
+class SelfAffineSection(Section):
+    """[surface] kind = "self-affine"."""
+
+    kind: Literal["self-affine"]
+    sq: Length
+    hurst: Number
+    cutoffs: tuple[Length, Length]  # shortest and longest wavelength
+    seed: Seed = 0
+
+
+class FlatSection(Section):
+    """[surface] kind = "flat", or surface = "flat"."""
+
+    kind: Literal["flat"]
+
+
+class MeasuredSection(Section):
+    """[surface] file = "..."."""
+
+    file: str
+    sq: Annotated[Length | None, _Optional] = None  # scale to this; left out: as measured
+    form: Literal["none", "plane", "quadratic"] = "quadratic"
+    fit: Literal["crop", "tile"] = "crop"
+    unit: str | None = None  # of the heights, where the file does not say
+    lateral_unit: str | None = None
+
+
+_SURFACES: dict[str, type[Section]] = {
+    "gaussian": GaussianSection,
+    "self-affine": SelfAffineSection,
+    "flat": FlatSection,
+}
+
+
+class GridSection(Section):
+    """[grid]: cells, and corners in half-widths of the smooth dry line contact."""
+
+    cells: tuple[Annotated[int, Strict()], Annotated[int, Strict()]]
+    x: tuple[Number, Number]
+    y: tuple[Number, Number]
+
+
+class SolverSection(Section):
+    """[solver]: how hard to solve."""
+
+    tolerance: Number = Options().tolerance
+    max_iterations: Annotated[int, Strict()] = Options().max_iterations
+    contact_film: Length = _restated(Options().contact_film, "m")
+
+
+class SweepSection(Section):
+    """A range of one quantity in [study]."""
+
+    start: Length = Field(alias="from")
+    to: Length
+    step: Length
+
+
+class StudySection(Section):
+    """[study]: what a sweep varies; read and kept, not yet run."""
+
+    sq: SweepSection
+    seeds: Count = 1
+
+
+class _Located(BadInput):
+    """What is wrong, and the keys that lead to it."""
+
+    def __init__(self, keys: tuple[str | int, ...], message: str) -> None:
+        super().__init__(message)
+        self.keys = keys
+        self.message = message
+
+
+def _parameters(law: type, units: Mapping[str, str]) -> dict[str, Any]:
+    """A dataclass's fields as fields of a section: quantities where a unit is listed, else as annotated."""
+    parameters: dict[str, Any] = {}
+    for parameter in fields(law):
+        unit = units.get(parameter.name)
+        kind = _type(unit) if unit else Annotated[cast(Any, parameter.type), Strict()]
+        default: Any = ... if parameter.default is MISSING else parameter.default
+        parameters[parameter.name] = (kind, _restated(default, unit) if unit and default is not ... else default)
+    return parameters
+
+
+def _law_sections(laws: Mapping[str, type]) -> dict[str, type[Section]]:
+    return {
+        name: create_model(name, __base__=Section, law=(str, ...), **_parameters(law, _LAW_UNITS))
+        for name, law in laws.items()
+    }
+
+
+def _choice(key: str, sections: Mapping[str, type[Section]], value: object) -> Section:
+    """The section that value[key] names; a bare name stands for a table that holds nothing else."""
+    table = {key: value} if isinstance(value, str) else value
+    if not isinstance(table, Mapping):
+        raise BadInput(f"must be a table with the key {key}, got {_shown(value)}")
+    if key not in table:
+        raise _Located((key,), f"is missing; it is one of {', '.join(sections)}")
+    name = table[key]
+    if not isinstance(name, str) or name not in sections:
+        near = get_close_matches(str(name), sections, n=1)
+        raise _Located(
+            (key,),
+            f"must be one of {', '.join(sections)}, got {_shown(name)}"
+            + (f'; did you mean "{near[0]}"?' if near else ""),
+        )
+    return _validated(sections[name], table)
+
+
+def _surface_section(value: object) -> Section:
+    if isinstance(value, Mapping) and "file" in value:
+        if "kind" in value:
+            raise BadInput("has both kind and file; keep kind for a generated surface or file for a measured one")
+        return _validated(MeasuredSection, value)
+    if isinstance(value, Mapping) and "kind" not in value:
+        raise BadInput(f"must hold kind (one of {', '.join(_SURFACES)}) or file (a measured surface)")
+    return _choice("kind", _SURFACES, value)
+
+
+class LubricantSection(Section):
+    """[lubricant]: one law of each family."""
+
+    viscosity: Annotated[Section, PlainValidator(partial(_choice, "law", _law_sections(VISCOSITY_LAWS)))]
+    density: Annotated[Section, PlainValidator(partial(_choice, "law", _law_sections(DENSITY_LAWS)))]
+    rheology: Annotated[Section, PlainValidator(partial(_choice, "law", _law_sections(RHEOLOGY_LAWS)))]
+
+
+def _lubricant_section(value: object) -> LubricantSection | None:
+    return None if value == "none" else _validated(LubricantSection, value)
+
+
+VibrationSection = create_model(
+    "vibration",
+    __base__=Section,
+    **{re.sub("_(hz|s)$", "", name): kind for name, kind in _parameters(VibrationModel, _VIBRATION_UNITS).items()},
+)
+
+
+class CaseFile(Section):
+    """A whole case file. `lubricant = "none"` is a dry contact: an oil is not something to forget."""
+
+    model: Literal["unified"] = "unified"
+    contact: ContactSection
+    material: MaterialSection
+    lubricant: Annotated[LubricantSection | None, PlainValidator(_lubricant_section)]
+    surface: Annotated[Section, PlainValidator(_surface_section)]
+    grid: GridSection
+    solver: SolverSection = SolverSection()
+    vibration: Annotated[
+        Any, PlainValidator(lambda value: None if value == "none" else _validated(VibrationSection, value))
+    ] = None
+    study: Annotated[StudySection | None, _Optional] = None
+
+
+def _validated(model: type[S], table: object) -> S:
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        raise _first_mistake(model, error) from None
+
+
+def _first_mistake(model: type[Section], error: ValidationError) -> _Located:
+    """The mistake to mend first, in a sentence: a mistyped key explains a missing one."""
+    mistakes = error.errors(include_url=False)
+    mistake = next((m for m in mistakes if m["type"] == "extra_forbidden"), mistakes[0])
+    keys, kind, given = mistake["loc"], mistake["type"], mistake["input"]
+    cause = mistake.get("ctx", {}).get("error")
+    if isinstance(cause, _Located):
+        return _Located(keys + cause.keys, cause.message)
+    if isinstance(cause, BadInput):
+        return _Located(keys, str(cause))
+    if kind == "extra_forbidden":
+        known = _keys_of(model, keys[:-1])
+        near = get_close_matches(str(keys[-1]), known, n=1)
+        remedy = f"did you mean {near[0]}?" if near else f"known here: {', '.join(known)}"
+        return _Located(keys, f"is not a known key; {remedy}")
+    if kind == "missing":
+        return _Located(keys, "is missing; add it")
+    expected = mistake["msg"].removeprefix("Input ").removeprefix("should ")
+    if expected.startswith("be a valid dictionary"):
+        expected = "be a table"
+    expected = expected.replace("'", '"')
+    return _Located(keys, f"must {expected}, got {_shown(given)}")
+
+
+def _keys_of(model: type[Section], keys: tuple[str | int, ...]) -> list[str]:
+    for key in keys:
+        annotation = model.model_fields[str(key)].annotation
+        model = next(m for m in (annotation, *get_args(annotation)) if isinstance(m, type) and issubclass(m, Section))
+    return [entry.alias or name for name, entry in model.model_fields.items()]
+
+
+def _dotted(keys: tuple[str | int, ...]) -> str:
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(".")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A contact to solve, as its case file states it. Made by `load_case`.
+
+    `contents` are the file's tables, `folder` is where a surface file is looked for, `source` what messages call the
+    case, `stored` the roughness of the run that the case came from.
+    """
+
+    contents: CaseFile
+    folder: Path = field(compare=False, repr=False)
+    source: str = field(compare=False)
+    stored: Surface | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        # refuse now what would else be refused later, perhaps after a long wait
+        built = {"material": "conditions", "grid": "grid", "solver": "options", "vibration": "vibration"}
+        for part, name in built.items():
+            with self.naming(part):
+                getattr(self, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:  # the sections of laws are made at run time, which pickle cannot follow
+        return _case_again, (self.text, self.folder, self.source, self.stored)
+
+    @contextmanager
+    def naming(self, part: str) -> Iterator[None]:
+        """Let what is refused inside say which case and which part of it is meant."""
+        try:
+            yield
+        except BadInput as error:
+            raise type(error)(f"{self.source}: {part}: {error}") from None
+
+    @cached_property
+    def conditions(self) -> ContactConditions:
+        """Bodies, load and motion."""
+        contact, material = self.contents.contact, self.contents.material
+        first, second = (float(modulus) for modulus in material.youngs_modulus)
+        speed = float(contact.entrainment_speed)
+        return ContactConditions(
+            pair=ElasticPair((first, second), material.poisson_ratio),
+            geometry=contact.geometry,
+            radius=float(contact.radius),
+            length=float(contact.length),
+            load=float(contact.load),
+            surface_speeds=(speed * (1.0 + contact.slip / 2.0), speed * (1.0 - contact.slip / 2.0)),
+            hardness=None if material.hardness is None else float(material.hardness),
+        )
+
+    @cached_property
+    def lubricant(self) -> Lubricant | None:
+        """The oil, None for a dry contact."""
+        section = self.contents.lubricant
+        if section is None:
+            return None
+        return Lubricant(
+            viscosity=_law(VISCOSITY_LAWS, section.viscosity),
+            density=_law(DENSITY_LAWS, section.density),
+            rheology=_law(RHEOLOGY_LAWS, section.rheology),
+        )
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The rectangle to compute on; half-widths turned into metres."""
+        section, a = self.contents.grid, self.conditions.hertz.half_widths[0]
+        (left, right), (front, back) = section.x, section.y
+        grid = Grid(section.cells, (left * a, front * a), (right * a, back * a))
+        if not (left < -1.0 and right > 1.0):
+            raise BadInput(
+                f"x must reach beyond the contact on both sides, got {left:g} to {right:g} half-widths; use -4.5 to 1.9"
+            )
+        return grid
+
+    @cached_property
+    def options(self) -> Options:
+        """How hard to solve."""
+        section = self.contents.solver
+        return Options(
+            tolerance=section.tolerance,
+            max_iterations=section.max_iterations,
+            contact_film=float(section.contact_film),
+        )
+
+    @cached_property
+    def vibration(self) -> VibrationModel | None:
+        """The vibration model; None when the case has no [vibration]."""
+        section = self.contents.vibration
+        if section is None:
+            return None
+        values = {entry.name: getattr(section, re.sub("_(hz|s)$", "", entry.name)) for entry in fields(VibrationModel)}
+        plain: dict[str, Any] = {name: float(v) if isinstance(v, float) else v for name, v in values.items()}
+        return VibrationModel(**plain)
+
+    @cached_property
+    def _roughness(self) -> tuple[Surface, tuple[str, ...]]:
+        section = self.contents.surface
+        if self.stored is not None:
+            return self.stored, ()
+        if isinstance(section, GaussianSection):
+            lx, ly = (float(length) for length in section.correlation_length)
+            rng = np.random.default_rng(section.seed)
+            return gaussian_surface(self.grid, sq=float(section.sq), correlation_length=(lx, ly), rng=rng), ()
+        if isinstance(section, SelfAffineSection):
+            shortest, longest = (float(length) for length in section.cutoffs)
+            rng = np.random.default_rng(section.seed)
+            return self_affine_surface(
+                self.grid, sq=float(section.sq), hurst=section.hurst, cutoffs=(shortest, longest), rng=rng
+            ), ()
+        if isinstance(section, MeasuredSection):
+            measured = read_surface(self.folder / section.file, unit=section.unit, lateral_unit=section.lateral_unit)
+            sq = None if section.sq is None else float(section.sq)
+            prepared = prepare_surface(measured, self.grid, sq=sq, form=section.form, fit=section.fit)
+            return prepared.surface, (*measured.notes, *prepared.steps)
+        return flat_surface(self.grid), ()
+
+    def surface(self) -> Surface:
+        """The composite roughness on the grid: generated, read and prepared, or as stored in the run.
+
+        Raises
+        ------
+        BadInput
+            for a surface that the grid cannot carry, or a measurement that does not cover the contact.
+        UnreadableFile
+            for a surface file that cannot be read.
+        """
+        with self.naming("surface"):
+            return self._roughness[0]
+
+    @property
+    def surface_notes(self) -> tuple[str, ...]:
+        """What was done to a measured surface, a sentence each."""
+        self.surface()
+        return self._roughness[1]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the results has to know about the case, a sentence each."""
+        inlet = -self.contents.grid.x[0]
+        if inlet >= SHORTEST_INLET or self.lubricant is None:
+            return ()
+        return (
+            f"The inlet of {inlet:g} half-widths is shorter than {SHORTEST_INLET:g} and starves the film; "
+            "start grid.x at -4.5 unless that is meant.",
+        )
+
+    @property
+    def text(self) -> str:
+        """The case as TOML, every default written out; loads to an equal case."""
+        tables = _plain(self.contents)
+        if self.contents.lubricant is None:
+            tables["lubricant"] = "none"
+        lines = [f"{key} = {_toml(value)}" for key, value in tables.items() if not isinstance(value, dict)]
+        for name, table in tables.items():
+            if isinstance(table, dict):
+                lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
+        return "\n".join(lines) + "\n"
+
+    def with_overrides(self, overrides: Mapping[str, object]) -> "Case":
+        """The case with values replaced, such as `{"contact.load": "400 N", "grid.cells": "[128, 128]"}`.
+
+        Text is read as a TOML value where it is one and taken as it stands where not. Stored roughness is kept
+        as long as neither the surface nor the grid changes.
+
+        Raises
+        ------
+        BadInput
+            for a key or value that the case file would be refused for.
+        """
+        tables = tomllib.loads(self.text)
+        for path, value in overrides.items():
+            *parents, key = path.split(".")
+            if not all((*parents, key)):
+                raise BadInput(f"{self.source}: {path} is not a key; name one such as contact.load")
+            table = tables
+            for parent in parents:
+                if not isinstance(table.get(parent), dict):
+                    table[parent] = {}
+                table = table[parent]
+            table[key] = _toml_value(value) if isinstance(value, str) else value
+        case = _case(tables, self.folder, self.source)
+        same = case.grid == self.grid and case.contents.surface == self.contents.surface
+        return replace(case, stored=self.stored) if same else case
+
+
+def load_case(
+    source: str | Path, *, folder: Path | None = None, name: str | None = None, stored: Surface | None = None
+) -> Case:
+    """Read a case file, or its text (a `str` of more than one line).
+
+    Parameters
+    ----------
+    source : path of a TOML file, or its text
+    folder : where the case's surface file is looked for; by default beside the case file, or the current folder
+    name : what messages call the case; by default the path
+    stored : roughness to use in place of the case's own, as kept in a run
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is missing or no TOML.
+    BadInput
+        for a key, law, unit or value that cannot be meant; one sentence that says which.
+    """
+    if isinstance(source, str) and "\n" in source:
+        name = name or "case"
+        return _case(_tables(source, name), folder or Path(), name, stored)
+    path = Path(source)
+    try:
+        text = path.read_text("utf-8")
+    except FileNotFoundError:
+        raise UnreadableFile(f"{path} does not exist; check its name") from None
+    except UnicodeDecodeError:
+        raise UnreadableFile(f"{path} is not a text file; a case is TOML") from None
+    except OSError as error:
+        raise UnreadableFile(f"{path} cannot be read: {error.strerror}") from None
+    name = name or str(path)
+    return _case(_tables(text, name), folder or path.parent, name, stored)
+
+
+def _case(tables: dict[str, Any], folder: Path, source: str, stored: Surface | None = None) -> Case:
+    try:
+        contents = _validated(CaseFile, tables)
+    except _Located as mistake:
+        raise BadInput(f"{source}: {_dotted(mistake.keys)} {mistake.message}") from None
+    return Case(contents, folder, source, stored)
+
+
+def _case_again(text: str, folder: Path, source: str, stored: Surface | None) -> Case:
+    return load_case(text, folder=folder, name=source, stored=stored)
+
+
+def _tables(text: str, source: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UnreadableFile(f"{source} is not valid TOML: {error}") from None
+
+
+def _toml_value(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text  # the shell took the quotes away
+
+
+def _law(laws: Mapping[str, type[L]], section: Section) -> L:
+    values = {name: getattr(section, name) for name in type(section).model_fields}
+    law = laws[values.pop("law")]
+    return law(**{name: float(value) if isinstance(value, float) else value for name, value in values.items()})
+
+
+def _plain(section: Section) -> dict[str, Any]:
+    """Tables of plain values, quantities as they were written; what is left out stays out."""
+    values = {entry.alias or name: getattr(section, name) for name, entry in type(section).model_fields.items()}
+    return {
+        key: _plain(value) if isinstance(value, Section) else value
+        for key, value in values.items()
+        if value is not None
+    }
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, Amount):
+        return json.dumps(value.text, ensure_ascii=False)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(entry)}" for key, entry in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    return json.dumps(value)  # JSON writes booleans, integers and finite floats as TOML does
+
+
+def relative_to(file: str | Path, folder: Path) -> str:
+    """`file` as seen from `folder`, so that a case can be moved together with its surface."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(file).resolve().as_posix()

@@ -1,0 +1,365 @@
+"""The command line: parses, calls, prints. No physics.
+
+The first line of the output is the verdict; `--json` prints one object and nothing else; progress goes to stderr.
+Exit codes: 0 done, 2 bad input or usage, 1 anything else.
+"""
+
+import json
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from asperity.errors import AsperityError, BadInput
+
+if TYPE_CHECKING:
+    from asperity.case import Case
+    from asperity.ehl.solution import Iteration
+    from asperity.run import Run
+    from asperity.surface import SurfaceDescription
+
+DEMO_SQ = ("0.5 um", "1.5 um", "3 um")
+INTERRUPTED = 130  # what typer makes of Ctrl-C
+SILENT_FOR = 2.0  # seconds without a step of the solver, after which its compilation is announced
+
+app = typer.Typer(
+    help="Hears how a lubricated contact wears: film, load sharing of asperities and oil, contact resonance.",
+    epilog="Exit codes: 0 done, 2 bad input or usage, 1 anything else.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only, and no progress.")]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command and exit with its code; what asperity refuses is one line on stderr."""
+    try:
+        code = app(args=arguments, prog_name="asperity", standalone_mode=False)
+        if code == INTERRUPTED:
+            code = _complain("interrupted; nothing half written was left behind", 1)
+    except BadInput as error:
+        code = _complain(str(error), 2)
+    except AsperityError as error:
+        code = _complain(str(error), 1)
+    except typer.TyperException as error:  # usage
+        code = _complain(f"{error.format_message().rstrip('.')}; asperity --help says what there is", error.exit_code)
+    sys.exit(code)
+
+
+def _complain(sentence: str, code: int) -> int:
+    print(f"error: {sentence}", file=sys.stderr)
+    return code
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from asperity import __version__
+
+        print(f"asperity {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _asperity(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for the case, the runs and the report.")] = Path("asperity-demo"),
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Solve the paper's contact at a few roughness levels, from case file to report."""
+    from importlib.resources import files
+
+    from asperity.case import load_case
+
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"cannot write into {out}: it is a file; name a folder")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"cannot make the folder {out}: {error.strerror}; choose another") from None
+    case_file, report_file = out / "paper.toml", out / "report.html"
+    _write_text(case_file, files("asperity").joinpath("paper.toml").read_text("utf-8"))
+    case = load_case(case_file)
+    runs = []
+    for sq in DEMO_SQ:
+        run = _solve(case.with_overrides({"surface.sq": sq}), label=f"Sq {sq}", quiet=quiet)
+        run.save(out / f"run-sq-{sq.replace(' ', '')}.nc")
+        runs.append(run)
+    _write_report(runs, report_file)
+    first, last = runs[0], runs[-1]
+    less, more = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
+    verdict = (
+        f"From Sq {DEMO_SQ[0]} to {DEMO_SQ[-1]} the asperities' share of the load goes from {less} to {more}: "
+        f"{first.resonance_in_words()}, then {last.resonance_in_words().removeprefix('contact resonance ')}."
+    )
+    if as_json:
+        _print_json({"verdict": verdict, "report": str(report_file), "runs": [run.scalars() for run in runs]})
+    else:
+        print(verdict)
+        if not quiet:
+            print()
+            for sq, run in zip(DEMO_SQ, runs, strict=True):
+                print(f"  Sq {sq:7}{run.verdict()}")
+            print()
+            print(f"Report: {report_file}")
+            print(f"Try next: asperity solve {case_file} --set contact.load='400 N'")
+    if not all(run.solution.convergence.converged for run in runs):
+        raise typer.Exit(1)
+
+
+@app.command()
+def solve(
+    case: Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a run to solve again.")],
+    surface: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A measured surface in place of the case's own.")
+    ] = None,
+    override: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the case: contact.load='400 N'."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Solve one contact: film, load sharing, contact resonance."""
+    if out is not None:
+        _require_output(out, ".nc")
+    run = _solve(_case(case, surface, override or []), label=case.name, quiet=quiet)
+    if out is not None:
+        run.save(out)
+    if as_json:
+        _print_json(run.scalars())
+    else:
+        print(run.verdict())
+        if not quiet:
+            _print_run(run)
+            if out is not None:
+                print(f"\nKept in {out}; asperity report {out} makes a page of it")
+    if not run.solution.convergence.converged:
+        where = f"; the unfinished state is in {out}" if out is not None else ""
+        raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
+
+
+@app.command()
+def surface(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")],
+    out: Annotated[Path | None, typer.Option(metavar="PNG", help="Draw the map of one surface.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of the heights, for a file that names none.")] = None,
+    lateral_unit: Annotated[str | None, typer.Option(help="Unit of x and y, for a file that names none.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say what a surface file holds: size, pixel, missing data, parameters after form removal."""
+    if out is not None:
+        _require_output(out, ".png")
+        if len(files) > 1:
+            raise BadInput(f"--out {out} holds one map, got {len(files)} surfaces; draw them one by one")
+    from asperity.surface import describe_surface
+
+    described = [describe_surface(file, unit=unit, lateral_unit=lateral_unit) for file in files]
+    if out is not None:
+        from asperity.report.figures import surface_map
+
+        surface_map(described[0], out)
+    if as_json:
+        _print_json({"files": [description.scalars() for description in described]})
+        return
+    for number, description in enumerate(described):
+        if number and not quiet:
+            print()
+        print(_surface_verdict(description))
+        if not quiet:
+            _print_surface(description)
+    if out is not None and not quiet:
+        print(f"\nMap: {out}")
+
+
+@app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Runs kept by asperity solve --out.")],
+    out: Annotated[Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make one self-contained HTML page of one run or several."""
+    out = out or (runs[0].with_suffix(".html") if len(runs) == 1 else Path("report.html"))
+    _require_output(out, ".html")
+    from asperity.run import load_run
+
+    loaded = [load_run(path) for path in runs]
+    _write_report(loaded, out)
+    if as_json:
+        _print_json({"report": str(out), "runs": [run.scalars() for run in loaded]})
+        return
+    for run in loaded:
+        print(run.verdict())
+    if not quiet:
+        print(f"\nReport: {out}")
+
+
+def _case(path: Path, surface: Path | None, overrides: list[str]) -> "Case":
+    from asperity.case import load_case, relative_to
+    from asperity.run import load_run
+
+    case = load_run(path).case if path.suffix == ".nc" else load_case(path)
+    if surface is not None:
+        if not surface.is_file():
+            raise BadInput(f"--surface {surface} does not exist; check its name")
+        case = case.with_overrides({"surface": {"file": relative_to(surface, case.folder)}})
+    wanted = {}
+    for override in overrides:
+        key, equals, value = override.partition("=")
+        if not (equals and key.strip() and value.strip()):
+            raise BadInput(f"--set takes KEY=VALUE such as contact.load='400 N', got {override!r}")
+        wanted[key.strip()] = value.strip()
+    return case.with_overrides(wanted) if wanted else case
+
+
+def _require_output(path: Path, suffix: str) -> None:
+    from asperity.ehl.storage import require_writable
+
+    if path.suffix != suffix:
+        raise BadInput(f"--out must be a file that ends in {suffix}, got {path}")
+    require_writable(path)
+
+
+def _write_text(path: Path, text: str) -> None:
+    from asperity.ehl.storage import whole_file
+
+    with whole_file(path) as part:
+        part.write_text(text, "utf-8")
+
+
+def _write_report(runs: "Sequence[Run]", path: Path) -> None:
+    from asperity.report import write_report
+
+    write_report(runs, path)
+
+
+def _solve(case: "Case", *, label: str, quiet: bool) -> "Run":
+    from asperity.run import solve_case
+
+    case.surface()  # made or read here: it may take seconds, which are not the solver's
+    with _progress(label, quiet=quiet) as report_step:
+        return solve_case(case, progress=report_step, strict=False)
+
+
+@contextmanager
+def _progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], None] | None]":
+    """Show the solver's steps on a terminal; announce the compilation that makes the first solve ever slow."""
+    if quiet:
+        yield None
+        return
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    announcement = threading.Timer(
+        SILENT_FOR,
+        console.print,
+        [f"{label}: compiling the solver for this machine; once after installation, up to a minute ..."],
+        {"soft_wrap": True, "highlight": False},
+    )
+    announcement.daemon = True
+    announcement.start()
+    try:
+        with console.status(f"{label}: setting up ...") if console.is_terminal else _nothing() as status:
+
+            def report_step(step: "Iteration") -> None:
+                announcement.cancel()
+                if status is not None:
+                    nx, ny = step.cells
+                    status.update(f"{label}: {nx} x {ny} cells, step {step.number}, residual {step.residual:.1e}")
+
+            yield report_step
+    finally:
+        announcement.cancel()
+
+
+@contextmanager
+def _nothing() -> Iterator[None]:
+    yield None
+
+
+def _print_json(values: dict[str, Any]) -> None:
+    print(json.dumps(values, indent=2, allow_nan=False))
+
+
+def _print_rows(rows: Sequence[tuple[str, str]]) -> None:
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"  {name:{width}}  {value}")
+
+
+def _print_run(run: "Run") -> None:
+    state, convergence = run.state, run.solution.convergence
+    lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
+    rows = [
+        ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
+        ("CAR, contact in the Hertz zone", f"{100 * state.car:.2f} %"),
+        ("CAR of the domain, over the Hertz area", f"{100 * state.car_domain:.2f} %"),
+        ("asperities count as touching below", f"{1e9 * run.solution.options.contact_film:g} nm"),
+        ("Sq, composite roughness", f"{1e6 * state.sq:.3f} um"),
+        (
+            "film: least, central, mean",
+            f"{1e6 * state.h_min:.3f}, {1e6 * state.h_central:.3f}, {1e6 * state.h_mean:.3f} um",
+        ),
+        ("lambda, smooth film over Sq", lambda_ratio),
+        ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),
+    ]
+    resonance = None if run.vibration is None else run.vibration.resonance
+    if resonance is not None and resonance.found:
+        rows += [
+            ("CRF, contact resonance", f"{resonance.crf_hz:.1f} ± {resonance.crf_std_hz:.1f} Hz"),
+            ("CRFA, its spectral height", f"{resonance.crfa:.3g} ± {resonance.crfa_std:.2g} (m/s^2)^2/Hz"),
+        ]
+    rows += [
+        ("oil lost or re-created, over oil entering", f"{100 * state.mass_flux_imbalance:.1f} %"),
+        ("load error, Reynolds residual", f"{state.load_error:.1e}, {state.reynolds_residual:.1e}"),
+        ("solver", convergence.explain()),
+    ]
+    print()
+    _print_rows(rows)
+    for note in run.notes:
+        print(f"  note: {note}")
+
+
+def _surface_verdict(description: "SurfaceDescription") -> str:
+    measured, parameters = description.measured, description.parameters
+    (nx, ny), (dx, dy) = measured.grid.cells, measured.grid.spacing
+    return (
+        f"{description.path}: Sq {1e6 * parameters.sq:.3g} um, {nx} x {ny} cells of "
+        f"{1e6 * dx:.4g} x {1e6 * dy:.4g} um, {100 * measured.missing:.2g} % missing."
+    )
+
+
+def _print_surface(description: "SurfaceDescription") -> None:
+    measured, parameters = description.measured, description.parameters
+    width, height = measured.grid.extent
+    print()
+    _print_rows(
+        [
+            ("format", measured.format),
+            ("size", f"{1e6 * width:.4g} x {1e6 * height:.4g} um"),
+            ("Sa, Sq", f"{1e6 * parameters.sa:.4g}, {1e6 * parameters.sq:.4g} um"),
+            ("Ssk, Sku", f"{parameters.ssk:.3g}, {parameters.sku:.3g}"),
+            ("Sdq", f"{parameters.sdq:.3g}"),
+            ("Sal, Str", f"{1e6 * parameters.sal:.3g} um, {parameters.str_:.3g}"),
+        ]
+    )
+    for step in (*description.steps, *measured.notes):
+        print(f"  note: {step}")

@@ -1,0 +1,173 @@
+"""The main job: a case solved, its load sharing read off, its contact resonance found; kept in one file.
+
+Does no physics of its own; prints nothing.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from asperity.case import Case, load_case
+from asperity.coupling import Vibration, contact_vibration
+from asperity.ehl.solution import ContactSolution, Iteration
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.state import ContactState, contact_state
+from asperity.ehl.storage import load_solution
+from asperity.errors import BadInput, NotConverged, UnreadableFile
+from asperity.surface import Surface
+
+FULL_FILM_BELOW = 0.01  # share of the load on asperities
+BOUNDARY_FROM = 0.9
+
+Scalar = float | int | bool | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A solved case: the contact, what a tribologist reads off it, and what an accelerometer would hear.
+
+    `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the numbers has to know.
+    """
+
+    case: Case
+    solution: ContactSolution
+    state: ContactState
+    vibration: Vibration | None
+    notes: tuple[str, ...] = ()
+
+    def scalars(self) -> dict[str, Scalar]:
+        """Every number of the run by its name in `asperity solve --json`, SI; None where there is none."""
+        state, convergence = self.state, self.solution.convergence
+        resonance = None if self.vibration is None else self.vibration.resonance
+        heard = resonance is not None and resonance.found
+        return {
+            "car": state.car,
+            "car_domain": state.car_domain,
+            "clr": state.clr,
+            "sq_m": state.sq,
+            "h_min_m": state.h_min,
+            "h_central_m": state.h_central,
+            "h_mean_m": state.h_mean,
+            "p_max_pa": state.p_max,
+            "lambda_ratio": state.lambda_ratio,
+            "converged": convergence.converged,
+            "iterations": convergence.iterations,
+            "reynolds_residual": state.reynolds_residual,
+            "load_error": state.load_error,
+            "mass_flux_imbalance": state.mass_flux_imbalance,
+            "seconds": convergence.seconds,
+            "crf_hz": _finite(resonance.crf_hz) if resonance is not None and heard else None,
+            "crfa": _finite(resonance.crfa) if resonance is not None and heard else None,
+            "crf_std_hz": _finite(resonance.crf_std_hz) if resonance is not None and heard else None,
+            "crfa_std": _finite(resonance.crfa_std) if resonance is not None and heard else None,
+        }
+
+    def verdict(self) -> str:
+        """One sentence on the state of the contact.
+
+        Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more; mixed between.
+        """
+        clr, car = self.state.clr, self.state.car
+        if self.solution.lubricant is None:
+            regime = "Dry contact"
+        elif clr < FULL_FILM_BELOW:
+            regime = "Full film"
+        else:
+            regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
+        sentence = f"{regime}: asperities carry {100 * clr:.1f} % of the load on {100 * car:.1f} % of the Hertz zone"
+        if not self.solution.convergence.converged:
+            sentence = f"NOT CONVERGED, do not use: {sentence}"
+        return f"{sentence}; {self.resonance_in_words()}."
+
+    def resonance_in_words(self) -> str:
+        """The contact resonance with its standard deviation, or why there is none."""
+        if self.vibration is None:
+            return "vibration not asked for"
+        resonance = self.vibration.resonance
+        if not resonance.found:
+            return f"no contact resonance ({resonance.reason.rstrip('.')})"
+        deviation = _finite(resonance.crf_std_hz)
+        if deviation is None:
+            return f"contact resonance at {resonance.crf_hz:.0f} Hz"
+        decimals = 1 if deviation < 2.0 else 0
+        return f"contact resonance at {resonance.crf_hz:.{decimals}f} ± {deviation:.{decimals}f} Hz"
+
+    def save(self, path: str | Path) -> Path:
+        """Write the run as one netCDF that restates its case, whole or not at all, and return the path."""
+        return self.solution.save(path)
+
+
+def solve_case(
+    case: Case,
+    *,
+    surface: Surface | None = None,
+    progress: Callable[[Iteration], None] | None = None,
+    strict: bool = True,
+) -> Run:
+    """Solve a case and listen to it.
+
+    Parameters
+    ----------
+    case : what to solve
+    surface : composite roughness on the case's grid, in place of the case's own
+    progress : called after every step of the solver
+    strict : raise when the solver stops before its tolerance; else the run says so
+
+    Raises
+    ------
+    BadInput
+        for a surface that does not fit the case's grid, or cannot be made or read.
+    NotConverged
+        if `strict`; its `solution` is the unfinished contact.
+    """
+    if surface is not None:
+        if surface.grid != case.grid:
+            raise BadInput(
+                f"surface must lie on the case's grid, got {surface.grid} where the case has {case.grid}; "
+                "make it on case.grid"
+            )
+        case = replace(case, stored=surface)
+    notes = (*case.surface_notes, *case.notes)
+    kept = {"case": case.text, "notes": json.dumps(notes)}
+    try:
+        solution = solve_contact(
+            case.conditions, case.lubricant, case.surface(), options=case.options, progress=progress, strict=strict
+        )
+    except NotConverged as unfinished:
+        raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None
+    return _run(case, replace(solution, attributes=kept), notes)
+
+
+def load_run(path: str | Path) -> Run:
+    """Read a run back: its fields as they were solved, everything else worked out from them anew.
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is missing, damaged, or holds no case.
+    """
+    path = Path(path)
+    solution = load_solution(path)
+    try:
+        text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
+    except (KeyError, ValueError):
+        raise UnreadableFile(
+            f"{path} holds a solution without its case; solve the case with asperity solve --out"
+        ) from None
+    return _run(load_case(text, folder=path.parent, name=str(path), stored=solution.surface), solution, notes)
+
+
+def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
+    state = contact_state(solution)
+    model = case.vibration
+    with case.naming("vibration"):
+        vibration = None if model is None else contact_vibration(state, case.conditions, model)
+    if not solution.convergence.converged:
+        notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
+    return Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,187 @@
+"""The commands as a user types them, on the real solver and small grids."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import x3pio
+
+import asperity.run
+from asperity import NotConverged, load_case, load_run, solve_case
+from asperity.cli import main
+from asperity.errors import BadInput
+from asperity.surface import flat_surface
+
+PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
+KEYS = [  # design.md, section 4, and the standard deviations of the last two
+    *("car", "car_domain", "clr", "sq_m", "h_min_m", "h_central_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
+    *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
+    *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
+]
+
+
+@pytest.fixture
+def asp(tmp_path, monkeypatch, capsys):
+    """Run a command in a folder that holds a small case; return exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    Path("case.toml").write_text(PAPER.replace("[256, 256]", "[64, 64]"), "utf-8")
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        said = capsys.readouterr()
+        return end.value.code or 0, said.out, said.err
+
+    return run
+
+
+def numbers(text: str) -> dict[str, float]:
+    scalars = json.loads(text)
+    scalars.pop("seconds")
+    return scalars
+
+
+def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
+    code, out, _ = asp("solve", "case.toml", "--json")
+    assert code == 0
+    assert list(json.loads(out)) == KEYS
+    assert json.loads(out)["converged"] is True
+    assert json.loads(out)["sq_m"] == pytest.approx(1e-6)
+
+
+def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
+    code, out, _ = asp("solve", "case.toml")
+    assert code == 0
+    scalars = json.loads(asp("solve", "case.toml", "--json")[1])
+    assert out.splitlines()[0].startswith("Mixed lubrication: asperities carry ")
+    assert f"{100 * scalars['clr']:.1f} % of the load on {100 * scalars['car']:.1f} %" in out.splitlines()[0]
+    assert f"{scalars['crf_hz']:.1f} ± {scalars['crf_std_hz']:.1f} Hz" in out
+    assert asp("solve", "case.toml", "--quiet")[1:] == (out.splitlines()[0] + "\n", "")
+
+
+def test_solving_a_run_again_gives_the_same_numbers(asp):
+    first = numbers(asp("solve", "case.toml", "--out", "run.nc", "--json")[1])
+    assert load_run("run.nc").case == load_case("case.toml")
+    Path("case.toml").unlink()
+    assert numbers(asp("solve", "run.nc", "--json")[1]) == first
+    assert load_run("run.nc").scalars() | {"seconds": 0} == first | {"seconds": 0}
+
+
+def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
+    Path("maps").mkdir()
+    heights = 1e-6 * np.random.default_rng(5).standard_normal((60, 40)).repeat(8, 0).repeat(8, 1)
+    x3pio.write("maps/ring.x3p", heights.T, x_scale=2e-6, y_scale=2e-6)
+    code, out, _ = asp("solve", "case.toml", "--surface", "maps/ring.x3p", "--out", "run.nc")
+    assert code == 0
+    assert "note: removed a quadratic form" in out
+    first = load_run("run.nc")
+    assert first.case.contents.surface.file == "maps/ring.x3p"
+    Path("maps/ring.x3p").unlink()
+    assert numbers(asp("solve", "run.nc", "--json")[1]) == {k: v for k, v in first.scalars().items() if k != "seconds"}
+    assert any("removed a quadratic form" in note for note in first.notes)
+
+
+def test_set_changes_the_case(asp):
+    code, out, _ = asp(
+        "solve", "case.toml", "--set", "contact.load=250 N", "--set", "surface.seed=3", "--out", "run.nc"
+    )
+    assert code == 0
+    assert "Kept in run.nc" in out
+    run = load_run("run.nc")
+    assert run.solution.conditions.load == 250.0
+    assert run.case.contents.surface.seed == 3
+
+
+def test_a_dry_smooth_contact_is_hertz_and_rings_at_full_load(asp):
+    _, out, _ = asp("solve", "case.toml", "--set", "lubricant=none", "--set", "surface=flat", "--json")
+    dry = json.loads(out)
+    assert dry["clr"] == pytest.approx(1.0, abs=1e-3)
+    assert dry["p_max_pa"] == pytest.approx(0.5691e9, rel=0.02)  # physics: p_h of the paper's case
+    assert dry["lambda_ratio"] is None
+    assert dry["crf_hz"] is None  # nothing rough passes: no excitation
+
+
+def test_python_and_command_line_agree(asp):
+    run = solve_case(load_case("case.toml"))
+    assert {k: v for k, v in run.scalars().items() if k != "seconds"} == numbers(asp("solve", "case.toml", "--json")[1])
+
+
+def test_a_case_without_vibration_has_no_resonance(asp):
+    code, out, _ = asp("solve", "case.toml", "--set", "vibration=none", "--out", "run.nc")
+    assert code == 0
+    assert "vibration not asked for" in out
+    assert load_run("run.nc").scalars()["crf_hz"] is None
+    assert asp("report", "run.nc")[0] == 0
+
+
+def test_a_solve_that_does_not_converge_is_loud_and_kept(asp):
+    code, out, err = asp("solve", "case.toml", "--set", "solver.max_iterations=1", "--out", "run.nc")
+    assert code == 1
+    assert out.startswith("NOT CONVERGED")
+    assert err.startswith("error: not converged")
+    assert "run.nc" in err
+    kept = load_run("run.nc")
+    assert not kept.solution.convergence.converged
+    assert kept.scalars()["converged"] is False
+    assert "Not converged" in kept.notes[0]
+    with pytest.raises(NotConverged) as unfinished:
+        solve_case(kept.case)
+    assert unfinished.value.solution.attributes["case"] == kept.case.text
+
+
+def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(asperity.run, "solve_contact", interrupted)
+    code, out, err = asp("solve", "case.toml", "--out", "run.nc")
+    assert (code, out) == (1, "")
+    assert err.startswith("error: interrupted")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_report_makes_a_page_of_one_run_or_several(asp):
+    asp("solve", "case.toml", "--out", "run.nc", "--quiet")
+    code, out, _ = asp("report", "run.nc")
+    assert code == 0
+    assert "run.html" in out
+    code, out, _ = asp("report", "run.nc", "run.nc", "--out", "two.html", "--json")
+    assert code == 0
+    assert json.loads(out)["report"] == "two.html"
+    assert all(Path(name).read_text("utf-8").startswith("<!") for name in ("run.html", "two.html"))
+
+
+def test_surface_says_what_it_read(asp):
+    heights = np.random.default_rng(5).standard_normal((32, 48)) * 1e-6
+    heights[:2] = np.nan
+    x3pio.write("ring.x3p", heights.T, x_scale=2e-6, y_scale=3e-6)
+    code, out, _ = asp("surface", "ring.x3p", "--out", "map.png", "--json")
+    assert code == 0
+    (found,) = json.loads(out)["files"]
+    assert found["file"] == "ring.x3p"
+    assert found["cells"] == [32, 48]
+    assert found["pixel_m"] == pytest.approx([2e-6, 3e-6])
+    assert found["missing"] == pytest.approx(2 / 32)
+    assert found["sq_m"] == pytest.approx(1e-6, rel=0.1)
+    assert Path("map.png").read_bytes().startswith(b"\x89PNG")
+    assert asp("surface", "ring.x3p")[1].startswith("ring.x3p: Sq ")
+
+
+def test_a_surface_on_another_grid_is_refused():
+    case = load_case(PAPER)
+    with pytest.raises(BadInput, match=r"case\.grid"):
+        solve_case(case, surface=flat_surface(case.with_overrides({"grid.cells": [32, 32]}).grid))
+
+
+def test_demo_goes_from_case_to_report(asp):
+    code, out, _ = asp("demo", "--out", "shown")
+    assert code == 0
+    assert out.startswith("From Sq 0.5 um to 3 um the asperities' share of the load goes from ")
+    assert str(Path("shown", "report.html")) in out
+    names = {"paper.toml", "report.html", "run-sq-0.5um.nc", "run-sq-1.5um.nc", "run-sq-3um.nc"}
+    assert {entry.name for entry in Path("shown").iterdir()} == names
+    runs = [load_run(f"shown/run-sq-{sq}um.nc") for sq in ("0.5", "1.5", "3")]
+    assert [run.case.grid.cells for run in runs] == [(256, 256)] * 3
+    shares = [run.state.clr for run in runs]
+    assert shares == sorted(shares)

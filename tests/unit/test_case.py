@@ -1,0 +1,206 @@
+import math
+import pickle
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from asperity.case import load_case
+from asperity.coupling import VibrationModel
+from asperity.ehl.solution import Options
+from asperity.errors import BadInput, UnreadableFile
+from asperity.lubricant import Barus, DowsonHigginson, Roelands
+from asperity.surface import Surface
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return load_case(EXAMPLES / "paper.toml")
+
+
+def test_the_papers_table_2_arrives_in_si(paper):
+    conditions, oil = paper.conditions, paper.lubricant
+    assert (conditions.geometry, conditions.radius, conditions.length, conditions.load) == (
+        "line",
+        0.0054,
+        0.010,
+        500.0,
+    )
+    assert conditions.pair.effective_modulus == pytest.approx(219.78e9, rel=1e-5)  # printed in Table 2
+    assert conditions.entrainment_speed == pytest.approx(1.91, rel=1e-15)
+    assert conditions.slide_to_roll == pytest.approx(0.2, rel=1e-14)
+    assert oil.viscosity == Barus(0.096, 18.2e-9)
+    assert oil.density == DowsonHigginson(880.0)
+    assert paper.vibration == VibrationModel(mass=0.1, damping_ratio=0.02)
+    assert paper.options == Options()
+
+
+def test_the_grid_is_measured_in_half_widths_of_the_papers_contact(paper):
+    a = math.sqrt(8.0 * 5e4 * 0.0054 / (math.pi * 219.78e9))  # physics: a = sqrt(8 w' R/(pi E'))
+    assert paper.grid.lower == pytest.approx((-4.5 * a, -1.6 * a), rel=1e-5)
+    assert paper.grid.upper == pytest.approx((1.9 * a, 1.6 * a), rel=1e-5)
+
+
+def test_the_packaged_case_is_the_example():
+    packaged = Path(__file__).parents[2] / "src" / "asperity" / "paper.toml"
+    assert packaged.read_bytes() == (EXAMPLES / "paper.toml").read_bytes()
+
+
+def test_only_the_printed_domain_is_said_to_starve(paper):
+    printed = load_case(EXAMPLES / "paper-as-printed.toml")
+    assert paper.notes == ()
+    assert "starves" in printed.notes[0]
+    assert printed.with_overrides({"grid.x": [-4.5, 1.9]}) == paper
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        {},
+        {"lubricant": "none"},
+        {"material.hardness": "none", "vibration": "none"},
+        {"surface": "flat"},
+        {"surface": {"file": 'quo"te\\ü/ring.x3p', "sq": "0.8 um", "fit": "tile"}},
+        {"surface": {"kind": "self-affine", "sq": "1 um", "hurst": 0.8, "cutoffs": ["2 um", "80 um"]}},
+        {"lubricant.viscosity.law": "roelands", "solver.contact_film": "2 nm", "solver.tolerance": 1e-6},
+        {"study.sq": {"from": "0.5 um", "to": "4 um", "step": "0.1 um"}, "study.seeds": 5},
+    ],
+)
+def test_the_text_of_a_case_loads_to_an_equal_case(paper, overrides):
+    case = paper.with_overrides(overrides)
+    again = load_case(case.text)
+    assert again == case
+    assert again.text == case.text
+    assert (again.conditions, again.lubricant, again.grid, again.options, again.vibration) == (
+        case.conditions,
+        case.lubricant,
+        case.grid,
+        case.options,
+        case.vibration,
+    )
+
+
+def test_a_case_travels_to_another_process(paper):
+    again = pickle.loads(pickle.dumps(paper))
+    assert again == paper
+    assert again.text == paper.text
+
+
+@given(st.floats(1e-3, 1e6), st.sampled_from([("mm", 1e-3), ("um", 1e-6), ("m", 1.0), ("nm", 1e-9)]))
+def test_lengths_in_any_unit_are_the_same_length(value, unit):
+    text, factor = unit
+    case = load_case(EXAMPLES / "paper.toml").with_overrides({"contact.length": f"{value!r} {text}"})
+    assert case.conditions.length == pytest.approx(value * factor, rel=1e-15)
+
+
+def test_overrides_read_toml_and_text_without_its_quotes(paper):
+    case = paper.with_overrides({"contact.load": "400 N", "grid.cells": "[64, 32]", "surface.seed": "3"})
+    assert case.conditions.load == 400.0
+    assert case.grid.cells == (64, 32)
+    assert case == paper.with_overrides({"contact.load": '"400 N"', "grid.cells": [64, 32], "surface.seed": 3})
+
+
+def test_roelands_takes_its_own_reference_pressure(paper):
+    case = paper.with_overrides({"lubricant.viscosity.law": "roelands"})
+    assert case.lubricant.viscosity == Roelands(0.096, 18.2e-9, 1.96e8)
+
+
+def test_one_seed_is_one_surface_at_any_roughness(paper):
+    coarse = paper.with_overrides({"grid.cells": [64, 64]})
+    rougher = coarse.with_overrides({"surface.sq": "2 um"})
+    assert coarse.surface().sq == pytest.approx(1e-6, rel=1e-12)
+    np.testing.assert_allclose(rougher.surface().heights, 2.0 * coarse.surface().heights, rtol=1e-12)
+    other = coarse.with_overrides({"surface.seed": 8}).surface()
+    assert not np.allclose(other.heights, coarse.surface().heights)
+
+
+def test_stored_roughness_stays_until_surface_or_grid_change(paper):
+    small = paper.with_overrides({"grid.cells": [64, 64]})
+    stored = Surface(np.full((64, 64), 1e-7), small.grid)
+    case = load_case(small.text, stored=stored)
+    assert case.with_overrides({"contact.entrainment_speed": "1 m/s"}).surface() is stored
+    assert case.with_overrides({"surface.seed": 9}).surface() is not stored
+    assert case.with_overrides({"contact.load": "400 N"}).surface().grid.extent < stored.grid.extent
+
+
+BAD = [
+    ("contact.laod", "400 N", "contact.laod is not a known key; did you mean load?"),
+    ("contcat.load", "400 N", "contcat is not a known key; did you mean contact?"),
+    ("vibration.rate_hz", "50 kHz", "vibration.rate_hz is not a known key; did you mean rate?"),
+    ("surface.hurst", "0.8", "surface.hurst is not a known key"),
+    (
+        "lubricant.viscosity.law",
+        "baruss",
+        'viscosity.law must be one of barus, roelands, got "baruss"; did you mean "barus"?',
+    ),
+    ("lubricant.viscosity.p0", "1 MPa", "lubricant.viscosity.p0 is not a known key"),
+    ("surface.kind", "gausian", 'did you mean "gaussian"?'),
+    ("contact.load", "500 m", 'contact.load must be a force such as "500 N", got "500 m"'),
+    ("contact.load", "500 newtons of force", "contact.load must be a force"),
+    ("contact.load", "500 n", "capitals matter"),
+    ("contact.load", 500, 'contact.load must be a force such as "500 N", got the bare number 500'),
+    ("contact.load", "0 N", 'contact.load must be positive and finite, got "0 N"'),
+    ("contact.load", "nan N", "contact.load must be a force"),
+    ("contact.load", "1e400 N", "contact.load must be positive and finite"),
+    ("contact.length", "-10 mm", 'contact.length must be positive and finite, got "-10 mm"'),
+    ("contact.slip", "nan", "contact.slip"),
+    ("contact.slip", True, "contact.slip"),
+    ("contact.geometry", "point", "cannot be solved yet"),
+    ("contact.geometry", "lien", "contact.geometry"),
+    ("material.youngs_modulus", ["200 GPa"], "material.youngs_modulus"),
+    ("material.poisson_ratio", 0.7, "Poisson's ratio must lie above -1"),
+    ("grid.cells", [3, 3], "at least 8 cells along x, got 3"),
+    ("grid.cells", [64.5, 64], "grid.cells[0]"),
+    ("grid.x", [1.9, -4.5], "upper x beyond its lower one"),
+    ("grid.x", [-0.5, 1.9], "x must reach beyond the contact"),
+    ("solver.tolerance", 3, "tolerance must lie between 0 and 0.1"),
+    ("vibration.damping_ratio", -0.1, "damping ratio"),
+    ("vibration.rate", "3000 rpm", "not in hertz"),
+    ("lubricant", "water", "lubricant"),
+    ("surface.file", "ring.x3p", "both kind and file"),
+    ("study", {"sq": {"from": "1 um"}}, "study.sq.to is missing"),
+    ("model", "conserving", "model must be"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "sentence"), BAD)
+def test_what_cannot_be_meant_is_refused_in_one_sentence(paper, key, value, sentence):
+    with pytest.raises(BadInput) as refused:
+        paper.with_overrides({key: value})
+    message = str(refused.value)
+    assert sentence in message
+    assert message.startswith(paper.source)
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("section", ["contact", "material", "lubricant", "surface", "grid"])
+def test_a_missing_section_is_named(section):
+    text = (EXAMPLES / "paper.toml").read_text("utf-8").replace(f"[{section}]", f"[study.{section}]")
+    with pytest.raises(BadInput):
+        load_case(text)
+    tables = text.split(f"[study.{section}]")
+    after = tables[1].split("\n[", 1)
+    with pytest.raises(BadInput, match=f"{section} is missing"):
+        load_case(tables[0] + "\n[" + after[1])
+
+
+@given(st.text(max_size=12))
+def test_any_text_for_a_unit_is_a_force_or_refused(text):
+    paper = load_case(EXAMPLES / "paper.toml")
+    with suppress(BadInput):
+        case = paper.with_overrides({"contact.load": f"1 {text}"})
+        assert case.conditions.load > 0.0
+        assert load_case(case.text) == case
+
+
+def test_files_that_are_no_case_are_named(tmp_path):
+    (tmp_path / "binary.toml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
+    (tmp_path / "broken.toml").write_text("[contact\n")
+    for name in ("absent.toml", "binary.toml", "broken.toml", "."):
+        with pytest.raises(UnreadableFile, match=name.replace(".", r"\.") if name != "." else str(tmp_path)):
+            load_case(tmp_path / name)

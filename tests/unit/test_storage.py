@@ -1,0 +1,159 @@
+import errno
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+
+from asperity.conditions import ContactConditions, ElasticPair
+from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
+from asperity.ehl.storage import load_solution
+from asperity.errors import AsperityError, BadInput, UnreadableFile
+from asperity.grid import Grid
+from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
+from asperity.surface import Surface
+
+
+@pytest.fixture
+def solution():
+    rng = np.random.default_rng(1)
+    cells = (12, 9)
+    grid = Grid(cells, (-0.1 / 3.0, -1e-4 / 7.0), (0.2 / 3.0, 1e-4 / 7.0))
+    steps = tuple(Iteration((6 * n, 9), n, *rng.random(3)) for n in (1, 2))
+    return ContactSolution(
+        conditions=ContactConditions(
+            pair=ElasticPair((0.1 + 2e11, 2.07e11), (0.3, 1.0 / 3.0)),
+            geometry="line",
+            radius=5.4e-3,
+            load=500.0 / 3.0,
+            surface_speeds=(2.101, 1.719),
+            length=0.01,
+            hardness=2e9,
+        ),
+        lubricant=Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()),
+        surface=Surface(rng.standard_normal(cells) * 1e-6, grid),
+        options=Options(tolerance=3e-7, max_iterations=17, contact_film=1e-9 / 3.0),
+        pressure=rng.random(cells) * 1e9,
+        gap=rng.random(cells) * 1e-6,
+        in_contact=rng.random(cells) < 0.3,
+        rigid_approach=-1e-6 / 3.0,
+        convergence=Convergence(Status.STALLED, steps, 3e-7, 0.1 + 0.2),
+        attributes={"case": 'model = "unified"\n# größer\n', "notes": "[]"},
+    )
+
+
+def same(one, other):
+    for name in ("conditions", "lubricant", "options", "rigid_approach", "convergence", "attributes", "grid"):
+        assert getattr(one, name) == getattr(other, name), name
+    for name in ("pressure", "gap", "in_contact"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert a.dtype == b.dtype
+        assert a.tobytes() == b.tobytes(), name
+    assert one.surface.heights.tobytes() == other.surface.heights.tobytes()
+
+
+def test_every_number_comes_back_bit_for_bit(solution, tmp_path):
+    path = solution.save(tmp_path / "run.nc")
+    same(load_solution(path), solution)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.nc"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"lubricant": None},
+        {"lubricant": Lubricant(viscosity=Roelands(0.04, 2e-8), density=Incompressible(850.0), rheology=Newtonian())},
+        {"attributes": {}},
+    ],
+)
+def test_other_oils_and_none_come_back(solution, tmp_path, changes):
+    changed = replace(solution, **changes)
+    same(load_solution(changed.save(tmp_path / "run.nc")), changed)
+
+
+def test_infinities_of_an_unfinished_solve_come_back(solution, tmp_path):
+    solution.pressure[3, 3] = np.nan
+    solution.gap[2, 2] = np.inf
+    same(load_solution(solution.save(tmp_path / "run.nc")), solution)
+
+
+def test_anyone_can_read_the_file_without_asperity(solution, tmp_path):
+    with xarray.open_dataset(solution.save(tmp_path / "run.nc"), engine="h5netcdf") as opened:
+        assert opened.attrs["Conventions"].startswith("CF-")
+        assert opened.attrs["case"] == solution.attributes["case"]
+        assert opened["pressure"].dims == ("x", "y")
+        units = {name: opened[name].attrs["units"] for name in ("x", "y", "pressure", "gap", "surface_height")}
+        assert units == {"x": "m", "y": "m", "pressure": "Pa", "gap": "m", "surface_height": "m"}
+        np.testing.assert_array_equal(opened["x"], solution.grid.x)
+        for name in ("asperity", "numpy", "scipy", "numba", "python"):
+            assert f'"{name}": ' in opened.attrs["versions"]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.7, 0.99])
+def test_a_file_cut_short_is_refused(solution, tmp_path, share):
+    path = solution.save(tmp_path / "run.nc")
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(UnreadableFile, match=r"run\.nc"):
+        load_solution(path)
+
+
+def test_a_flipped_bit_in_a_field_is_noticed(solution, tmp_path):
+    import h5py
+
+    path = solution.save(tmp_path / "run.nc")
+    with h5py.File(path) as opened:
+        chunk = opened["pressure"].id.get_chunk_info(0)
+    content = bytearray(path.read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(UnreadableFile, match="damaged"):
+        load_solution(path)
+
+
+def test_what_is_no_run_is_refused(tmp_path):
+    (tmp_path / "text.nc").write_text("pressure 1 GPa")
+    xarray.Dataset({"pressure": ("x", [1.0])}).to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
+    xarray.Dataset(attrs={"asperity_format": 99}).to_netcdf(tmp_path / "newer.nc", engine="h5netcdf")
+    xarray.Dataset(attrs={"asperity_format": 1}).to_netcdf(tmp_path / "empty.nc", engine="h5netcdf")
+    reasons = {
+        "text": "damaged or not a run",
+        "foreign": "not a run of asperity",
+        "newer": "run format 99",
+        "empty": "damaged",
+        "absent": "does not exist",
+    }
+    for name, reason in reasons.items():
+        with pytest.raises(UnreadableFile, match=reason):
+            load_solution(tmp_path / f"{name}.nc")
+
+
+@pytest.mark.parametrize(
+    ("failure", "raised"),
+    [(KeyboardInterrupt(), KeyboardInterrupt), (OSError(errno.ENOSPC, "No space left on device"), AsperityError)],
+)
+def test_an_interrupted_save_leaves_what_was_there(solution, tmp_path, monkeypatch, failure, raised):
+    path = solution.save(tmp_path / "run.nc")
+    before = path.read_bytes()
+
+    def half_written(_dataset, part, **_):
+        part.write_bytes(b"half")
+        raise failure
+
+    monkeypatch.setattr(xarray.Dataset, "to_netcdf", half_written)
+    with pytest.raises(raised):
+        solution.save(path)
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_a_folder_that_is_not_there_is_named(solution, tmp_path):
+    with pytest.raises(BadInput, match="nowhere does not exist"):
+        solution.save(tmp_path / "nowhere" / "run.nc")
+    with pytest.raises(BadInput, match="it is a folder"):
+        solution.save(tmp_path)
+
+
+def test_an_attribute_cannot_hide_the_formats_own(solution):
+    with pytest.raises(BadInput, match="options"):
+        replace(solution, attributes={"options": "mine"}).to_dataset()
