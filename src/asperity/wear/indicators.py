@@ -1,0 +1,363 @@
+"""CRF and CRFA: finding the contact resonance in a spectrum, with standard deviations and a verdict.
+
+The default is a Whittle (maximum-likelihood) fit of one oscillator line over a sloping floor; the paper's smoothed
+highest point is kept beside it. Where to look, the band, is the caller's to say: `asperity.coupling` knows it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.arrays import Field, Mask
+from asperity.errors import BadInput
+from asperity.signals import Spectrum, smooth
+
+FEWEST_LINES = 20  # five parameters from fewer lines would be an interpolation, not a fit
+STRONG_EVIDENCE = 10.0  # BIC difference, "very strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
+PAPER_PASSES = 3  # "five-point triple smoothing"
+SMALLEST_DAMPING, LARGEST_DAMPING = 1e-5, 0.7  # above 0.7 an oscillator has no peak
+MOST_BLOCKS = 512  # for the search of a start only
+
+Model = Callable[
+    [Field], tuple[Field, Field]
+]  # parameters -> expected density (lines,), its slopes (lines, parameters)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resonance:
+    """A contact resonance, or the reason why there is none.
+
+    `crf_hz` is the oscillator's natural frequency f0 [Hz]; `crfa` the fitted line at f0 without the floor below it
+    [(m/s^2)^2/Hz]; `crf_std`, `crfa_std` their standard deviations from the Fisher information. `damping_ratio` with
+    its `damping_ratio_std`, and `floor`, the density at the lower and upper end of `band_hz`, complete the fitted
+    curve. `evidence` is how much better, by BIC, a line and a floor explain the band than a floor alone (found needs
+    10, very strong). All of a line's figures are nan when it was not `found`; `reason` then says why.
+    The paper's peak has no standard deviation, damping, floor or evidence: nan.
+    """
+
+    crf_hz: float
+    crfa: float
+    crf_std: float
+    crfa_std: float
+    found: bool
+    reason: str
+    band_hz: tuple[float, float]
+    method: str
+    damping_ratio: float = np.nan
+    damping_ratio_std: float = np.nan
+    floor: tuple[float, float] = (np.nan, np.nan)
+    evidence: float = np.nan
+
+    @property
+    def crf_std_hz(self) -> float:
+        """`crf_std`, under the name that tables and JSON give it [Hz]."""
+        return self.crf_std
+
+    def curve(self, frequency_hz: Field) -> Field:
+        """Fitted density at `frequency_hz` (any shape): line and floor; the floor alone when nothing was found.
+
+        nan everywhere for a method that fits no curve.
+        """
+        low, high = self.band_hz
+        share = (frequency_hz - low) / (high - low)
+        curve = self.floor[0] * (1.0 - share) + self.floor[1] * share
+        if self.found:
+            curve = curve + self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
+        return curve
+
+
+def line_shape(frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:
+    """Acceleration line of an oscillator that rides over white base acceleration, 1 at f = f0.
+
+    T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 + 4ζ^2)/(4ζ^2). Roughness
+    whose spectrum falls as f^-4 (a second-order low pass, far above its cut-off) is white base acceleration.
+    """
+    return _line_and_slopes(frequency_hz, f0_hz, damping_ratio)[0]
+
+
+def _line_and_slopes(frequency_hz: Field, f0_hz: float, damping_ratio: float) -> tuple[Field, Field, Field]:
+    """The line L, dL/d(ln f0) and dL/d(ln ζ)."""
+    x2 = (frequency_hz / f0_hz) ** 2
+    squared = 4.0 * damping_ratio**2
+    top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
+    line = squared / (1.0 + squared) * top / bottom
+    by_f0 = line * ((2.0 * squared * x2 - 4.0 * x2 * (1.0 - x2)) / bottom - 2.0 * squared * x2 / top)
+    by_damping = line * (2.0 * squared * x2 * (1.0 / top - 1.0 / bottom) + 2.0 / (1.0 + squared))
+    return line, by_f0, by_damping
+
+
+def contact_resonance(spectrum: Spectrum, *, band_hz: tuple[float, float], method: str = "likelihood") -> Resonance:
+    """Find the contact resonance between the two ends of `band_hz` [Hz].
+
+    Parameters
+    ----------
+    method : "likelihood" fits one oscillator over a floor and tests it against the floor alone; "peak" takes the
+        highest point after the paper's smoothing, whatever it is
+
+    Raises
+    ------
+    BadInput
+        for an unknown method, a band outside the spectrum or with fewer than 20 lines, a spectrum that is not finite,
+        or a smoothed one where its statistics matter.
+    """
+    if method not in INDICATOR_METHODS:
+        raise BadInput(f"indicator method must be one of {', '.join(INDICATOR_METHODS)}, got {method!r}")
+    low, high = band_hz
+    top = float(spectrum.frequency_hz[-1])
+    if not 0.0 < low < high <= top:
+        raise BadInput(f"resonance band must lie between 0 and {top:g} Hz, got {low:g} to {high:g} Hz; change it")
+    inside = (spectrum.frequency_hz >= low) & (spectrum.frequency_hz <= high)
+    lines = int(np.count_nonzero(inside))
+    if lines < FEWEST_LINES:
+        raise BadInput(
+            f"resonance band {low:g} to {high:g} Hz holds {lines} spectral lines, a fit needs {FEWEST_LINES}; "
+            "lengthen the spectrum's segment or widen the band"
+        )
+    if not np.isfinite(spectrum.density[inside]).all():
+        raise BadInput(f"spectrum must be finite from {low:g} to {high:g} Hz, got some that is not; repair the record")
+    return INDICATOR_METHODS[method](spectrum, inside, (low, high))
+
+
+def _highest_point(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
+    """The paper's section 4.2: smooth three times, take the highest point (here: of the band)."""
+    smoothed = smooth(spectrum, PAPER_PASSES)
+    density = smoothed.density[inside]
+    highest = int(np.argmax(density))
+    if highest in (0, density.size - 1):
+        return no_resonance(
+            "the highest point of the band is its edge: what is rising there lies outside", band_hz, "peak"
+        )
+    return Resonance(
+        crf_hz=float(smoothed.frequency_hz[inside][highest]),
+        crfa=float(density[highest]),
+        crf_std=np.nan,
+        crfa_std=np.nan,
+        found=True,
+        reason=f"highest point after {PAPER_PASSES} five-point smoothings, not tested against chance",
+        band_hz=band_hz,
+        method="peak",
+    )
+
+
+def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
+    """The oscillator line that makes the spectrum likeliest, if the spectrum needs one."""
+    if spectrum.smoothing_passes:
+        raise BadInput(
+            f"the likelihood fit needs an unsmoothed spectrum, got one smoothed {spectrum.smoothing_passes} times; "
+            "pass the spectrum itself or take method='peak'"
+        )
+    low, high = band_hz
+    frequency = spectrum.frequency_hz[inside]
+    scale = float(np.mean(spectrum.density[inside]))
+    if scale <= 0.0:
+        return no_resonance("the band holds no vibration at all", band_hz, "likelihood")
+    data = _Data(spectrum.density[inside] / scale, spectrum.averages)
+
+    share = (frequency - low) / (high - low)
+    floors = np.stack([1.0 - share, share], axis=1)
+    any_floor = _Bounds(np.zeros(2), np.full(2, np.inf))
+    floor_only = _scoring(lambda theta: (floors @ theta, floors), np.ones(2), any_floor, data)
+    fit = _fit_line(frequency, floors, data, spectrum, band_hz)
+
+    independent = spectrum.averages * frequency.size
+    evidence = 2.0 * (floor_only.cost - fit.cost) - 3.0 * float(np.log(max(independent, np.e)))
+    level, f0, zeta = (float(value) for value in np.exp(fit.parameters[:3]))
+    level_std, f0_std, zeta_std = (float(std) for std in fit.std[:3] * [level, f0, zeta])
+    width = 2.0 * zeta * f0
+    objection = None
+    if evidence < STRONG_EVIDENCE:
+        objection = f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {evidence:+.1f})"
+    elif not fit.settled:
+        objection = "the fit did not settle"
+    elif not low + 3.0 * f0_std < f0 < high - 3.0 * f0_std:
+        objection = f"what stands out peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
+    elif width < spectrum.resolution_hz:
+        objection = (
+            f"the line at {f0:.0f} Hz is narrower than the spectrum resolves ({width:.2g} Hz wide, resolution "
+            f"{spectrum.resolution_hz:.2g} Hz): a tone, or too short a segment"
+        )
+    elif width > high - low:
+        objection = f"the line at {f0:.0f} Hz is wider than the band ({width:.0f} Hz): a slope, not a resonance"
+    if objection is not None:
+        floor = (scale * float(floor_only.parameters[0]), scale * float(floor_only.parameters[1]))
+        return no_resonance(objection, band_hz, "likelihood", floor, evidence)
+    return Resonance(
+        crf_hz=f0,
+        crfa=scale * level,
+        crf_std=f0_std,
+        crfa_std=scale * level_std,
+        found=True,
+        reason=f"a line {width:.0f} Hz wide stands out of the floor (BIC {evidence:+.0f})",
+        band_hz=band_hz,
+        method="likelihood",
+        damping_ratio=zeta,
+        damping_ratio_std=zeta_std,
+        floor=(scale * float(fit.parameters[3]), scale * float(fit.parameters[4])),
+        evidence=evidence,
+    )
+
+
+INDICATOR_METHODS: dict[str, Callable[[Spectrum, Mask, tuple[float, float]], Resonance]] = {
+    "likelihood": _likeliest_line,
+    "peak": _highest_point,
+}
+
+
+def no_resonance(
+    reason: str,
+    band_hz: tuple[float, float],
+    method: str,
+    floor: tuple[float, float] = (np.nan, np.nan),
+    evidence: float = np.nan,
+) -> Resonance:
+    """A resonance that is not there, or that could not even be looked for, and why."""
+    return Resonance(
+        crf_hz=np.nan,
+        crfa=np.nan,
+        crf_std=np.nan,
+        crfa_std=np.nan,
+        found=False,
+        reason=reason,
+        band_hz=band_hz,
+        method=method,
+        floor=floor,
+        evidence=evidence,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Data:
+    """Ordinates (lines,) and how many independent ones each is worth."""
+
+    density: Field
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """Where the scoring ended: parameters, their standard deviations, -log likelihood (up to a constant), settled."""
+
+    parameters: Field
+    std: Field
+    cost: float
+    settled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Bounds:
+    lower: Field
+    upper: Field
+
+
+def _fit_line(frequency: Field, floors: Field, data: _Data, spectrum: Spectrum, band_hz: tuple[float, float]) -> _Fit:
+    """Line and floor, parameters (ln level, ln f0, ln ζ, floor at the band's low end, at its high end).
+
+    Started from blocks of the spectrum at several widths: the likelihood has a side maximum at every scatter peak.
+    """
+    low, high = band_hz
+    bounds = _Bounds(
+        np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING), 0.0, 0.0]),
+        np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING), np.inf, np.inf]),
+    )
+    size = -(-frequency.size // MOST_BLOCKS)
+    count = frequency.size // size
+    blocks = _Data(data.density[: count * size].reshape(count, size).mean(axis=1), data.weight * size)
+    centres = frequency[: count * size].reshape(count, size).mean(axis=1)
+    block_floors = floors[: count * size].reshape(count, size, 2).mean(axis=1)
+    coarse = [
+        _scoring(_line_model(centres, block_floors, np.ones(1)), start, bounds, blocks)
+        for start in _starts(centres, blocks.density)
+    ]
+    best = min(coarse, key=lambda fit: fit.cost)
+    return _scoring(_line_model(frequency, floors, _leakage(spectrum)), best.parameters, bounds, data)
+
+
+def _starts(frequency: Field, density: Field) -> list[Field]:
+    """One start for each of several widths: the highest place of the spectrum averaged over that width."""
+    from scipy.ndimage import uniform_filter1d
+
+    spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
+    starts = []
+    for zeta in (0.002, 0.007, 0.02, 0.06):
+        width = max(1, round(2.0 * zeta * float(np.mean(frequency)) / spacing))
+        averaged = uniform_filter1d(density, min(width, density.size // 4), mode="nearest")
+        floor = float(np.quantile(averaged, 0.2)) / 2.0
+        highest = int(np.argmax(averaged))
+        level = np.log(max(averaged[highest] - floor, 1e-3))
+        starts.append(np.array([level, np.log(frequency[highest]), np.log(zeta), floor, floor]))
+    return starts
+
+
+def _leakage(spectrum: Spectrum) -> Field:
+    """What the window spreads over the lines around one; sums to 1. Exact for a spectrum smooth between lines."""
+    from scipy.signal import get_window
+
+    power = np.abs(np.fft.fft(get_window(spectrum.window, spectrum.segment))) ** 2
+    half = min(8, (spectrum.segment - 1) // 2)
+    near = np.concatenate([power[-half:], power[: half + 1]]) / power.sum()
+    reach = int(np.flatnonzero(near[half:] > 1e-4)[-1])
+    near = near[half - reach : half + reach + 1]
+    return np.asarray(near / near.sum())
+
+
+def _line_model(frequency: Field, floors: Field, leakage: Field) -> Model:
+    """Expected density and slopes: the line as the window shows it, plus the floor."""
+    reach = leakage.size // 2
+    spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
+    wide = frequency[0] + spacing * np.arange(-reach, frequency.size + reach)
+
+    def model(theta: Field) -> tuple[Field, Field]:
+        level, f0, zeta = np.exp(theta[:3])
+        line, by_f0, by_damping = (
+            level * (np.convolve(part, leakage, "valid") if reach else part)
+            for part in _line_and_slopes(wide, f0, zeta)
+        )
+        return line + floors @ theta[3:], np.column_stack([line, by_f0, by_damping, floors])
+
+    return model
+
+
+def _scoring(model: Model, start: Field, bounds: _Bounds, data: _Data) -> _Fit:
+    """Damped Fisher scoring for exponential ordinates: minimise sum w (ln P + I/P) within bounds.
+
+    The information F = sum w dP dPᵀ/P^2 stands in for the curvature, with Marquardt's damping; a parameter that pushes
+    against its bound rests there. Source: Whittle (1953); Levin, IEEE Trans. Inf. Theory 11 (1965).
+    """
+    theta = np.clip(start, bounds.lower, bounds.upper)
+    expected, slopes = model(theta)
+    cost = _cost(expected, data)
+    damping = 1e-3
+    settled = False
+    for _ in range(200):
+        relative = slopes / expected[:, None]
+        score = data.weight * relative.T @ (data.density / expected - 1.0)
+        information = data.weight * relative.T @ relative
+        free = ~(((theta <= bounds.lower) & (score <= 0.0)) | ((theta >= bounds.upper) & (score >= 0.0)))
+        inner = information[np.ix_(free, free)]
+        diagonal = np.diag(np.diag(inner) + 1e-12 * np.trace(inner))
+        step = np.zeros_like(theta)
+        step[free] = np.linalg.solve(inner + damping * diagonal, score[free])
+        if np.sum(score[free] ** 2 / np.diag(diagonal)) < 1e-8:  # in units of ln likelihood, whatever the damping
+            settled = True
+            break
+        trial = np.clip(theta + step, bounds.lower, bounds.upper)
+        trial_expected, trial_slopes = model(trial)
+        trial_cost = _cost(trial_expected, data)
+        if trial_cost < cost:
+            theta, expected, slopes, cost = trial, trial_expected, trial_slopes, trial_cost
+            damping = max(damping / 5.0, 1e-9)
+        elif damping > 1e8:  # no way down that rounding can see
+            settled = True
+            break
+        else:
+            damping *= 4.0
+    std = np.zeros_like(theta)
+    std[free] = np.sqrt(np.abs(np.diag(np.linalg.pinv(inner, hermitian=True))))
+    return _Fit(theta, std, cost, settled)
+
+
+def _cost(expected: Field, data: _Data) -> float:
+    if not np.all(expected > 0.0):
+        return float("inf")
+    return float(data.weight * np.sum(np.log(expected) + data.density / expected))

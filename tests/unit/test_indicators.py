@@ -1,0 +1,174 @@
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+from asperity.vibration import ContactOscillator
+from asperity.wear import contact_resonance
+from asperity.wear.indicators import _line_and_slopes, line_shape
+
+BAND = (2500.0, 4000.0)
+FREQUENCY = np.arange(0.0, 10_000.0, 1.25)
+
+
+def chance_periodogram(density, seed) -> Spectrum:
+    """An ideal 0.8 s periodogram: independent exponential ordinates about `density`."""
+    drawn = density * np.random.default_rng(seed).exponential(size=density.size)
+    return Spectrum(
+        frequency_hz=FREQUENCY,
+        density=drawn,
+        unit="(m/s^2)^2/Hz",
+        duration_s=0.8,
+        segment=16_000,
+        window="boxcar",
+        resolution_hz=1.25,
+        averages=1.0,
+    )
+
+
+def test_the_line_is_the_oscillators_gain_over_white_base_acceleration():
+    oscillator = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.07)
+    f0 = oscillator.natural_frequency_hz
+    f = np.linspace(100.0, 9000.0, 50)
+    transmissibility = oscillator.gain(f) / f**4 / (oscillator.gain(np.array(f0)) / f0**4)
+    assert line_shape(f, f0, 0.07) == pytest.approx(transmissibility, rel=1e-10)
+
+
+def test_slopes_of_the_line_are_its_derivatives():
+    f = np.linspace(2000.0, 5000.0, 40)
+    _, by_f0, by_damping = _line_and_slopes(f, 3300.0, 0.03)
+    d = 1e-6
+    assert by_f0 == pytest.approx(
+        (line_shape(f, 3300.0 * np.exp(d), 0.03) - line_shape(f, 3300.0 * np.exp(-d), 0.03)) / (2 * d), abs=1e-6
+    )
+    assert by_damping == pytest.approx(
+        (line_shape(f, 3300.0, 0.03 * np.exp(d)) - line_shape(f, 3300.0, 0.03 * np.exp(-d))) / (2 * d), abs=1e-6
+    )
+
+
+def test_without_scatter_the_fit_returns_what_was_put_in():
+    floor = 0.02 + 0.03 * (FREQUENCY - BAND[0]) / (BAND[1] - BAND[0])
+    clean = chance_periodogram(np.ones(FREQUENCY.size), 0)
+    clean = Spectrum(
+        frequency_hz=FREQUENCY,
+        density=0.7 * line_shape(FREQUENCY, 3210.0, 0.025) + floor,
+        unit=clean.unit,
+        duration_s=0.8,
+        segment=16_000,
+        window="boxcar",
+        resolution_hz=1.25,
+        averages=1.0,
+    )
+    found = contact_resonance(clean, band_hz=BAND)
+    assert found.found
+    assert found.crf_hz == pytest.approx(3210.0, rel=1e-6)
+    assert found.crfa == pytest.approx(0.7, rel=1e-4)
+    assert found.damping_ratio == pytest.approx(0.025, rel=1e-4)
+    assert found.floor == pytest.approx((0.02, 0.05), rel=1e-3)
+    inside = np.abs(FREQUENCY - np.mean(BAND)) < np.ptp(BAND) / 2
+    assert found.curve(FREQUENCY[inside]) == pytest.approx(clean.density[inside], rel=1e-4)
+
+
+def test_a_line_blurred_by_a_short_hann_window_is_fitted_unblurred():
+    """The mean of a Welch spectrum is the density convolved with |W|^2: here on a grid 100 times finer."""
+    rate, segment, finer = 20e3, 500, 100
+    frequency = np.fft.fftfreq(segment * finer, 1 / rate)
+    density = 0.7 * line_shape(np.abs(frequency), 3210.0, 0.02)
+    kernel = np.abs(np.fft.fft(np.hanning(segment + 1)[:-1], segment * finer)) ** 2
+    blurred = np.fft.ifft(np.fft.fft(density) * np.fft.fft(kernel / kernel.sum())).real[: segment * finer // 2 : finer]
+    spectrum = Spectrum(
+        frequency_hz=np.arange(blurred.size) * rate / segment,
+        density=blurred,
+        unit="(m/s^2)^2/Hz",
+        duration_s=10.0,
+        segment=segment,
+        window="hann",
+        resolution_hz=1.5 * rate / segment,
+        averages=380.0,
+    )
+    fit = contact_resonance(spectrum, band_hz=BAND)
+    assert fit.crf_hz == pytest.approx(3210.0, rel=3e-4)
+    assert fit.crfa == pytest.approx(0.7, rel=0.002)  # a fit that took the blur for damping would be 1.7 % low
+    assert fit.damping_ratio == pytest.approx(0.02, rel=0.002)
+
+
+@pytest.mark.parametrize("damping_ratio", [0.01, 0.02, 0.05])
+def test_the_fit_scatters_as_it_says_and_about_the_truth(damping_ratio):
+    density = line_shape(FREQUENCY, 3200.0, damping_ratio) + 0.02
+    fits = [contact_resonance(chance_periodogram(density, seed), band_hz=BAND) for seed in range(150)]
+    assert all(fit.found for fit in fits)
+    pulls = {
+        "crf": np.array([(fit.crf_hz - 3200.0) / fit.crf_std for fit in fits]),
+        "crfa": np.array([(np.log(fit.crfa)) / (fit.crfa_std / fit.crfa) for fit in fits]),
+        "damping": np.array(
+            [np.log(fit.damping_ratio / damping_ratio) * fit.damping_ratio / fit.damping_ratio_std for fit in fits]
+        ),
+    }
+    for name, pull in pulls.items():
+        assert np.std(pull) == pytest.approx(1.0, abs=0.2), name
+        assert abs(np.mean(pull)) < 0.35, name
+
+
+def test_the_stated_deviation_is_the_cramer_rao_bound_of_a_lone_line():
+    """sd(f0) = sqrt(zeta f0 / (2 pi T)) for a line without floor in a band much wider than it."""
+    density = line_shape(FREQUENCY, 3200.0, 0.01)
+    stated = [contact_resonance(chance_periodogram(density, s), band_hz=(1500.0, 6500.0)).crf_std for s in range(20)]
+    assert np.median(stated) == pytest.approx(np.sqrt(0.01 * 3200.0 / (2 * np.pi * 0.8)), rel=0.1)
+
+
+@pytest.mark.parametrize(("window", "segment"), [("boxcar", None), ("hann", None), ("hann", 2000)])
+def test_noise_has_no_resonance_and_the_reason_is_given(window, segment):
+    false = 0
+    for seed in range(60):
+        noise = Signal(np.random.default_rng(seed).standard_normal(16_000), 20e3, "m/s^2")
+        seen = contact_resonance(power_spectrum(noise, segment=segment, window=window), band_hz=BAND)
+        false += seen.found
+        assert seen.found or "stands out" in seen.reason
+    assert false == 0
+
+
+def test_what_is_not_found_has_no_figures_but_a_floor_to_draw():
+    seen = contact_resonance(chance_periodogram(np.full(FREQUENCY.size, 3.0), 1), band_hz=BAND)
+    assert not seen.found
+    assert np.isnan([seen.crf_hz, seen.crfa, seen.crf_std, seen.crfa_std]).all()
+    assert seen.curve(np.array([3000.0])) == pytest.approx(3.0, rel=0.1)
+
+
+@pytest.mark.parametrize("f0", [2300.0, 4200.0])
+def test_a_line_outside_the_band_is_not_taken_for_one_inside(f0):
+    density = line_shape(FREQUENCY, f0, 0.03) + 1e-3
+    seen = contact_resonance(chance_periodogram(density, 3), band_hz=BAND)
+    assert not seen.found
+    assert "edge" in seen.reason
+
+
+def test_a_tone_is_not_a_resonance():
+    time = np.arange(16_000) / 20e3
+    values = np.random.default_rng(0).standard_normal(16_000) + 3.0 * np.sin(2 * np.pi * 3000.7 * time)
+    seen = contact_resonance(power_spectrum(Signal(values, 20e3, "m/s^2")), band_hz=BAND)
+    assert not seen.found
+    assert "tone" in seen.reason
+
+
+def test_the_papers_peak_is_the_highest_smoothed_point():
+    spectrum = chance_periodogram(line_shape(FREQUENCY, 3200.0, 0.02) + 0.01, 4)
+    seen = contact_resonance(spectrum, band_hz=BAND, method="peak")
+    smoothed = smooth(spectrum, 3).density
+    inside = np.flatnonzero(np.abs(FREQUENCY - np.mean(BAND)) <= np.ptp(BAND) / 2)
+    at = inside[np.argmax(smoothed[inside])]
+    assert (seen.crf_hz, seen.crfa) == (FREQUENCY[at], smoothed[at])
+    assert np.isnan([seen.crf_std, seen.crfa_std, seen.damping_ratio]).all()
+    assert np.isnan(seen.curve(FREQUENCY)).all()
+
+
+def test_bad_input_is_named():
+    spectrum = chance_periodogram(np.ones(FREQUENCY.size), 0)
+    with pytest.raises(BadInput, match="likelihood, peak"):
+        contact_resonance(spectrum, band_hz=BAND, method="kurtosis")
+    for band in ((0.0, 100.0), (3000.0, 2000.0), (3000.0, 20e3)):
+        with pytest.raises(BadInput, match=r"band must lie between 0 and 9998\.75 Hz"):
+            contact_resonance(spectrum, band_hz=band)
+    with pytest.raises(BadInput, match="holds 9 spectral lines"):
+        contact_resonance(spectrum, band_hz=(3000.0, 3010.0))
+    with pytest.raises(BadInput, match="smoothed 2 times"):
+        contact_resonance(smooth(spectrum, 2), band_hz=BAND)

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+
+
+def white(samples: int, seed: int = 0) -> Signal:
+    return Signal(np.random.default_rng(seed).standard_normal(samples), 1000.0, "m/s^2")
+
+
+def impulse_spectrum(at: int, lines: int = 12) -> Spectrum:
+    density = np.zeros(lines)
+    density[at] = 1.0
+    frequency = np.arange(lines, dtype=float)
+    return Spectrum(
+        frequency_hz=frequency,
+        density=density,
+        unit="m^2/Hz",
+        duration_s=1.0,
+        segment=2 * lines - 2,
+        window="boxcar",
+        resolution_hz=1.0,
+        averages=1.0,
+    )
+
+
+@pytest.mark.parametrize(("segment", "window"), [(None, "boxcar"), (None, "hann"), (256, "hann"), (500, "boxcar")])
+def test_the_spectrum_integrates_to_the_variance(segment, window):
+    signal = white(200_000)
+    spectrum = power_spectrum(signal, segment=segment, window=window)
+    assert np.sum(spectrum.density) * spectrum.spacing_hz == pytest.approx(np.var(signal.values), rel=0.02)
+
+
+def test_a_periodogram_obeys_parseval_to_rounding():
+    signal = white(4096)
+    spectrum = power_spectrum(signal, window="boxcar")
+    assert np.sum(spectrum.density) * spectrum.spacing_hz == pytest.approx(np.var(signal.values), rel=1e-12)
+    assert spectrum.averages == pytest.approx(1.0)
+    assert spectrum.resolution_hz == pytest.approx(1.0 / signal.duration_s)
+
+
+def test_a_sine_on_a_line_shows_its_power_over_the_resolution():
+    time = np.arange(1000) / 1000.0
+    spectrum = power_spectrum(Signal(3.0 * np.sin(2 * np.pi * 100.0 * time), 1000.0, "g"), window="hann")
+    at = int(np.argmax(spectrum.density))
+    assert spectrum.frequency_hz[at] == pytest.approx(100.0)
+    assert spectrum.density[at] * spectrum.resolution_hz == pytest.approx(4.5, rel=1e-9)
+    assert spectrum.resolution_hz == pytest.approx(1.5)  # the Hann window's 1.5 lines
+    assert spectrum.unit == "g^2/Hz"
+
+
+def test_the_unit_is_squared_as_a_whole():
+    assert power_spectrum(white(100)).unit == "(m/s^2)^2/Hz"
+
+
+@pytest.mark.parametrize(("segment", "window"), [(None, "boxcar"), (None, "hann"), (200, "hann"), (200, "boxcar")])
+def test_averages_say_how_much_a_sum_over_lines_scatters(segment, window):
+    """Mean of n lines of unit white noise: variance 1 / (n averages), by 1500 records."""
+    means = []
+    for seed in range(1500):
+        spectrum = power_spectrum(white(2000, seed), segment=segment, window=window)
+        inner = spectrum.density[5:-5] / 2e-3
+        means.append(np.mean(inner))
+    predicted = 1.0 / np.sqrt(inner.size * spectrum.averages)
+    assert np.std(means) == pytest.approx(predicted, rel=0.1)
+
+
+def test_known_averages_of_hann_windows():
+    assert power_spectrum(white(4000), window="hann").averages == pytest.approx(18.0 / 35.0, rel=1e-3)
+    many = power_spectrum(white(400_000), segment=1000, window="hann")
+    assert many.averages == pytest.approx(18.0 / 19.0 * 400, rel=0.01)  # half overlapped: 94.7 % of all there is
+
+
+ROWS = {
+    0: np.array([69, 4, -6, 4, -1]) / 70,
+    1: np.array([2, 27, 12, -8, 2]) / 35,
+    2: np.array([-3, 12, 17, 12, -3]) / 35,
+}
+
+
+@pytest.mark.parametrize("row", [0, 1, 2])
+def test_smoothing_has_the_five_point_cubic_coefficients_to_the_ends(row):
+    for column in range(5):
+        start = smooth(impulse_spectrum(column), 1).density
+        end = smooth(impulse_spectrum(11 - column), 1).density
+        assert start[row] == pytest.approx(ROWS[row][column], abs=1e-12)
+        assert end[11 - row] == pytest.approx(ROWS[row][column], abs=1e-12)
+
+
+def test_three_passes_are_one_after_the_other_and_are_counted():
+    spectrum = power_spectrum(white(2000))
+    thrice = smooth(spectrum, 3)
+    assert np.array_equal(thrice.density, smooth(smooth(smooth(spectrum, 1), 1), 1).density)
+    assert thrice.smoothing_passes == 3
+    assert smooth(spectrum, 1).resolution_hz == pytest.approx(spectrum.resolution_hz * 35 / 17)
+
+
+def test_what_has_no_spectrum_is_refused_by_name():
+    with pytest.raises(BadInput, match="8 to 100 samples"):
+        power_spectrum(white(100), segment=101)
+    with pytest.raises(BadInput, match="'parabola'"):
+        power_spectrum(white(100), window="parabola")
+    with pytest.raises(BadInput, match="1 of 100"):
+        power_spectrum(Signal(np.where(np.arange(100) == 7, np.nan, 1.0), 1.0, "m"))
+    with pytest.raises(BadInput, match="at least 1 pass"):
+        smooth(power_spectrum(white(100)), 0)

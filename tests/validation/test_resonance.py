@@ -1,0 +1,78 @@
+"""The chain roughness -> record -> fit, against the oscillator that made the record."""
+
+import numpy as np
+import pytest
+
+from asperity.conditions import ContactConditions, ElasticPair
+from asperity.coupling import VibrationModel, contact_vibration, cutoff_hz, excitation, oscillator, search_band
+from asperity.ehl.state import ContactState
+from asperity.signals import Signal, power_spectrum
+from asperity.vibration import acceleration
+from asperity.wear import contact_resonance
+
+CONDITIONS = ContactConditions(
+    pair=ElasticPair((207e9, 207e9), (0.3, 0.3)),
+    geometry="line",
+    radius=5.4e-3,
+    load=200.0,
+    surface_speeds=(2.12, 1.70),
+    length=10e-3,
+)
+
+
+def touching(clr: float, car: float, sq: float = 2e-6) -> ContactState:
+    return ContactState(
+        car=car,
+        car_domain=car,
+        clr=clr,
+        sq=sq,
+        h_min=0.0,
+        h_central=0.0,
+        h_mean=0.0,
+        lambda_ratio=None,
+        p_max=1e9,
+        reynolds_residual=0.0,
+        load_error=0.0,
+        mass_flux_imbalance=0.0,
+    )
+
+
+@pytest.mark.parametrize(("clr", "car"), [(1.0, 1.0), (0.9, 0.6), (0.4, 0.3), (0.15, 0.06)])
+def test_fitted_crf_of_a_record_is_the_oscillators_within_three_deviations(clr, car):
+    for seed in (1, 2, 3):
+        model = VibrationModel(mass=0.1, damping_ratio=0.02, seed=seed)
+        seen = contact_vibration(touching(clr, car), CONDITIONS, model)
+        assert seen.resonance.found
+        f0 = seen.oscillator.natural_frequency_hz
+        assert abs(seen.resonance.crf_hz - f0) < 3.0 * seen.resonance.crf_std
+        crfa = np.interp(f0, seen.expected.frequency_hz, seen.expected.density)
+        assert abs(seen.resonance.crfa - crfa) < 3.0 * seen.resonance.crfa_std
+
+
+@pytest.mark.parametrize(("window", "segment"), [("boxcar", None), ("hann", 4000)])
+def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(window, segment):
+    """Item 6 of issue 2: 200 records of 0.8 s, the pieces of one long one, fitted in the contact model's band."""
+    records, samples, rate = 200, 40_000, 50e3
+    state = touching(0.5, 0.4)
+    model = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=rate, duration_s=records * samples / rate)
+    spring = oscillator(state, CONDITIONS, model)
+    pieces = acceleration(spring, excitation(state, model)).values.reshape(records, samples)
+    band = search_band(CONDITIONS, model)
+    fits = [
+        contact_resonance(power_spectrum(Signal(piece, rate, "m/s^2"), segment=segment, window=window), band_hz=band)
+        for piece in pieces
+    ]
+    assert all(fit.found for fit in fits)
+
+    f0 = spring.natural_frequency_hz
+    errors = np.array([fit.crf_hz - f0 for fit in fits])
+    stated = np.sqrt(np.mean([fit.crf_std**2 for fit in fits]))
+    assert np.std(errors) == pytest.approx(stated, rel=0.2)
+    assert abs(np.mean(errors)) < 0.35 * stated
+
+    # CRFA in the continuum, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4 zeta^2)/(4 zeta^2)
+    fc, zeta = cutoff_hz(state, model), 0.02
+    truth = 4e-12 * 2 * np.sqrt(2) / (np.pi * fc) * (2 * np.pi * fc) ** 4 * (1 + 4 * zeta**2) / (4 * zeta**2)
+    relative = np.array([fit.crfa / truth for fit in fits])
+    assert np.std(relative) == pytest.approx(np.median([fit.crfa_std / fit.crfa for fit in fits]), rel=0.2)
+    assert np.mean(relative) == pytest.approx(np.sinc(f0 / rate) ** 4, abs=0.04)
