@@ -199,6 +199,7 @@ def test_conditions_are_those_of_the_paper(single):
     assert rows["Hertz (smooth, dry)"] == "half-width a = 55.93 µm, largest pressure 0.5691 GPa"  # physics of the paper
     assert rows["Reduced modulus"] == "E* = 109.89 GPa (E′ = 2 E* = 219.78 GPa)"
     assert rows["Viscosity law"] == "barus, η₀ = 0.096 Pa s, α = 18.2 1/GPa"
+    assert rows["Roughness"].endswith("kind gaussian, sq 1.25 um, correlation length 40 um and 40 um, seed 7")
     assert rows["Domain"] == "x from −4.50 a to 1.90 a, y from −1.60 a to 1.60 a, repeating in y"
 
 
@@ -245,7 +246,7 @@ def test_several_runs_are_drawn_against_roughness(single, several):
         assert drawn(single, title) == 0
         assert drawn(several, title) == 1
     assert drawn(several, "Film thickness") == 3
-    assert "20.0 % to 69.4 %" in several.text  # oil-flow imbalance over the runs
+    assert "20.0 % to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
 
 
 def test_page_can_be_read_without_seeing_it(several):
@@ -259,7 +260,7 @@ def test_page_can_be_read_without_seeing_it(several):
 
 
 def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
-    assert "Filled 0.2 % missing cells" in single.text
+    assert "Filled 0.2\N{NO-BREAK SPACE}% missing cells" in single.text
     for limit in (
         "Oil is not conserved",
         "A snapshot",
@@ -326,6 +327,30 @@ def test_report_needs_a_run_and_a_folder(tmp_path):
 )
 def test_value_and_deviation_end_at_the_same_digit(value, deviation, shown):
     assert page.with_deviation(value, deviation) == shown
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ("residual 6.2e-03; tolerance 1e-04", "residual 6.2×10⁻³; tolerance 1×10⁻⁴"),
+        ("54.2 % of it at 3461.2 ± 2.3 Hz", "54.2~% of it at 3461.2~±~2.3~Hz"),
+        ("3 nm, not 3 nmol", "3~nm, not 3 nmol"),
+    ],
+)
+def test_prose_is_set_as_in_print(written, shown):
+    assert page.in_print(written) == shown.replace("~", "\N{NO-BREAK SPACE}")
+
+
+def test_load_on_capped_oil_is_not_hidden():
+    case = load_case(CASE)
+    solution = solution_like(case)
+    pressure = np.zeros(solution.grid.cells)
+    pressure[10, :3] = 2e9  # three cells at the hardness, one of them touching ...
+    pressure[11, :2] = 1e9  # ... and as much again as one of them below it
+    touching = np.zeros(solution.grid.cells, dtype=bool)
+    touching[10, 0] = True
+    run = replace(run_like(), solution=replace(solution, pressure=pressure, in_contact=touching))
+    assert "without touching carry 50.0\N{NO-BREAK SPACE}% of the load" in page.render_page([run])
 
 
 # Figures -------------------------------------------------------------------------------------------------------------

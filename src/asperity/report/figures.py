@@ -272,18 +272,20 @@ def convergence_history(convergence: Convergence) -> Figure:
         ("load error", [step.load_error for step in history], "--s", VERMILION),
         ("change", [step.change for step in history], ":^", GREEN),
     )
+    sparse = max(len(history) // 60, 1)
     for label, values, stroke, colour in rows:
         shown = np.where(np.asarray(values) > 0.0, values, np.nan)  # a logarithmic axis has no place for exact zeros
-        axes.semilogy(steps, shown, stroke, color=colour, markersize=3, linewidth=1.0, label=label)
+        axes.semilogy(steps, shown, stroke, color=colour, markersize=3, markevery=sparse, linewidth=1.0, label=label)
     axes.axhline(convergence.tolerance, color="black", linewidth=0.8, linestyle=(0, (6, 2)), label="tolerance")
 
     starts = [i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells]
+    crowded = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
     for start in starts:
         nx, ny = history[start].cells
         axes.axvline(start + 0.5, color=GREY, linewidth=0.6)
         axes.annotate(
             f"{nx} × {ny}", (start + 0.5, 0.0), (3, 3), xycoords=("data", "axes fraction"), textcoords="offset points",
-            fontsize=8, color="#374151", rotation=90 if len(starts) > 4 else 0,
+            fontsize=8, color="#374151", rotation=90 if crowded else 0,
         )  # fmt: skip
     outcome = "converged" if convergence.converged else f"NOT CONVERGED ({convergence.status})"
     axes.set(xlabel="Newton step", ylabel="relative size [-]", title=f"Convergence: {outcome}")
@@ -356,7 +358,9 @@ def _draw_against_roughness(
         [sq[i] for i in doubtful], [values[i] for i in doubtful], stroke[-1], color=colour, markerfacecolor="white",
         markersize=6,
     )  # fmt: skip
-    axes.set_xlabel("composite roughness Sq [µm]")
+    every = [point["sq_m"] * MICRO for point in points]
+    margin = 0.06 * (max(every) - min(every)) or 0.5
+    axes.set(xlabel="composite roughness Sq [µm]", xlim=(min(every) - margin, max(every) + margin))
 
 
 @_styled()

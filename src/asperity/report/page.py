@@ -5,6 +5,7 @@ The page is self-contained and loads nothing. Numbers are those of `Run.scalars`
 """
 
 import re
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.metadata import version
@@ -98,8 +99,8 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def power_of_ten(value: float, digits: int = 1) -> str:
     """1.3e-05 as 1.3×10⁻⁵."""
-    mantissa, exponent = f"{value:.{digits}e}".split("e")
-    return "0" if value == 0.0 else f"{mantissa}×10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+    mantissa, exponent = _signed(value, f".{digits}e").split("e")
+    return "0" if value == 0.0 else f"{mantissa}×10{str(int(exponent.replace('−', '-'))).translate(SUPERSCRIPTS)}"
 
 
 def with_deviation(value: float, deviation: float | None) -> tuple[str, str]:
@@ -115,6 +116,14 @@ def with_deviation(value: float, deviation: float | None) -> tuple[str, str]:
     spread = deviation / 10.0**exponent
     decimals = max(0, 1 - floor(log10(spread)))
     return f"{scaled:.{decimals}f}{power}", f"± {spread:.{decimals}f}{power}"
+
+
+def in_print(text: str) -> str:
+    """Prose with 1.3e-05 as 1.3×10⁻⁵, and numbers that stay on one line with their unit."""
+    text = re.sub(
+        r"\b\d(\.\d+)?e[+-]\d+", lambda number: power_of_ten(float(number[0]), len(number[1] or ".") - 1), text
+    )
+    return re.sub(r"(?<=\d) (?=[%±]|Hz|GPa|[µn]m\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
 
 
 def _percent(share: float) -> str:
@@ -168,7 +177,7 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity("clr", "Load share of asperities, CLR", "%", "asperity load over the whole load", 100.0, ".1f"),
+    Quantity("clr", "Load share of asperities, CLR", "%", "load on contact cells over the whole load", 100.0, ".1f"),
     Quantity(
         "car", "Contact area share in the Hertz zone, CAR", "%", "contact cells in |x| ≤ a over all there", 100.0, ".1f"
     ),
@@ -176,10 +185,10 @@ QUANTITIES = (
         "car_domain", "Contact area of the whole domain", "%", "over the Hertz area; counts |x| > a too", 100.0, ".1f"
     ),
     Quantity("sq_m", "Composite roughness, Sq", "µm", "root-mean-square height before deformation", 1e6),
-    Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap in the Hertz zone", 1e6),
+    Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap anywhere", 1e6),
     Quantity("h_central_m", "Central film", "µm", "mean gap in |x| ≤ a/10", 1e6),
-    Quantity("h_mean_m", "Mean film", "µm", "mean gap in the Hertz zone", 1e6),
-    Quantity("lambda_ratio", "Film ratio, Λ", "", "film of the smooth contact over Sq", 1.0, ".2f"),
+    Quantity("h_mean_m", "Mean film", "µm", "mean gap in |x| ≤ a", 1e6),
+    Quantity("lambda_ratio", "Film ratio, Λ", "", "mean film over Sq", 1.0, ".2f"),
     Quantity("p_max_pa", "Largest pressure", "GPa", "oil and asperities together", 1e-9),
     Quantity("crf_hz", "Contact resonance frequency, CRF", "Hz", "of one simulated record", deviation="crf_std_hz"),
     Quantity(
@@ -187,10 +196,17 @@ QUANTITIES = (
     ),
     Quantity("converged", "Converged", "", "residual, load error and change all below the tolerance"),
     Quantity("iterations", "Newton steps", "", "on all grid levels together", 1.0, ".0f"),
-    Quantity("reynolds_residual", "Reynolds residual", "", "how well the flow equation is met", 1.0, power_of_ten),
+    Quantity(
+        "reynolds_residual", "Reynolds residual", "", "root mean square, as a share of Hertz's p max", 1.0, power_of_ten
+    ),
     Quantity("load_error", "Load error", "", "carried against applied load", 1.0, power_of_ten),
     Quantity(
-        "mass_flux_imbalance", "Oil-flow imbalance", "%", "oil lost or re-created over oil that enters", 100.0, ".1f"
+        "mass_flux_imbalance",
+        "Oil-flow imbalance",
+        "%",
+        "oil lost or re-created over oil carried through",
+        100.0,
+        ".1f",
     ),
     Quantity("seconds", "Time to solve", "s", "wall clock", 1.0, ".2f"),
 )
@@ -229,7 +245,7 @@ def _picture(figure: Figure, caption: str, alt: str) -> _Picture:
     text = re.sub(r"^.*?(?=<svg)", "", figures.svg(figure), flags=re.DOTALL)  # an image needs no XML prologue
     width, height = figure.get_size_inches() * 96.0
     uri = "data:image/svg+xml," + quote(re.sub(r"\s*\n\s*", " ", text), safe=" ='/:;,.()+-*!@?&$[]{}|~^`")
-    return _Picture(uri, round(float(width)), round(float(height)), alt, caption)
+    return _Picture(uri, round(float(width)), round(float(height)), in_print(alt), in_print(caption))
 
 
 class _RunView:
@@ -239,12 +255,12 @@ class _RunView:
         scalars = run.scalars()
         self.label = label
         self.anchor = anchor
-        self.verdict = run.verdict()
+        self.verdict = in_print(run.verdict())
         self.converged = bool(scalars["converged"])
-        self.ending = run.solution.convergence.explain().capitalize()
+        self.ending = in_print(run.solution.convergence.explain()).capitalize()
         self.tiles = [_tile(quantity, scalars) for quantity in QUANTITIES if quantity.key in TILES]
         self.pictures = _run_pictures(run, scalars)
-        self.notes = [note[:1].upper() + note[1:] for note in (*run.notes, *_silence(run))]
+        self.notes = [in_print(note[:1].upper() + note[1:]) for note in (*run.notes, *_silence(run))]
         self.case_text = run.case.text
 
 
@@ -279,7 +295,7 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
         ),
         _picture(
             figures.pressure_map(solution),
-            "Pressure, carried by oil and asperities together.",
+            "Pressure of oil and asperities together." + _capped_oil(solution),
             f"Map of the pressure: at most {scalars['p_max_pa'] * 1e-9:.3f} GPa; Hertz's would be "
             f"{solution.conditions.hertz.p_max * 1e-9:.3f} GPa.",
         ),
@@ -305,6 +321,17 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
             f"Residual, load error and change against the Newton step: {solution.convergence.explain()}.",
         ),
     ]
+
+
+def _capped_oil(solution: ContactSolution) -> str:
+    """What CLR leaves out: load on oil films that stand at the pressure cap."""
+    if solution.p_cap is None or solution.lubricant is None:
+        return ""
+    capped = (solution.pressure >= 0.999 * solution.p_cap) & ~solution.in_contact
+    share = solution.pressure[capped].sum() / solution.pressure.sum()
+    return (
+        f" Cells that stand at the hardness without touching carry {_percent(share)} of the load; CLR leaves them out."
+    )
 
 
 def _spectrum_picture(run: "Run") -> list[_Picture]:
@@ -450,12 +477,19 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     }
 
 
+def _roughness(case_text: str) -> str:
+    """The case's [surface] in one line: which surface it was belongs beside every CAR."""
+    surface = tomllib.loads(case_text)["surface"]
+    texts = {key: " and ".join(map(str, value)) if isinstance(value, list) else value for key, value in surface.items()}
+    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in texts.items())
+
+
 def _conditions(run: "Run") -> dict[str, str]:
     solution = run.solution
     return {
         **_contact_rows(solution.conditions),
         **_lubricant_rows(solution.lubricant),
-        "Roughness": f"Sq {solution.surface.sq * 1e6:.4g} µm",
+        "Roughness": f"Sq {solution.surface.sq * 1e6:.4g} µm; case: {_roughness(run.case.text)}",
         **_numerical_rows(solution),
         **_vibration_rows(run.case.vibration),
     }
