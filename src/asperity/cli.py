@@ -105,8 +105,11 @@ def demo(
     less, more = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
     verdict = (
         f"From Sq {DEMO_SQ[0]} to {DEMO_SQ[-1]} the asperities' share of the load goes from {less} to {more}: "
-        f"{first.resonance_in_words()}, then {last.resonance_in_words().removeprefix('contact resonance ')}."
+        f"{first.resonance_in_words()} at first, {last.resonance_in_words()} at last."
     )
+    unfinished = [sq for sq, run in zip(DEMO_SQ, runs, strict=True) if not run.solution.convergence.converged]
+    if unfinished:
+        verdict = f"NOT CONVERGED at Sq {', '.join(unfinished)}, do not use: {verdict}"
     if as_json:
         _print_json({"verdict": verdict, "report": str(report_file), "runs": [run.scalars() for run in runs]})
     else:
@@ -118,8 +121,8 @@ def demo(
             print()
             print(f"Report: {report_file}")
             print(f"Try next: asperity solve {case_file} --set contact.load='400 N'")
-    if not all(run.solution.convergence.converged for run in runs):
-        raise typer.Exit(1)
+    if unfinished:
+        raise AsperityError(f"not converged at Sq {', '.join(unfinished)}; the unfinished states are in {out}")
 
 
 @app.command()
@@ -271,7 +274,7 @@ def _progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], Non
     announcement = threading.Timer(
         SILENT_FOR,
         console.print,
-        [f"{label}: compiling the solver for this machine; once after installation, up to a minute ..."],
+        [f"{label}: no step yet; the first solve after installation compiles the solver, up to a minute ..."],
         {"soft_wrap": True, "highlight": False},
     )
     announcement.daemon = True
@@ -318,7 +321,7 @@ def _print_run(run: "Run") -> None:
             "film: least, central, mean",
             f"{1e6 * state.h_min:.3f}, {1e6 * state.h_central:.3f}, {1e6 * state.h_mean:.3f} um",
         ),
-        ("lambda, smooth film over Sq", lambda_ratio),
+        ("lambda, film over Sq", lambda_ratio),
         ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),
     ]
     resonance = None if run.vibration is None else run.vibration.resonance
