@@ -359,7 +359,7 @@ def _draw_against_roughness(
         markersize=6,
     )  # fmt: skip
     every = [point["sq_m"] * MICRO for point in points]
-    margin = 0.06 * (max(every) - min(every)) or 0.5
+    margin = max(0.06 * (max(every) - min(every)), 0.1 * max(every)) or 0.5
     axes.set(xlabel="composite roughness Sq [µm]", xlim=(min(every) - margin, max(every) + margin))
 
 
@@ -371,7 +371,7 @@ def shares_against_roughness(points: Sequence[Mapping[str, Any]]) -> Figure:
     _draw_against_roughness(axes, points, "clr", "CLR: share of the load", 100.0, "-o", VERMILION)
     _draw_against_roughness(axes, points, "car", "CAR: share of the Hertz zone", 100.0, "--s", BLUE)
     axes.set(ylabel="taken by asperities [%]", title="Load and area share of asperities", ylim=(0.0, 100.0))
-    axes.legend(loc="best")
+    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
@@ -392,7 +392,7 @@ def resonance_against_roughness(points: Sequence[Mapping[str, Any]], full_load_c
             full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label="asperities carry all the load"
         )
     axes.set(ylabel="contact resonance [Hz]", title="Contact resonance frequency")
-    axes.legend(loc="lower right")
+    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
