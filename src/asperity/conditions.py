@@ -67,7 +67,8 @@ class ContactConditions:
         if self.geometry not in get_args(Geometry):
             raise BadInput(f"geometry must be one of {', '.join(get_args(Geometry))}, got {self.geometry!r}")
         if (self.geometry == "elliptic") != isinstance(self.radius, tuple):
-            raise BadInput(f"radius of a {self.geometry} contact is {'a pair (Rx, Ry)' if self.geometry == 'elliptic' else 'one number'}, got {self.radius!r}")
+            wanted = "a pair (Rx, Ry)" if self.geometry == "elliptic" else "one number"
+            raise BadInput(f"radius of a {self.geometry} contact is {wanted}, got {self.radius!r}")
         for radius in self.radius if isinstance(self.radius, tuple) else (self.radius,):
             require_positive("radius", radius, "m")
         require_positive("load", self.load, "N")
@@ -76,7 +77,9 @@ class ContactConditions:
                 raise BadInput("a line contact needs its length; give length in metres")
             require_positive("length", self.length, "m")
         elif self.length is not None:
-            raise BadInput(f"length belongs to a line contact only, got {self.length:g} m for a {self.geometry} contact; leave it out")
+            raise BadInput(
+                f"length belongs to a line contact, got {self.length:g} m for a {self.geometry} contact; leave it out"
+            )
         if self.hardness is not None:
             require_positive("hardness", self.hardness, "Pa")
         require_positive("entrainment speed", self.entrainment_speed, "m/s")

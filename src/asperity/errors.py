@@ -26,5 +26,7 @@ class NotConverged(AsperityError):
 def require_positive(name: str, value: float, unit: str = "") -> float:
     """Return `value`, or say which quantity has to be positive and finite."""
     if not 0.0 < value < float("inf"):
-        raise BadInput(f"{name} must be positive and finite, got {value:g} {unit}".rstrip() + "; correct its sign or value")
+        raise BadInput(
+            f"{name} must be positive and finite, got {value:g} {unit}".rstrip() + "; correct its sign or value"
+        )
     return value

@@ -37,9 +37,13 @@ class Grid:
     def __post_init__(self) -> None:
         for axis, count, low, high in zip("xy", self.cells, self.lower, self.upper, strict=True):
             if count < FEWEST_CELLS:
-                raise BadInput(f"grid must have at least {FEWEST_CELLS} cells along {axis}, got {count}; use 64 or more")
+                raise BadInput(
+                    f"grid must have at least {FEWEST_CELLS} cells along {axis}, got {count}; use 64 or more"
+                )
             if not low < high:
-                raise BadInput(f"grid must have an upper {axis} beyond its lower one, got {low:g} m to {high:g} m; swap them")
+                raise BadInput(
+                    f"grid must have an upper {axis} beyond its lower one, got {low:g} m to {high:g} m; swap them"
+                )
 
     @property
     def spacing(self) -> tuple[float, float]:

@@ -32,7 +32,9 @@ def line_contact(load: float, length: float, radius: float, reduced_modulus: flo
     line_load = load / length
     a = np.sqrt(4.0 * line_load * radius / (np.pi * reduced_modulus))
     p_max = 2.0 * line_load / (np.pi * a)
-    return HertzContact((float(a), length / 2.0), float(p_max), float(np.pi / 4.0 * p_max), float(2.0 * a * length), None)
+    return HertzContact(
+        (float(a), length / 2.0), float(p_max), float(np.pi / 4.0 * p_max), float(2.0 * a * length), None
+    )
 
 
 def point_contact(load: float, radius: float, reduced_modulus: float) -> HertzContact:
@@ -61,10 +63,8 @@ def elliptic_contact(load: float, radii: tuple[float, float], reduced_modulus: f
 
     k = float(np.exp(brentq(curvature_ratio, np.log(1e-6), np.log(1.0 - 1e-9), xtol=1e-15, rtol=1e-14)))
     m = 1.0 - k**2
-    # pressure p0 over semi-axes (long = c, short = k c): 1/R_small = 2 p0 b / (E* m c^2) (E/k^2 - K), p0 = 3F/(2 pi k c^2)
-    long_axis = float(
-        np.cbrt(3.0 * load * r_small * (ellipe(m) / k**2 - ellipk(m)) / (np.pi * reduced_modulus * m))
-    )
+    # 1/R_small = 2 p0 k c (E/k^2 - K)/(E* m c^2) for the long semi-axis c, with p0 = 3F/(2 pi k c^2)
+    long_axis = float(np.cbrt(3.0 * load * r_small * (ellipe(m) / k**2 - ellipk(m)) / (np.pi * reduced_modulus * m)))
     short_axis = k * long_axis
     p_max = 1.5 * load / (np.pi * long_axis * short_axis)
     approach = p_max * short_axis * ellipk(m) / reduced_modulus
@@ -85,11 +85,11 @@ def point_stiffness(load: float, radius: float, reduced_modulus: float) -> float
 
 def line_pressure(x: Field, half_width: float, p_max: float) -> Field:
     """Pressure of a line contact at x [Pa]: p_h sqrt(1 - (x/a)^2) inside |x| < a, zero outside."""
-    return p_max * np.sqrt(np.maximum(1.0 - (x / half_width) ** 2, 0.0))
+    return np.asarray(p_max * np.sqrt(np.maximum(1.0 - (x / half_width) ** 2, 0.0)))
 
 
 def line_gap(x: Field, half_width: float, radius: float) -> Field:
-    """Gap of a dry line contact at x [m], zero inside: a^2/(2R) (X sqrt(X^2 - 1) - ln(X + sqrt(X^2 - 1))), X = |x|/a."""
+    """Gap of a dry line contact at x [m], zero inside: a²/(2R) (X √(X²−1) − ln(X + √(X²−1))), X = |x|/a."""
     outside = np.maximum(np.abs(x) / half_width, 1.0)
     root = np.sqrt(outside**2 - 1.0)
-    return half_width**2 / (2.0 * radius) * (outside * root - np.log(outside + root))
+    return np.asarray(half_width**2 / (2.0 * radius) * (outside * root - np.log(outside + root)))

@@ -1,0 +1,1 @@
+"""Mixed elastohydrodynamic lubrication: dimensionless inside, SI at its border."""

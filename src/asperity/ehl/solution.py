@@ -95,7 +95,7 @@ class ContactSolution:
     """A solved contact.
 
     `pressure` [Pa], `gap` [m] between the deformed surfaces and `in_contact` have shape (nx, ny) on `grid`;
-    `rigid_approach` [m] is the approach of the bodies at the contact centre, h0 in h = h0 + x^2/(2R) + deflection - roughness.
+    `rigid_approach` [m] is h0 in h = h0 + x^2/(2R) + deflection - roughness.
     What was solved travels along: conditions, lubricant (None when dry), surface and options.
     """
 

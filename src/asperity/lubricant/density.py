@@ -5,8 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from asperity.errors import require_positive
 from asperity.arrays import Field
+from asperity.errors import require_positive
 
 
 class DensityLaw(Protocol):

@@ -5,8 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from asperity.errors import require_positive
 from asperity.arrays import Field
+from asperity.errors import require_positive
 
 
 class ViscosityLaw(Protocol):
@@ -39,7 +39,7 @@ class Barus:
 
     def __call__(self, pressure: Field) -> Field:
         """η(p) [Pa s]."""
-        return self.eta0 * np.exp(self.alpha * pressure)
+        return np.asarray(self.eta0 * np.exp(self.alpha * pressure))
 
     def log_slope(self, pressure: Field) -> Field:
         """d(ln η)/dp = α [1/Pa]."""
@@ -68,12 +68,12 @@ class Roelands:
 
     @property
     def exponent(self) -> float:
-        """z."""
+        """The exponent z."""
         return self.alpha * self.p0 / self._scale
 
     def __call__(self, pressure: Field) -> Field:
         """η(p) [Pa s]."""
-        return self.eta0 * np.exp(self._scale * ((1.0 + pressure / self.p0) ** self.exponent - 1.0))
+        return np.asarray(self.eta0 * np.exp(self._scale * ((1.0 + pressure / self.p0) ** self.exponent - 1.0)))
 
     def log_slope(self, pressure: Field) -> Field:
         """d(ln η)/dp [1/Pa]."""

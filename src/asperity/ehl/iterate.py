@@ -1,0 +1,85 @@
+"""Newton's method on a mixed-EHL problem: better and better pressures, for as long as anybody asks.
+
+Semismooth (each cell is linearised by the equation that decides it), inexact (GMRES to a tenth), and limited cell by
+cell: a cell that turns back takes shorter steps, so that a few undecided ones cannot keep all others waiting.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.ehl.krylov import gmres
+from asperity.ehl.problem import Balance, Preconditioner, Problem
+
+LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step
+FORCING = 0.1
+MOST_KRYLOV_STEPS = 60
+COARSE_CELLS = 128  # across the grid that the preconditioner factors
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One Newton step: the balance it started from, and the mean relative change of pressure it asks for."""
+
+    number: int
+    balance: Balance
+    approach: float
+    change: float
+
+
+def newton(problem: Problem, pressure: Field, approach: float) -> Iterator[Step]:
+    """Yield each Newton step's starting point and the change it asks for, then take the step."""
+    longest: Field = np.full(problem.cells, LONGEST_STEP)
+    before = np.zeros(problem.cells)
+    for number in count(1):
+        balance = problem.evaluate(pressure, approach)
+        d_pressure, d_approach = newton_step(balance)
+        yield Step(number, balance, approach, float(np.mean(np.abs(d_pressure)) / np.mean(pressure)))
+        turned_back = (d_pressure * before < 0.0) & (np.abs(d_pressure) > longest)
+        longest = np.where(turned_back, 0.5 * longest, np.minimum(1.5 * longest, LONGEST_STEP))
+        before = d_pressure
+        pressure = np.clip(pressure + np.clip(d_pressure, -longest, longest), 0.0, problem.p_cap)
+        approach += d_approach
+
+
+def newton_step(balance: Balance) -> tuple[Field, float]:
+    """Change of pressure and approach that meets every linearised equation and the load, to a tenth."""
+    problem = balance.problem
+    cells = problem.cells
+    unknown = balance.unknown
+    known_change = np.where(unknown, 0.0, -balance.residual)
+    block = max(1, -(-max(cells) // COARSE_CELLS), 2 if min(cells) >= 32 else 1)
+    inverse = Preconditioner(balance, block)
+
+    # unknowns: the pressure changes and, last, the approach; last equation: they make up the missing load
+    weight = 1.0 / np.sqrt(unknown.size)
+    missing = -balance.load_error * problem.load / (problem.spacing[0] * problem.spacing[1]) - known_change.sum()
+    response = np.where(unknown, balance.product(np.zeros(cells), 1.0), 0.0)
+    answer = inverse(response)
+    total = float(answer.sum())
+    if total == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
+        return known_change, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
+
+    def product(vector: Field) -> Field:
+        d_pressure = vector[:-1].reshape(cells)
+        rows = balance.product(d_pressure, float(vector[-1]))
+        rows[~unknown] = 0.0
+        return np.append(rows.ravel(), weight * d_pressure.sum())
+
+    def precondition(vector: Field) -> Field:
+        d_pressure = inverse(vector[:-1].reshape(cells))
+        d_approach = (d_pressure.sum() - vector[-1] / weight) / total
+        return np.append((d_pressure - d_approach * answer).ravel(), d_approach)
+
+    wanted = np.where(unknown, -balance.residual - balance.product(known_change, 0.0), 0.0)
+    solved = gmres(
+        product,
+        precondition,
+        np.append(wanted.ravel(), weight * missing),
+        tolerance=FORCING,
+        most_steps=MOST_KRYLOV_STEPS,
+    )
+    return known_change + solved[:-1].reshape(cells), float(solved[-1])

@@ -1,0 +1,229 @@
+"""The mixed-EHL problem on one grid, dimensionless: what each cell asks for, and its semismooth linearisation.
+
+Every cell obeys one of four equations, each written so that it grows with the cell's own pressure P:
+ruptured P, touching (H - H_c)/k, lubricated R/J, capped P - P_cap; phi = max(min(P, (H - H_c)/k, R/J), P - P_cap) = 0.
+R is the cell's net oil outflow, J its derivative, k the compliance of near cells, H_c the gap that counts as contact.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.arrays import Field, Mask
+from asperity.ehl.deflection import Deflection, line_deflection
+from asperity.kernels import relax, reynolds
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
+from asperity.lubricant import Lubricant
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """A contact on one grid, in the solver's units.
+
+    `undeformed` is X^2/2 minus roughness, shape (nx, ny); `load` the wanted sum of P dX dY; `p_cap` and `contact_gap`
+    bound P above and H below; `speed` is the speed number, `p_scale` [Pa] turns P into pascals for the oil's laws.
+    """
+
+    undeformed: Field
+    lower: float
+    spacing: tuple[float, float]
+    load: float
+    p_cap: float
+    contact_gap: float
+    speed: float
+    p_scale: float
+    lubricant: Lubricant | None
+
+    @property
+    def cells(self) -> tuple[int, int]:
+        """(nx, ny)."""
+        nx, ny = self.undeformed.shape
+        return nx, ny
+
+    @property
+    def x(self) -> Field:
+        """Cell centres in Hertz half-widths, shape (nx,)."""
+        return self.lower + (np.arange(self.cells[0]) + 0.5) * self.spacing[0]
+
+    @property
+    def deflection(self) -> Deflection:
+        """The elastic half-space on this grid."""
+        return line_deflection(self.cells, self.spacing)
+
+    def coarsened(self) -> "Problem":
+        """The same contact on a grid of half as many cells each way; heights are averaged over each cell."""
+        nx, ny = self.cells
+        x = self.x**2 / 2.0
+        rough = (self.undeformed - x[:, None]).reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3))
+        dx, dy = 2.0 * self.spacing[0], 2.0 * self.spacing[1]
+        coarse_x = self.lower + (np.arange(nx // 2) + 0.5) * dx
+        return Problem(
+            undeformed=rough + (coarse_x**2 / 2.0)[:, None],
+            lower=self.lower,
+            spacing=(dx, dy),
+            load=self.load,
+            p_cap=self.p_cap,
+            contact_gap=self.contact_gap,
+            speed=self.speed,
+            p_scale=self.p_scale,
+            lubricant=self.lubricant,
+        )
+
+    def evaluate(self, pressure: Field, approach: float) -> "Balance":
+        """What is left of every equation at a pressure and a rigid approach H0."""
+        gap = self.undeformed + self.deflection(pressure)
+        gap += approach
+        contact_scale = 1.0 / (self.deflection.near[0] - self.deflection.near[3])
+        touching = (gap - self.contact_gap) * contact_scale
+        if self.lubricant is None:
+            film, outflow, fluid_scale = None, np.zeros_like(pressure), np.ones_like(pressure)
+            residual, state = touching.copy(), np.full(pressure.shape, TOUCHING, dtype=np.int8)
+        else:
+            film, outflow, fluid_scale = self._flow(pressure, gap, self.lubricant)
+            fluid = outflow * fluid_scale
+            wet = (fluid < touching) & (touching > 0.0)  # overlapping bodies touch, whatever the oil says
+            residual = np.minimum(fluid, touching)
+            state = np.where(wet, np.int8(LUBRICATED), np.int8(TOUCHING))
+        ruptured = pressure < residual
+        residual[ruptured] = pressure[ruptured]
+        state[ruptured] = RUPTURED
+        capped = pressure - self.p_cap > residual
+        residual[capped] = pressure[capped] - self.p_cap
+        state[capped] = CAPPED
+        return Balance(self, pressure, gap, residual, Rows(state, fluid_scale, contact_scale), film, outflow)
+
+    def _flow(self, pressure: Field, gap: Field, oil: Lubricant) -> tuple[Film, Field, Field]:
+        pascals = pressure * self.p_scale
+        height = np.maximum(gap, self.contact_gap)
+        open_gap = (gap > self.contact_gap).astype(float)  # overlapping bodies do not change the film
+        density = oil.density(pascals) / oil.density.rho0
+        density_slope = oil.density.slope(pascals) * (self.p_scale / oil.density.rho0)
+        content = density * height
+        mobility = content * height**2 * (oil.viscosity.eta0 / (self.speed * oil.viscosity(pascals)))
+        film = Film(
+            content,
+            density * open_gap,
+            density_slope * height,
+            mobility,
+            3.0 * mobility / height * open_gap,
+            mobility * (density_slope / density - oil.viscosity.log_slope(pascals) * self.p_scale),
+        )
+        dx, dy = self.spacing
+        ahead = gap[0] + ((self.x[0] - dx) ** 2 - self.x[0] ** 2) / 2.0  # the gap one cell before the inlet
+        outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
+        entering = 0.5 * (
+            np.maximum(ahead, self.contact_gap) + height[0]
+        )  # unit density: the inlet is at ambient pressure
+        reynolds.net_outflow(pressure, content, mobility, entering, dx, dy, outflow)
+        reynolds.fluid_diagonal(film, self.deflection.near, dx, dy, diagonal)
+        return film, outflow, 1.0 / diagonal
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """A problem evaluated at one pressure: gap, residual phi, and what linearisation needs."""
+
+    problem: Problem
+    pressure: Field
+    gap: Field  # may be negative where a cap lets the bodies overlap: the depth of plastic flattening
+    residual: Field
+    rows: Rows
+    film: Film | None
+    outflow: Field  # net oil outflow per cell area
+
+    @property
+    def load_error(self) -> float:
+        """Relative."""
+        dx, dy = self.problem.spacing
+        return float(self.pressure.sum() * dx * dy / self.problem.load - 1.0)
+
+    @property
+    def residual_rms(self) -> float:
+        """Root mean square of phi, as a share of p_h."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def in_contact(self) -> Mask:
+        """Cells where the bodies touch: gap closed to the contact film, or flattened below it."""
+        return np.asarray((self.rows.state == TOUCHING) | (self.gap <= self.problem.contact_gap))
+
+    @property
+    def unknown(self) -> Mask:
+        """Cells whose pressure the linear system decides; ruptured and capped cells know theirs."""
+        return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == TOUCHING))
+
+    def product(self, d_pressure: Field, d_approach: float) -> Field:
+        """The linearised equations applied to a change of pressure and approach."""
+        d_gap = self.problem.deflection(d_pressure)
+        d_gap += d_approach
+        out = np.empty_like(d_pressure)
+        if self.film is None:
+            touching = self.rows.state == TOUCHING
+            return np.where(touching, d_gap * self.rows.contact_scale, d_pressure)
+        reynolds.jacobian_product(self.rows, self.film, self.pressure, d_pressure, d_gap, *self.problem.spacing, out)
+        return out
+
+    def local_stencil(self) -> Stencil:
+        """Five-point approximation of `product`."""
+        stencil = Stencil(*(np.zeros(self.problem.cells) for _ in range(5)))
+        film = self.film or Film(*[np.zeros(self.problem.cells)] * 6)
+        reynolds.local_stencil(self.rows, film, self.problem.deflection.near, *self.problem.spacing, stencil)
+        return stencil
+
+
+class Preconditioner:
+    """A cheap approximate inverse of a balance's linearisation.
+
+    Aggregated onto blocks of cells and factored, the five-point stencil of the lubricated cells removes what is slow
+    and smooth (thick, low-pressure valleys); zebra line relaxation along x removes the rest.
+    """
+
+    def __init__(self, balance: Balance, block: int) -> None:
+        self.balance = balance
+        self.block = block
+        self.stencil = balance.local_stencil()
+        self.lines = relax.Lines(np.empty(balance.problem.cells), np.empty(balance.problem.cells))
+        relax.factor_lines(self.stencil, self.lines)
+        self.unknown = balance.unknown
+        self.wet = balance.rows.state == LUBRICATED
+        self.work = np.empty(balance.problem.cells)
+        if balance.film is not None:
+            self.scale = 1.0 / balance.rows.fluid_scale
+            nx, ny = balance.problem.cells
+            self.coarse_cells = (-(-nx // block), -(-ny // block))
+            self.factors = self._factor()
+
+    def _factor(self) -> Any:  # SuperLU has no public type
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        coarse = Stencil(*(np.empty(self.coarse_cells) for _ in range(5)))
+        relax.aggregate_stencil(self.stencil, self.scale, self.wet, self.block, coarse)
+        cx, cy = self.coarse_cells
+        index = np.arange(cx * cy).reshape(cx, cy)
+        columns = np.stack(
+            [index, np.roll(index, 1, 0), np.roll(index, -1, 0), np.roll(index, -1, 1), np.roll(index, 1, 1)]
+        )
+        values = np.stack([part.ravel() for part in coarse])
+        rows = np.broadcast_to(index.ravel(), values.shape)
+        matrix = csc_array((values.ravel(), (rows.ravel(), columns.reshape(5, -1).ravel())), shape=(cx * cy, cx * cy))
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+    def __call__(self, residual: Field) -> Field:
+        """Approximate change of pressure that answers a residual, both (nx, ny)."""
+        smooth = np.zeros_like(residual)
+        rest = residual
+        if self.balance.film is not None:
+            coarse = np.empty(self.coarse_cells)
+            relax.restrict(residual, self.scale, self.wet, self.block, coarse)
+            coarse = self.factors.solve(coarse.ravel()).reshape(self.coarse_cells)
+            relax.prolong(coarse, self.wet, self.block, smooth)
+            rest = np.empty_like(residual)
+            relax.stencil_residual(self.stencil, residual, smooth, rest)
+        change = np.zeros_like(residual)
+        for parity in (0, 1, 0):
+            relax.relax_lines(self.stencil, self.lines, rest, change, parity, self.work)
+        change += smooth
+        change[~self.unknown] = 0.0
+        return change
