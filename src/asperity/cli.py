@@ -313,6 +313,7 @@ def _print_run(run: "Run") -> None:
     lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
     rows = [
         ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
+        ("load on oil at the pressure cap, not in CLR", f"{100 * state.capped_oil_load_ratio:.2f} %"),
         ("CAR, contact in the Hertz zone", f"{100 * state.car:.2f} %"),
         ("CAR of the domain, over the Hertz area", f"{100 * state.car_domain:.2f} %"),
         ("asperities count as touching below", f"{1e9 * run.solution.options.contact_film:g} nm"),
@@ -321,7 +322,7 @@ def _print_run(run: "Run") -> None:
             "film: least, central, mean",
             f"{1e6 * state.h_min:.3f}, {1e6 * state.h_central:.3f}, {1e6 * state.h_mean:.3f} um",
         ),
-        ("lambda, film over Sq", lambda_ratio),
+        ("lambda, smooth-contact film over Sq", lambda_ratio),
         ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),
     ]
     resonance = None if run.vibration is None else run.vibration.resonance
@@ -331,7 +332,7 @@ def _print_run(run: "Run") -> None:
             ("CRFA, its spectral height", f"{resonance.crfa:.3g} ± {resonance.crfa_std:.2g} (m/s^2)^2/Hz"),
         ]
     rows += [
-        ("oil lost or re-created, over oil entering", f"{100 * state.mass_flux_imbalance:.1f} %"),
+        ("oil lost or re-created, over oil carried through", f"{100 * state.mass_flux_imbalance:.1f} %"),
         ("load error, Reynolds residual", f"{state.load_error:.1e}, {state.reynolds_residual:.1e}"),
         ("solver", convergence.explain()),
     ]

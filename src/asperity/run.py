@@ -46,6 +46,7 @@ class Run:
             "car": state.car,
             "car_domain": state.car_domain,
             "clr": state.clr,
+            "capped_oil_load_ratio": state.capped_oil_load_ratio,
             "sq_m": state.sq,
             "h_min_m": state.h_min,
             "h_central_m": state.h_central,

@@ -30,6 +30,7 @@ def state(clr: float = 1.0, car: float = 1.0, sq: float = 2e-6) -> ContactState:
         car=car,
         car_domain=car,
         clr=clr,
+        capped_oil_load_ratio=0.0,
         sq=sq,
         h_min=0.0,
         h_central=0.0,

@@ -83,8 +83,8 @@ def run_like(text=CASE, *, status=Status.CONVERGED, surface=None, notes=(), **nu
     case = load_case(text, stored=surface)
     state = ContactState(**{
         "car": 0.3712, "car_domain": 0.6034, "clr": 0.5423, "sq": 1.25e-6, "h_min": 4.9e-9, "h_central": 0.512e-6,
-        "h_mean": 0.634e-6, "lambda_ratio": 0.584, "p_max": 1.987e9, "reynolds_residual": 3.1e-6,
-        "load_error": 2.3e-7, "mass_flux_imbalance": 0.694,
+        "capped_oil_load_ratio": 0.0321, "h_mean": 0.634e-6, "lambda_ratio": 0.584, "p_max": 1.987e9,
+        "reynolds_residual": 3.1e-6, "load_error": 2.3e-7, "mass_flux_imbalance": 0.694,
         **numbers,
     })  # fmt: skip
     vibration = None if case.vibration is None else contact_vibration(state, case.conditions, case.vibration)
@@ -342,15 +342,8 @@ def test_prose_is_set_as_in_print(written, shown):
 
 
 def test_load_on_capped_oil_is_not_hidden():
-    case = load_case(CASE)
-    solution = solution_like(case)
-    pressure = np.zeros(solution.grid.cells)
-    pressure[10, :3] = 2e9  # three cells at the hardness, one of them touching ...
-    pressure[11, :2] = 1e9  # ... and as much again as one of them below it
-    touching = np.zeros(solution.grid.cells, dtype=bool)
-    touching[10, 0] = True
-    run = replace(run_like(), solution=replace(solution, pressure=pressure, in_contact=touching))
-    assert "without touching carry 50.0\N{NO-BREAK SPACE}% of the load" in page.render_page([run])
+    shown = page.render_page([run_like(capped_oil_load_ratio=0.5)])
+    assert "without touching carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
 
 
 # Figures -------------------------------------------------------------------------------------------------------------

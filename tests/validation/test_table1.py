@@ -18,6 +18,7 @@ def dry(sq: float) -> ContactState:
         car=1.0,
         car_domain=1.0,
         clr=1.0,
+        capped_oil_load_ratio=0.0,
         sq=sq,
         h_min=0.0,
         h_central=0.0,

@@ -17,7 +17,7 @@ from asperity.ehl.problem import Balance, Preconditioner, Problem
 LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step
 FORCING = 0.1
 MOST_KRYLOV_STEPS = 60
-COARSE_CELLS = 128  # across the grid that the preconditioner factors
+COARSE_CELLS = 64  # across the grid that the preconditioner factors
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class Step:
 
 def newton(problem: Problem, pressure: Field, approach: float) -> Iterator[Step]:
     """Yield each Newton step's starting point and the change it asks for, then take the step."""
-    longest: Field = np.full(problem.cells, LONGEST_STEP)
-    before = np.zeros(problem.cells)
+    longest: Field = np.full(problem.undeformed.shape, LONGEST_STEP)
+    before: Field = np.zeros_like(pressure)
     for number in count(1):
         balance = problem.evaluate(pressure, approach)
         d_pressure, d_approach = newton_step(balance)

@@ -6,8 +6,8 @@ import numpy as np
 
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.solve import contact_problem
-from asperity.kernels.reynolds import LUBRICATED
+from asperity.ehl.solve import contact_problem, dowson_higginson_film
+from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
 CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the contact
 
@@ -17,9 +17,12 @@ class ContactState:
     """Scalars of a solved contact, SI.
 
     `car` contact cells in |x| <= a over all cells there; `car_domain` contact area of the whole domain over the Hertz
-    area; `clr` load on contact cells over the load; `sq` composite roughness [m]; films [m]: `h_min` smallest gap of
+    area; `clr` load on contact cells over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap
+    without touching, over the load: oil that the model holds at the hardness, which a coarser contact threshold would
+    count as contact; `sq` composite roughness [m]; films [m]: `h_min` smallest gap of
     the domain (the contact film where bodies touch), `h_central` mean over |x| <= a/10, `h_mean` mean over |x| <= a;
-    `lambda_ratio` = h_mean/Sq (None for a smooth surface); `p_max` [Pa]; `reynolds_residual` root mean square of what
+    `lambda_ratio` = Dowson and Higginson's smooth-contact film h_min over Sq, the usual definition
+    (None for a smooth surface or a dry contact); `p_max` [Pa]; `reynolds_residual` root mean square of what
     is left of every cell's equation, as a share of p_h; `load_error` relative; `mass_flux_imbalance` oil that vanishes
     or appears in cells where Reynolds' equation does not hold, in sum, over the oil that the surfaces carry through the
     Hertz zone, u times mean film (0 when dry).
@@ -28,6 +31,7 @@ class ContactState:
     car: float
     car_domain: float
     clr: float
+    capped_oil_load_ratio: float
     sq: float
     h_min: float
     h_central: float
@@ -45,20 +49,22 @@ def contact_state(solution: ContactSolution) -> ContactState:
     grid, touching = solution.grid, solution.in_contact
     x = np.abs(grid.x) / scales.length
     hertz_zone, centre = x <= 1.0, x <= max(CENTRE, grid.spacing[0] / scales.length)
-    h_mean, sq = float(solution.gap[hertz_zone].mean()), solution.surface.sq
+    sq, oil = solution.surface.sq, solution.lubricant
     problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
     balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
+    capped = balance.rows.state == CAPPED
     unbalanced = np.abs(balance.outflow[balance.rows.state != LUBRICATED]).sum() * problem.spacing[0] / grid.cells[1]
     carried = balance.film.content[hertz_zone].mean() if balance.film else np.inf
     return ContactState(
         car=float(touching[hertz_zone].mean()),
         car_domain=float(touching.mean() * grid.extent[0] / (2.0 * scales.length)),
         clr=float(solution.pressure[touching].sum() / solution.pressure.sum()),
+        capped_oil_load_ratio=float(solution.pressure[capped & ~touching].sum() / solution.pressure.sum()),
         sq=sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
-        h_mean=h_mean,
-        lambda_ratio=h_mean / sq if sq > 0.0 else None,
+        h_mean=float(solution.gap[hertz_zone].mean()),
+        lambda_ratio=dowson_higginson_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,

@@ -179,6 +179,14 @@ class Quantity:
 QUANTITIES = (
     Quantity("clr", "Load share of asperities, CLR", "%", "load on contact cells over the whole load", 100.0, ".1f"),
     Quantity(
+        "capped_oil_load_ratio",
+        "Load on oil at the pressure cap",
+        "%",
+        "in cells that do not touch; not part of CLR",
+        100.0,
+        ".1f",
+    ),
+    Quantity(
         "car", "Contact area share in the Hertz zone, CAR", "%", "contact cells in |x| ≤ a over all there", 100.0, ".1f"
     ),
     Quantity(
@@ -188,7 +196,7 @@ QUANTITIES = (
     Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap anywhere", 1e6),
     Quantity("h_central_m", "Central film", "µm", "mean gap in |x| ≤ a/10", 1e6),
     Quantity("h_mean_m", "Mean film", "µm", "mean gap in |x| ≤ a", 1e6),
-    Quantity("lambda_ratio", "Film ratio, Λ", "", "mean film over Sq", 1.0, ".2f"),
+    Quantity("lambda_ratio", "Film ratio, Λ", "", "smooth-contact film (Dowson-Higginson) over Sq", 1.0, ".2f"),
     Quantity("p_max_pa", "Largest pressure", "GPa", "oil and asperities together", 1e-9),
     Quantity("crf_hz", "Contact resonance frequency, CRF", "Hz", "of one simulated record", deviation="crf_std_hz"),
     Quantity(
@@ -295,7 +303,7 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
         ),
         _picture(
             figures.pressure_map(solution),
-            "Pressure of oil and asperities together." + _capped_oil(solution),
+            "Pressure of oil and asperities together." + _capped_oil(run),
             f"Map of the pressure: at most {scalars['p_max_pa'] * 1e-9:.3f} GPa; Hertz's would be "
             f"{solution.conditions.hertz.p_max * 1e-9:.3f} GPa.",
         ),
@@ -323,15 +331,12 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
     ]
 
 
-def _capped_oil(solution: ContactSolution) -> str:
+def _capped_oil(run: "Run") -> str:
     """What CLR leaves out: load on oil films that stand at the pressure cap."""
-    if solution.p_cap is None or solution.lubricant is None:
+    if run.solution.p_cap is None or run.solution.lubricant is None:
         return ""
-    capped = (solution.pressure >= 0.999 * solution.p_cap) & ~solution.in_contact
-    share = solution.pressure[capped].sum() / solution.pressure.sum()
-    return (
-        f" Cells that stand at the hardness without touching carry {_percent(share)} of the load; CLR leaves them out."
-    )
+    share = _percent(run.state.capped_oil_load_ratio)
+    return f" Cells that stand at the hardness without touching carry {share} of the load; CLR leaves them out."
 
 
 def _spectrum_picture(run: "Run") -> list[_Picture]:
