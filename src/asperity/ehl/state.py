@@ -17,15 +17,14 @@ class ContactState:
     """Scalars of a solved contact, SI.
 
     `car` contact cells in |x| <= a over all cells there; `car_domain` contact area of the whole domain over the Hertz
-    area; `clr` load on contact cells over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap
-    without touching, over the load: oil that the model holds at the hardness, which a coarser contact threshold would
-    count as contact; `sq` composite roughness [m]; films [m]: `h_min` smallest gap of
-    the domain (the contact film where bodies touch), `h_central` mean over |x| <= a/10, `h_mean` mean over |x| <= a;
-    `lambda_ratio` = Dowson and Higginson's smooth-contact film h_min over Sq, the usual definition
-    (None for a smooth surface or a dry contact); `p_max` [Pa]; `reynolds_residual` root mean square of what
-    is left of every cell's equation, as a share of p_h; `load_error` relative; `mass_flux_imbalance` oil that vanishes
-    or appears in cells where Reynolds' equation does not hold, in sum, over the oil that the surfaces carry through the
-    Hertz zone, u times mean film (0 when dry).
+    area; `clr` load on contact cells over the load; `capped_oil_load_ratio` load on cells that stand at the pressure
+    cap without touching, over the load: oil that the model holds at the hardness, which a coarser contact threshold
+    would count as contact; `sq` composite roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact
+    film where bodies touch), `h_central` mean over |x| <= a/10, `h_mean` mean over |x| <= a; `lambda_ratio` Dowson and
+    Higginson's smooth-contact film over Sq, the usual definition (None for a smooth surface or a dry contact); `p_max`
+    [Pa]; `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h;
+    `load_error` relative; `mass_flux_imbalance` oil that vanishes or appears in cells where Reynolds' equation does
+    not hold, in sum, over the oil that the surfaces carry through the Hertz zone, u times mean film (0 when dry).
     """
 
     car: float
