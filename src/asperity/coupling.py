@@ -17,7 +17,7 @@ from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, require_damping_ratio
 from asperity.wear import INDICATOR_METHODS, Resonance, contact_resonance, no_resonance
 
-SMALLEST_SHARE = 0.1  # CLR at the lower end of the search band: below it the asperities hardly carry
+SMALLEST_SHARE = 0.01  # CLR at the lower end of the search band: below it the film is full and nothing resonates
 BAND_MARGIN = 0.05
 SAMPLES_PER_PERIOD = 15  # below it the straight lines between samples cost the resonance over 3 % of its power
 
@@ -184,7 +184,7 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
 
 
 def search_band(conditions: ContactConditions, model: VibrationModel) -> tuple[float, float]:
-    """Where the contact resonance can be [Hz]: from f0 at CLR 0.1 to f0 at CLR 1, 5 % wider at both ends."""
+    """Where the contact resonance can be [Hz]: from f0 at CLR 0.01 to f0 at CLR 1, 5 % wider at both ends."""
     low, high = (_loaded_oscillator(share, conditions, model).natural_frequency_hz for share in (SMALLEST_SHARE, 1.0))
     return (1.0 - BAND_MARGIN) * low, (1.0 + BAND_MARGIN) * high
 

@@ -93,7 +93,7 @@ def test_profile_at_the_resonance_has_the_continuous_filters_power():
 
 def test_band_follows_from_the_contact_alone():
     low, high = search_band(CONDITIONS, MODEL)
-    assert low == pytest.approx(0.95 * 3329.5 * 0.1 ** (1 / 6), rel=1e-4)
+    assert low == pytest.approx(0.95 * 3329.5 * 0.01 ** (1 / 6), rel=1e-4)
     assert high == pytest.approx(1.05 * 3329.5, rel=1e-4)
     assert contact_vibration(state(clr=0.4), CONDITIONS, MODEL).band_hz == (low, high)
 
@@ -126,7 +126,7 @@ def test_without_touching_asperities_there_is_no_resonance_but_a_reason(silent, 
 
 
 def test_a_share_too_small_for_the_band_is_not_found():
-    seen = contact_vibration(state(clr=0.03, car=0.02), CONDITIONS, MODEL)
+    seen = contact_vibration(state(clr=0.003, car=0.02), CONDITIONS, MODEL)
     assert not seen.resonance.found
     assert "edge" in seen.resonance.reason
 
