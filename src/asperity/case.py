@@ -4,7 +4,6 @@ Units live here and nowhere deeper. What is wrong with a file is said in one sen
 the value and the remedy. Solving a case is left to `asperity.run`.
 """
 
-import json
 import math
 import os
 import re
@@ -542,14 +541,12 @@ class Case:
     @property
     def text(self) -> str:
         """The case as TOML, every default written out; loads to an equal case."""
+        import tomli_w
+
         tables = _plain(self.contents)
         if self.contents.lubricant is None:
             tables["lubricant"] = "none"
-        lines = [f"{key} = {_toml(value)}" for key, value in tables.items() if not isinstance(value, dict)]
-        for name, table in tables.items():
-            if isinstance(table, dict):
-                lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
-        return "\n".join(lines) + "\n"
+        return tomli_w.dumps(tables)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "Case":
         """The case with values replaced, such as `{"contact.load": "400 N", "grid.cells": "[128, 128]"}`.
@@ -648,23 +645,15 @@ def _law(laws: Mapping[str, type[L]], section: Section) -> L:
 def _plain(section: Section) -> dict[str, Any]:
     """Tables of plain values, quantities as they were written; what is left out stays out."""
     values = {entry.alias or name: getattr(section, name) for name, entry in type(section).model_fields.items()}
-    return {
-        key: _plain(value) if isinstance(value, Section) else value
-        for key, value in values.items()
-        if value is not None
-    }
+    return {key: _plain_value(value) for key, value in values.items() if value is not None}
 
 
-def _toml(value: object) -> str:
-    if isinstance(value, Amount):
-        return json.dumps(value.text, ensure_ascii=False)
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(entry)}" for key, entry in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return json.dumps(value)  # JSON writes booleans, integers and finite floats as TOML does
+def _plain_value(value: object) -> object:
+    if isinstance(value, Section):
+        return _plain(value)
+    if isinstance(value, tuple):
+        return [_plain_value(entry) for entry in value]
+    return value.text if isinstance(value, Amount) else value
 
 
 def relative_to(file: str | Path, folder: Path) -> str:
