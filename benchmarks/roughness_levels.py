@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 
 from asperity.case import load_case
-from asperity.ehl.deflection import line_deflection
+from asperity.ehl.deflection import deflection
 from asperity.ehl.solution import ContactSolution, Options
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import contact_state
@@ -46,7 +46,7 @@ def solve(sq_um: float, seed: int, tolerance: float, cells: int) -> ContactSolut
     case = load_case(CASE).with_overrides(
         {"surface.sq": f"{sq_um} um", "surface.seed": seed, "grid.cells": [cells, cells]}
     )
-    line_deflection.cache_clear()
+    deflection.cache_clear()
     return solve_contact(
         case.conditions, case.lubricant, case.surface(), options=Options(tolerance=tolerance), strict=False
     )

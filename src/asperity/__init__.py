@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from asperity.ehl.storage import load_solution
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
     from asperity.grid import Grid
-    from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
+    from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
     from asperity.report import write_report
     from asperity.run import Run, load_run, solve_case
     from asperity.signals import Signal, Spectrum, power_spectrum, smooth
@@ -44,7 +44,7 @@ _NAMES = {
     "ehl.storage": ("load_solution",),
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
     "grid": ("Grid",),
-    "lubricant": ("Barus", "DowsonHigginson", "Incompressible", "Lubricant", "Newtonian", "Roelands"),
+    "lubricant": ("Barus", "DowsonHigginson", "Incompressible", "Lubricant", "Newtonian", "ReeEyring", "Roelands"),
     "report": ("write_report",),
     "run": ("Run", "load_run", "solve_case"),
     "signals": ("Signal", "Spectrum", "power_spectrum", "smooth"),
@@ -82,6 +82,7 @@ __all__ = [
     "Newtonian",
     "NotConverged",
     "Options",
+    "ReeEyring",
     "Resonance",
     "Roelands",
     "Run",

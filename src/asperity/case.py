@@ -64,7 +64,13 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "s": ("a time", "2 s"),
     "Hz": ("a frequency", "50 kHz"),
 }
-_LAW_UNITS = {"eta0": "Pa s", "alpha": "1/Pa", "p0": "Pa", "rho0": "kg/m^3"}  # parameters not listed are plain numbers
+_LAW_UNITS = {
+    "eta0": "Pa s",
+    "alpha": "1/Pa",
+    "p0": "Pa",
+    "rho0": "kg/m^3",
+    "tau0": "Pa",
+}  # parameters not listed are plain numbers
 _VIBRATION_UNITS = {"mass": "kg", "rate_hz": "Hz", "duration_s": "s", "cutoff_reference_hz": "Hz"}
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 

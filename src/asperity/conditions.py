@@ -105,6 +105,13 @@ class ContactConditions:
         return self.radius[0] if isinstance(self.radius, tuple) else self.radius
 
     @property
+    def radius_across_rolling(self) -> float:
+        """Ry [m]; infinite for a line contact."""
+        if isinstance(self.radius, tuple):
+            return self.radius[1]
+        return float("inf") if self.geometry == "line" else self.radius
+
+    @property
     def line_load(self) -> float:
         """Load per length of a line contact [N/m]."""
         if self.length is None:

@@ -1,9 +1,9 @@
-"""How an elastic half-space gives way under a pressure that repeats in y: an exact cell-to-cell convolution by FFT.
+"""How an elastic half-space gives way under pressure: an exact cell-to-cell convolution by FFT.
 
-x is aperiodic (zero padded), y periodic. Wavenumber 0 in y is the plane-strain logarithm -ln|X|/π, averaged over a
-cell; every other wavenumber q is the cell's integral of K₀(q|X|)/π, summed over the aliases that a pressure constant
-over each cell excites. Source: K. L. Johnson, Contact Mechanics (1985), eq 2.24b for the logarithm; the Fourier
-transform of 1/r along y for the rest.
+V = c ∫∫ P/distance, every cell's pressure constant. Aperiodic axes are zero padded. Where y repeats, wavenumber 0 in
+y is the plane-strain logarithm averaged over a cell and every other wavenumber q the cell's integral of 2 K₀(q|X|),
+summed over the aliases that a pressure constant over each cell excites; else Love's closed form for a rectangle.
+Source: K. L. Johnson, Contact Mechanics (1985), eqs 2.24b and 3.25; the Fourier transform of 1/r along y.
 """
 
 from dataclasses import dataclass
@@ -21,21 +21,23 @@ NEAR_ALIASES, FAR_ALIASES, NEAR_CELLS = 200, 2, 3
 class Deflection:
     """Compliance of every cell on every other.
 
-    `spectrum` shape (2 nx, ny//2 + 1); `row` the compliance of cells 0, 1, ... along x on one line, shape (nx + 1,).
+    `spectrum` is the transformed kernel, `row` the compliance of cells 0, 1, ... along x on one line, shape (nx + 1,).
     """
 
     cells: tuple[int, int]
     spectrum: Field
     row: Field
+    periodic: bool
 
     def __call__(self, pressure: Field) -> Field:
         """Surface displacement V of a pressure P, both dimensionless, shape (nx, ny)."""
         import scipy.fft as fft
 
         nx, ny = self.cells
-        waves = fft.fft(fft.rfft(pressure, axis=1), n=2 * nx, axis=0, overwrite_x=True)
-        waves *= self.spectrum  # zero padded to twice nx: the outlet must not feel the inlet
-        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=ny, axis=1))
+        length = ny if self.periodic else 2 * ny
+        waves = fft.fft(fft.rfft(pressure, n=length, axis=1), n=2 * nx, axis=0, overwrite_x=True)
+        waves *= self.spectrum  # zero padded to twice the length: the outlet must not feel the inlet
+        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=length, axis=1)[:, :ny])
 
     @property
     def near(self) -> Field:
@@ -44,16 +46,33 @@ class Deflection:
 
 
 @lru_cache(maxsize=16)
-def line_deflection(cells: tuple[int, int], spacing: tuple[float, float]) -> Deflection:
-    """Compliance of a line contact's grid; spacing in Hertz half-widths."""
+def deflection(cells: tuple[int, int], spacing: tuple[float, float], compliance: float, periodic: bool) -> Deflection:
+    """Compliance of a grid; spacing in Hertz half-widths."""
     import scipy.fft as fft
 
+    if periodic:
+        kernel = 2.0 * compliance * _line_kernel(cells, spacing)
+        row = fft.irfft(kernel, n=cells[1], axis=1)[:, 0]
+        mirrored = np.concatenate([kernel, kernel[-2:0:-1]])
+        spectrum = fft.fft(mirrored, axis=0).real
+    else:
+        kernel = compliance * _love_kernel(cells, spacing)
+        row = kernel[:, 0]
+        mirrored = np.concatenate([kernel, kernel[-2:0:-1]])
+        mirrored = np.concatenate([mirrored, mirrored[:, -2:0:-1]], axis=1)
+        spectrum = fft.rfft2(mirrored).real
+    spectrum, row = np.ascontiguousarray(spectrum), row.copy()
+    spectrum.flags.writeable = row.flags.writeable = False
+    return Deflection(cells, spectrum, row, periodic)
+
+
+def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
+    """(1/2) ∫∫ 1/distance over each cell of a line contact, transformed along y, shape (nx + 1, ny//2 + 1)."""
     (nx, ny), (dx, dy) = cells, spacing
     cell = np.arange(nx + 1)
     kernel = np.zeros((nx + 1, ny // 2 + 1))
     edges = (np.arange(nx + 2) - 0.5) * dx
-    primitive = edges * np.log(np.abs(edges)) - edges
-    kernel[:, 0] = -np.diff(primitive) / np.pi
+    kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
     waves = np.arange(ny // 2 + 1)
     for alias in range(-NEAR_ALIASES, NEAR_ALIASES + 1):
         number = waves + alias * ny
@@ -61,19 +80,23 @@ def line_deflection(cells: tuple[int, int], spacing: tuple[float, float]) -> Def
         wavenumber = 2.0 * np.pi * np.abs(number[real]) / (ny * dy)
         count = nx + 1 if abs(alias) <= FAR_ALIASES else min(NEAR_CELLS, nx + 1)
         kernel[:count, real] += _k0_over_cells(wavenumber, cell[:count], dx) * np.sinc(number[real] / ny)
-    mirrored = np.concatenate([kernel, kernel[nx - 1 : 0 : -1]])
-    spectrum = np.ascontiguousarray(fft.fft(mirrored, axis=0).real)
-    row = np.asarray(fft.irfft(kernel, n=ny, axis=1))[:, 0].copy()
-    spectrum.flags.writeable = row.flags.writeable = False
-    return Deflection(cells, spectrum, row)
+    return kernel
 
 
 def _k0_over_cells(wavenumber: Field, cell: np.ndarray, dx: float) -> Field:
-    """(1/π) ∫ K₀(q|x|) dx over each cell, shape (cells, wavenumbers)."""
+    """∫ K₀(q|x|) dx over each cell, shape (cells, wavenumbers)."""
     from scipy.special import iti0k0
 
     edges = (np.arange(cell.size + 1) - 0.5) * dx
     argument = np.abs(edges)[:, None] * wavenumber
     integral = np.where(argument < 500.0, iti0k0(np.minimum(argument, 500.0))[1], np.pi / 2.0)
     integral[0] *= -1.0  # the first edge lies left of the origin
-    return np.asarray(np.diff(integral, axis=0) / (wavenumber * np.pi))
+    return np.asarray(np.diff(integral, axis=0) / wavenumber)
+
+
+def _love_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
+    """∫∫ 1/distance over each cell, shape (nx + 1, ny + 1)."""
+    x, y = (((np.arange(n + 2) - 0.5) * d) for n, d in zip(cells, spacing, strict=True))
+    x, y = x[:, None], y[None, :]
+    corners = x * np.arcsinh(y / np.abs(x)) + y * np.arcsinh(x / np.abs(y))
+    return np.asarray(np.diff(np.diff(corners, axis=0), axis=1))

@@ -1,7 +1,8 @@
 """Newton's method on a mixed-EHL problem: better and better pressures, for as long as anybody asks.
 
 Semismooth (each cell is linearised by the equation that decides it), inexact (GMRES to a tenth), and limited cell by
-cell: a cell that turns back takes shorter steps, so that a few undecided ones cannot keep all others waiting.
+cell: a cell that turns back takes shorter steps, so that a few undecided ones cannot keep all others waiting. The
+approach of the bodies is limited the same way.
 """
 
 from collections.abc import Iterator
@@ -14,7 +15,9 @@ from asperity.arrays import Field
 from asperity.ehl.krylov import gmres
 from asperity.ehl.problem import Balance, Preconditioner, Problem
 
-LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step
+LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step ...
+LONGEST_SHARE = 0.3  # ... or this share of the cell's own pressure: sharp elastic asperities reach 100 p_h
+FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more: what a capped contact answers is not linear
 FORCING = 0.1
 MOST_KRYLOV_STEPS = 60
 COARSE_CELLS = 64  # across the grid that the preconditioner factors
@@ -32,17 +35,23 @@ class Step:
 
 def newton(problem: Problem, pressure: Field, approach: float) -> Iterator[Step]:
     """Yield each Newton step's starting point and the change it asks for, then take the step."""
-    longest: Field = np.full(problem.undeformed.shape, LONGEST_STEP)
+    longest: Field = np.full_like(pressure, LONGEST_STEP)
     before: Field = np.zeros_like(pressure)
+    furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
+    approach_before = 0.0
     for number in count(1):
         balance = problem.evaluate(pressure, approach)
         d_pressure, d_approach = newton_step(balance)
         yield Step(number, balance, approach, float(np.mean(np.abs(d_pressure)) / np.mean(pressure)))
         turned_back = (d_pressure * before < 0.0) & (np.abs(d_pressure) > longest)
-        longest = np.where(turned_back, 0.5 * longest, np.minimum(1.5 * longest, LONGEST_STEP))
+        most_now = np.maximum(LONGEST_STEP, LONGEST_SHARE * pressure)
+        longest = np.where(turned_back, 0.5 * longest, np.minimum(1.5 * longest, most_now))
         before = d_pressure
         pressure = np.clip(pressure + np.clip(d_pressure, -longest, longest), 0.0, problem.p_cap)
-        approach += d_approach
+        turned_back_bodies = d_approach * approach_before < 0.0 and abs(d_approach) > 0.5 * furthest
+        furthest = 0.5 * furthest if turned_back_bodies else min(1.2 * furthest, most)
+        approach_before = d_approach
+        approach += float(np.clip(d_approach, -furthest, furthest))
 
 
 def newton_step(balance: Balance) -> tuple[Field, float]:

@@ -5,70 +5,92 @@ ruptured P, touching (H - H_c)/k, lubricated R/J, capped P - P_cap; phi = max(mi
 R is the cell's net oil outflow, J its derivative, k the compliance of near cells, H_c the gap that counts as contact.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
-from asperity.ehl.deflection import Deflection, line_deflection
+from asperity.ehl.deflection import Deflection, deflection
 from asperity.kernels import relax, reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
 from asperity.lubricant import Lubricant
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
+class Form:
+    """Shape and compliance of the smooth bodies.
+
+    The gap grows as X^2/2 + `flatness` Y^2/2; `compliance` scales the half-space's deflection, V = compliance times the
+    integral of P/distance; `aspect` is the Hertz contact's half-width across over along rolling (infinite for a line);
+    `periodic` tells whether the contact repeats in y.
+    """
+
+    flatness: float
+    compliance: float
+    aspect: float
+    periodic: bool
+
+    def gap(self, x: Field, y: Field) -> Field:
+        """Gap at H0 = 0, shape (x, y)."""
+        return np.asarray((x**2 / 2.0)[:, None] + self.flatness * (y**2 / 2.0))
+
+
+@dataclass(frozen=True, kw_only=True)
 class Problem:
     """A contact on one grid, in the solver's units.
 
-    `undeformed` is X^2/2 minus roughness, shape (nx, ny); `load` the wanted sum of P dX dY; `p_cap` and `contact_gap`
-    bound P above and H below; `speed` is the speed number, `p_scale` [Pa] turns P into pascals for the oil's laws.
+    `form` is the bodies' own shape and `roughness` what stands out of it, shape (nx, ny); `load` the wanted sum of
+    P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the speed number. For the oil's laws
+    `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]. A contact that does not repeat in y is
+    bounded by lines of cells at ambient pressure.
     """
 
-    undeformed: Field
-    lower: float
+    form: Form
+    roughness: Field
+    lower: tuple[float, float]
     spacing: tuple[float, float]
     load: float
     p_cap: float
     contact_gap: float
     speed: float
+    sliding: float
     p_scale: float
     lubricant: Lubricant | None
 
     @property
     def cells(self) -> tuple[int, int]:
         """(nx, ny)."""
-        nx, ny = self.undeformed.shape
+        nx, ny = self.roughness.shape
         return nx, ny
 
     @property
     def x(self) -> Field:
-        """Cell centres in Hertz half-widths, shape (nx,)."""
-        return self.lower + (np.arange(self.cells[0]) + 0.5) * self.spacing[0]
+        """Cell centres along rolling in Hertz half-widths, shape (nx,)."""
+        return np.asarray(self.lower[0] + (np.arange(self.cells[0]) + 0.5) * self.spacing[0])
+
+    @property
+    def y(self) -> Field:
+        """Cell centres across rolling in Hertz half-widths, shape (ny,)."""
+        return np.asarray(self.lower[1] + (np.arange(self.cells[1]) + 0.5) * self.spacing[1])
+
+    @cached_property
+    def undeformed(self) -> Field:
+        """Gap of the rough bodies before they deform, at H0 = 0, shape (nx, ny)."""
+        return np.asarray(self.form.gap(self.x, self.y) - self.roughness)
 
     @property
     def deflection(self) -> Deflection:
         """The elastic half-space on this grid."""
-        return line_deflection(self.cells, self.spacing)
+        return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic)
 
     def coarsened(self) -> "Problem":
         """The same contact on a grid of half as many cells each way; heights are averaged over each cell."""
         nx, ny = self.cells
-        x = self.x**2 / 2.0
-        rough = (self.undeformed - x[:, None]).reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3))
-        dx, dy = 2.0 * self.spacing[0], 2.0 * self.spacing[1]
-        coarse_x = self.lower + (np.arange(nx // 2) + 0.5) * dx
-        return Problem(
-            undeformed=rough + (coarse_x**2 / 2.0)[:, None],
-            lower=self.lower,
-            spacing=(dx, dy),
-            load=self.load,
-            p_cap=self.p_cap,
-            contact_gap=self.contact_gap,
-            speed=self.speed,
-            p_scale=self.p_scale,
-            lubricant=self.lubricant,
-        )
+        roughness = self.roughness.reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3))
+        dx, dy = self.spacing
+        return replace(self, roughness=roughness, spacing=(2.0 * dx, 2.0 * dy))
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
@@ -82,7 +104,8 @@ class Problem:
         else:
             film, outflow, fluid_scale = self._flow(pressure, gap, self.lubricant)
             fluid = outflow * fluid_scale
-            wet = (fluid < touching) & (touching > 0.0)  # overlapping bodies touch, whatever the oil says
+            wet = fluid < touching
+            film = film.held_where(~wet & (touching <= 0.0))  # pressing overlapping bodies together moves no film
             residual = np.minimum(fluid, touching)
             state = np.where(wet, np.int8(LUBRICATED), np.int8(TOUCHING))
         ruptured = pressure < residual
@@ -91,23 +114,28 @@ class Problem:
         capped = pressure - self.p_cap > residual
         residual[capped] = pressure[capped] - self.p_cap
         state[capped] = CAPPED
+        if not self.form.periodic:
+            for rim in (0, -1):
+                residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
         return Balance(self, pressure, gap, residual, Rows(state, fluid_scale, contact_scale), film, outflow)
 
     def _flow(self, pressure: Field, gap: Field, oil: Lubricant) -> tuple[Film, Field, Field]:
         pascals = pressure * self.p_scale
         height = np.maximum(gap, self.contact_gap)
-        open_gap = (gap > self.contact_gap).astype(float)  # overlapping bodies do not change the film
         density = oil.density(pascals) / oil.density.rho0
         density_slope = oil.density.slope(pascals) * (self.p_scale / oil.density.rho0)
         content = density * height
-        mobility = content * height**2 * (oil.viscosity.eta0 / (self.speed * oil.viscosity(pascals)))
+        viscosity = oil.viscosity(pascals)
+        log_slope = oil.viscosity.log_slope(pascals) * self.p_scale
+        thinning, exponent = oil.rheology.thinning(viscosity * self.sliding / height)
+        mobility = content * height**2 * (oil.viscosity.eta0 / self.speed) / (viscosity * thinning)
         film = Film(
             content,
-            density * open_gap,
+            density,
             density_slope * height,
             mobility,
-            3.0 * mobility / height * open_gap,
-            mobility * (density_slope / density - oil.viscosity.log_slope(pascals) * self.p_scale),
+            (3.0 + exponent) * mobility / height,
+            mobility * (density_slope / density - (1.0 + exponent) * log_slope),
         )
         dx, dy = self.spacing
         ahead = gap[0] + ((self.x[0] - dx) ** 2 - self.x[0] ** 2) / 2.0  # the gap one cell before the inlet

@@ -17,7 +17,7 @@ class Scales:
 
     @classmethod
     def of(cls, conditions: ContactConditions, lubricant: Lubricant | None) -> "Scales":
-        """Scales of a line contact."""
+        """Scales of a contact; a and R are those along rolling."""
         a, p_h, radius = conditions.hertz.half_widths[0], conditions.hertz.p_max, conditions.radius_along_rolling
         eta0 = lubricant.viscosity.eta0 if lubricant else 0.0
         return cls(a, p_h, a**2 / radius, 12.0 * eta0 * conditions.entrainment_speed * radius**2 / (a**3 * p_h))

@@ -4,9 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.arrays import Mask
+from asperity.conditions import ContactConditions
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.solve import contact_problem, dowson_higginson_film
+from asperity.ehl.solve import contact_problem, smooth_film
+from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
 CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the contact
@@ -46,8 +49,8 @@ def contact_state(solution: ContactSolution) -> ContactState:
     """Read the scalars off a solution; the residuals are evaluated anew from its fields."""
     scales = Scales.of(solution.conditions, solution.lubricant)
     grid, touching = solution.grid, solution.in_contact
-    x = np.abs(grid.x) / scales.length
-    hertz_zone, centre = x <= 1.0, x <= max(CENTRE, grid.spacing[0] / scales.length)
+    hertz_zone = _inside(solution.conditions, grid, 1.0)
+    centre = _inside(solution.conditions, grid, CENTRE)
     sq, oil = solution.surface.sq, solution.lubricant
     problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
     balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
@@ -56,16 +59,32 @@ def contact_state(solution: ContactSolution) -> ContactState:
     carried = balance.film.content[hertz_zone].mean() if balance.film else np.inf
     return ContactState(
         car=float(touching[hertz_zone].mean()),
-        car_domain=float(touching.mean() * grid.extent[0] / (2.0 * scales.length)),
+        car_domain=float(touching.mean() * _hertz_areas(solution.conditions, grid)),
         clr=float(solution.pressure[touching].sum() / solution.pressure.sum()),
         capped_oil_load_ratio=float(solution.pressure[capped & ~touching].sum() / solution.pressure.sum()),
         sq=sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
         h_mean=float(solution.gap[hertz_zone].mean()),
-        lambda_ratio=dowson_higginson_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
+        lambda_ratio=smooth_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,
         mass_flux_imbalance=float(unbalanced / carried),
     )
+
+
+def _inside(conditions: ContactConditions, grid: Grid, share: float) -> Mask:
+    """Cells within `share` of the Hertz half-widths, at least the middle ones, shape (nx, ny)."""
+    a, b = conditions.hertz.half_widths
+    dx, dy = grid.spacing
+    along = np.abs(grid.x) / max(share * a, dx)
+    across = np.zeros(grid.cells[1]) if conditions.geometry == "line" else np.abs(grid.y) / max(share * b, dy)
+    return np.asarray((along**2)[:, None] + across**2 <= 1.0)
+
+
+def _hertz_areas(conditions: ContactConditions, grid: Grid) -> float:
+    """Area of the grid in Hertz contact areas."""
+    if conditions.geometry == "line":
+        return grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
+    return grid.extent[0] * grid.extent[1] / conditions.hertz.area

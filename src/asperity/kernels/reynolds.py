@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from asperity.arrays import Codes, Field
+from asperity.arrays import Codes, Field, Mask
 
 RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # what decides a cell
 
@@ -24,6 +24,13 @@ class Film(NamedTuple):
     mobility: Field
     mobility_by_gap: Field
     mobility_by_pressure: Field
+
+    def held_where(self, held: Mask) -> "Film":
+        """The same film, its gap fixed in some cells."""
+        return self._replace(
+            content_by_gap=np.where(held, 0.0, self.content_by_gap),
+            mobility_by_gap=np.where(held, 0.0, self.mobility_by_gap),
+        )
 
 
 class Rows(NamedTuple):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from asperity.lubricant.density import DENSITY_LAWS, DensityLaw, DowsonHigginson, Incompressible
-from asperity.lubricant.rheology import RHEOLOGY_LAWS, Newtonian
+from asperity.lubricant.rheology import RHEOLOGY_LAWS, Newtonian, ReeEyring, RheologyLaw
 from asperity.lubricant.viscosity import VISCOSITY_LAWS, Barus, Roelands, ViscosityLaw
 
 __all__ = [
@@ -16,6 +16,8 @@ __all__ = [
     "Incompressible",
     "Lubricant",
     "Newtonian",
+    "ReeEyring",
+    "RheologyLaw",
     "Roelands",
     "ViscosityLaw",
 ]
@@ -27,4 +29,4 @@ class Lubricant:
 
     viscosity: ViscosityLaw
     density: DensityLaw
-    rheology: Newtonian
+    rheology: RheologyLaw

@@ -1,11 +1,49 @@
-"""How shear thins the oil: one frozen law a class. So far only the oil that does not."""
+"""How shear thins the oil: one frozen law a class."""
 
 from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.errors import require_positive
+
+
+class RheologyLaw(Protocol):
+    """What the solver asks of a rheology."""
+
+    def thinning(self, shear: Field) -> tuple[Field, Field]:
+        """Effective over Newtonian viscosity, and d(ln of it)/d(ln shear), at the shear stress η Δu/h [Pa]."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Newtonian:
     """Shear stress proportional to shear rate; the effective viscosity is the viscosity itself."""
 
+    def thinning(self, shear: Field) -> tuple[Field, Field]:
+        """1 and 0."""
+        return np.ones_like(shear), np.zeros_like(shear)
 
-RHEOLOGY_LAWS: dict[str, type[Newtonian]] = {"newtonian": Newtonian}
+
+@dataclass(frozen=True, slots=True)
+class ReeEyring:
+    """Viscosity that falls once shear passes a stress: 1/η* = (1/η)(τ₀/τ₁) sinh(τ₁/τ₀). Source: the paper's Eq 9.
+
+    τ₁ is the shear stress on the surface that sliding alone would cause, τ₁ = τ₀ asinh(η Δu/(τ₀ h)): the part of the
+    pressure gradient is left out, so that η* = η asinh(S)/S with S = η Δu/(τ₀ h). In pure rolling the oil is Newtonian.
+    """
+
+    tau0: float  # Eyring stress, where thinning sets in [Pa]
+
+    def __post_init__(self) -> None:
+        require_positive("Eyring stress tau0", self.tau0, "Pa")
+
+    def thinning(self, shear: Field) -> tuple[Field, Field]:
+        """asinh(S)/S and S/(√(1 + S²) asinh S) - 1."""
+        ratio = np.maximum(shear / self.tau0, 1e-6)  # below it both are 1 and 0 to twelve digits
+        stress = np.arcsinh(ratio)
+        return stress / ratio, ratio / (np.sqrt(1.0 + ratio**2) * stress) - 1.0
+
+
+RHEOLOGY_LAWS: dict[str, type[Newtonian] | type[ReeEyring]] = {"newtonian": Newtonian, "ree-eyring": ReeEyring}

@@ -8,6 +8,8 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import require_positive
 
+LARGEST_EXPONENT = 400.0  # of an exponential law: glass long before, and e^709 is no longer a number
+
 
 class ViscosityLaw(Protocol):
     """What the solver asks of a viscosity law."""
@@ -39,7 +41,7 @@ class Barus:
 
     def __call__(self, pressure: Field) -> Field:
         """η(p) [Pa s]."""
-        return np.asarray(self.eta0 * np.exp(self.alpha * pressure))
+        return np.asarray(self.eta0 * np.exp(np.minimum(self.alpha * pressure, LARGEST_EXPONENT)))
 
     def log_slope(self, pressure: Field) -> Field:
         """d(ln η)/dp = α [1/Pa]."""
@@ -73,7 +75,8 @@ class Roelands:
 
     def __call__(self, pressure: Field) -> Field:
         """η(p) [Pa s]."""
-        return np.asarray(self.eta0 * np.exp(self._scale * ((1.0 + pressure / self.p0) ** self.exponent - 1.0)))
+        exponent = self._scale * ((1.0 + pressure / self.p0) ** self.exponent - 1.0)
+        return np.asarray(self.eta0 * np.exp(np.minimum(exponent, LARGEST_EXPONENT)))
 
     def log_slope(self, pressure: Field) -> Field:
         """d(ln η)/dp [1/Pa]."""
