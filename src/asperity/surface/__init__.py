@@ -1,22 +1,31 @@
 """Rough surfaces: generated, measured, prepared and described."""
 
+from asperity.surface.bearing import BearingCurve, bearing_curve
+from asperity.surface.condition import condition, level
 from asperity.surface.generate import gaussian_surface, self_affine_surface
 from asperity.surface.model import MeasuredSurface, Surface, flat_surface
 from asperity.surface.parameters import SurfaceDescription, SurfaceParameters, describe_surface, surface_parameters
-from asperity.surface.prepare import PreparedSurface, level, prepare_surface
+from asperity.surface.prepare import CompositeSurface, PreparedSurface, prepare_surface
+from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
 
 __all__ = [
+    "BearingCurve",
+    "CompositeSurface",
     "MeasuredSurface",
     "PreparedSurface",
+    "ProfileParameters",
     "Surface",
     "SurfaceDescription",
     "SurfaceParameters",
+    "bearing_curve",
+    "condition",
     "describe_surface",
     "flat_surface",
     "gaussian_surface",
     "level",
     "prepare_surface",
+    "profile_parameters",
     "read_surface",
     "self_affine_surface",
     "surface_parameters",
