@@ -105,14 +105,14 @@ def test_the_solution_does_not_remember_where_it_started(usual):
     assert abs(clr(other) - clr(usual)) > 0.05
     again = solved(usual.surface, start=other)
     assert clr(again) == pytest.approx(clr(usual), abs=5e-4)
-    assert np.sqrt(np.mean((again.pressure - usual.pressure) ** 2)) < 2e-4 * P_H
+    assert np.sqrt(np.mean((again.pressure - usual.pressure) ** 2)) < 1e-3 * P_H
 
 
 def test_a_mirrored_or_shifted_surface_has_the_mirrored_or_shifted_solution(usual):
     for there in (lambda field: field[:, ::-1], lambda field: np.roll(field, 11, axis=1)):
         moved = solved(Surface(there(usual.surface.heights).copy(), FINE))
         assert clr(moved) == pytest.approx(clr(usual), abs=5e-4)
-        assert np.sqrt(np.mean((moved.pressure - there(usual.pressure)) ** 2)) < 5e-4 * P_H
+        assert np.sqrt(np.mean((moved.pressure - there(usual.pressure)) ** 2)) < 1e-3 * P_H
 
 
 def test_a_wider_strip_of_the_same_surface_is_the_same_contact():
