@@ -39,18 +39,28 @@ from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
 from asperity.surface import (
+    CompositeSurface,
+    PreparedSurface,
     Surface,
+    correlation_lengths,
     flat_surface,
     gaussian_surface,
+    ground_surface,
+    non_gaussian_surface,
     prepare_surface,
     read_surface,
+    run_in_surface,
+    sandblasted_surface,
     self_affine_surface,
 )
+from asperity.surface.condition import Form, Outliers
+from asperity.surface.model import area_text, length_text
 
 if TYPE_CHECKING:
     import pint
 
 SHORTEST_INLET = 4.0  # half-widths; a shorter inlet starves the film (0.448 um at 1.9, 0.722 um at 4.5; docs/paper.md)
+SAMPLE_DEVIATION = 0.05  # of a generated surface's correlation lengths, beyond which the notes say so
 
 _MEASURES = {  # SI unit -> what it measures, and how one is written
     "m": ("a length", "5.4 mm"),
@@ -133,6 +143,20 @@ def _twice(value: object) -> object:
     return value if isinstance(value, list | tuple) else (value, value)
 
 
+def read_length(name: str, text: str) -> float:
+    """A length on the command line, such as "0.25 mm", in metres.
+
+    Raises
+    ------
+    BadInput
+        for what is no positive length with a unit; the message begins with `name`.
+    """
+    try:
+        return float(_amount("m", text))
+    except BadInput as error:
+        raise BadInput(f"{name} {error}") from None
+
+
 def _none(value: object) -> object:
     """Let the word none leave an optional thing out: `--set material.hardness=none`."""
     return None if value == "none" else value
@@ -195,6 +219,51 @@ class GaussianSection(Section):
     kind: Literal["gaussian"]
     sq: Length
     correlation_length: Annotated[tuple[Length, Length], _Twice]
+    direction_deg: Number = 0.0  # of the first correlation length, from x towards y
+    seed: Seed = 0
+
+
+class NonGaussianSection(Section):
+    """[surface] kind = "non-gaussian"."""
+
+    kind: Literal["non-gaussian"]
+    sq: Length
+    skewness: Number
+    kurtosis: Number
+    correlation_length: Annotated[tuple[Length, Length], _Twice]
+    direction_deg: Number = 0.0
+    seed: Seed = 0
+
+
+class RunInSection(Section):
+    """[surface] kind = "run-in"."""
+
+    kind: Literal["run-in"]
+    sq: Length
+    correlation_length: Annotated[tuple[Length, Length], _Twice]
+    plateau_share: Number
+    plateau_roughness: Number = 0.1  # Sq of the plateau over that of the surface before it was worn
+    direction_deg: Number = 0.0
+    seed: Seed = 0
+
+
+class GroundSection(Section):
+    """[surface] kind = "ground"."""
+
+    kind: Literal["ground"]
+    sq: Length
+    groove_width: Length
+    groove_length: Length
+    direction_deg: Number = 0.0  # of the lay, from x towards y
+    seed: Seed = 0
+
+
+class SandblastedSection(Section):
+    """[surface] kind = "sandblasted"."""
+
+    kind: Literal["sandblasted"]
+    sq: Length
+    crater_radius: Length
     seed: Seed = 0
 
 
@@ -214,20 +283,35 @@ class FlatSection(Section):
     kind: Literal["flat"]
 
 
-class MeasuredSection(Section):
-    """[surface] file = "..."."""
+class FileSection(Section):
+    """A measured surface and what is done to it."""
 
     file: str
     sq: Annotated[Length | None, _Optional] = None  # scale to this; left out: as measured
-    form: Literal["none", "plane", "quadratic"] = "quadratic"
+    form: Form = "quadratic"
     fit: Literal["crop", "tile"] = "crop"
+    turn: Annotated[bool, Strict()] = False  # by a quarter turn: what the file has along x runs along y
+    outliers: Outliers = "keep"
+    s_filter: Annotated[Length | None, _Optional] = None
+    l_filter: Annotated[Length | None, _Optional] = None
     unit: str | None = None  # of the heights, where the file does not say
     lateral_unit: str | None = None
+    pixel: Annotated[tuple[Length, Length], _Twice] | None = None  # of a matrix of bare heights
+
+
+class MeasuredSection(FileSection):
+    """[surface] file = "..."."""
+
+    second: FileSection | None = None  # on the other body; the composite of both is solved
 
 
 _SURFACES: dict[str, type[Section]] = {
     "gaussian": GaussianSection,
+    "non-gaussian": NonGaussianSection,
     "self-affine": SelfAffineSection,
+    "ground": GroundSection,
+    "sandblasted": SandblastedSection,
+    "run-in": RunInSection,
     "flat": FlatSection,
 }
 
@@ -491,22 +575,94 @@ class Case:
         section = self.contents.surface
         if self.stored is not None:
             return self.stored, ()
-        if isinstance(section, GaussianSection):
-            lx, ly = (float(length) for length in section.correlation_length)
-            rng = np.random.default_rng(section.seed)
-            return gaussian_surface(self.grid, sq=float(section.sq), correlation_length=(lx, ly), rng=rng), ()
+        if isinstance(section, FileSection):
+            return self._measured(section)
+        if isinstance(section, FlatSection):
+            return flat_surface(self.grid), ()
+        return self._generated(section, np.random.default_rng(getattr(section, "seed", 0)))
+
+    def _generated(self, section: Section, rng: np.random.Generator) -> tuple[Surface, tuple[str, ...]]:
+        grid = self.grid
         if isinstance(section, SelfAffineSection):
             shortest, longest = (float(length) for length in section.cutoffs)
-            rng = np.random.default_rng(section.seed)
-            return self_affine_surface(
-                self.grid, sq=float(section.sq), hurst=section.hurst, cutoffs=(shortest, longest), rng=rng
+            sq, hurst = float(section.sq), section.hurst
+            return self_affine_surface(grid, sq=sq, hurst=hurst, cutoffs=(shortest, longest), rng=rng), ()
+        if isinstance(section, SandblastedSection):
+            sq, radius = float(section.sq), float(section.crater_radius)
+            return sandblasted_surface(grid, sq=sq, crater_radius=radius, rng=rng), ()
+        if isinstance(section, GroundSection):
+            width, length = float(section.groove_width), float(section.groove_length)
+            lay = math.radians(section.direction_deg)
+            return ground_surface(
+                grid, sq=float(section.sq), groove_width=width, groove_length=length, direction=lay, rng=rng
             ), ()
-        if isinstance(section, MeasuredSection):
-            measured = read_surface(self.folder / section.file, unit=section.unit, lateral_unit=section.lateral_unit)
-            sq = None if section.sq is None else float(section.sq)
-            prepared = prepare_surface(measured, self.grid, sq=sq, form=section.form, fit=section.fit)
-            return prepared.surface, (*measured.notes, *prepared.steps)
-        return flat_surface(self.grid), ()
+        assert isinstance(section, GaussianSection | NonGaussianSection | RunInSection)
+        lx, ly = (float(length) for length in section.correlation_length)
+        lay = math.radians(section.direction_deg)
+        common: dict[str, Any] = {
+            "sq": float(section.sq),
+            "correlation_length": (lx, ly),
+            "direction": lay,
+            "rng": rng,
+        }
+        if isinstance(section, RunInSection):
+            share, rest = section.plateau_share, section.plateau_roughness
+            return run_in_surface(grid, plateau_share=share, plateau_roughness=rest, **common), ()
+        if isinstance(section, NonGaussianSection):
+            made = non_gaussian_surface(grid, skewness=section.skewness, kurtosis=section.kurtosis, **common)
+        else:
+            made = gaussian_surface(grid, **common)
+        found = correlation_lengths(made, lay)
+        if all(abs(f / asked - 1.0) <= SAMPLE_DEVIATION for f, asked in zip(found, (lx, ly), strict=True)):
+            return made, ()
+        return made, (
+            f"This sample's autocorrelation falls to 1/e over {area_text(found)}, where {area_text((lx, ly))} "
+            "was asked for: the domain holds few correlation lengths, so seeds scatter.",
+        )
+
+    def _measured(self, section: FileSection) -> tuple[Surface, tuple[str, ...]]:
+        prepared = self._prepared(section)
+        if not (isinstance(section, MeasuredSection) and section.second is not None):
+            return prepared.surface, prepared.steps
+        second = self._prepared(section.second)
+        speeds = self.conditions.surface_speeds
+        combined = CompositeSurface(prepared.surface, second.surface, speeds).surface
+        return combined, (
+            *(f"{section.file}: {step}" for step in prepared.steps),
+            *(f"{section.second.file}: {step}" for step in second.steps),
+            f"added {section.file} (moving at {speeds[0]:.4g} m/s) and {section.second.file} ({speeds[1]:.4g} m/s), "
+            f"the second face down; Sq {length_text(combined.sq)} together",
+        )
+
+    def _prepared(self, section: FileSection) -> PreparedSurface:
+        def plain(length: float | None) -> float | None:
+            return None if length is None else float(length)
+
+        pixel = None if section.pixel is None else (float(section.pixel[0]), float(section.pixel[1]))
+        measured = read_surface(
+            self.folder / section.file, unit=section.unit, lateral_unit=section.lateral_unit, pixel=pixel
+        )
+        prepared = prepare_surface(
+            measured,
+            self.grid,
+            sq=plain(section.sq),
+            form=section.form,
+            fit=section.fit,
+            turn=section.turn,
+            outliers=section.outliers,
+            s_filter=plain(section.s_filter),
+            l_filter=plain(section.l_filter),
+        )
+        return replace(prepared, steps=(*measured.notes, *prepared.steps))
+
+    def composite(self) -> CompositeSurface | None:
+        """Two measured surfaces apart, each with its speed; None when the case has no second one."""
+        section = self.contents.surface
+        if not (isinstance(section, MeasuredSection) and section.second is not None):
+            return None
+        with self.naming("surface"):
+            first, second = self._prepared(section), self._prepared(section.second)
+            return CompositeSurface(first.surface, second.surface, self.conditions.surface_speeds)
 
     def surface(self) -> Surface:
         """The composite roughness on the grid: generated, read and prepared, or as stored in the run.
@@ -523,7 +679,7 @@ class Case:
 
     @property
     def surface_notes(self) -> tuple[str, ...]:
-        """What was done to a measured surface, a sentence each."""
+        """What was done to a measured surface, and where a generated one strays from what was asked for."""
         self.surface()
         return self._roughness[1]
 

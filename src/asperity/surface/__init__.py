@@ -5,7 +5,13 @@ from asperity.surface.condition import condition, level
 from asperity.surface.generate import gaussian_surface, non_gaussian_surface, run_in_surface, self_affine_surface
 from asperity.surface.machined import ground_surface, sandblasted_surface
 from asperity.surface.model import MeasuredSurface, Surface, flat_surface
-from asperity.surface.parameters import SurfaceDescription, SurfaceParameters, describe_surface, surface_parameters
+from asperity.surface.parameters import (
+    SurfaceDescription,
+    SurfaceParameters,
+    correlation_lengths,
+    describe_surface,
+    surface_parameters,
+)
 from asperity.surface.prepare import CompositeSurface, PreparedSurface, prepare_surface
 from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
@@ -21,6 +27,7 @@ __all__ = [
     "SurfaceParameters",
     "bearing_curve",
     "condition",
+    "correlation_lengths",
     "describe_surface",
     "flat_surface",
     "gaussian_surface",

@@ -162,14 +162,20 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
         bow = across * (2.0 * slope - curvature * across) / (flat + round_)
         return np.asarray(z0 + tilt * along + np.sqrt(1.0 + tilt**2) * bow)
 
-    terms = np.stack([np.ones_like(at_x), at_x, at_y, at_x**2, at_x * at_y, at_y**2], axis=-1)
-    c, *_ = np.linalg.lstsq(terms, z, rcond=None)
-    bends, axes = np.linalg.eigh(np.array([[2.0 * c[3], c[4]], [c[4], 2.0 * c[5]]]))
+    powers = [
+        (i, j)
+        for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+        if measured.uniform is None or (i, j)[measured.uniform] == 0
+    ]
+    found, *_ = np.linalg.lstsq(np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None)
+    c = dict.fromkeys(((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)), 0.0) | dict(zip(powers, found, strict=True))
+    gradient = np.array([c[1, 0], c[0, 1]])
+    bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
     steep = int(np.argmax(np.abs(bends)))
     direction = axes[:, steep]
     angle = float(np.arctan2(direction[1], direction[0]))
-    slope, tilt = c[1:3] @ direction, c[1:3] @ np.array([-direction[1], direction[0]])
-    start = np.array([c[0], np.clip(slope, -0.9, 0.9), tilt, angle, -bends[steep]])
+    slope, tilt = gradient @ direction, gradient @ np.array([-direction[1], direction[0]])
+    start = np.array([c[0, 0], np.clip(slope, -0.9, 0.9), tilt, angle, -bends[steep]])
 
     # the profile of a cylinder says nothing of its axis
     free = [0, 1, 2, 3, 4] if measured.uniform is None else [0, 1, 4]
@@ -182,8 +188,8 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     def misfit(freed: Field) -> Field:
         return np.asarray(shape(parameters(freed), at_x, at_y) - z)
 
-    found = least_squares(misfit, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    best = parameters(found.x)
+    nearest = least_squares(misfit, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    best = parameters(nearest.x)
     curvature = float(best[4])
     return scale * shape(best, x, y), scale / curvature if curvature else np.inf
 

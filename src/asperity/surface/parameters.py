@@ -157,6 +157,17 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
     )
 
 
+def correlation_lengths(surface: Surface | MeasuredSurface, direction: float = 0.0) -> tuple[float, float]:
+    """Distances along and across `direction` [rad from x] over which the autocorrelation falls to 1/e [m].
+
+    NaN where it does not within half the map. Generators take these lengths; Sal is where it has fallen to 0.2.
+    """
+    correlation, middle = _autocorrelation(surface.heights - np.nanmean(surface.heights), surface.grid)
+    angles = np.array([direction, direction + np.pi / 2.0])
+    first, second = _decay(correlation, middle, surface.grid, angles, np.exp(-1.0))[0]
+    return float(first), float(second)
+
+
 def _gradient(heights: Field, grid: Grid) -> float:
     squares = 0.0
     for axis, (spacing, repeats) in enumerate(zip(grid.spacing, grid.periodic, strict=True)):
@@ -197,11 +208,22 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
 
 
 def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
-    """Sal, Str, and whether Str is only an upper bound: the autocorrelation along rays from zero lag."""
+    """Sal, Str, and whether Str is only an upper bound."""
+    correlation, middle = _autocorrelation(heights, grid)
+    distances, ends = _decay(correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAYED)
+    if np.isnan(distances).all():
+        return float("nan"), float("nan"), False
+    shortest = float(np.nanmin(distances))
+    longest = float(np.max(np.where(np.isnan(distances), ends, distances)))
+    return shortest, shortest / longest, bool(np.isnan(distances).any())
+
+
+def _decay(
+    correlation: Field, middle: tuple[int, int], grid: Grid, angles: Field, threshold: float
+) -> tuple[Field, Field]:
+    """Where the autocorrelation falls below the threshold along rays, NaN where it does not; and where they end."""
     from scipy.ndimage import map_coordinates
 
-    correlation, middle = _autocorrelation(heights, grid)
-    angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
     cosines, sines = np.cos(angles)[:, None] / grid.spacing[0], np.sin(angles)[:, None] / grid.spacing[1]
     # the ray ends where it leaves the known lags; its samples are half a cell apart, at most
     ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
@@ -209,15 +231,11 @@ def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
     along = map_coordinates(
         correlation, [middle[0] + radii * cosines, middle[1] + radii * sines], order=3, mode="nearest"
     )
-    below = along < _DECAYED
-    decays = below.any(axis=1)
-    if not decays.any():
-        return float("nan"), float("nan"), False
-    ray = np.flatnonzero(decays)
+    below = along < threshold
+    ray = np.flatnonzero(below.any(axis=1))
     after = np.argmax(below[ray], axis=1)
     high, low = along[ray, after - 1], along[ray, after]
     inner, outer = radii[ray, after - 1], radii[ray, after]
-    distances = ends[:, 0].copy()
-    distances[ray] = inner + (outer - inner) * (high - _DECAYED) / (high - low)
-    shortest = float(np.min(distances[ray]))
-    return shortest, shortest / float(np.max(distances)), not bool(decays.all())
+    distances = np.full(angles.size, np.nan)
+    distances[ray] = inner + (outer - inner) * (high - threshold) / (high - low)
+    return distances, ends[:, 0]
