@@ -33,7 +33,7 @@ from pydantic import (
 )
 
 from asperity.conditions import ContactConditions, ElasticPair, Geometry
-from asperity.coupling import VibrationModel
+from asperity.coupling import PRESETS, VibrationModel, preset_choices
 from asperity.ehl.solution import Options
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
@@ -73,9 +73,18 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "kg": ("a mass", "0.1 kg"),
     "s": ("a time", "2 s"),
     "Hz": ("a frequency", "50 kHz"),
+    "N s/m": ("a damping coefficient", "80 N s/m"),
 }
 _LAW_UNITS = {"eta0": "Pa s", "alpha": "1/Pa", "p0": "Pa", "rho0": "kg/m^3"}  # parameters not listed are plain numbers
-_VIBRATION_UNITS = {"mass": "kg", "rate_hz": "Hz", "duration_s": "s", "cutoff_reference_hz": "Hz"}
+_VIBRATION_UNITS = {
+    "mass": "kg",
+    "damping": "N s/m",
+    "reference_depth": "m",
+    "passing_speed": "m/s",
+    "rate_hz": "Hz",
+    "duration_s": "s",
+    "cutoff_reference_hz": "Hz",
+}
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 
 
@@ -363,7 +372,10 @@ def _parameters(law: type, units: Mapping[str, str]) -> dict[str, Any]:
         unit = units.get(parameter.name)
         kind = _type(unit) if unit else Annotated[cast(Any, parameter.type), Strict()]
         default: Any = ... if parameter.default is MISSING else parameter.default
-        parameters[parameter.name] = (kind, _restated(default, unit) if unit and default is not ... else default)
+        if default is None:
+            kind = Annotated[kind | None, _Optional]
+        stated = _restated(default, unit) if unit and isinstance(default, float) else default
+        parameters[parameter.name] = (kind, stated)
     return parameters
 
 
@@ -414,11 +426,37 @@ def _lubricant_section(value: object) -> LubricantSection | None:
     return None if value == "none" else _validated(LubricantSection, value)
 
 
+def _vibration_key(name: str) -> str:
+    """The key of a field of VibrationModel: in a case, the unit stands beside the value."""
+    return re.sub("_(hz|s)$", "", name)
+
+
+_PRESET: Any = (Literal["sound", "paper"], "sound")
 VibrationSection = create_model(
     "vibration",
     __base__=Section,
-    **{re.sub("_(hz|s)$", "", name): kind for name, kind in _parameters(VibrationModel, _VIBRATION_UNITS).items()},
+    preset=_PRESET,
+    **{_vibration_key(name): kind for name, kind in _parameters(VibrationModel, _VIBRATION_UNITS).items()},
 )
+
+
+def _vibration_section(value: object) -> Any:
+    """A preset's choices, and over them what the case says."""
+    if value == "none":
+        return None
+    chosen = value.get("preset", "sound") if isinstance(value, Mapping) else "sound"
+    if isinstance(value, Mapping) and isinstance(chosen, str) and chosen in PRESETS:
+        value = {**_preset_table(chosen), **value}
+    return _validated(VibrationSection, value)
+
+
+def _preset_table(name: str) -> dict[str, Any]:
+    """A preset's choices as a case writes them."""
+    units = _VIBRATION_UNITS
+    return {
+        _vibration_key(key): _restated(choice, units[key]) if key in units else choice
+        for key, choice in preset_choices(name).items()
+    }
 
 
 class CaseFile(Section):
@@ -431,9 +469,7 @@ class CaseFile(Section):
     surface: Annotated[Section, PlainValidator(_surface_section)]
     grid: GridSection
     solver: SolverSection = SolverSection()
-    vibration: Annotated[
-        Any, PlainValidator(lambda value: None if value == "none" else _validated(VibrationSection, value))
-    ] = None
+    vibration: Annotated[Any, PlainValidator(_vibration_section)] = None
     study: Annotated[StudySection | None, _Optional] = None
 
 
@@ -566,7 +602,7 @@ class Case:
         section = self.contents.vibration
         if section is None:
             return None
-        values = {entry.name: getattr(section, re.sub("_(hz|s)$", "", entry.name)) for entry in fields(VibrationModel)}
+        values = {entry.name: getattr(section, _vibration_key(entry.name)) for entry in fields(VibrationModel)}
         plain: dict[str, Any] = {name: float(v) if isinstance(v, float) else v for name, v in values.items()}
         return VibrationModel(**plain)
 
@@ -708,7 +744,7 @@ class Case:
         """The case with values replaced, such as `{"contact.load": "400 N", "grid.cells": "[128, 128]"}`.
 
         Text is read as a TOML value where it is one and taken as it stands where not. Stored roughness is kept
-        as long as neither the surface nor the grid changes.
+        as long as neither the surface nor the grid changes. `vibration.preset` replaces all that presets choose.
 
         Raises
         ------
@@ -716,6 +752,9 @@ class Case:
             for a key or value that the case file would be refused for.
         """
         tables = tomllib.loads(self.text)
+        if "vibration.preset" in overrides:  # what the old preset chose is written out, and would stand above the new
+            for choice in preset_choices("sound"):
+                tables.get("vibration", {}).pop(_vibration_key(choice), None)
         for path, value in overrides.items():
             *parents, key = path.split(".")
             if not all((*parents, key)):
