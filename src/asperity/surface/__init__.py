@@ -15,6 +15,7 @@ from asperity.surface.parameters import (
 from asperity.surface.prepare import CompositeSurface, PreparedSurface, prepare_surface
 from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
+from asperity.surface.spectrum import SurfaceSpectrum, surface_spectrum
 
 __all__ = [
     "BearingCurve",
@@ -25,6 +26,7 @@ __all__ = [
     "Surface",
     "SurfaceDescription",
     "SurfaceParameters",
+    "SurfaceSpectrum",
     "bearing_curve",
     "condition",
     "correlation_lengths",
@@ -41,4 +43,5 @@ __all__ = [
     "sandblasted_surface",
     "self_affine_surface",
     "surface_parameters",
+    "surface_spectrum",
 ]
