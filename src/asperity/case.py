@@ -33,24 +33,34 @@ from pydantic import (
 )
 
 from asperity.conditions import ContactConditions, ElasticPair, Geometry
-from asperity.coupling import VibrationModel
+from asperity.coupling import PRESETS, VibrationModel, preset_choices
 from asperity.ehl.solution import Options
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
 from asperity.surface import (
+    CompositeSurface,
+    PreparedSurface,
     Surface,
+    correlation_lengths,
     flat_surface,
     gaussian_surface,
+    ground_surface,
+    non_gaussian_surface,
     prepare_surface,
     read_surface,
+    run_in_surface,
+    sandblasted_surface,
     self_affine_surface,
 )
+from asperity.surface.condition import Form, Outliers
+from asperity.surface.model import area_text, length_text
 
 if TYPE_CHECKING:
     import pint
 
 SHORTEST_INLET = 4.0  # half-widths; a shorter inlet starves the film (0.448 um at 1.9, 0.722 um at 4.5; docs/paper.md)
+SAMPLE_DEVIATION = 0.05  # of a generated surface's correlation lengths, beyond which the notes say so
 
 _MEASURES = {  # SI unit -> what it measures, and how one is written
     "m": ("a length", "5.4 mm"),
@@ -63,15 +73,19 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "kg": ("a mass", "0.1 kg"),
     "s": ("a time", "2 s"),
     "Hz": ("a frequency", "50 kHz"),
+    "N s/m": ("a damping coefficient", "80 N s/m"),
 }
-_LAW_UNITS = {
-    "eta0": "Pa s",
-    "alpha": "1/Pa",
-    "p0": "Pa",
-    "rho0": "kg/m^3",
-    "tau0": "Pa",
-}  # parameters not listed are plain numbers
-_VIBRATION_UNITS = {"mass": "kg", "rate_hz": "Hz", "duration_s": "s", "cutoff_reference_hz": "Hz"}
+# parameters of laws that are not listed are plain numbers
+_LAW_UNITS = {"eta0": "Pa s", "alpha": "1/Pa", "p0": "Pa", "rho0": "kg/m^3", "tau0": "Pa"}
+_VIBRATION_UNITS = {
+    "mass": "kg",
+    "damping": "N s/m",
+    "reference_depth": "m",
+    "passing_speed": "m/s",
+    "rate_hz": "Hz",
+    "duration_s": "s",
+    "cutoff_reference_hz": "Hz",
+}
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 
 
@@ -139,6 +153,20 @@ def _twice(value: object) -> object:
     return value if isinstance(value, list | tuple) else (value, value)
 
 
+def read_length(name: str, text: str) -> float:
+    """A length on the command line, such as "0.25 mm", in metres.
+
+    Raises
+    ------
+    BadInput
+        for what is no positive length with a unit; the message begins with `name`.
+    """
+    try:
+        return float(_amount("m", text))
+    except BadInput as error:
+        raise BadInput(f"{name} {error}") from None
+
+
 def _none(value: object) -> object:
     """Let the word none leave an optional thing out: `--set material.hardness=none`."""
     return None if value == "none" else value
@@ -201,6 +229,51 @@ class GaussianSection(Section):
     kind: Literal["gaussian"]
     sq: Length
     correlation_length: Annotated[tuple[Length, Length], _Twice]
+    direction_deg: Number = 0.0  # of the first correlation length, from x towards y
+    seed: Seed = 0
+
+
+class NonGaussianSection(Section):
+    """[surface] kind = "non-gaussian"."""
+
+    kind: Literal["non-gaussian"]
+    sq: Length
+    skewness: Number
+    kurtosis: Number
+    correlation_length: Annotated[tuple[Length, Length], _Twice]
+    direction_deg: Number = 0.0
+    seed: Seed = 0
+
+
+class RunInSection(Section):
+    """[surface] kind = "run-in"."""
+
+    kind: Literal["run-in"]
+    sq: Length
+    correlation_length: Annotated[tuple[Length, Length], _Twice]
+    plateau_share: Number
+    plateau_roughness: Number = 0.1  # Sq of the plateau over that of the surface before it was worn
+    direction_deg: Number = 0.0
+    seed: Seed = 0
+
+
+class GroundSection(Section):
+    """[surface] kind = "ground"."""
+
+    kind: Literal["ground"]
+    sq: Length
+    groove_width: Length
+    groove_length: Length
+    direction_deg: Number = 0.0  # of the lay, from x towards y
+    seed: Seed = 0
+
+
+class SandblastedSection(Section):
+    """[surface] kind = "sandblasted"."""
+
+    kind: Literal["sandblasted"]
+    sq: Length
+    crater_radius: Length
     seed: Seed = 0
 
 
@@ -220,20 +293,35 @@ class FlatSection(Section):
     kind: Literal["flat"]
 
 
-class MeasuredSection(Section):
-    """[surface] file = "..."."""
+class FileSection(Section):
+    """A measured surface and what is done to it."""
 
     file: str
     sq: Annotated[Length | None, _Optional] = None  # scale to this; left out: as measured
-    form: Literal["none", "plane", "quadratic"] = "quadratic"
+    form: Form = "quadratic"
     fit: Literal["crop", "tile"] = "crop"
+    turn: Annotated[bool, Strict()] = False  # by a quarter turn: what the file has along x runs along y
+    outliers: Outliers = "keep"
+    s_filter: Annotated[Length | None, _Optional] = None
+    l_filter: Annotated[Length | None, _Optional] = None
     unit: str | None = None  # of the heights, where the file does not say
     lateral_unit: str | None = None
+    pixel: Annotated[tuple[Length, Length], _Twice] | None = None  # of a matrix of bare heights
+
+
+class MeasuredSection(FileSection):
+    """[surface] file = "..."."""
+
+    second: FileSection | None = None  # on the other body; the composite of both is solved
 
 
 _SURFACES: dict[str, type[Section]] = {
     "gaussian": GaussianSection,
+    "non-gaussian": NonGaussianSection,
     "self-affine": SelfAffineSection,
+    "ground": GroundSection,
+    "sandblasted": SandblastedSection,
+    "run-in": RunInSection,
     "flat": FlatSection,
 }
 
@@ -285,7 +373,10 @@ def _parameters(law: type, units: Mapping[str, str]) -> dict[str, Any]:
         unit = units.get(parameter.name)
         kind = _type(unit) if unit else Annotated[cast(Any, parameter.type), Strict()]
         default: Any = ... if parameter.default is MISSING else parameter.default
-        parameters[parameter.name] = (kind, _restated(default, unit) if unit and default is not ... else default)
+        if default is None:
+            kind = Annotated[kind | None, _Optional]
+        stated = _restated(default, unit) if unit and isinstance(default, float) else default
+        parameters[parameter.name] = (kind, stated)
     return parameters
 
 
@@ -336,11 +427,37 @@ def _lubricant_section(value: object) -> LubricantSection | None:
     return None if value == "none" else _validated(LubricantSection, value)
 
 
+def _vibration_key(name: str) -> str:
+    """The key of a field of VibrationModel: in a case, the unit stands beside the value."""
+    return re.sub("_(hz|s)$", "", name)
+
+
+_PRESET: Any = (Literal["sound", "paper"], "sound")
 VibrationSection = create_model(
     "vibration",
     __base__=Section,
-    **{re.sub("_(hz|s)$", "", name): kind for name, kind in _parameters(VibrationModel, _VIBRATION_UNITS).items()},
+    preset=_PRESET,
+    **{_vibration_key(name): kind for name, kind in _parameters(VibrationModel, _VIBRATION_UNITS).items()},
 )
+
+
+def _vibration_section(value: object) -> Any:
+    """A preset's choices, and over them what the case says."""
+    if value == "none":
+        return None
+    chosen = value.get("preset", "sound") if isinstance(value, Mapping) else "sound"
+    if isinstance(value, Mapping) and isinstance(chosen, str) and chosen in PRESETS:
+        value = {**_preset_table(chosen), **value}
+    return _validated(VibrationSection, value)
+
+
+def _preset_table(name: str) -> dict[str, Any]:
+    """A preset's choices as a case writes them."""
+    units = _VIBRATION_UNITS
+    return {
+        _vibration_key(key): _restated(choice, units[key]) if key in units else choice
+        for key, choice in preset_choices(name).items()
+    }
 
 
 class CaseFile(Section):
@@ -353,9 +470,7 @@ class CaseFile(Section):
     surface: Annotated[Section, PlainValidator(_surface_section)]
     grid: GridSection
     solver: SolverSection = SolverSection()
-    vibration: Annotated[
-        Any, PlainValidator(lambda value: None if value == "none" else _validated(VibrationSection, value))
-    ] = None
+    vibration: Annotated[Any, PlainValidator(_vibration_section)] = None
     study: Annotated[StudySection | None, _Optional] = None
 
 
@@ -488,7 +603,7 @@ class Case:
         section = self.contents.vibration
         if section is None:
             return None
-        values = {entry.name: getattr(section, re.sub("_(hz|s)$", "", entry.name)) for entry in fields(VibrationModel)}
+        values = {entry.name: getattr(section, _vibration_key(entry.name)) for entry in fields(VibrationModel)}
         plain: dict[str, Any] = {name: float(v) if isinstance(v, float) else v for name, v in values.items()}
         return VibrationModel(**plain)
 
@@ -497,22 +612,94 @@ class Case:
         section = self.contents.surface
         if self.stored is not None:
             return self.stored, ()
-        if isinstance(section, GaussianSection):
-            lx, ly = (float(length) for length in section.correlation_length)
-            rng = np.random.default_rng(section.seed)
-            return gaussian_surface(self.grid, sq=float(section.sq), correlation_length=(lx, ly), rng=rng), ()
+        if isinstance(section, FileSection):
+            return self._measured(section)
+        if isinstance(section, FlatSection):
+            return flat_surface(self.grid), ()
+        return self._generated(section, np.random.default_rng(getattr(section, "seed", 0)))
+
+    def _generated(self, section: Section, rng: np.random.Generator) -> tuple[Surface, tuple[str, ...]]:
+        grid = self.grid
         if isinstance(section, SelfAffineSection):
             shortest, longest = (float(length) for length in section.cutoffs)
-            rng = np.random.default_rng(section.seed)
-            return self_affine_surface(
-                self.grid, sq=float(section.sq), hurst=section.hurst, cutoffs=(shortest, longest), rng=rng
+            sq, hurst = float(section.sq), section.hurst
+            return self_affine_surface(grid, sq=sq, hurst=hurst, cutoffs=(shortest, longest), rng=rng), ()
+        if isinstance(section, SandblastedSection):
+            sq, radius = float(section.sq), float(section.crater_radius)
+            return sandblasted_surface(grid, sq=sq, crater_radius=radius, rng=rng), ()
+        if isinstance(section, GroundSection):
+            width, length = float(section.groove_width), float(section.groove_length)
+            lay = math.radians(section.direction_deg)
+            return ground_surface(
+                grid, sq=float(section.sq), groove_width=width, groove_length=length, direction=lay, rng=rng
             ), ()
-        if isinstance(section, MeasuredSection):
-            measured = read_surface(self.folder / section.file, unit=section.unit, lateral_unit=section.lateral_unit)
-            sq = None if section.sq is None else float(section.sq)
-            prepared = prepare_surface(measured, self.grid, sq=sq, form=section.form, fit=section.fit)
-            return prepared.surface, (*measured.notes, *prepared.steps)
-        return flat_surface(self.grid), ()
+        assert isinstance(section, GaussianSection | NonGaussianSection | RunInSection)
+        lx, ly = (float(length) for length in section.correlation_length)
+        lay = math.radians(section.direction_deg)
+        common: dict[str, Any] = {
+            "sq": float(section.sq),
+            "correlation_length": (lx, ly),
+            "direction": lay,
+            "rng": rng,
+        }
+        if isinstance(section, RunInSection):
+            share, rest = section.plateau_share, section.plateau_roughness
+            return run_in_surface(grid, plateau_share=share, plateau_roughness=rest, **common), ()
+        if isinstance(section, NonGaussianSection):
+            made = non_gaussian_surface(grid, skewness=section.skewness, kurtosis=section.kurtosis, **common)
+        else:
+            made = gaussian_surface(grid, **common)
+        found = correlation_lengths(made, lay)
+        if all(abs(f / asked - 1.0) <= SAMPLE_DEVIATION for f, asked in zip(found, (lx, ly), strict=True)):
+            return made, ()
+        return made, (
+            f"This sample's autocorrelation falls to 1/e over {area_text(found)}, where {area_text((lx, ly))} "
+            "was asked for: the domain holds few correlation lengths, so seeds scatter.",
+        )
+
+    def _measured(self, section: FileSection) -> tuple[Surface, tuple[str, ...]]:
+        prepared = self._prepared(section)
+        if not (isinstance(section, MeasuredSection) and section.second is not None):
+            return prepared.surface, prepared.steps
+        second = self._prepared(section.second)
+        speeds = self.conditions.surface_speeds
+        combined = CompositeSurface(prepared.surface, second.surface, speeds).surface
+        return combined, (
+            *(f"{section.file}: {step}" for step in prepared.steps),
+            *(f"{section.second.file}: {step}" for step in second.steps),
+            f"added {section.file} (moving at {speeds[0]:.4g} m/s) and {section.second.file} ({speeds[1]:.4g} m/s), "
+            f"the second face down; Sq {length_text(combined.sq)} together",
+        )
+
+    def _prepared(self, section: FileSection) -> PreparedSurface:
+        def plain(length: float | None) -> float | None:
+            return None if length is None else float(length)
+
+        pixel = None if section.pixel is None else (float(section.pixel[0]), float(section.pixel[1]))
+        measured = read_surface(
+            self.folder / section.file, unit=section.unit, lateral_unit=section.lateral_unit, pixel=pixel
+        )
+        prepared = prepare_surface(
+            measured,
+            self.grid,
+            sq=plain(section.sq),
+            form=section.form,
+            fit=section.fit,
+            turn=section.turn,
+            outliers=section.outliers,
+            s_filter=plain(section.s_filter),
+            l_filter=plain(section.l_filter),
+        )
+        return replace(prepared, steps=(*measured.notes, *prepared.steps))
+
+    def composite(self) -> CompositeSurface | None:
+        """Two measured surfaces apart, each with its speed; None when the case has no second one."""
+        section = self.contents.surface
+        if not (isinstance(section, MeasuredSection) and section.second is not None):
+            return None
+        with self.naming("surface"):
+            first, second = self._prepared(section), self._prepared(section.second)
+            return CompositeSurface(first.surface, second.surface, self.conditions.surface_speeds)
 
     def surface(self) -> Surface:
         """The composite roughness on the grid: generated, read and prepared, or as stored in the run.
@@ -529,7 +716,7 @@ class Case:
 
     @property
     def surface_notes(self) -> tuple[str, ...]:
-        """What was done to a measured surface, a sentence each."""
+        """What was done to a measured surface, and where a generated one strays from what was asked for."""
         self.surface()
         return self._roughness[1]
 
@@ -558,7 +745,7 @@ class Case:
         """The case with values replaced, such as `{"contact.load": "400 N", "grid.cells": "[128, 128]"}`.
 
         Text is read as a TOML value where it is one and taken as it stands where not. Stored roughness is kept
-        as long as neither the surface nor the grid changes.
+        as long as neither the surface nor the grid changes. `vibration.preset` replaces all that presets choose.
 
         Raises
         ------
@@ -566,6 +753,9 @@ class Case:
             for a key or value that the case file would be refused for.
         """
         tables = tomllib.loads(self.text)
+        if "vibration.preset" in overrides:  # what the old preset chose is written out, and would stand above the new
+            for choice in preset_choices("sound"):
+                tables.get("vibration", {}).pop(_vibration_key(choice), None)
         for path, value in overrides.items():
             *parents, key = path.split(".")
             if not all((*parents, key)):

@@ -53,7 +53,7 @@ def elliptic_contact(load: float, radii: tuple[float, float], reduced_modulus: f
     from scipy.special import ellipe, ellipk
 
     r_large, r_small = max(radii), min(radii)
-    if np.isclose(r_large, r_small, rtol=1e-12):
+    if np.isclose(r_large, r_small, rtol=3e-9, atol=0.0):  # the root below loses its digits, or its bracket
         return point_contact(load, r_small, reduced_modulus)
 
     def curvature_ratio(log_k: float) -> float:
@@ -81,6 +81,15 @@ def point_compression(load: float, radius: float, reduced_modulus: float) -> flo
 def point_stiffness(load: float, radius: float, reduced_modulus: float) -> float:
     """Incremental stiffness dF/dz0 of sphere on plane [N/m]: S0 = 1.5 F / z0, the paper's Eq 3."""
     return 1.5 * load / point_compression(load, radius, reduced_modulus)
+
+
+def line_stiffness(load: float, length: float, radius: float, reduced_modulus: float, depth: float) -> float:
+    """Incremental stiffness dF/dδ of cylinder on plane [N/m], δ from points `depth` away: π E* L / (2 ln(2d/a)).
+
+    From δ = (P'/πE*) (2 ln(2d/a) + 1), a ~ sqrt(P'). Source: K. L. Johnson, Contact Mechanics (1985), section 5.6.
+    """
+    half_width = line_contact(load, length, radius, reduced_modulus).half_widths[0]
+    return float(np.pi * reduced_modulus * length / (2.0 * np.log(2.0 * depth / half_width)))
 
 
 def line_pressure(x: Field, half_width: float, p_max: float) -> Field:

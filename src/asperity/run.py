@@ -164,7 +164,7 @@ def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
     state = contact_state(solution)
     model = case.vibration
     with case.naming("vibration"):
-        vibration = None if model is None else contact_vibration(state, case.conditions, model)
+        vibration = None if model is None else contact_vibration(state, case.conditions, model, solution=solution)
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
     return Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes)

@@ -1,14 +1,18 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import (
+    PRESETS,
     VibrationModel,
     contact_vibration,
     cutoff_hz,
+    dry_full_load,
     excitation,
     oscillator,
-    profile_density,
+    preset_choices,
     search_band,
 )
 from asperity.ehl.state import ContactState
@@ -61,36 +65,6 @@ def test_cutoff_follows_the_area_share():
     assert cutoff_hz(state(car=0.25), proportional) == pytest.approx(15.0)
 
 
-def test_profile_density_integrates_to_the_height():
-    frequency = np.linspace(0.0, 30e3, 3_000_001)
-    assert np.trapezoid(profile_density(frequency, 2e-6, 30.0), frequency) == pytest.approx(4e-12, rel=1e-6)
-
-
-def test_profile_has_the_roughness_as_its_height_and_the_butterworth_autocovariance():
-    """R(t) = h^2 e^(-a t) (cos a t + sin a t), a = sqrt(2) pi fc, at lags of a few ms, over 400 s."""
-    model = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=4e3, duration_s=400.0)
-    heights = excitation(state(sq=2e-6), model).values
-    assert heights.size == 1_600_000
-    assert np.std(heights) == pytest.approx(2e-6, rel=0.03)
-    a = np.sqrt(2.0) * np.pi * 30.0
-    for lag in (1, 20, 60):
-        t = lag / 4e3
-        expected = 4e-12 * np.exp(-a * t) * (np.cos(a * t) + np.sin(a * t))
-        assert np.mean(heights[lag:] * heights[:-lag]) == pytest.approx(expected, abs=0.05 * 4e-12)
-
-
-def test_profile_at_the_resonance_has_the_continuous_filters_power():
-    """Where a bilinear filter would lack 1.6 % and more: band power against the closed form, to statistical error."""
-    from asperity.signals import power_spectrum
-
-    model = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=20e3, duration_s=100.0)
-    spectrum = power_spectrum(excitation(state(), model), segment=20_000, window="blackmanharris")
-    band = (spectrum.frequency_hz > 2500) & (spectrum.frequency_hz < 4000)
-    f = spectrum.frequency_hz[band]
-    folded = sum(profile_density(np.abs(f + k * 20e3), 2e-6, 30.0) for k in range(-3, 4))
-    assert np.mean(spectrum.density[band] / folded) == pytest.approx(1.0, abs=0.012)
-
-
 def test_band_follows_from_the_contact_alone():
     low, high = search_band(CONDITIONS, MODEL)
     assert low == pytest.approx(0.95 * 3329.5 * 0.01 ** (1 / 6), rel=1e-4)
@@ -102,8 +76,8 @@ def test_one_seed_is_one_record():
     first, again = (contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, MODEL) for _ in range(2))
     assert np.array_equal(first.response.values, again.response.values)
     assert first.resonance == again.resonance
-    other = excitation(state(clr=0.5, car=0.3), VibrationModel(mass=0.1, damping_ratio=0.02, seed=2))
-    assert not np.array_equal(first.profile.values, other.values)
+    other = contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, seed=2))
+    assert not np.array_equal(first.profile.values, other.profile.values)
 
 
 def test_record_scatters_about_the_expected_spectrum():
@@ -135,8 +109,8 @@ def test_bad_input_is_named():
     slow = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=20e3)
     with pytest.raises(BadInput, match=r"15 times the full-load resonance of 33\d\d Hz, got 20000 Hz"):
         contact_vibration(state(), CONDITIONS, slow)
-    with pytest.raises(BadInput, match="hertz-point"):
-        VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="hertz-line")
+    with pytest.raises(BadInput, match="hertz-point, hertz-line, parallel-film, tangent"):
+        VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="palmgren")
     with pytest.raises(BadInput, match="likelihood, peak"):
         VibrationModel(mass=0.1, damping_ratio=0.02, method="highest")
     with pytest.raises(BadInput, match=r"got -0\.1 kg"):
@@ -144,4 +118,96 @@ def test_bad_input_is_named():
     with pytest.raises(BadInput, match="CLR"):
         oscillator(state(clr=0.0), CONDITIONS, MODEL)
     with pytest.raises(BadInput, match="cut-off must lie"):
-        excitation(state(), VibrationModel(mass=0.1, damping_ratio=0.02, duration_s=0.01))
+        contact_vibration(state(), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, duration_s=0.01))
+    choices = {
+        "damping_law": "stiff",
+        "excitation": "hammer",
+        "coefficient": "lost",
+        "patch": "square",
+        "response": "euler",
+        "filter": "chebyshev",
+        "height_as": "rz",
+        "height_of": "peak",
+    }
+    for name, value in choices.items():
+        with pytest.raises(BadInput, match=value):
+            VibrationModel(mass=0.1, damping_ratio=0.02, **{name: value})
+    for name in ("damping", "reference_depth", "passing_speed"):
+        with pytest.raises(BadInput, match=name.replace("_", " ")):
+            VibrationModel(mass=0.1, damping_ratio=0.02, **{name: -1.0})
+    with pytest.raises(BadInput, match="N s/m"):
+        VibrationModel(mass=0.1, damping_ratio=0.02, damping_law="constant")
+    with pytest.raises(BadInput, match="point spring"):
+        VibrationModel(mass=0.1, damping_ratio=0.02, response="nonlinear", stiffness_law="hertz-line")
+    with pytest.raises(BadInput, match="sound, paper"):
+        VibrationModel.preset("papper", mass=0.1, damping_ratio=0.02)
+    for name in ("tangent", "surface"):
+        changed = {"stiffness_law": name} if name == "tangent" else {"excitation": name}
+        fast = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=300e3, **changed)
+        with pytest.raises(BadInput, match="solve the case"):
+            contact_vibration(state(), CONDITIONS, fast)
+
+
+def test_the_presets_differ_in_what_the_paper_did_and_sound_is_the_default():
+    sound = VibrationModel.preset("sound", mass=0.1, damping_ratio=0.02)
+    assert sound == MODEL
+    assert set(preset_choices("sound")) == set(PRESETS["paper"])
+    paper = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
+    assert (paper.rate_hz, paper.filter, paper.coefficient, paper.damping_law) == (
+        10e3,
+        "bilinear",
+        "kept",
+        "hertz-for-radian",
+    )
+    heard = contact_vibration(dry_full_load(CONDITIONS, 2e-6), CONDITIONS, paper)
+    assert heard.oscillator.damping_ratio == pytest.approx(0.02 / (2 * np.pi))
+    assert heard.response.rate_hz == 10e3
+    assert heard.resonance.found
+    assert heard.dynamic_load == pytest.approx(0.002, abs=0.001)  # physics.md section 4: 0.002 F
+
+
+def test_damping_laws_are_eq_5_with_radians_with_hertz_and_a_constant():
+    springs = {
+        law: oscillator(
+            state(), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, damping_law=law, damping=50.0)
+        )
+        for law in ("ratio", "hertz-for-radian", "constant")
+    }
+    f0 = springs["ratio"].natural_frequency_hz
+    assert springs["ratio"].damping == pytest.approx(2 * 2 * np.pi * f0 * 0.1 * 0.02)
+    assert springs["hertz-for-radian"].damping == pytest.approx(2 * f0 * 0.1 * 0.02)
+    assert springs["constant"].damping == pytest.approx(50.0)
+
+
+def test_a_line_contacts_own_spring_is_the_slope_of_its_approach():
+    """dF/dδ of δ = (P'/πE*) (2 ln(4R/a) - 1), a cylinder pressed at its centre (Johnson 1985, section 5.6)."""
+    modulus, radius, length = CONDITIONS.pair.reduced_modulus, 5.4e-3, 10e-3
+
+    def approach(load: float) -> float:
+        a = np.sqrt(4 * load / length * radius / (np.pi * modulus))
+        return load / length / (np.pi * modulus) * (2 * np.log(4 * radius / a) - 1)
+
+    slope = 0.2 / (approach(100.1) - approach(99.9))
+    law = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="hertz-line")
+    assert oscillator(state(clr=0.5), CONDITIONS, law).stiffness == pytest.approx(slope, rel=1e-6)
+
+
+def test_the_film_beside_the_asperities_is_softer_than_the_bodies_and_stiffer_than_either():
+    law = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="parallel-film")
+    bodies = oscillator(state(), CONDITIONS, MODEL).stiffness
+    oily = replace(state(clr=0.3, sq=1e-6), h_mean=0.7e-6)
+    both = oscillator(oily, CONDITIONS, law).stiffness
+    layers = 1 / (1 / both - 1 / bodies)
+    assert layers == pytest.approx(0.3 * 200 / (0.48 * 1e-6) + 0.7 * 200 / (0.13 * 0.7e-6))
+    assert oscillator(replace(oily, clr=0.0), CONDITIONS, law).stiffness < bodies  # no asperity touches: still a spring
+
+
+def test_the_excitations_choices_reach_the_noise():
+    model = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02, filter_order=3, patch="line")
+    averaged = excitation(state(car=0.3), CONDITIONS, model)
+    assert averaged.half_width == pytest.approx(CONDITIONS.hertz.half_widths[0])
+    assert averaged.speed == pytest.approx(0.42)
+    noise = averaged.source
+    assert (noise.order, noise.filter, noise.height_of, noise.reference_cutoff_hz) == (3, "bilinear", "record", 30.0)
+    with pytest.raises(BadInput, match="passing_speed"):
+        excitation(state(), replace(CONDITIONS, surface_speeds=(1.9, 1.9)), model)

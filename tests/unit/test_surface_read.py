@@ -133,14 +133,79 @@ def test_a_map_of_a_few_points(tmp_path):
         read_surface(xyz(tmp_path / "few.xyz", cells=(3, 4)), unit="um", lateral_unit="um")
 
 
-def test_a_profile_is_refused(tmp_path):
-    import x3pio
-
+def test_a_profile_goes_on_unchanged_along_y(tmp_path):
     path = tmp_path / "line.hfm"
     path.write_text("".join(f"{0.0005 * i:.4f} {np.sin(i):.5f}\n" for i in range(200)))
-    refused(path, "profile")
-    x3pio.write(tmp_path / "row.x3p", hills((40, 1)).T, x_scale=1e-6, y_scale=1e-6)
-    refused(tmp_path / "row.x3p", "row.x3p")
+    measured = read_surface(path, unit="um", lateral_unit="mm")
+    assert measured.uniform == 1
+    assert measured.grid.spacing[0] == pytest.approx(0.5e-6)
+    np.testing.assert_allclose(measured.heights, 1e-6 * np.sin(np.arange(200))[:, None] * np.ones(8), atol=6e-12)
+
+
+def test_a_row_of_an_x3p_is_a_profile_too(tmp_path):
+    import sdfio
+
+    sdfio.write(tmp_path / "row.sdf", hills((40, 1)), x_scale=2e-6, y_scale=2e-6)
+    with pytest.raises(UnreadableFile, match="too few"):
+        read_surface(tmp_path / "row.sdf")  # 1 x 40: along y, where a profile is not looked for
+    sdfio.write(tmp_path / "row.sdf", hills((40, 1)).T, x_scale=2e-6, y_scale=2e-6)
+    measured = read_surface(tmp_path / "row.sdf")
+    np.testing.assert_allclose(measured.profile, hills((40, 1))[:, 0], atol=1e-15)
+    assert measured.uniform == 1
+
+
+TABLES = {
+    "decimal commas in quotes": ("x.csv", '"x","z"\n' + "".join(f'"{i},50","{i}0,25"\n' for i in range(12))),
+    "semicolons": ("x.txt", "X;Z\n[mm];[um]\n" + "".join(f"{i},5;{i}0,25\n" for i in range(12))),
+    "tabs": ("x.dat", "".join(f"{i}.5\t{i}0.25\t\n" for i in range(12))),
+    "commas": ("x.csv", "x,z\n" + "".join(f"{i}.5,{i}0.25\n" for i in range(12))),
+    "blanks": ("x.prf", "".join(f"  {i},5  {i}0,25\n" for i in range(12))),
+}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_columns_are_read_whatever_separates_them(tmp_path, table):
+    name, text = TABLES[table]
+    (tmp_path / name).write_text(text)
+    measured = read_surface(tmp_path / name, unit="um", lateral_unit="mm")
+    assert measured.grid.spacing[0] == pytest.approx(1e-3)
+    np.testing.assert_allclose(measured.profile, 1e-6 * (10.0 * np.arange(12) + 0.25), atol=1e-12)
+
+
+def test_points_that_are_not_evenly_spaced_are_interpolated_and_noted(tmp_path):
+    x = np.linspace(0.0, 1.0, 50) ** 1.2
+    (tmp_path / "line.csv").write_text("".join(f"{a:.6f};{2.0 * a:.6f}\n" for a in x))
+    measured = read_surface(tmp_path / "line.csv", unit="um", lateral_unit="mm")
+    np.testing.assert_allclose(measured.profile, 2e-6 * np.linspace(0.0, 1.0, 50), atol=1e-11)
+    assert any("not evenly spaced" in note for note in measured.notes)
+
+
+@pytest.mark.parametrize("name", ["bare.txt", "bare.csv", "bare.npy"])
+def test_a_matrix_of_bare_heights_needs_its_pixel(tmp_path, name):
+    heights = hills((12, 9)) * 1e6
+    if name == "bare.npy":
+        np.save(tmp_path / name, heights)
+    else:
+        separator = "," if name == "bare.csv" else " "
+        rows = heights.T[::-1]  # a file's first line is its top, an array's first column its bottom
+        (tmp_path / name).write_text("\n".join(separator.join(f"{z:.9f}" for z in row) for row in rows))
+    with pytest.raises(BadInput, match="give pixel"):
+        read_surface(tmp_path / name, unit="um")
+    with pytest.raises(BadInput, match="give unit"):
+        read_surface(tmp_path / name, pixel=2e-6)
+    measured = read_surface(tmp_path / name, unit="um", pixel=(2e-6, 3e-6))
+    assert measured.grid.spacing == pytest.approx((2e-6, 3e-6))
+    np.testing.assert_allclose(measured.heights, hills((12, 9)), atol=1e-14)
+
+
+def test_a_pixel_that_the_file_states_is_not_overridden(x3p):
+    with pytest.raises(BadInput, match="states its own pixel"):
+        read_surface(x3p[0], pixel=1e-6)
+
+
+def test_heights_as_steep_as_walls_are_questioned(tmp_path):
+    measured = read_surface(xyz(tmp_path / "points.txt"), unit="mm", lateral_unit="um")
+    assert any("check the units of both" in note for note in measured.notes)
 
 
 def test_the_library_stays_quiet_about_mpi():

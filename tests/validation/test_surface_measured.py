@@ -51,9 +51,20 @@ def test_a_point_list_reads_once_its_units_are_given():
     assert found["pixel_m"] == pytest.approx([5e-6, 5e-6])
 
 
-@pytest.mark.parametrize("name", ["bullet_land.x3p", "stylus_4p8mm.hfm", "wear_track_C1.csv"])
-def test_what_is_no_readable_map_is_refused_in_a_sentence(name, capfd):
-    with pytest.raises(UnreadableFile, match=name):
+def test_profiles_read_as_their_readme_says():
+    stylus = describe_surface(FILES / "stylus_4p8mm.hfm").scalars()
+    assert stylus["cells"][0] == 9600
+    assert stylus["pixel_m"][0] == pytest.approx(0.5e-6, rel=1e-3)
+    assert stylus["profile"]["rq_m"] == pytest.approx(0.138e-6, rel=0.02)
+    track = describe_surface(FILES / "wear_track_C1.csv", unit="um", lateral_unit="mm").scalars()
+    assert track["cells"][0] == 4800
+    assert track["size_m"][0] == pytest.approx(2.4e-3, rel=1e-3)
+    assert track["profile"]["rt_m"] == pytest.approx(1.2e-6, rel=0.02)  # the file's extremes, -0.45 and 0.75, less form
+
+
+@pytest.mark.parametrize("name", ["bullet_land.x3p", "nanovea_test1.txt", "wear_track_C1.csv"])
+def test_what_cannot_be_read_as_it_stands_is_refused_in_a_sentence(name, capfd):
+    with pytest.raises(BadInput, match=name):
         read_surface(FILES / name)
     assert capfd.readouterr() == ("", "")
 
@@ -80,6 +91,7 @@ def test_the_milled_surface_covers_the_papers_contact():
     heights = prepared.surface.heights
     assert np.std(heights[:, 0] - heights[:, -1]) < 2.0 * np.std(np.diff(heights, axis=1))
     assert [step.split()[0] for step in prepared.steps] == [
+        "kept",
         "removed",
         "cut",
         "filled",

@@ -25,7 +25,7 @@ from asperity.ehl.solution import ContactSolution, Convergence
 from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput
 from asperity.hertz import line_pressure
-from asperity.surface import SurfaceDescription
+from asperity.surface import MeasuredSurface, SurfaceDescription, SurfaceSpectrum, bearing_curve, surface_spectrum
 
 WIDTH = 4.8  # inches
 MICRO = 1e6  # m -> um
@@ -401,7 +401,7 @@ def resonance_against_roughness(points: Sequence[Mapping[str, Any]], full_load_c
 
 @_styled()
 def surface_map(described: SurfaceDescription, path: Path) -> Path:
-    """Write a PNG of a measured surface, levelled: its map and how its heights are distributed.
+    """Write a PNG of a measured surface, levelled: map, profile, bearing curve, radial and directional spectrum.
 
     Raises
     ------
@@ -411,26 +411,90 @@ def surface_map(described: SurfaceDescription, path: Path) -> Path:
     if path.suffix.lower() != ".png":
         raise BadInput(f"the map is written as PNG, got {path.name}; name a file that ends in .png")
     levelled = described.levelled
+    spectrum = surface_spectrum(levelled)
+    figure = Figure(figsize=(11.0, 7.4), layout="constrained")
+    places = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
+    if levelled.uniform is None:
+        _draw_levelled_map(figure, figure.add_subplot(places[0, :2]), levelled)
+        _draw_lay(figure.add_subplot(places[0, 2], projection="polar"), spectrum)
+        _draw_profile(figure.add_subplot(places[1, 0]), levelled, "Profile through the middle, along x")
+    else:
+        _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
+        _draw_height_distribution(figure.add_subplot(places[1, 0]), levelled.profile)
+    _draw_bearing_curve(figure.add_subplot(places[1, 1]), described)
+    _draw_radial_spectrum(figure.add_subplot(places[1, 2]), spectrum, levelled.uniform is not None)
+    dx, dy = (pixel * MICRO for pixel in levelled.grid.spacing)
+    nx, ny = levelled.grid.cells
+    if levelled.uniform is None:
+        size = f"Sq {described.parameters.sq * MICRO:.3g} µm, {nx} × {ny} pixels of {dx:.3g} × {dy:.3g} µm"
+    else:
+        size = f"profile, Rq {described.parameters.sq * MICRO:.3g} µm, {levelled.profile.size} points"
+        size += f" every {min(dx, dy):.3g} µm"
+    figure.suptitle(f"{described.path.name}: {size}", x=0.01, ha="left", parse_math=False)
+    with whole_file(path) as part:
+        figure.savefig(part, format="png", dpi=130, metadata={"Software": None})
+    return path
+
+
+def _draw_levelled_map(figure: Figure, axes: Axes, levelled: MeasuredSurface) -> None:
     heights = levelled.heights * MICRO
     width, height = (side * MICRO for side in levelled.grid.extent)
     reach = float(np.nanpercentile(np.abs(heights), 99.5)) or 1.0
-
-    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
-    map_axes, histogram = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
-    map_axes.set_facecolor("#d946ef")  # what was not measured; no height has this colour
-    image = map_axes.imshow(
+    axes.set_facecolor("#d946ef")  # what was not measured; no height has this colour
+    image = axes.imshow(
         heights.T, origin="lower", extent=(0.0, width, 0.0, height), cmap="cividis", vmin=-reach, vmax=reach,
         interpolation="none" if max(heights.shape) < 600 else "antialiased",
     )  # fmt: skip
     missing = f", {levelled.missing:.1%} not measured (pink)".replace("%", " %") if levelled.missing else ""
-    map_axes.set(xlabel="x [µm]", ylabel="y [µm]", title=f"Levelled heights{missing}")
-    figure.colorbar(image, ax=map_axes, label="height, material up [µm]", extend="both", shrink=0.9)
-    _draw_height_distribution(histogram, levelled.heights)
-    dx, dy = (pixel * MICRO for pixel in levelled.grid.spacing)
-    nx, ny = levelled.grid.cells
-    size = f"{nx} × {ny} pixels of {dx:.3g} × {dy:.3g} µm"
-    title = f"{described.path.name}: Sq {described.parameters.sq * MICRO:.3g} µm, {size}"
-    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
-    with whole_file(path) as part:
-        figure.savefig(part, format="png", dpi=160, metadata={"Software": None})
-    return path
+    axes.set(xlabel="x [µm]", ylabel="y [µm]", title=f"Levelled heights{missing}")
+    figure.colorbar(image, ax=axes, label="height, material up [µm]", extend="both", shrink=0.9)
+
+
+def _draw_profile(axes: Axes, levelled: MeasuredSurface, title: str) -> None:
+    profile = levelled.profile * MICRO
+    spacing = levelled.grid.spacing[1 if levelled.uniform == 0 else 0] * MICRO
+    axes.plot((np.arange(profile.size) + 0.5) * spacing, profile, color=BLUE, linewidth=0.8)
+    axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
+    axes.set(xlabel="x [µm]", ylabel="height [µm]", title=title)
+    axes.set_xlim(0.0, profile.size * spacing)
+
+
+def _draw_bearing_curve(axes: Axes, described: SurfaceDescription) -> None:
+    curve, parameters = bearing_curve(described.levelled.heights), described.parameters
+    prefix = "S" if described.profile is None else "R"
+    axes.plot(100.0 * curve.share, curve.height * MICRO, color=BLUE)
+    top, bottom = curve.height_at(parameters.smr1) * MICRO, curve.height_at(parameters.smr2) * MICRO
+    axes.axhspan(bottom, top, color="#e5e7eb", linewidth=0)
+    core, peaks, pits = (f"{height * MICRO:.3g}" for height in (parameters.sk, parameters.spk, parameters.svk))
+    axes.text(
+        0.97, 0.96, f"{prefix}k {core} µm (shaded)\n{prefix}pk {peaks} µm, {prefix}vk {pits} µm",
+        transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
+    )  # fmt: skip
+    inner = [curve.height_at(share) * MICRO for share in (0.999, 0.001)]
+    if inner[0] < inner[1]:  # the rarest heights would flatten the rest
+        axes.set_ylim(inner[0] - 0.1 * (inner[1] - inner[0]), inner[1] + 0.4 * (inner[1] - inner[0]))
+    axes.set(xlabel="material above [%]", ylabel="height [µm]", title="Bearing curve")
+    axes.set_xlim(0.0, 100.0)
+
+
+def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) -> None:
+    some = spectrum.density > 0.0
+    wavelength = 2.0 * np.pi / spectrum.wavenumber[some] * MICRO
+    if not some.any():
+        axes.text(0.5, 0.5, "perfectly smooth", transform=axes.transAxes, ha="center")
+    else:
+        axes.loglog(wavelength, spectrum.density[some], color=VERMILION, marker=".", markersize=4)
+        axes.invert_xaxis()
+    unit = "m³" if profile else "m⁴"
+    title = "Spectrum of the profile" if profile else "Spectrum, all directions"
+    axes.set(xlabel="wavelength [µm]", ylabel=f"power density C [{unit}]", title=title)
+
+
+def _draw_lay(axes: Axes, spectrum: SurfaceSpectrum) -> None:
+    polar: Any = axes
+    both = np.concatenate([spectrum.lay, spectrum.lay + np.pi, spectrum.lay[:1]])
+    share = 100.0 * np.concatenate([spectrum.share, spectrum.share, spectrum.share[:1]])
+    polar.plot(both, share, color=GREEN)
+    polar.fill(both, share, color=GREEN, alpha=0.2)
+    polar.set_title("Lay: share of Sq² in ridges\nalong this direction [% per 5°]")
+    polar.tick_params(labelsize=8)

@@ -482,10 +482,20 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     }
 
 
+_UNSAID = {"direction_deg": 0.0, "turn": False, "outliers": "keep"}  # what goes without saying
+
+
 def _roughness(case_text: str) -> str:
     """The case's [surface] in one line: which surface it was belongs beside every CAR."""
     surface = tomllib.loads(case_text)["surface"]
-    texts = {key: " and ".join(map(str, value)) if isinstance(value, list) else value for key, value in surface.items()}
+    second = surface.pop("second", None)
+    said = _table_in_words(surface)
+    return said if second is None else f"{said}; on the other body: {_table_in_words(second)}"
+
+
+def _table_in_words(table: dict[str, Any]) -> str:
+    said = {key: value for key, value in table.items() if _UNSAID.get(key) != value}
+    texts = {key: " and ".join(map(str, value)) if isinstance(value, list) else value for key, value in said.items()}
     return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in texts.items())
 
 

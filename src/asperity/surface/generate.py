@@ -1,7 +1,8 @@
-"""Random rough surfaces with a wanted spectrum, by seed.
+"""Random rough surfaces with a wanted spectrum and height distribution, by seed.
 
 White noise is filtered in wavenumber space, so a surface repeats along both axes. The noise belongs to the domain, not
-to its cells: one seed gives one physical surface, sampled at the cell centres of whatever grid resolves it.
+to its cells: one seed gives one physical surface, sampled at the cell centres of whatever grid resolves it. Surfaces
+made by cutting and denting are in `asperity.surface.machined`.
 """
 
 from collections.abc import Callable
@@ -11,24 +12,31 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
+from asperity.surface import johnson
 from asperity.surface.model import Surface, length_text
 
 _LARGEST_WAVENUMBER = 9.0  # times the correlation length: beyond it a Gaussian spectrum holds exp(-81/4), nothing
 
 
 def gaussian_surface(
-    grid: Grid, *, sq: float, correlation_length: float | tuple[float, float], rng: np.random.Generator
+    grid: Grid,
+    *,
+    sq: float,
+    correlation_length: float | tuple[float, float],
+    direction: float = 0.0,
+    rng: np.random.Generator,
 ) -> Surface:
-    """Gaussian heights with a Gaussian autocorrelation: R(x, y) = Sq^2 exp(-(x/lx)^2 - (y/ly)^2).
+    """Gaussian heights with a Gaussian autocorrelation: R(u, v) = Sq^2 exp(-(u/l1)^2 - (v/l2)^2).
 
     The correlation length is where the autocorrelation has fallen to 1/e. ISO 25178's Sal is another length, where it
-    has fallen to 0.2: Sal = lx sqrt(ln 5) = 1.27 lx.
+    has fallen to 0.2: Sal = l sqrt(ln 5) = 1.27 l.
 
     Parameters
     ----------
     grid : where the heights are wanted
     sq : root-mean-square height of this very sample [m]; the mean is zero
-    correlation_length : lx = ly, or (lx, ly) [m]
+    correlation_length : l1 = l2, or (l1, l2) [m]
+    direction : angle of u, along which l1 is measured, from x towards y [rad]
     rng : the only source of chance; seeds that are equal give surfaces that differ by the factor of `sq` alone
 
     Raises
@@ -38,24 +46,140 @@ def gaussian_surface(
         holds no sample of the roughness.
     """
     lengths = correlation_length if isinstance(correlation_length, tuple) else (correlation_length, correlation_length)
-    for axis, length, spacing, extent in zip("xy", lengths, grid.spacing, grid.extent, strict=True):
-        require_positive(f"correlation length along {axis}", length, "m")
-        if length < 2.0 * spacing:
+    require_lengths(grid, lengths, direction)
+    return _filtered_noise(grid, sq, *_gaussian_spectrum(lengths, direction), rng)
+
+
+def require_lengths(
+    grid: Grid,
+    lengths: tuple[float, float],
+    direction: float,
+    names: tuple[str, str] = ("correlation length along x", "correlation length along y"),
+) -> None:
+    """Refuse lengths along and across `direction` that the grid cannot show or the domain cannot hold."""
+    cosine, sine = abs(np.cos(direction)), abs(np.sin(direction))
+    for name, length, along in zip(names, lengths, ((cosine, sine), (sine, cosine)), strict=True):
+        where = name if direction == 0.0 else name.replace("along x", "along the lay").replace("along y", "across it")
+        require_positive(where, length, "m")
+        coarsest = 2.0 / np.hypot(along[0] / grid.spacing[0], along[1] / grid.spacing[1])
+        longest = 0.5 / max(along[0] / grid.extent[0], along[1] / grid.extent[1])
+        if length < coarsest * (1.0 - 1e-9):
             raise BadInput(
-                f"correlation length along {axis} must be at least 2 cells, {length_text(2.0 * spacing)}, "
+                f"{where} must be at least 2 cells, {length_text(coarsest)}, "
                 f"got {length_text(length)}; use more cells or a longer one"
             )
-        if length > extent / 2.0:
+        if length > longest * (1.0 + 1e-9):
             raise BadInput(
-                f"correlation length along {axis} must be at most half the domain, {length_text(extent / 2.0)}, "
+                f"{where} must be at most half the domain, {length_text(longest)}, "
                 f"got {length_text(length)}; use a larger domain or a shorter one"
             )
-    lx, ly = lengths
+
+
+def _gaussian_spectrum(
+    lengths: tuple[float, float], direction: float
+) -> tuple[Callable[[Field, Field], Field], tuple[float, float]]:
+    """Amplitude over (kx, ky), and the largest of either that matters."""
+    (first, second), cosine, sine = lengths, np.cos(direction), np.sin(direction)
 
     def amplitude(kx: Field, ky: Field) -> Field:
-        return np.exp(-((kx * lx) ** 2 + (ky * ly) ** 2) / 8.0)
+        along, across = kx * cosine + ky * sine, ky * cosine - kx * sine
+        return np.asarray(np.exp(-((along * first) ** 2 + (across * second) ** 2) / 8.0))
 
-    return _filtered_noise(grid, sq, amplitude, (_LARGEST_WAVENUMBER / lx, _LARGEST_WAVENUMBER / ly), rng)
+    return amplitude, (
+        float(_LARGEST_WAVENUMBER * np.hypot(cosine / first, sine / second)),
+        float(_LARGEST_WAVENUMBER * np.hypot(sine / first, cosine / second)),
+    )
+
+
+def non_gaussian_surface(
+    grid: Grid,
+    *,
+    sq: float,
+    skewness: float,
+    kurtosis: float,
+    correlation_length: float | tuple[float, float],
+    direction: float = 0.0,
+    rng: np.random.Generator,
+) -> Surface:
+    """Heights of wanted skewness and kurtosis, met by this very sample, at wanted correlation lengths.
+
+    A Gaussian surface is translated height by height by the curve of Johnson's system (SU or SB) that gives its sample
+    the two moments. Translation shortens correlations; the Gaussian surface has longer ones to make up for it, so that
+    the autocorrelation falls to 1/e at the lengths asked for. Sources: N. L. Johnson, Biometrika 36 (1949) 149; the
+    polynomial of correlations of M. Grigoriu, J. Eng. Mech. 110 (1984) 610.
+
+    Parameters
+    ----------
+    grid, sq, correlation_length, direction, rng : as for `gaussian_surface`
+    skewness : Ssk; negative for deep pits and flat peaks
+    kurtosis : Sku; 3 for Gaussian heights, more for rare high peaks or deep pits
+
+    Raises
+    ------
+    BadInput
+        for moments that no distribution has (kurtosis below 1 + skewness^2), or this sample cannot take, and as
+        `gaussian_surface` does.
+    """
+    if not kurtosis > 1.0 + skewness**2:
+        raise BadInput(
+            f"kurtosis must be above 1 + skewness^2 = {1.0 + skewness**2:.4g}, got {kurtosis:g}; raise it, or bring "
+            "the skewness nearer to 0"
+        )
+    lengths = correlation_length if isinstance(correlation_length, tuple) else (correlation_length, correlation_length)
+    require_lengths(grid, lengths, direction)
+    stretch = johnson.stretch(skewness, kurtosis)
+    longer = (lengths[0] * stretch, lengths[1] * stretch)
+    gaussian = _filtered_noise(grid, 1.0, *_gaussian_spectrum(longer, direction), rng).heights
+    curve, found = johnson.fit(*johnson.histogram(gaussian), skewness, kurtosis)
+    if abs(found[0] - skewness) > 0.02 * max(1.0, abs(skewness)) or abs(found[1] - kurtosis) > 0.02 * kurtosis:
+        raise BadInput(
+            f"this sample cannot take a skewness of {skewness:g} and a kurtosis of {kurtosis:g} (nearest: "
+            f"{found[0]:.3g} and {found[1]:.3g}); use a larger domain, shorter correlation lengths or milder values"
+        )
+    heights = curve(gaussian)
+    heights -= heights.mean()
+    return Surface(heights * (sq / np.std(heights)), grid)
+
+
+def run_in_surface(
+    grid: Grid,
+    *,
+    sq: float,
+    correlation_length: float | tuple[float, float],
+    plateau_share: float,
+    plateau_roughness: float = 0.1,
+    direction: float = 0.0,
+    rng: np.random.Generator,
+) -> Surface:
+    """A Gaussian surface whose peaks are worn to a plateau, as running-in and plateau honing leave it.
+
+    z = min(z1, c + r z2): of the rough z1, what stood above c is gone, replaced by the finer roughness of the plateau.
+    Source: the two processes of ISO 13565-3.
+
+    Parameters
+    ----------
+    grid, sq, correlation_length, direction, rng : as for `gaussian_surface`; the lengths are those of z1
+    plateau_share : share of the surface whose peaks are worn off, above 0 and below 1; c follows from it
+    plateau_roughness : r, the plateau's Sq over that of z1; its correlation lengths are half as long, where the
+        grid can show that
+
+    Raises
+    ------
+    BadInput
+        for a share out of range, a negative roughness, and as `gaussian_surface` does.
+    """
+    if not 0.0 < plateau_share < 1.0:
+        raise BadInput(f"plateau_share must lie between 0 and 1, got {plateau_share:g}; a run-in surface has about 0.4")
+    if not 0.0 <= plateau_roughness <= 1.0:
+        raise BadInput(f"plateau_roughness must lie between 0 and 1, got {plateau_roughness:g}; 0.1 is usual")
+    lengths = correlation_length if isinstance(correlation_length, tuple) else (correlation_length, correlation_length)
+    require_lengths(grid, lengths, direction)
+    rough = _filtered_noise(grid, 1.0, *_gaussian_spectrum(lengths, direction), rng).heights
+    finer = (lengths[0] / 2.0, lengths[1] / 2.0)
+    fine = _filtered_noise(grid, 1.0, *_gaussian_spectrum(finer, direction), rng).heights
+    heights = np.minimum(rough, np.quantile(rough, 1.0 - plateau_share) + plateau_roughness * fine)
+    heights -= heights.mean()
+    return Surface(heights * (require_positive("sq", sq, "m") / np.std(heights)), grid)
 
 
 def self_affine_surface(

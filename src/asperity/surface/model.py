@@ -1,6 +1,6 @@
 """A rough surface on a grid: heights only, no physics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,6 +44,7 @@ class MeasuredSurface:
 
     `heights` [m], shape (nx, ny) on `grid`, NaN where the instrument saw nothing; `grid` is centred on zero and
     repeats along neither axis. `name` and `format` of the file; `notes` say in a sentence each what looks odd.
+    `uniform` is the axis along which a measured profile is taken to go on unchanged, None for a map.
 
     Raises
     ------
@@ -56,6 +57,7 @@ class MeasuredSurface:
     name: str
     format: str
     notes: tuple[str, ...] = ()
+    uniform: int | None = None
 
     def __post_init__(self) -> None:
         if self.heights.shape != self.grid.cells:
@@ -77,6 +79,24 @@ class MeasuredSurface:
     def surface(self) -> Surface:
         """The same heights as a `Surface`; missing cells raise `BadInput`."""
         return Surface(self.heights, self.grid)
+
+    @property
+    def profile(self) -> Field:
+        """The heights [m] of a measured profile, shape (n,); of a map, its middle row along x."""
+        return self.heights[0] if self.uniform == 0 else self.heights[:, self.heights.shape[1] // 2]
+
+    def turned(self) -> "MeasuredSurface":
+        """The same surface mounted a quarter turn counter-clockwise: what ran along x runs along y."""
+        (x0, y0), (x1, y1) = self.grid.lower, self.grid.upper
+        grid = replace(
+            self.grid,
+            cells=self.grid.cells[::-1],
+            lower=(-y1, x0),
+            upper=(-y0, x1),
+            periodic=self.grid.periodic[::-1],
+        )
+        uniform = None if self.uniform is None else 1 - self.uniform
+        return replace(self, heights=np.ascontiguousarray(self.heights[:, ::-1].T), grid=grid, uniform=uniform)
 
 
 def flat_surface(grid: Grid) -> Surface:

@@ -7,9 +7,16 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.grid import Grid
+from asperity.surface.bearing import bearing_curve, core_heights
+from asperity.surface.condition import Form, Outliers, condition
 from asperity.surface.model import MeasuredSurface, Surface
-from asperity.surface.prepare import Form, level
+from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
+
+LENGTHS = {
+    *("sa", "sq", "sp", "sv", "sz", "sal", "sk", "spk", "svk"),
+    *("ra", "rq", "rp", "rv", "rz", "rt", "rsm", "rk", "rpk", "rvk"),
+}  # parameters in metres; the others are plain numbers
 
 _DECAYED = 0.2  # ISO 25178-2: the autocorrelation at which Sal and Str are read
 _DIRECTIONS = 180  # rays over half a turn; the autocorrelation is the same backwards
@@ -19,39 +26,51 @@ _DIRECTIONS = 180  # rays over half a turn; the autocorrelation is the same back
 class SurfaceParameters:
     """Areal parameters of ISO 25178-2, about the mean of the cells that are known.
 
-    `sa`, `sq` arithmetic and root mean square height [m]; `ssk`, `sku` skewness and kurtosis (0 and 3 for Gaussian
-    heights); `sdq` root mean square gradient, from differences of neighbouring cells; `sal` the shortest distance over
-    which the autocorrelation falls to 0.2 [m]; `str_` that distance over the longest one (1 isotropic, towards 0 with
-    a lay). Where the autocorrelation stays above 0.2 within half the map in some direction, `str_` is an upper bound
-    and `str_bounded` is true. NaN: ssk, sku, sal and str_ of a flat surface, sal and str_ where nothing decays.
+    Height: `sa`, `sq` arithmetic and root mean square height [m]; `ssk`, `sku` skewness and kurtosis (0 and 3 for
+    Gaussian heights); `sp`, `sv`, `sz` highest peak, deepest pit and their sum [m]. Hybrid: `sdq` root mean square
+    gradient, from differences of neighbouring cells; `sdr` area of the surface over its projection, less 1. Spatial:
+    `sal` the shortest distance over which the autocorrelation falls to 0.2 [m]; `str_` that distance over the longest
+    one (1 isotropic, towards 0 with a lay). Where the autocorrelation stays above 0.2 within half the map in some
+    direction, `str_` is an upper bound and `str_bounded` is true. Functional: core height `sk`, reduced peak height
+    `spk`, reduced pit depth `svk` [m], and the material ratios `smr1`, `smr2` that bound the core, 0 to 1. NaN: ssk,
+    sku, sal and str_ of a flat surface, sal and str_ where nothing decays.
     """
 
     sa: float
     sq: float
     ssk: float
     sku: float
+    sp: float
+    sv: float
+    sz: float
     sdq: float
+    sdr: float
     sal: float
     str_: float
     str_bounded: bool
+    sk: float
+    spk: float
+    svk: float
+    smr1: float
+    smr2: float
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceDescription:
-    """A measured file: as read, levelled (the map to draw), its parameters after levelling, and what was done."""
+    """A measured file: as read, levelled (the map to draw), its parameters after levelling, and what was done.
+
+    `profile` are the parameters of ISO 21920-2, of a file that holds a profile only.
+    """
 
     path: Path
     measured: MeasuredSurface
     levelled: MeasuredSurface
     parameters: SurfaceParameters
     steps: tuple[str, ...]
+    profile: ProfileParameters | None = None
 
     def scalars(self) -> dict[str, object]:
         """What `asperity surface --json` prints for the file: SI numbers, None for what is not a number."""
-        numbers = {key.rstrip("_"): value for key, value in asdict(self.parameters).items()}
-        known = {key: None if value != value else value for key, value in numbers.items()}
-        for length in ("sa", "sq", "sal"):
-            known[f"{length}_m"] = known.pop(length)
         return {
             "file": str(self.path),
             "format": self.measured.format,
@@ -59,25 +78,52 @@ class SurfaceDescription:
             "pixel_m": list(self.measured.grid.spacing),
             "size_m": list(self.measured.grid.extent),
             "missing": self.measured.missing,
-            **known,
+            **_plain(self.parameters),
+            "profile": None if self.profile is None else _plain(self.profile),
             "steps": list(self.steps),
             "notes": list(self.measured.notes),
         }
 
 
+def _plain(parameters: SurfaceParameters | ProfileParameters) -> dict[str, object]:
+    """Names with their unit behind, None for what is not a number."""
+    return {
+        f"{name}_m" if name in LENGTHS else name.rstrip("_"): None if value != value else value
+        for name, value in asdict(parameters).items()
+    }
+
+
 def describe_surface(
-    path: str | Path, *, form: Form = "quadratic", unit: str | None = None, lateral_unit: str | None = None
+    path: str | Path,
+    *,
+    form: Form = "quadratic",
+    unit: str | None = None,
+    lateral_unit: str | None = None,
+    pixel: float | tuple[float, float] | None = None,
+    turn: bool = False,
+    outliers: Outliers = "keep",
+    s_filter: float | None = None,
+    l_filter: float | None = None,
 ) -> SurfaceDescription:
     """Read a measured file, level it, and compute its parameters; missing cells are left out, not filled.
+
+    Parameters
+    ----------
+    path, unit, lateral_unit, pixel : as for `read_surface`
+    form, turn, outliers, s_filter, l_filter : as for `prepare_surface`
 
     Raises
     ------
     UnreadableFile, BadInput
-        as `read_surface` and `level` do.
+        as `read_surface` and `condition` do.
     """
-    measured = read_surface(path, unit=unit, lateral_unit=lateral_unit)
-    levelled, step = level(measured, form)
-    return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), (step,))
+    measured = read_surface(path, unit=unit, lateral_unit=lateral_unit, pixel=pixel)
+    levelled, steps = condition(measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter)
+    if levelled.uniform is None:
+        return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps)
+    spacing = levelled.grid.spacing[1 - levelled.uniform]
+    profile = profile_parameters(levelled.profile, spacing)
+    return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps, profile)
 
 
 def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
@@ -85,18 +131,41 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
     heights = surface.heights - np.nanmean(surface.heights)
     sq = float(np.sqrt(np.nanmean(heights**2)))
     if sq == 0.0:
-        return SurfaceParameters(0.0, 0.0, np.nan, np.nan, 0.0, np.nan, np.nan, False)
+        nan = float("nan")
+        return SurfaceParameters(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0, 0.0, 0.0, nan, nan, False, 0.0, 0.0, 0.0, 0.0, 1.0)
     sal, texture, bounded = _texture(heights, surface.grid)
+    sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
+    core = core_heights(bearing_curve(heights))
     return SurfaceParameters(
         sa=float(np.nanmean(np.abs(heights))),
         sq=sq,
         ssk=float(np.nanmean(heights**3)) / sq**3,
         sku=float(np.nanmean(heights**4)) / sq**4,
+        sp=sp,
+        sv=sv,
+        sz=sp + sv,
         sdq=_gradient(heights, surface.grid),
+        sdr=_developed_area(heights, surface.grid) - 1.0,
         sal=sal,
         str_=texture,
         str_bounded=bounded,
+        sk=core.core,
+        spk=core.peaks,
+        svk=core.pits,
+        smr1=core.upper,
+        smr2=core.lower,
     )
+
+
+def correlation_lengths(surface: Surface | MeasuredSurface, direction: float = 0.0) -> tuple[float, float]:
+    """Distances along and across `direction` [rad from x] over which the autocorrelation falls to 1/e [m].
+
+    NaN where it does not within half the map. Generators take these lengths; Sal is where it has fallen to 0.2.
+    """
+    correlation, middle = _autocorrelation(surface.heights - np.nanmean(surface.heights), surface.grid)
+    angles = np.array([direction, direction + np.pi / 2.0])
+    first, second = _decay(correlation, middle, surface.grid, angles, np.exp(-1.0))[0]
+    return float(first), float(second)
 
 
 def _gradient(heights: Field, grid: Grid) -> float:
@@ -105,6 +174,17 @@ def _gradient(heights: Field, grid: Grid) -> float:
         steps = np.roll(heights, -1, axis) - heights if repeats else np.diff(heights, axis=axis)
         squares += float(np.nanmean(steps**2)) / spacing**2
     return float(np.sqrt(squares))
+
+
+def _developed_area(heights: Field, grid: Grid) -> float:
+    """Area over its projection; each square of four cells is the mean of its two ways into triangles (ISO 25178-2)."""
+    for axis, repeats in enumerate(grid.periodic):
+        if repeats:
+            heights = np.concatenate([heights, np.take(heights, [0], axis)], axis)
+    slope_x = (np.diff(heights, axis=0) / grid.spacing[0]) ** 2
+    slope_y = (np.diff(heights, axis=1) / grid.spacing[1]) ** 2
+    corners = [np.sqrt(1.0 + x + y) for x in (slope_x[:, :-1], slope_x[:, 1:]) for y in (slope_y[:-1], slope_y[1:])]
+    return float(np.nanmean(np.mean(corners, axis=0)))
 
 
 def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]]:
@@ -128,11 +208,22 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
 
 
 def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
-    """Sal, Str, and whether Str is only an upper bound: the autocorrelation along rays from zero lag."""
+    """Sal, Str, and whether Str is only an upper bound."""
+    correlation, middle = _autocorrelation(heights, grid)
+    distances, ends = _decay(correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAYED)
+    if np.isnan(distances).all():
+        return float("nan"), float("nan"), False
+    shortest = float(np.nanmin(distances))
+    longest = float(np.max(np.where(np.isnan(distances), ends, distances)))
+    return shortest, shortest / longest, bool(np.isnan(distances).any())
+
+
+def _decay(
+    correlation: Field, middle: tuple[int, int], grid: Grid, angles: Field, threshold: float
+) -> tuple[Field, Field]:
+    """Where the autocorrelation falls below the threshold along rays, NaN where it does not; and where they end."""
     from scipy.ndimage import map_coordinates
 
-    correlation, middle = _autocorrelation(heights, grid)
-    angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
     cosines, sines = np.cos(angles)[:, None] / grid.spacing[0], np.sin(angles)[:, None] / grid.spacing[1]
     # the ray ends where it leaves the known lags; its samples are half a cell apart, at most
     ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
@@ -140,15 +231,11 @@ def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
     along = map_coordinates(
         correlation, [middle[0] + radii * cosines, middle[1] + radii * sines], order=3, mode="nearest"
     )
-    below = along < _DECAYED
-    decays = below.any(axis=1)
-    if not decays.any():
-        return float("nan"), float("nan"), False
-    ray = np.flatnonzero(decays)
+    below = along < threshold
+    ray = np.flatnonzero(below.any(axis=1))
     after = np.argmax(below[ray], axis=1)
     high, low = along[ray, after - 1], along[ray, after]
     inner, outer = radii[ray, after - 1], radii[ray, after]
-    distances = ends[:, 0].copy()
-    distances[ray] = inner + (outer - inner) * (high - _DECAYED) / (high - low)
-    shortest = float(np.min(distances[ray]))
-    return shortest, shortest / float(np.max(distances)), not bool(decays.all())
+    distances = np.full(angles.size, np.nan)
+    distances[ray] = inner + (outer - inner) * (high - threshold) / (high - low)
+    return distances, ends[:, 0]

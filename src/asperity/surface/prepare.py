@@ -1,10 +1,10 @@
-"""From a measured map to roughness on a contact grid: level, cut, fill, resample, close the ends, scale.
+"""From a measured map to roughness on a contact grid: condition, cut, fill, resample, close the ends, scale, combine.
 
 Every step says in one sentence what it did; the sentences travel with the result.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -12,19 +12,15 @@ import numpy.typing as npt
 from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
+from asperity.surface.condition import Form, Outliers, condition
 from asperity.surface.model import MeasuredSurface, Surface, area_text, length_text
 from asperity.surface.read import library
 
-Form = Literal["none", "plane", "quadratic"]
 Fit = Literal["crop", "tile"]
 
-_POWERS: dict[Form, tuple[tuple[int, int], ...]] = {
-    "none": ((0, 0),),
-    "plane": ((0, 0), (1, 0), (0, 1)),
-    "quadratic": ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)),
-}
 _OVERLAP = 1.0 / 8.0  # of a repeating side, over which its ends are blended: long enough to hide, short enough to spare
-_HALF_AT_CUTOFF = 0.4697 / np.sqrt(2.0 * np.pi)  # ISO 16610-61 Gaussian: sigma over the wavelength passed at 50 %
+_LOBES = 16  # of the windowed sinc to either side; Kaiser's 6 then stops aliases to 1e-3 ...
+_KAISER = 6.0  # ... and passes waves longer than 2.3 cells untouched
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,35 +31,31 @@ class PreparedSurface:
     steps: tuple[str, ...]
 
 
-def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
-    """Remove the least-squares form and the mean; returns the levelled map and what was done.
-
-    Missing cells take no part and stay missing. `form`: "none" (the mean only), "plane" or "quadratic".
+@dataclass(frozen=True, slots=True)
+class CompositeSurface:
+    """Two rough surfaces that face each other, and the speed [m/s] along x at which each moves.
 
     Raises
     ------
     BadInput
-        for a form that is not in that list, or fewer valid cells than the form has terms.
+        if they do not lie on one grid.
     """
-    if form not in get_args(Form):
-        raise BadInput(f"form must be one of {', '.join(get_args(Form))}, got {form!r}")
-    known = np.isfinite(measured.heights)
-    powers = _POWERS[form]
-    if np.count_nonzero(known) < len(powers):
-        raise BadInput(
-            f"{measured.name} has too few valid heights to remove a {form} form; use form none or measure again"
-        )
-    x, y = np.meshgrid(*(np.linspace(-1.0, 1.0, n) for n in measured.grid.cells), indexing="ij")
-    terms = np.stack([x**i * y**j for i, j in powers], axis=-1)
-    offset = np.mean(measured.heights[known])  # some files carry centimetres of it; least squares should not
-    coefficients, *_ = np.linalg.lstsq(terms[known], measured.heights[known] - offset, rcond=None)
-    shape = terms @ coefficients
-    levelled = replace(measured, heights=measured.heights - offset - shape)
-    if form == "none":
-        return levelled, "removed the mean height and no form"
-    height = length_text(float(np.ptp(shape)))
-    sq = f"Sq {length_text(measured.sq)} before, {length_text(levelled.sq)} after"
-    return levelled, f"removed a {form} form of {height} peak to valley from the whole map ({sq})"
+
+    first: Surface
+    second: Surface
+    speeds: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        if self.first.grid != self.second.grid:
+            raise BadInput(
+                f"two surfaces in contact need one grid, got {self.first.grid} and {self.second.grid}; "
+                "prepare both for the same one"
+            )
+
+    @property
+    def surface(self) -> Surface:
+        """What the gap sees: the sum of both. The second lies face down, turned over about x, so its y runs back."""
+        return Surface(self.first.heights + self.second.heights[:, ::-1], self.first.grid)
 
 
 def prepare_surface(
@@ -73,19 +65,24 @@ def prepare_surface(
     sq: float | None = None,
     form: Form = "quadratic",
     fit: Fit = "crop",
+    turn: bool = False,
+    outliers: Outliers = "keep",
+    s_filter: float | None = None,
+    l_filter: float | None = None,
     most_missing: float = 0.25,
 ) -> PreparedSurface:
     """Put a measured map onto a contact grid as roughness about a zero mean.
 
-    The form is removed from the whole map, the centre cut out, its missing cells filled, resampled (low-passed first
-    where the grid is coarser than the pixel) and, along an axis that repeats, its ends blended into one another.
+    The map is conditioned as a whole, the centre cut out, its missing cells filled, resampled by a windowed sinc that
+    keeps every wave that the coarser of pixel and cell can show, and, along an axis that repeats, its ends blended
+    into one another. A profile goes on unchanged across its direction.
 
     Parameters
     ----------
     measured : what the instrument gave
     grid : the contact's grid; x of the map runs along rolling
     sq : scale the heights to this Sq [m]; None keeps them as measured
-    form : what to remove first, "none", "plane" or "quadratic"
+    form, turn, outliers, s_filter, l_filter : how to condition the map first, see `condition`
     fit : "crop" needs a map as large as the grid; "tile" repeats a smaller one, mirrored so that no seam shows
     most_missing : the largest share of missing cells that is filled
 
@@ -98,22 +95,25 @@ def prepare_surface(
         raise BadInput(f"fit must be one of {', '.join(get_args(Fit))}, got {fit!r}")
     if sq is not None:
         require_positive("sq", sq, "m")
-    levelled, levelling = level(measured, form)
-    steps = [levelling]
-    overlap = tuple(
-        max(4, round(n * _OVERLAP)) if ends else 0 for n, ends in zip(grid.cells, grid.periodic, strict=True)
+    levelled, conditioning = condition(
+        measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
     )
-    steps.append(_fitting(measured, grid, fit))
+    steps = [*conditioning]
+    overlap = tuple(
+        max(4, round(n * _OVERLAP)) if ends and axis != levelled.uniform else 0
+        for axis, (n, ends) in enumerate(zip(grid.cells, grid.periodic, strict=True))
+    )
+    steps.append(_fitting(levelled, grid, fit))
     heights, positions = _cut(levelled, grid, overlap)
     heights, filling = _fill(heights, levelled, most_missing)
     steps.append(filling)
-    heights, resampling = _resample(heights, positions, measured.grid, grid, overlap)
+    heights, resampling = _resample(heights, positions, levelled.grid, grid, overlap)
     steps.append(resampling)
     for axis, (cells, shared) in enumerate(zip(grid.cells, overlap, strict=True)):
         if shared:
-            before = _sq_inside(heights, grid.cells)
+            before = _shape_inside(heights, grid)
             heights = _close(heights, axis, cells, shared)
-            steps.append(_closing(axis, shared, measured, grid, before, _sq_inside(heights, grid.cells)))
+            steps.append(_closing(axis, shared, levelled, grid, before, _shape_inside(heights, grid)))
     heights = heights - heights.mean()
     found = float(np.std(heights))
     if sq is None:
@@ -131,6 +131,18 @@ def prepare_surface(
 def _fitting(measured: MeasuredSurface, grid: Grid, fit: Fit) -> str:
     """What part of the map is used, or why it cannot be."""
     have, need = area_text(measured.grid.extent), area_text(grid.extent)
+    if measured.uniform is not None:
+        axis = 1 - measured.uniform
+        length, side = measured.grid.extent[axis], grid.extent[axis]
+        steady = f"taken to go on unchanged along {'xy'[measured.uniform]}"
+        if length >= side * (1.0 - 1e-9):
+            return f"cut {length_text(side)} from the centre of the profile of {length_text(length)}, {steady}"
+        if fit == "crop":
+            raise BadInput(
+                f"{measured.name} is a profile of {length_text(length)}, shorter than the contact's "
+                f"{length_text(side)}; use a smaller grid, a longer profile, or fit = tile to repeat it mirrored"
+            )
+        return f"repeated the profile of {length_text(length)}, mirrored at its ends, to {length_text(side)}, {steady}"
     # a grid whose corners come out of a division may exceed the map it was cut to by a rounding error
     if all(m >= g * (1.0 - 1e-9) for m, g in zip(measured.grid.extent, grid.extent, strict=True)):
         return f"cut {need} from the centre of the {have} measured"
@@ -150,7 +162,7 @@ def _cut(measured: MeasuredSurface, grid: Grid, overlap: tuple[int, ...]) -> tup
         measured.grid.cells, measured.grid.spacing, grid.extent, grid.spacing, overlap, strict=True
     ):
         half = (extent + shared * cell) / 2.0
-        margin = 4 + int(np.ceil(4.0 * _smoothing(pixel, cell)))  # the spline's and the low-pass's reach
+        margin = 1 + int(np.ceil(_LOBES * max(pixel, cell) / pixel))  # the sinc's reach
         reach = int(np.ceil(half / pixel)) + margin
         wanted = np.arange(n // 2 - reach, n // 2 + reach + 1)
         folded = np.mod(wanted, 2 * n)
@@ -177,34 +189,27 @@ def _fill(heights: Field, measured: MeasuredSurface, most_missing: float) -> tup
     ), f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"
 
 
-def _smoothing(pixel: float, cell: float) -> float:
-    """Sigma in pixels of the low-pass that keeps a coarser grid from folding short waves into long ones."""
-    return float(_HALF_AT_CUTOFF * 2.0 * cell / pixel) if cell > pixel * (1.0 + 1e-6) else 0.0
-
-
 def _resample(
     heights: Field, positions: list[Field], source: Grid, grid: Grid, overlap: tuple[int, ...]
 ) -> tuple[Field, str]:
-    """Low-pass where the grid is coarser, then a cubic spline; `overlap` cells more than the grid has."""
-    from scipy.interpolate import RectBivariateSpline
-    from scipy.ndimage import gaussian_filter1d
-
-    smoothed = []
-    for axis, (pixel, cell) in enumerate(zip(source.spacing, grid.spacing, strict=True)):
-        sigma = _smoothing(pixel, cell)
-        if sigma:
-            heights = gaussian_filter1d(heights, sigma, axis=axis, mode="nearest")
-            smoothed.append(f"waves below {length_text(2.0 * cell)} along {'xy'[axis]} low-passed first")
-    wanted = [
-        np.asarray((np.arange(n + shared) + 0.5 - (n + shared) / 2.0) * cell, dtype=np.float64)
-        for n, shared, cell in zip(grid.cells, overlap, grid.spacing, strict=True)
-    ]
-    resampled = np.asarray(
-        RectBivariateSpline(positions[0], positions[1], heights, kx=3, ky=3, s=0.0)(wanted[0], wanted[1])
-    )
-    how = "; ".join(smoothed) or f"below waves of {length_text(2.0 * max(source.spacing))} the detail is the spline's"
+    """Band-limited interpolation along each axis; `overlap` cells more than the grid has."""
+    shortest = []
+    for axis, (n, shared, pixel, cell) in enumerate(
+        zip(grid.cells, overlap, source.spacing, grid.spacing, strict=True)
+    ):
+        wanted = (np.arange(n + shared) + 0.5 - (n + shared) / 2.0) * cell
+        step = max(pixel, cell)
+        t = (wanted[:, None] - positions[axis][None, :]) / step
+        weights = np.sinc(t) * np.i0(_KAISER * np.sqrt(np.maximum(1.0 - (t / _LOBES) ** 2, 0.0)))
+        weights[np.abs(t) > _LOBES] = 0.0
+        weights /= weights.sum(axis=1, keepdims=True)
+        heights = np.moveaxis(np.tensordot(weights, heights, axes=(1, axis)), 0, axis)
+        shortest.append(2.0 * step)
     pixels, cells = area_text(source.spacing), area_text(grid.spacing)
-    return resampled, f"resampled from pixels of {pixels} to cells of {cells} by a cubic spline ({how})"
+    return np.ascontiguousarray(heights), (
+        f"resampled from pixels of {pixels} to cells of {cells} by a windowed sinc, "
+        f"which keeps the waves longer than {area_text((shortest[0], shortest[1]))} as they are"
+    )
 
 
 def _close(heights: Field, axis: int, cells: int, shared: int) -> Field:
@@ -223,15 +228,30 @@ def _close(heights: Field, axis: int, cells: int, shared: int) -> Field:
     return np.moveaxis(closed, 0, axis)
 
 
-def _closing(axis: int, shared: int, measured: MeasuredSurface, grid: Grid, before: float, after: float) -> str:
+def _closing(axis: int, shared: int, measured: MeasuredSurface, grid: Grid, before: "_Shape", after: "_Shape") -> str:
     length = shared * grid.spacing[axis]
     spare = measured.grid.extent[axis] - grid.extent[axis]
     mirrored = "" if spare >= length else ", mirrored there for want of more measurement,"
     return (
         f"blended the ends along {'xy'[axis]} over {length_text(length)}{mirrored} so that the surface repeats "
-        f"(Sq {length_text(before)} before, {length_text(after)} after)"
+        f"(Sq {length_text(before.sq)} before, {length_text(after.sq)} after; Sdq {before.sdq:.3g}, {after.sdq:.3g}; "
+        f"Ssk {before.ssk:.2f}, {after.ssk:.2f}; Sku {before.sku:.2f}, {after.sku:.2f})"
     )
 
 
-def _sq_inside(heights: Field, cells: tuple[int, int]) -> float:
-    return float(np.std(heights[: cells[0], : cells[1]]))
+class _Shape(NamedTuple):
+    """The parameters that blending may move."""
+
+    sq: float
+    sdq: float
+    ssk: float
+    sku: float
+
+
+def _shape_inside(heights: Field, grid: Grid) -> _Shape:
+    inside = heights[: grid.cells[0], : grid.cells[1]] - heights[: grid.cells[0], : grid.cells[1]].mean()
+    sq = float(np.std(inside))
+    sdq = float(np.sqrt(sum(np.mean(np.diff(inside, axis=axis) ** 2) / d**2 for axis, d in enumerate(grid.spacing))))
+    if sq == 0.0:
+        return _Shape(0.0, 0.0, 0.0, 0.0)
+    return _Shape(sq, sdq, float(np.mean(inside**3)) / sq**3, float(np.mean(inside**4)) / sq**4)

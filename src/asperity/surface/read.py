@@ -1,7 +1,7 @@
 """Reading measured surfaces, in the formats of the instruments.
 
-SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that it cannot. Nothing is corrected here:
-levelling, filling and resampling are left to `asperity.surface.prepare`.
+SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that it cannot, `asperity.surface.text` the
+tables. Nothing is corrected here: levelling, filling and resampling are left to `asperity.surface.prepare`.
 """
 
 import warnings
@@ -15,66 +15,107 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import BadInput, UnreadableFile
+from asperity.errors import BadInput, UnreadableFile, require_positive
 from asperity.grid import FEWEST_CELLS, Grid
 from asperity.surface.model import MeasuredSurface, length_text
+from asperity.surface.text import SUFFIXES as TABLES
+from asperity.surface.text import read_table
 
 _TEXT = {"xyz", "asc"}  # columns of numbers: any name will do for them
 _UNMARKED = {"nms", "hgt"}  # formats that accept nearly any bytes, so only the file's name can call for them
 _PLAUSIBLE_PIXEL = 1e-10, 1e-3  # an atom to a millimetre [m]
+_PLAUSIBLE_SLOPE = 3.0  # median over neighbours; 72 degrees, which no instrument sees everywhere
+_EVEN = 0.01  # of the mean step of a profile, up to which its steps may differ before that is noted
 _REMEDY = "export it again, as standard x3p or SDF if need be"
 
 
 @dataclass(frozen=True, slots=True)
 class _Map:
-    """What a reader found: `heights` (nx, ny) and `pixel` in the units named, None where the file names none."""
+    """What a reader found: `heights` (nx, ny) and `pixel` in the units named, None where the file names none.
+
+    Heights of shape (n, 1) are a profile. `pixel` is None where the caller gives it, in metres.
+    """
 
     heights: Field
-    pixel: tuple[float, float]
+    pixel: tuple[float, float] | None
     format: str
     unit: str | None
     notes: tuple[str, ...] = ()
 
 
-def read_surface(path: str | Path, *, unit: str | None = None, lateral_unit: str | None = None) -> MeasuredSurface:
-    """Read a measured map; heights in metres, NaN where the instrument saw nothing.
+def read_surface(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    lateral_unit: str | None = None,
+    pixel: float | tuple[float, float] | None = None,
+) -> MeasuredSurface:
+    """Read a measured map or profile; heights in metres, NaN where the instrument saw nothing.
+
+    A profile is taken to run along x and to go on unchanged along y, as ground or turned roughness across the rolling
+    direction of a line contact does; `MeasuredSurface.uniform` is then 1.
 
     Parameters
     ----------
-    path : a file in any format of SurfaceTopography, x3pio or sdfio
+    path : a file in any format of SurfaceTopography, x3pio or sdfio, or a table of numbers as text: two columns are a
+        profile, three a list of points, more a matrix of heights whose rows run along x
     unit, lateral_unit : units of the heights and of x and y, such as "um" and "mm", for files that name none
+    pixel : distance of neighbouring heights [m], (dx, dy) where they differ, for a matrix of bare heights
 
     Raises
     ------
     UnreadableFile
-        for a file that is missing, empty, cut short, not what its name says, in no known format, or a profile.
+        for a file that is missing, empty, cut short, not what its name says, or in no known format.
     BadInput
-        for a file without units when none are given, or units given for a file that has its own.
+        for a file without units or pixel size when none are given, or either given for a file that has its own.
     """
     path = Path(path)
-    found = _read(path)
+    sizes = None if pixel is None else pixel if isinstance(pixel, tuple) else (pixel, pixel)
+    for size in sizes or ():
+        require_positive("pixel", size, "m")
+    found = _read(path, matrix=sizes is not None)
+    if found.pixel is None and sizes is None:
+        raise BadInput(f"{path.name} holds heights without a pixel size; give pixel, their distance")
+    if found.pixel is not None and sizes is not None:
+        raise BadInput(f"{path.name} states its own pixel size; leave out pixel")
+    if found.pixel is None and lateral_unit is not None:
+        raise BadInput(f"{path.name} holds bare heights, whose pixel is given in metres; leave out lateral_unit")
+    if found.pixel is None and found.unit is None:
+        lateral_unit = "m"
     height_scale, lateral_scale = _scales(path.name, found.unit, unit, lateral_unit)
-    if min(found.heights.shape) < FEWEST_CELLS:
-        raise UnreadableFile(
-            f"{path.name} holds {found.heights.shape[0]} x {found.heights.shape[1]} heights, too few for a map; "
-            f"give a measurement of at least {FEWEST_CELLS} x {FEWEST_CELLS}"
-        )
+    if found.pixel is not None:
+        sizes = (found.pixel[0] * lateral_scale, found.pixel[1] * lateral_scale)
+    assert sizes is not None
     heights = np.where(np.isfinite(found.heights), found.heights, np.nan) * height_scale
     if np.isnan(heights).all():
         raise UnreadableFile(f"{path.name} holds no valid height among its {heights.size}; measure it again")
-    pixel = (found.pixel[0] * lateral_scale, found.pixel[1] * lateral_scale)
-    half = tuple(n * d / 2.0 for n, d in zip(heights.shape, pixel, strict=True))
+    if not all(0.0 < size < np.inf for size in sizes):
+        raise UnreadableFile(f"{path.name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
+    uniform = 1 if heights.shape[1] == 1 else None
+    if uniform:
+        heights, sizes = np.repeat(heights, FEWEST_CELLS, axis=1), (sizes[0], sizes[0])
+    if min(heights.shape) < FEWEST_CELLS:
+        raise UnreadableFile(
+            f"{path.name} holds {heights.shape[0]} x {found.heights.shape[1]} heights, too few for a map; "
+            f"give a measurement of at least {FEWEST_CELLS} x {FEWEST_CELLS}"
+        )
+    half = tuple(n * d / 2.0 for n, d in zip(heights.shape, sizes, strict=True))
     grid = Grid(
         cells=(heights.shape[0], heights.shape[1]),
         lower=(-half[0], -half[1]),
         upper=(half[0], half[1]),
         periodic=(False, False),
     )
-    return MeasuredSurface(heights, grid, path.name, found.format, (*found.notes, *_oddities(pixel)))
+    notes = (*found.notes, *_oddities(sizes, heights))
+    return MeasuredSurface(heights, grid, path.name, found.format, notes, uniform)
 
 
-def _oddities(pixel: tuple[float, float]) -> Iterator[str]:
+def _oddities(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
     smallest, largest = _PLAUSIBLE_PIXEL
+    steps = np.abs(np.diff(heights, axis=0)) / pixel[0]
+    slope = float(np.nanmedian(steps)) if np.isfinite(steps).any() else 0.0
+    if slope > _PLAUSIBLE_SLOPE:
+        yield f"neighbouring heights differ by {slope:.3g} times their distance; check the units of both"
     for axis, size in zip("xy", pixel, strict=True):
         if not smallest <= size <= largest:
             yield f"the pixel along {axis} is {length_text(size)}, hardly a roughness map; check the lateral unit"
@@ -101,7 +142,7 @@ def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str |
     return metres(unit), metres(lateral_unit)
 
 
-def _read(path: Path) -> _Map:
+def _read(path: Path, *, matrix: bool) -> _Map:
     """The map in the file, by the readers that its suffix names; without a telling suffix, by its content."""
     name, suffix = path.name, path.suffix.lower().removeprefix(".")
     try:
@@ -114,9 +155,13 @@ def _read(path: Path) -> _Map:
     if not start:
         raise UnreadableFile(f"{name} is empty; {_REMEDY}")
 
+    if suffix == "npy":
+        return _array(path)
+    if matrix and suffix in TABLES:
+        return _Map(_x_first(read_table(path)[::-1]), None, "text", None)
     suffixes = {reader.format(): set(reader.file_extensions()) for reader in library().IO.readers}
     formats = [form for form, known in suffixes.items() if suffix in known]
-    if not formats:
+    if not formats and suffix not in TABLES:
         return _read_by_content(path)
     if _TEXT.intersection(formats):
         formats = [form for form in suffixes if form in _TEXT.union(formats)]
@@ -159,7 +204,7 @@ def _format_of(path: Path) -> str | None:
         try:
             form = str(library().open_topography(str(path)).format())
         except Exception:  # noqa: BLE001 - as above
-            form = next((known for known, read in _LAST_RESORTS.items() if _readable(read, path)), "")
+            form = next((known for known in ("x3p", "sdf") if _readable(_LAST_RESORTS[known], path)), "")
     return form if form and form not in _UNMARKED | _TEXT else None
 
 
@@ -177,18 +222,61 @@ def _topography(path: Path, form: str | None) -> _Map:
         if form is None and reader.format() in _UNMARKED:
             raise UnreadableFile(f"{path.name} is in no format that can be read; {_REMEDY}")
         channel = reader.default_channel
-        if channel.dim != 2:
-            raise UnreadableFile(f"{path.name} holds a profile of {channel.nb_grid_pts[0]} points; give an areal map")
+        if channel.dim == 1:
+            line = reader.topography()
+            x, z = line.positions_and_heights()
+            return _profile(path, x, z, str(reader.format()), line.unit)
         if channel.physical_sizes is None:
-            raise UnreadableFile(f"{path.name} holds heights without a pixel size; {_REMEDY}")
-        topography = reader.topography()
+            topography = reader.topography(physical_sizes=channel.nb_grid_pts)
+        else:
+            topography = reader.topography()
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
         sizes, unit = topography.physical_sizes, topography.unit
-    pixel = (float(sizes[0]) / heights.shape[0], float(sizes[1]) / heights.shape[1])
+    pixel = None
+    if channel.physical_sizes is not None:
+        pixel = (float(sizes[0]) / heights.shape[0], float(sizes[1]) / heights.shape[1])
     maps = [other.name for other in reader.channels if other.dim == 2]
     if len(maps) > 1:
         notes.append(f"of the {len(maps)} maps in the file, the first, {channel.name!r}, was read")
     return _Map(heights, pixel, str(reader.format()), unit, tuple(notes))
+
+
+def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> _Map:
+    """A profile on even steps; steps that differ are interpolated onto their mean, which is noted."""
+    steps = np.diff(x)
+    if x.size < FEWEST_CELLS or not (steps > 0.0).all():
+        raise UnreadableFile(f"{path.name} is no profile of at least {FEWEST_CELLS} points along a rising x; {_REMEDY}")
+    step = float(x[-1] - x[0]) / (x.size - 1)
+    notes: tuple[str, ...] = ()
+    z = np.ma.filled(np.ma.asarray(z, dtype=np.float64), np.nan)
+    if np.max(np.abs(steps - step)) > _EVEN * step:
+        notes = ("the profile's points are not evenly spaced; they were interpolated onto even steps",)
+        z = np.interp(x[0] + step * np.arange(x.size), x, z)
+    return _Map(z[:, None], (step, step), form, unit, notes)
+
+
+def _table(path: Path) -> _Map:
+    """Two columns are a profile; a list of points is SurfaceTopography's to read, a matrix wants its pixel."""
+    numbers = read_table(path)
+    if numbers.shape[1] == 2:
+        return _profile(path, numbers[:, 0], numbers[:, 1], "text", None)
+    if min(numbers.shape) < FEWEST_CELLS:
+        raise UnreadableFile(
+            f"{path.name} holds {numbers.shape[0]} rows of {numbers.shape[1]} numbers; "
+            "give a profile (x, z), points on a regular grid (x, y, z) or a matrix of heights"
+        )
+    return _Map(_x_first(numbers[::-1]), None, "text", None)
+
+
+def _array(path: Path) -> _Map:
+    """Heights of shape (nx, ny) as NumPy saves them; SurfaceTopography would leave the file open."""
+    try:
+        heights = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
+    except (ValueError, EOFError, OSError, TypeError, SyntaxError) as error:
+        raise UnreadableFile(f"{path.name} is no readable .npy file ({_first_line(error)}); {_REMEDY}") from error
+    if heights.ndim != 2:
+        raise UnreadableFile(f"{path.name} holds an array of {heights.ndim} axes; give heights along x and y")
+    return _Map(heights, None, "npy", None)
 
 
 def _x3p(path: Path) -> _Map:
@@ -206,12 +294,14 @@ def _sdf(path: Path) -> _Map:
     import sdfio
 
     content: Any = sdfio.read(path)
-    if min(content.data.shape) == 1:
-        raise UnreadableFile(f"{path.name} holds a profile of {content.data.size} points; give an areal map")
     return _Map(_x_first(content.data), (float(content.header.x_scale), float(content.header.y_scale)), "sdf", "m")
 
 
-_LAST_RESORTS: dict[str, Callable[[Path], _Map]] = {"x3p": _x3p, "sdf": _sdf}
+_LAST_RESORTS: dict[str, Callable[[Path], _Map]] = {
+    "x3p": _x3p,
+    "sdf": _sdf,
+    **dict.fromkeys(TABLES, _table),
+}
 
 
 def _x_first(rows: Any) -> Field:

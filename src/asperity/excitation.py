@@ -1,0 +1,308 @@
+"""What passes under the contact: rough heights in time, as a record and as a spectrum.
+
+Two sources, filtered noise (the paper's section 2.2) and a surface's own spectrum run over at a speed, and the contact
+patch that averages either. Which of them a contact rides over is for `asperity.coupling` to say.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.errors import BadInput, require_positive
+from asperity.signals import Signal
+from asperity.surface import Surface
+
+FILTERS = ("continuous", "bilinear")
+HEIGHTS_AS = ("rms", "ra")
+HEIGHTS_OF = ("process", "record", "noise")
+RA_TO_RMS = float(np.sqrt(np.pi / 2.0))  # of Gaussian heights
+HIGHEST_ORDER = 8
+
+
+class Excitation(Protocol):
+    """A profile's spectrum, and records of it."""
+
+    def density(self, frequency_hz: Field, rate_hz: float) -> Field:
+        """Expected one-sided spectrum at `frequency_hz` (any shape), for records of that sampling rate [m^2/Hz]."""
+        ...
+
+    def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
+        """One record [m]; one seed, one record."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilteredNoise:
+    """Gaussian white noise behind a Butterworth low pass.
+
+    Parameters
+    ----------
+    height, cutoff_hz : of the profile [m], of the filter [Hz]
+    order : of the filter; the paper names none, 2 reproduces its Table 1
+    filter : "continuous", the process sampled without error; "bilinear", the digital filter of the same name, started
+        from rest: what the paper must have used. It has no power left at rate/2, so a resonance near there is starved
+    height_as : "rms" or "ra", the mean absolute height
+    height_of : what has that height. "process": the filtered noise at large, so that one record scatters about it.
+        "record": this very record is scaled to it; chance in the few slow waves of a record then passes to every other
+        frequency. "noise": the noise before the filter, sample by sample; what is left behind depends on the rate
+    reference_cutoff_hz : the cut-off [Hz] at which the noise's coefficient is set so that the height comes out, and
+        then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at each cut-off, ^3
+
+    Raises
+    ------
+    BadInput
+        for a quantity out of range or a name that is not known.
+    """
+
+    height: float
+    cutoff_hz: float
+    order: int = 2
+    filter: str = "continuous"
+    height_as: str = "rms"
+    height_of: str = "process"
+    reference_cutoff_hz: float | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("profile height", self.height, "m")
+        require_positive("profile cut-off", self.cutoff_hz, "Hz")
+        if self.reference_cutoff_hz is not None:
+            require_positive("reference cut-off", self.reference_cutoff_hz, "Hz")
+        require_filter(self.order, self.filter, self.height_as, self.height_of)
+
+    def density(self, frequency_hz: Field, rate_hz: float) -> Field:
+        """White noise times |H|^2 [m^2/Hz]; without a rescaling of the record the exact expectation.
+
+        |H|^2 = 1 / (1 + (f/fc)^2n), with tan(π f/rate) for f, likewise fc, if bilinear.
+        """
+        frequency, cutoff = np.asarray(frequency_hz), self.cutoff_hz
+        if self.filter == "bilinear":
+            _require_below_half(cutoff, rate_hz)
+            warped, corner = np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5)), np.tan(np.pi * cutoff / rate_hz)
+        else:
+            warped, corner = frequency, cutoff
+        return np.asarray(self._white_density(rate_hz) / (1.0 + (warped / corner) ** (2 * self.order)))
+
+    def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
+        """Record of `samples` heights [m].
+
+        Raises
+        ------
+        BadInput
+            for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record shorter than one of its periods.
+        """
+        for cutoff in {self.cutoff_hz, self.reference_cutoff_hz or self.cutoff_hz}:
+            top = rate_hz / (10.0 if self.filter == "continuous" else 2.0)
+            if not rate_hz / samples <= cutoff < top:
+                raise BadInput(
+                    f"profile cut-off must lie between 1/duration ({rate_hz / samples:g} Hz) and {top:g} Hz at "
+                    f"{rate_hz:g} samples a second, got {cutoff:g} Hz; change the cut-off law, duration or rate"
+                )
+        heights = self._filtered(self.cutoff_hz, samples, rate_hz, seed)
+        if self.height_of == "record":
+            kept = self.reference_cutoff_hz
+            judged = heights if kept is None else self._filtered(kept, samples, rate_hz, seed)
+            found = np.std(judged) if self.height_as == "rms" else np.mean(np.abs(judged - np.mean(judged)))
+            heights *= self.height / float(found)
+        return Signal(heights, rate_hz, "m")
+
+    @property
+    def _rms(self) -> float:
+        return self.height * (RA_TO_RMS if self.height_as == "ra" else 1.0)
+
+    def _white_density(self, rate_hz: float) -> float:
+        """One-sided density of the noise before the filter [m^2/Hz]."""
+        if self.height_of == "noise":
+            return self._rms**2 * 2.0 / rate_hz
+        return self._rms**2 / self._noise_bandwidth(self.reference_cutoff_hz or self.cutoff_hz, rate_hz)
+
+    def _noise_bandwidth(self, cutoff: float, rate_hz: float) -> float:
+        """∫|H|^2 df [Hz]: fc (π/2n) / sin(π/2n), or over the warped axis."""
+        quarter = np.pi / (2.0 * self.order)
+        if self.filter == "continuous":
+            return float(cutoff * quarter / np.sin(quarter))
+        _require_below_half(cutoff, rate_hz)
+        from scipy.integrate import quad
+
+        corner = np.tan(np.pi * cutoff / rate_hz)
+
+        def integrand(t: float) -> float:  # t = tan(π f/rate) over the corner's
+            return float(1.0 / ((1.0 + (t * corner) ** 2) * (1.0 + t ** (2 * self.order))))
+
+        area = quad(integrand, 0.0, 1.0)[0] + quad(lambda u: integrand(1.0 / u) / u**2, 0.0, 1.0)[0]
+        return float(rate_hz / np.pi * corner * area)
+
+    def _filtered(self, cutoff: float, samples: int, rate_hz: float, seed: int) -> Field:
+        """Noise behind the filter at `cutoff`, of the expected height before any rescaling of the record."""
+        white_density = self._white_density(rate_hz)
+        if self.filter == "bilinear":
+            from scipy.signal import butter, sosfilt
+
+            white = np.random.default_rng(seed).standard_normal(samples)
+            white *= np.sqrt(white_density * rate_hz / 2.0)
+            return np.asarray(sosfilt(butter(self.order, cutoff, fs=rate_hz, output="sos"), white))
+        if self.order == 2:
+            rms = float(np.sqrt(white_density * self._noise_bandwidth(cutoff, rate_hz)))
+            return _butterworth_noise(samples, cutoff / rate_hz, rms, seed)
+        source = replace(self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz)
+        return synthesised(source, samples, rate_hz, seed)
+
+
+def require_filter(order: int, filter_name: str, height_as: str, height_of: str) -> None:
+    """Say which of a noise filter's choices is not known."""
+    if not 1 <= order <= HIGHEST_ORDER:
+        raise BadInput(f"filter order must lie between 1 and {HIGHEST_ORDER}, got {order}; 2 is the default")
+    for name, value, known in (
+        ("filter", filter_name, FILTERS),
+        ("height_as", height_as, HEIGHTS_AS),
+        ("height_of", height_of, HEIGHTS_OF),
+    ):
+        if value not in known:
+            raise BadInput(f"{name} must be one of {', '.join(known)}, got {value!r}")
+
+
+def _require_below_half(cutoff: float, rate_hz: float) -> None:
+    if cutoff >= rate_hz / 2.0:
+        raise BadInput(f"a digital filter's cut-off must lie below rate/2, {rate_hz / 2.0:g} Hz, got {cutoff:g} Hz")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceTrack:
+    """A surface's own profile run over at a speed: S(f) = Φ(f/v)/v.
+
+    `wavenumber` [cycles/m] evenly spaced from 0 and `spectrum` Φ [m^3], one-sided, both of shape (lines,); `speed` v
+    [m/s]. Between the lines Φ is linear, above the last it is 0: the map shows nothing finer than two of its pixels.
+    Records are Gaussian, and as long as one likes; they know the surface's spectrum, not its shapes.
+    """
+
+    wavenumber: Field
+    spectrum: Field
+    speed: float
+
+    def __post_init__(self) -> None:
+        require_positive("speed at which the surface passes", self.speed, "m/s")
+
+    @classmethod
+    def of(cls, surface: Surface, speed: float) -> "SurfaceTrack":
+        """The mean spectrum of the surface's cuts along rolling, Hann-tapered: line width 1.5 over the length."""
+        from scipy.signal import periodogram
+
+        if surface.sq == 0.0:
+            raise BadInput("a flat surface excites nothing; give it a roughness, or take filtered noise")
+        heights = surface.heights - np.mean(surface.heights)
+        spacing = surface.grid.spacing[0]
+        wavenumber, spectra = periodogram(heights, 1.0 / spacing, "hann", detrend=False, axis=0)
+        return cls(wavenumber=wavenumber, spectrum=np.mean(spectra, axis=1), speed=speed)
+
+    def density(self, frequency_hz: Field, rate_hz: float) -> Field:  # noqa: ARG002 - the same at any rate
+        """Φ(f/v)/v [m^2/Hz]."""
+        at = np.asarray(frequency_hz) / self.speed
+        return np.asarray(np.interp(at, self.wavenumber, self.spectrum, right=0.0) / self.speed)
+
+    def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
+        """Gaussian record with that spectrum [m]."""
+        return Signal(synthesised(self, samples, rate_hz, seed), rate_hz, "m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatchAverage:
+    """An excitation as the contact patch feels it: averaged with the weight of Hertz's pressure.
+
+    Waves of k = 2π f/v run across the patch of half-width a [m]: their height shrinks by 2 J1(ka)/(ka) in a line
+    contact (`shape` "line"), by 3 (sin ka - ka cos ka)/(ka)^3 in a round one ("point").
+    """
+
+    source: Excitation
+    shape: str
+    half_width: float
+    speed: float
+
+    def __post_init__(self) -> None:
+        require_positive("half-width of the contact patch", self.half_width, "m")
+        require_positive("speed at which the surface passes", self.speed, "m/s")
+        if self.shape not in PATCHES:
+            raise BadInput(f"contact patch must be one of {', '.join(PATCHES)}, got {self.shape!r}")
+
+    def weight(self, frequency_hz: Field) -> Field:
+        """What is left of a wave's height, 1 at 0 Hz, sign included."""
+        ka = 2.0 * np.pi * np.asarray(frequency_hz) * self.half_width / self.speed
+        return np.asarray(PATCHES[self.shape](ka))
+
+    def density(self, frequency_hz: Field, rate_hz: float) -> Field:
+        """The source's, times the weight squared [m^2/Hz]."""
+        return np.asarray(self.source.density(frequency_hz, rate_hz) * self.weight(frequency_hz) ** 2)
+
+    def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
+        """The source's record, averaged [m]."""
+        import scipy.fft as fft
+
+        reach = int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64  # so that no end is felt
+        heights = self.source.profile(samples + 2 * reach, rate_hz, seed).values
+        length = fft.next_fast_len(heights.size, real=True)
+        weight = self.weight(fft.rfftfreq(length, 1.0 / rate_hz))
+        averaged = fft.irfft(fft.rfft(heights, length) * weight, length)
+        return Signal(np.ascontiguousarray(averaged[reach : reach + samples]), rate_hz, "m")
+
+
+def _line_patch(ka: Field) -> Field:
+    from scipy.special import j1
+
+    safe = np.maximum(ka, 1e-6)
+    return np.asarray(2.0 * j1(safe) / safe)
+
+
+def _point_patch(ka: Field) -> Field:
+    from scipy.special import spherical_jn
+
+    safe = np.maximum(ka, 1e-6)
+    return np.asarray(3.0 * spherical_jn(1, safe) / safe)
+
+
+PATCHES = {"line": _line_patch, "point": _point_patch}
+
+
+def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
+    """Gaussian heights with the source's spectrum: random waves on the lines of a record twice as long, cut in half.
+
+    The half is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
+    """
+    import scipy.fft as fft
+
+    length = fft.next_fast_len(2 * samples, real=True)
+    frequency = fft.rfftfreq(length, 1.0 / rate_hz)
+    density = source.density(frequency, rate_hz)
+    rng = np.random.default_rng(seed)
+    waves = (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)) * np.sqrt(
+        density * rate_hz * length / 4.0
+    )
+    waves[0] = 0.0
+    return np.ascontiguousarray(fft.irfft(waves, length)[:samples])
+
+
+def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:
+    """Samples of y'' + √2 ω y' + ω^2 y = white noise, of standard deviation `rms`; `cutoff` in cycles a sample.
+
+    State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan 1978): y is an ARMA(2, 1) series of one white noise.
+    """
+    from scipy.linalg import expm
+    from scipy.signal import lfilter
+
+    omega = 2.0 * np.pi * cutoff
+    drift = np.array([[0.0, 1.0], [-(omega**2), -np.sqrt(2.0) * omega]])
+    exponential = expm(np.block([[-drift, np.diag([0.0, 1.0])], [np.zeros((2, 2)), drift.T]]))
+    step = exponential[2:, 2:].T
+    noise = step @ exponential[:2, 2:]
+    # y_n - tr(A) y_(n-1) + det(A) y_(n-2) = e1_(n-1) + (A12 e2 - A22 e1)_(n-2): its variance, neighbour covariance ...
+    back = np.array([-step[1, 1], step[0, 1]])
+    variance = noise[0, 0] + back @ noise @ back
+    neighbour = back @ noise[:, 0]
+    # ... are those of b0 w_n + b1 w_(n-1)
+    plus, minus = np.sqrt(variance + 2.0 * neighbour), np.sqrt(variance - 2.0 * neighbour)
+    numerator = np.array([plus + minus, plus - minus]) / 2.0
+    denominator = np.array([1.0, -np.trace(step), np.linalg.det(step)])
+
+    settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))  # 12 time constants: what is left of the start is e^-12
+    white = np.random.default_rng(seed).standard_normal(settling + samples)
+    to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)  # unit white noise would have variance 1 / (2 √2 ω^3)
+    return np.asarray(to_rms * lfilter(numerator, denominator, white)[settling:])

@@ -1,0 +1,84 @@
+"""Parameters of a roughness profile, ISO 21920-2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.surface.bearing import bearing_curve, core_heights
+
+SECTIONS = 5  # section lengths in the evaluation length, ISO 21920-3's default
+_DISCRIMINATION = 0.1  # of Rz: lower peaks and shallower pits belong to their neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileParameters:
+    """Parameters of ISO 21920-2 about the mean of the points that are known.
+
+    `ra`, `rq` arithmetic and root mean square height [m]; `rsk`, `rku` skewness and kurtosis; `rp`, `rv`, `rz` highest
+    peak, deepest pit and their sum, means over five section lengths [m]; `rt` the whole height [m]; `rsm` mean spacing
+    of profile elements [m], NaN for fewer than two; `rdq` root mean square slope, from neighbouring points; `rk`,
+    `rpk`, `rvk` core height, reduced peak height and pit depth [m]; `rmr1`, `rmr2` the shares that bound the core.
+    """
+
+    ra: float
+    rq: float
+    rsk: float
+    rku: float
+    rp: float
+    rv: float
+    rz: float
+    rt: float
+    rsm: float
+    rdq: float
+    rk: float
+    rpk: float
+    rvk: float
+    rmr1: float
+    rmr2: float
+
+
+def profile_parameters(heights: Field, spacing: float) -> ProfileParameters:
+    """The parameters of a levelled (and filtered, if wanted) profile.
+
+    Parameters
+    ----------
+    heights : shape (n,) [m], NaN where unknown
+    spacing : distance of the points [m]
+    """
+    z = heights - np.nanmean(heights)
+    rq = float(np.sqrt(np.nanmean(z**2)))
+    known = [section[np.isfinite(section)] for section in np.array_split(z, SECTIONS)]
+    known = [section for section in known if section.size]
+    rp = float(np.mean([section.max() for section in known]))
+    rv = float(np.mean([-section.min() for section in known]))
+    core = core_heights(bearing_curve(z))
+    return ProfileParameters(
+        ra=float(np.nanmean(np.abs(z))),
+        rq=rq,
+        rsk=float(np.nanmean(z**3)) / rq**3 if rq else float("nan"),
+        rku=float(np.nanmean(z**4)) / rq**4 if rq else float("nan"),
+        rp=rp,
+        rv=rv,
+        rz=rp + rv,
+        rt=float(np.nanmax(z) - np.nanmin(z)),
+        rsm=_mean_spacing(z[np.isfinite(z)], _DISCRIMINATION * (rp + rv)) * spacing,
+        rdq=float(np.sqrt(np.nanmean(np.diff(z) ** 2))) / spacing,
+        rk=core.core,
+        rpk=core.peaks,
+        rvk=core.pits,
+        rmr1=core.upper,
+        rmr2=core.lower,
+    )
+
+
+def _mean_spacing(z: Field, threshold: float) -> float:
+    """Rsm in points: from one upward crossing of the mean line that parts a pit from a peak to the next."""
+    side = np.where(z > threshold, 1, np.where(z < -threshold, -1, 0))
+    marked = np.flatnonzero(side)
+    rises = np.flatnonzero((side[marked[:-1]] < 0) & (side[marked[1:]] > 0))
+    crossings = []
+    for pit, peak in zip(marked[rises], marked[rises + 1], strict=True):
+        last = pit + int(np.flatnonzero(z[pit:peak] <= 0.0)[-1])
+        crossings.append(last - z[last] / (z[last + 1] - z[last]))
+    return float(np.mean(np.diff(crossings))) if len(crossings) > 1 else float("nan")

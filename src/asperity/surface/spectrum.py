@@ -1,0 +1,82 @@
+"""Which wavelengths and directions roughness is made of: radial and directional spectra.
+
+Source of the normalisation: T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr. Metrol. Prop. 5 (2017) 013001.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.surface.model import MeasuredSurface, Surface
+
+_PER_DECADE = 12  # radial bins
+_SECTORS = 36  # directional bins over half a turn
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceSpectrum:
+    """The power of roughness over wavelength and over direction.
+
+    `wavenumber` [1/m, 2 pi over the wavelength], ascending; `density` there: of a map the isotropic C [m^4] with
+    Sq^2 = (1/2 pi) integral of q C dq, of a profile the one-dimensional C [m^3] with Rq^2 = (1/pi) integral of C dq.
+    `lay` [rad], from x towards y, mid-sector, 0 to pi, and `share` of Sq^2 in ridges that run that way; both empty for
+    a profile.
+    """
+
+    wavenumber: Field
+    density: Field
+    lay: Field
+    share: Field
+
+    @property
+    def slope(self) -> float:
+        """Exponent of the density over the wavenumber: -2 (1 + H) where a map is self-affine."""
+        return float(np.polyfit(np.log(self.wavenumber), np.log(self.density), 1)[0])
+
+
+def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
+    """The spectra of a levelled surface; missing cells count as the mean, axes that do not repeat are Hann tapered."""
+    grid = surface.grid
+    heights = np.nan_to_num(surface.heights - np.nanmean(surface.heights))
+    if isinstance(surface, MeasuredSurface) and surface.uniform is not None:
+        axis = 1 - surface.uniform
+        return _profile_spectrum(np.nan_to_num(surface.profile - np.nanmean(surface.profile)), grid.spacing[axis])
+    windows = [np.ones(n) if repeats else _hann(n) for n, repeats in zip(grid.cells, grid.periodic, strict=True)]
+    window = np.outer(*windows)
+    power = np.abs(np.fft.fft2(heights * window)) ** 2 / np.mean(window**2)  # |sum|^2
+    (nx, ny), (dx, dy) = grid.cells, grid.spacing
+    density = power * dx * dy / (nx * ny)
+    kx, ky = 2.0 * np.pi * np.fft.fftfreq(nx, dx)[:, None], 2.0 * np.pi * np.fft.fftfreq(ny, dy)[None, :]
+    k = np.hypot(kx, ky)
+    inside = (k > 0.0) & (k < np.pi / max(dx, dy))  # every direction up to the same wavenumber
+    wavenumber, radial = _binned(k[inside], density[inside])
+    crest = np.mod(np.arctan2(np.broadcast_to(ky, k.shape), np.broadcast_to(kx, k.shape)) + np.pi / 2.0, np.pi)
+    sector = np.floor(crest[inside] / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
+    share: Field = np.bincount(sector, density[inside], minlength=_SECTORS).astype(np.float64)
+    total = share.sum()
+    lay = np.arange(_SECTORS) * np.pi / _SECTORS
+    return SurfaceSpectrum(wavenumber, radial, lay, share / total if total > 0.0 else share)
+
+
+def _profile_spectrum(heights: Field, spacing: float) -> SurfaceSpectrum:
+    window = _hann(heights.size)
+    power = np.abs(np.fft.rfft(heights * window)) ** 2 / np.mean(window**2) * spacing / heights.size
+    k = 2.0 * np.pi * np.fft.rfftfreq(heights.size, spacing)
+    wavenumber, density = _binned(k[1:], power[1:])
+    return SurfaceSpectrum(wavenumber, density, np.empty(0), np.empty(0))
+
+
+def _hann(count: int) -> Field:
+    return np.asarray(np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 2)
+
+
+def _binned(k: Field, density: Field) -> tuple[Field, Field]:
+    """Means over bins of equal width in log k; empty bins are left out."""
+    bins = np.floor(np.log10(k / k.min()) * _PER_DECADE + 0.5).astype(int)
+    counts = np.bincount(bins)
+    some = counts > 0
+    return (
+        np.exp(np.bincount(bins, np.log(k))[some] / counts[some]),
+        np.bincount(bins, density)[some] / counts[some],
+    )

@@ -1,0 +1,35 @@
+"""The finite-volume Reynolds equation face by face in plain NumPy, once without and once with units."""
+
+import numpy as np
+
+
+def faces(pressure, content, mobility, inlet_content, dx, dy):
+    """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell; complex welcome."""
+    nx = pressure.shape[0]
+    couette = np.empty((nx + 1, pressure.shape[1]), dtype=pressure.dtype)
+    couette[0] = inlet_content
+    couette[1] = content[0]
+    couette[2:] = 1.5 * content[1:] - 0.5 * content[:-1]
+    poiseuille = np.empty_like(couette)
+    poiseuille[0] = -mobility[0] * pressure[0] / (dx / 2.0)  # the outer faces are at ambient pressure
+    poiseuille[1:-1] = -(mobility[1:] + mobility[:-1]) / 2.0 * np.diff(pressure, axis=0) / dx
+    poiseuille[-1] = mobility[-1] * pressure[-1] / (dx / 2.0)
+    north = -(mobility + np.roll(mobility, -1, 1)) / 2.0 * (np.roll(pressure, -1, 1) - pressure) / dy
+    return couette + poiseuille, north
+
+
+def net_outflow(pressure, content, mobility, inlet_content, dx, dy):
+    along, north = faces(pressure, content, mobility, inlet_content, dx, dy)
+    return np.diff(along, axis=0) / dx + (north - np.roll(north, 1, 1)) / dy
+
+
+def mass_outflow(solution):
+    """Net mass outflow of each cell [kg/m^2/s] of a solved contact, from its pressure and gap and the oil's laws."""
+    conditions, oil, grid = solution.conditions, solution.lubricant, solution.grid
+    dx, dy = grid.spacing
+    p, h = solution.pressure, solution.gap
+    density = oil.density(p)
+    u = conditions.entrainment_speed
+    ahead = h[0] + ((grid.x[0] - dx) ** 2 - grid.x[0] ** 2) / (2.0 * conditions.radius)
+    entering = oil.density.rho0 * u * (ahead + h[0]) / 2.0
+    return net_outflow(p, u * density * h, density * h**3 / (12.0 * oil.viscosity(p)), entering, dx, dy)

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+
+from asperity.ehl.deflection import line_deflection
+from reference_solvers.half_space import periodic_compliance
+
+CELLS, SPACING = (16, 12), (0.11, 0.07)
+
+
+@pytest.fixture
+def deflection():
+    return line_deflection(CELLS, SPACING)
+
+
+def test_one_loaded_cell_dents_as_the_sum_of_its_images_does(deflection):
+    """Love's rectangle and 6000 images of it: no logarithmic kernel, no Bessel function, no transform."""
+    pressure = np.zeros(CELLS)
+    pressure[3, 5] = 1.0
+    (dx, dy), (nx, ny) = SPACING, CELLS
+    x, y = np.meshgrid((np.arange(nx) - 3) * dx, (np.arange(ny) - 5) * dy, indexing="ij")
+    expected = periodic_compliance(x, y, SPACING, ny * dy)
+    np.testing.assert_allclose(deflection(pressure), expected, atol=1e-7 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("cells", [(16, 12), (15, 9), (9, 16)])
+@pytest.mark.parametrize(
+    ("spacing", "tolerance"),
+    [((0.05, 0.05), 1e-7), ((0.2, 0.02), 3e-6), ((0.02, 0.2), 1e-4)],  # few aliases are summed for slim cells
+)
+def test_cells_of_any_shape(cells, spacing, tolerance):
+    pressure = np.zeros(cells)
+    pressure[0, 0] = 1.0
+    x, y = np.meshgrid(*(np.arange(n) * d for n, d in zip(cells, spacing, strict=True)), indexing="ij")
+    expected = periodic_compliance(x, y, spacing, cells[1] * spacing[1])
+    np.testing.assert_allclose(line_deflection(cells, spacing)(pressure), expected, atol=tolerance * np.ptp(expected))
+
+
+def test_a_pressure_that_does_not_vary_in_y_meets_the_logarithm(deflection):
+    """-(1/pi) int ln|x - s| ds over each cell, cell by cell."""
+    line = np.random.default_rng(1).random(CELLS[0])
+    x = np.arange(CELLS[0]) * SPACING[0]
+    edge = x[:, None] - x[None, :]
+    upper, lower = edge + SPACING[0] / 2.0, edge - SPACING[0] / 2.0
+    expected = -(upper * np.log(np.abs(upper)) - lower * np.log(np.abs(lower)) - SPACING[0]) / np.pi @ line
+    found = deflection(np.repeat(line[:, None], CELLS[1], axis=1))
+    np.testing.assert_allclose(found, np.repeat(expected[:, None], CELLS[1], axis=1), rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("cells", [64, 128, 256])
+def test_a_hertz_pressure_flattens_the_parabola(cells):
+    """V = const - X^2/2 inside |X| < 1, within 3/cells^1.5 of it; the pressure's edge sets the order."""
+    dx = 4.0 / cells
+    x = -2.0 + (np.arange(cells) + 0.5) * dx
+    pressure = np.repeat(np.sqrt(np.maximum(1.0 - x**2, 0.0))[:, None], 8, axis=1)
+    flat = (line_deflection((cells, 8), (dx, 0.3))(pressure) + (x**2 / 2.0)[:, None])[np.abs(x) < 1.0]
+    assert np.ptp(flat) < 3.0 * cells**-1.5
+    # and the constant: int sqrt(1 - s^2) ln|s| ds = -(pi/2)(ln 2 + 1/2), over -pi
+    assert flat.mean() == pytest.approx((np.log(2.0) + 0.5) / 2.0, abs=3.0 * cells**-1.5)
+
+
+def test_a_wave_along_y_sinks_as_a_half_space_does():
+    """cos(q y) on a band far wider than a wave: V = P/q, wave by wave of the staircase that the cells make of it."""
+    cells, dy = 32, 0.05
+    y = (np.arange(cells) + 0.5) * dy
+    wave = np.tile(np.cos(2.0 * np.pi * y / (cells * dy)), (256, 1))
+    found = line_deflection((256, cells), (0.1, dy))(wave)[128]
+    order = 1 + cells * np.arange(-1000, 1001)
+    sinks = np.sum(np.sinc(order / cells) / np.abs(2.0 * np.pi * order / (cells * dy)))
+    np.testing.assert_allclose(found, wave[128] * sinks, rtol=2e-5)
+
+
+def test_linear_reciprocal_and_mirrored(deflection):
+    rng = np.random.default_rng(2)
+    one, other = rng.random(CELLS), rng.random(CELLS)
+    np.testing.assert_allclose(
+        deflection(2.0 * one - 3.0 * other), 2.0 * deflection(one) - 3.0 * deflection(other), atol=1e-13
+    )
+    assert np.sum(other * deflection(one)) == pytest.approx(np.sum(one * deflection(other)), rel=1e-12)  # Betti
+    np.testing.assert_allclose(deflection(one[::-1]), deflection(one)[::-1], atol=1e-13)
+    np.testing.assert_allclose(deflection(one[:, ::-1]), deflection(one)[:, ::-1], atol=1e-13)
+    np.testing.assert_allclose(deflection(np.roll(one, 5, 1)), np.roll(deflection(one), 5, 1), atol=1e-13)
+
+
+def test_every_pressure_costs_work(deflection):
+    """The elastic energy of a pressure without net load on any line is positive: else a solver may run away."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        pressure = rng.standard_normal(CELLS)
+        pressure -= pressure.mean()
+        assert np.sum(pressure * deflection(pressure)) > 0.0
+
+
+def test_the_near_row_is_the_compliance_itself(deflection):
+    pressure = np.zeros(CELLS)
+    pressure[0, 0] = 1.0
+    np.testing.assert_allclose(deflection.near, deflection(pressure)[[0, 1, 2, 8], 0], rtol=1e-12)

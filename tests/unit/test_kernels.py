@@ -1,0 +1,298 @@
+"""Compiled loops against slow twins, and the linearisation against what it linearises."""
+
+import numpy as np
+import pytest
+
+from asperity.ehl.problem import Preconditioner
+from asperity.ehl.scales import Scales
+from asperity.ehl.solution import Options
+from asperity.ehl.solve import contact_problem, first_guess
+from asperity.kernels import relax, reynolds
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
+from reference_solvers import reynolds as twin
+from reference_solvers.paper import barus, contact, grid, rough
+
+CELLS, DX, DY = (10, 8), 0.13, 0.21
+NEAR = np.array([0.5, 0.3, 0.2, 0.05])
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(8)
+
+
+@pytest.fixture
+def film(rng):
+    return Film(*(0.1 + rng.random(CELLS) for _ in range(6)))
+
+
+@pytest.fixture
+def rows(rng):
+    return Rows(rng.integers(0, 4, CELLS).astype(np.int8), 0.5 + rng.random(CELLS), 1.7)
+
+
+@pytest.fixture
+def stencil(rng):
+    """Diagonally dominant, otherwise arbitrary."""
+    return Stencil(5.0 + rng.random(CELLS), *(-rng.random(CELLS) for _ in range(4)))
+
+
+def dense(stencil):
+    """The stencil as a matrix: x ends, y goes round."""
+    nx, ny = stencil.centre.shape
+    matrix = np.zeros((nx * ny, nx * ny))
+    for i in range(nx):
+        for j in range(ny):
+            row = i * ny + j
+            matrix[row, row] += stencil.centre[i, j]
+            if i > 0:
+                matrix[row, row - ny] += stencil.west[i, j]
+            if i < nx - 1:
+                matrix[row, row + ny] += stencil.east[i, j]
+            matrix[row, i * ny + (j + 1) % ny] += stencil.north[i, j]
+            matrix[row, i * ny + (j - 1) % ny] += stencil.south[i, j]
+    return matrix
+
+
+def outflow(pressure, film, inlet):
+    out = np.empty(CELLS)
+    reynolds.net_outflow(pressure, film.content, film.mobility, inlet, DX, DY, out)
+    return out
+
+
+def test_net_outflow_is_its_twins(rng, film):
+    pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
+    expected = twin.net_outflow(pressure, film.content, film.mobility, inlet, DX, DY)
+    np.testing.assert_allclose(outflow(pressure, film, inlet), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_what_leaves_the_cells_leaves_the_grid(rng, film):
+    """Fluxes telescope: the sum of all net outflows is what the outlet face lets out less what the inlet lets in."""
+    pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
+    along, _ = twin.faces(pressure, film.content, film.mobility, inlet, DX, DY)
+    kept = outflow(pressure, film, inlet).sum() * DX
+    assert kept == pytest.approx(along[-1].sum() - along[0].sum(), rel=1e-12)
+
+
+def test_net_outflow_is_second_order():
+    """d(m)/dx - d(eps dp/dx)/dx - d(eps dp/dy)/dy of smooth fields; away from the first-order inlet face."""
+
+    def error(cells):
+        x, dx = (np.arange(cells) + 0.5) / cells, 1.0 / cells
+        x, y = np.meshgrid(x, x, indexing="ij")
+        wave = 2.0 * np.pi
+        pressure = np.sin(np.pi * x) * (1.5 + np.cos(wave * y))
+        mobility = 1.0 + 0.5 * x * np.sin(wave * y)
+        content = 1.0 + x**3
+        out = np.empty((cells, cells))
+        reynolds.net_outflow(pressure, content, mobility, np.ones(cells), dx, dx, out)
+        p_x = np.pi * np.cos(np.pi * x) * (1.5 + np.cos(wave * y))
+        p_y = -wave * np.sin(np.pi * x) * np.sin(wave * y)
+        laplace = -(np.pi**2) * pressure - wave**2 * np.sin(np.pi * x) * np.cos(wave * y)
+        eps_x, eps_y = 0.5 * np.sin(wave * y), 0.5 * x * wave * np.cos(wave * y)
+        exact = 3.0 * x**2 - mobility * laplace - eps_x * p_x - eps_y * p_y
+        return np.abs(out - exact)[2:-1].max()
+
+    assert error(64) < error(32) / 3.6
+
+
+def test_jacobian_product_is_the_complex_step_of_the_twin(rng, film, rows):
+    pressure, d_pressure, d_gap = (rng.standard_normal(CELLS) for _ in range(3))
+    found = np.empty(CELLS)
+    reynolds.jacobian_product(rows, film, pressure, d_pressure, d_gap, DX, DY, found)
+    step = 1e-30j
+    along_step = twin.net_outflow(
+        pressure + step * d_pressure,
+        film.content + step * (film.content_by_gap * d_gap + film.content_by_pressure * d_pressure),
+        film.mobility + step * (film.mobility_by_gap * d_gap + film.mobility_by_pressure * d_pressure),
+        1.0 + step * film.content_by_gap[0] * d_gap[0],
+        DX,
+        DY,
+    )
+    expected = np.choose(
+        rows.state,
+        [d_pressure, d_gap * rows.contact_scale, along_step.imag / 1e-30 * rows.fluid_scale, d_pressure],
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
+
+
+def first_order_rows(film):
+    """Poiseuille with its mobility held, plus the first-order wedge through the near compliances; rows unscaled."""
+    nx, ny = CELLS
+    count = nx * ny
+    matrix = np.empty((count, count))
+    for column in range(count):
+        unit = np.zeros(count)
+        unit[column] = 1.0
+        matrix[:, column] = twin.net_outflow(
+            unit.reshape(CELLS), np.zeros(CELLS), film.mobility, np.zeros(ny), DX, DY
+        ).ravel()
+    by_gap, by_pressure = film.content_by_gap, film.content_by_pressure
+    for i in range(nx):
+        for j in range(ny):
+            for k in range(max(i - 1, 0), min(i + 2, nx)):
+                here = by_gap[i, j] * NEAR[abs(k - i)] + by_pressure[i, j] * (k == i)
+                before = by_gap[i, j] * NEAR[abs(k + 1 - i)]  # the inlet's gap moves with its first cell
+                if i > 0:
+                    before = by_gap[i - 1, j] * NEAR[abs(k + 1 - i)] + by_pressure[i - 1, j] * (k == i - 1)
+                matrix[i * ny + j, k * ny + j] += (here - before) / DX
+    return matrix
+
+
+def test_local_stencil_is_the_twins_matrix(film, rows):
+    stencil = Stencil(*(np.empty(CELLS) for _ in range(5)))
+    reynolds.local_stencil(rows, film, NEAR, DX, DY, stencil)
+    wet = first_order_rows(film) * rows.fluid_scale.ravel()[:, None]
+    ny = CELLS[1]
+    expected = np.eye(wet.shape[0])
+    for cell, state in enumerate(rows.state.ravel()):
+        if state == LUBRICATED:
+            expected[cell] = wet[cell]
+        elif state == TOUCHING:
+            expected[cell] = 0.0
+            for other, distance in ((cell - ny, 1), (cell, 0), (cell + ny, 1)):
+                if 0 <= other < wet.shape[0]:
+                    expected[cell, other] = (NEAR[distance] - NEAR[3]) * rows.contact_scale
+    np.testing.assert_allclose(dense(stencil), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_fluid_diagonal_is_the_stencils_own_but_never_below_the_stiff_film(film):
+    found = np.empty(CELLS)
+    reynolds.fluid_diagonal(film, NEAR, DX, DY, found)
+    own = np.diag(first_order_rows(film)).reshape(CELLS)
+    above = np.concatenate([film.content_by_gap[:1], film.content_by_gap[:-1]])
+    wedge = film.content_by_gap * NEAR[0] - above * NEAR[1] + film.content_by_pressure
+    least = own - wedge / DX + (NEAR[0] - NEAR[1]) / DX
+    np.testing.assert_allclose(found, np.maximum(own, least), rtol=1e-12)
+
+
+@pytest.mark.parametrize("parity", [0, 1])
+def test_relaxed_lines_leave_no_residual_and_the_others_alone(rng, stencil, parity):
+    lines = relax.Lines(np.empty(CELLS), np.empty(CELLS))
+    relax.factor_lines(stencil, lines)
+    residual, start = rng.standard_normal(CELLS), rng.standard_normal(CELLS)
+    correction = start.copy()
+    relax.relax_lines(stencil, lines, residual, correction, parity, np.empty(CELLS))
+    left = residual - (dense(stencil) @ correction.ravel()).reshape(CELLS)
+    np.testing.assert_allclose(left[:, parity::2], 0.0, atol=1e-12)
+    np.testing.assert_array_equal(correction[:, 1 - parity :: 2], start[:, 1 - parity :: 2])
+    assert np.abs(left[:, 1 - parity :: 2]).max() > 0.1
+
+
+def test_stencil_residual_is_the_matrix_product(rng, stencil):
+    residual, correction, out = rng.standard_normal(CELLS), rng.standard_normal(CELLS), np.empty(CELLS)
+    relax.stencil_residual(stencil, residual, correction, out)
+    np.testing.assert_allclose(out.ravel(), residual.ravel() - dense(stencil) @ correction.ravel(), atol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+def test_aggregation_is_a_galerkin_product(rng, stencil, factor):
+    """R A R^T with R one for the active cells of a block: restrict, prolong and the coarse stencil agree on R."""
+    active, scale = rng.random(CELLS) < 0.7, 0.5 + rng.random(CELLS)
+    active[:factor, :factor] = False  # one block without any
+    cells = tuple(-(-n // factor) for n in CELLS)
+    coarse = Stencil(*(np.empty(cells) for _ in range(5)))
+    relax.aggregate_stencil(stencil, scale, active, factor, coarse)
+    block = (np.arange(CELLS[0])[:, None] // factor) * cells[1] + np.arange(CELLS[1]) // factor
+    gather = np.zeros((cells[0] * cells[1], active.size))
+    gather[block.ravel(), np.arange(active.size)] = active.ravel()
+    expected = gather @ (scale.ravel()[:, None] * dense(stencil)) @ gather.T
+    empty = np.diag(expected) == 0.0
+    expected[empty, empty] = 1.0
+    np.testing.assert_allclose(dense(coarse), expected, atol=1e-12)
+
+    residual, restricted = rng.standard_normal(CELLS), np.empty(cells)
+    relax.restrict(residual, scale, active, factor, restricted)
+    np.testing.assert_allclose(restricted.ravel(), gather @ (scale * residual).ravel(), atol=1e-12)
+    spread, back = rng.standard_normal(cells), np.empty(CELLS)
+    relax.prolong(spread, active, factor, back)
+    np.testing.assert_allclose(back.ravel(), gather.T @ spread.ravel(), atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def balance():
+    """A rough contact half way to its solution: all four states occur, nothing balances."""
+    conditions, oil, on = contact(hardness=0.9e9), barus(), grid((32, 16))
+    problem = contact_problem(conditions, oil, rough(on, 0.7e-6, correlation_length=40e-6), Options())
+    pressure, approach = first_guess(problem, conditions, oil, Scales.of(conditions, oil))
+    uneven = 1.0 + 0.3 * np.sin(np.arange(problem.cells[1]) * np.pi / 8.0)
+    pressure = np.maximum(pressure * uneven + 0.02 * np.exp(-(problem.x**2) / 9.0)[:, None], 0.0)
+    return problem.evaluate(pressure, approach - 0.3)
+
+
+def test_every_state_occurs_and_each_cell_is_judged_by_its_own_equation(balance):
+    problem, state, p = balance.problem, balance.rows.state, balance.pressure
+    assert set(np.unique(state)) == {RUPTURED, TOUCHING, LUBRICATED, CAPPED}
+    gap = (balance.gap - problem.contact_gap) * balance.rows.contact_scale
+    fluid = balance.outflow * balance.rows.fluid_scale
+    expected = np.maximum(np.minimum(p, np.minimum(gap, fluid)), p - problem.p_cap)
+    np.testing.assert_array_equal(balance.residual, expected)
+
+
+def test_the_linearisation_is_the_derivative_of_the_equations(balance):
+    """Central differences of gap, outflow and pressure, in the cells that each decides and away from kinks."""
+    problem, rng = balance.problem, np.random.default_rng(9)
+    step = 1e-6
+    d_pressure, d_approach = rng.standard_normal(problem.cells), 0.7
+    approach = float(np.mean(balance.gap - problem.undeformed - problem.deflection(balance.pressure)))
+    ahead, behind = (
+        problem.evaluate(balance.pressure + sign * step * d_pressure, approach + sign * step * d_approach)
+        for sign in (1.0, -1.0)
+    )
+    found = balance.product(d_pressure, d_approach)
+    d_outflow = (ahead.outflow - behind.outflow) / (2.0 * step) * balance.rows.fluid_scale
+    d_gap = (ahead.gap - behind.gap) / (2.0 * step) * balance.rows.contact_scale
+    expected = np.choose(balance.rows.state, [d_pressure, d_gap, d_outflow, d_pressure])
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max())
+
+
+def test_film_slopes_are_derivatives(balance):
+    """Content and mobility by gap and by pressure, in cells where the bodies stay apart."""
+    problem, film = balance.problem, balance.film
+    step = 1e-6
+    apart = balance.gap > problem.contact_gap + 10.0 * step
+    oil = problem.lubricant
+    for change, by_content, by_mobility in (
+        ((step, 0.0), film.content_by_pressure, film.mobility_by_pressure),
+        ((0.0, step), film.content_by_gap, film.mobility_by_gap),
+    ):
+        (c1, e1), (c0, e0) = (
+            (
+                oil.density(q) / 880.0 * h,
+                oil.density(q) / 880.0 * h**3 * oil.viscosity.eta0 / (problem.speed * oil.viscosity(q)),
+            )
+            for q, h in (
+                ((balance.pressure + sign * change[0]) * problem.p_scale, balance.gap + sign * change[1])
+                for sign in (1.0, -1.0)
+            )
+        )
+        np.testing.assert_allclose(by_content[apart], (c1 - c0)[apart] / (2.0 * step), rtol=1e-6)
+        np.testing.assert_allclose(by_mobility[apart], (e1 - e0)[apart] / (2.0 * step), rtol=1e-5)
+    closed = balance.gap <= problem.contact_gap
+    assert closed.any()
+    assert not film.content_by_gap[closed].any()
+    assert not film.mobility_by_gap[closed].any()
+
+
+@pytest.mark.parametrize("block", [1, 2])
+def test_the_preconditioner_is_linear_and_leaves_known_cells_alone(balance, block):
+    inverse = Preconditioner(balance, block)
+    rng = np.random.default_rng(10)
+    one, other = rng.standard_normal((2, *balance.problem.cells))
+    np.testing.assert_allclose(inverse(one + 2.0 * other), inverse(one) + 2.0 * inverse(other), atol=1e-9)
+    assert not inverse(one)[~balance.unknown].any()
+
+
+def test_coarser_is_the_same_contact(balance):
+    """Averaged heights, the parabola at the new cell centres, the same load and size."""
+    fine = balance.problem
+    coarse = fine.coarsened()
+    assert coarse.cells == (16, 8)
+    for axis in (0, 1):
+        assert coarse.spacing[axis] * coarse.cells[axis] == pytest.approx(fine.spacing[axis] * fine.cells[axis])
+    np.testing.assert_allclose(coarse.x, (fine.x[::2] + fine.x[1::2]) / 2.0, rtol=1e-12)
+    heights = (fine.x**2 / 2.0)[:, None] - fine.undeformed
+    expected = (heights[::2, ::2] + heights[1::2, ::2] + heights[::2, 1::2] + heights[1::2, 1::2]) / 4.0
+    np.testing.assert_allclose((coarse.x**2 / 2.0)[:, None] - coarse.undeformed, expected, atol=1e-12)
+    for name in ("load", "p_cap", "contact_gap", "speed", "p_scale", "lubricant", "lower"):
+        assert getattr(coarse, name) == getattr(fine, name)

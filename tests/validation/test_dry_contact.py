@@ -1,0 +1,103 @@
+"""Rough, dry contact against tamaas, with and without a cap of the pressure, and a wave that is pressed flat.
+
+tamaas repeats along x as well. Its domain is eight times as wide, and the parabola is flattened by what the images of
+the line load, a spacing L apart, bend it back: -(1/pi) ln|2 sin(pi X/L)| = -(1/pi) ln|X| + const + pi X^2/(6 L^2), so
+that a load of pi/2 adds (pi^2/6) (a/L)^2 of the parabola.
+"""
+
+import numpy as np
+import pytest
+import tamaas
+
+from asperity.ehl.solution import Options
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.state import contact_state
+from asperity.surface import Surface, flat_surface
+from reference_solvers.paper import RADIUS, contact, grid, rough
+
+A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
+ON = grid((128, 128), (-2.0, 2.0))
+CELL = ON.spacing[0]
+WIDER = 8
+
+
+def tamaas_pressure(surface, cap=None):
+    """Pressure [Pa] on the surface's own cells, and the largest one anywhere else."""
+    tamaas.set_log_level(tamaas.LogLevel.error)
+    modulus = contact().pair.reduced_modulus
+    (nx, ny), (width, depth) = surface.grid.cells, surface.grid.extent
+    before = (WIDER - 1) * nx // 2
+    here = slice(before, before + nx)
+    x = surface.grid.lower[0] + (np.arange(WIDER * nx) - before + 0.5) * surface.grid.spacing[0]
+    bent = 1.0 - np.pi**2 / 6.0 * (A / (WIDER * width)) ** 2
+    heights = np.repeat((-(x**2) / (2.0 * RADIUS) * bent)[:, None], ny, axis=1)
+    heights[here] += surface.heights
+    model = tamaas.ModelFactory.createModel(
+        tamaas.model_type.basic_2d, [WIDER * width / A, depth / A], [WIDER * nx, ny]
+    )
+    model.E, model.nu = 1.0, 0.0  # stresses in units of E*
+    load = 50e3 / (WIDER * width) / modulus
+    if cap is None:
+        solver = tamaas.PolonskyKeerRey(model, heights / A, 1e-9)
+    else:
+        solver = tamaas.KatoSaturated(model, heights / A, 1e-7, cap / modulus)
+    solver.solve(load)
+    pressure = np.asarray(model.traction).reshape(WIDER * nx, ny) * modulus
+    return pressure[here], max(pressure[:before].max(), pressure[before + nx :].max())
+
+
+def test_the_twin_finds_hertz():
+    pressure, elsewhere = tamaas_pressure(flat_surface(ON))
+    assert elsewhere == 0.0
+    assert pressure.max() == pytest.approx(P_H, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("sq", "correlation_length", "cap"),
+    [
+        (0.5e-6, 16 * CELL, None),
+        (0.5e-6, 10 * CELL, None),
+        (1.0e-6, 16 * CELL, None),
+        (1.0e-6, 10 * CELL, 1.5e9),
+        (0.5e-6, 16 * CELL, 0.7e9),
+    ],
+)
+def test_area_and_pressure_are_those_of_tamaas(sq, correlation_length, cap):
+    surface = rough(ON, sq, seed=3, correlation_length=correlation_length)
+    found = solve_contact(contact(hardness=cap), None, surface, options=Options(tolerance=1e-5))
+    expected, elsewhere = tamaas_pressure(surface, cap)
+    assert elsewhere == 0.0
+    assert np.linalg.norm(found.pressure - expected) < 0.015 * np.linalg.norm(expected)
+    zone = np.abs(ON.x) <= A
+    state = contact_state(found)
+    assert state.car == pytest.approx(np.mean(expected[zone] > 0.0), abs=0.003)
+    assert state.car_domain == pytest.approx(np.mean(expected > 0.0) * 2.0, abs=0.005)
+    assert state.clr == pytest.approx(1.0, abs=1e-12)
+
+
+def test_signorini_holds_in_every_cell():
+    """p >= 0, h >= 0, p h = 0 and the load, in a rough contact without a cap."""
+    found = solve_contact(contact(), None, rough(ON, 1e-6), options=Options(tolerance=1e-6))
+    largest = found.pressure.max()
+    assert found.pressure.min() >= 0.0
+    assert found.gap.min() >= 0.0
+    assert np.max(found.gap[found.in_contact]) < 1e-4 * A**2 / RADIUS
+    assert found.pressure[~found.in_contact].max() <= 1e-6 * largest
+    assert found.pressure.mean() * ON.extent[0] == pytest.approx(50e3, rel=1e-6)
+
+
+def test_a_wave_pressed_flat_adds_its_own_pressure():
+    """A cosine of height d and wavenumber q under full contact takes the pressure E* q d/2: Johnson (1985) eq 13.7."""
+    q = 2.0 * np.pi * 4 / ON.extent[1]
+    height = 0.1 * P_H * 2.0 / (contact().pair.reduced_modulus * q)
+    wave = np.cos(q * ON.y)
+    found = solve_contact(
+        contact(), None, Surface(np.tile(height * wave, (128, 1)), ON), options=Options(tolerance=1e-6)
+    )
+    middle = found.pressure[np.abs(ON.x) < 0.3 * A]
+    assert np.all(middle > 0.0)
+    amplitude = 2.0 * np.mean(middle * wave, axis=1)
+    np.testing.assert_allclose(amplitude, 0.1 * P_H, rtol=0.01)
+    np.testing.assert_allclose(
+        middle.mean(axis=1), P_H * np.sqrt(1.0 - (ON.x[np.abs(ON.x) < 0.3 * A] / A) ** 2), rtol=0.01
+    )
