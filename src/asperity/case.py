@@ -197,18 +197,21 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, serialize_by_alias=True)
 
 
-def _solvable(geometry: object) -> object:
-    if geometry in get_args(Geometry) and geometry != "line":
-        raise BadInput(f'is "{geometry}", which cannot be solved yet; only "line" can')
-    return geometry
+def _radius(value: object) -> Amount | tuple[Amount, Amount]:
+    """One radius, or [Rx, Ry] of an elliptic contact."""
+    if isinstance(value, list | tuple):
+        if len(value) != 2:
+            raise BadInput(f"must be one length or a pair [Rx, Ry], got {len(value)} values")
+        return _amount("m", value[0]), _amount("m", value[1])
+    return _amount("m", value)
 
 
 class ContactSection(Section):
     """[contact]: geometry, load and motion."""
 
-    geometry: Annotated[Literal["line"], BeforeValidator(_solvable)]
-    radius: Length
-    length: Length
+    geometry: Geometry
+    radius: Annotated[float | tuple[float, float], PlainValidator(_radius)]
+    length: Annotated[Length | None, _Optional] = None  # of a line contact
     load: Force
     entrainment_speed: Speed
     slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
@@ -531,7 +534,7 @@ class Case:
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
-        built = {"material": "conditions", "grid": "grid", "solver": "options", "vibration": "vibration"}
+        built = {"contact and material": "conditions", "grid": "grid", "solver": "options", "vibration": "vibration"}
         for part, name in built.items():
             with self.naming(part):
                 getattr(self, name)
@@ -556,8 +559,8 @@ class Case:
         return ContactConditions(
             pair=ElasticPair((first, second), material.poisson_ratio),
             geometry=contact.geometry,
-            radius=float(contact.radius),
-            length=float(contact.length),
+            radius=_plain_radius(contact.radius),
+            length=None if contact.length is None else float(contact.length),
             load=float(contact.load),
             surface_speeds=(speed * (1.0 + contact.slip / 2.0), speed * (1.0 - contact.slip / 2.0)),
             hardness=None if material.hardness is None else float(material.hardness),
@@ -577,14 +580,19 @@ class Case:
 
     @cached_property
     def grid(self) -> Grid:
-        """The rectangle to compute on; half-widths turned into metres."""
-        section, a = self.contents.grid, self.conditions.hertz.half_widths[0]
+        """The rectangle to compute on; half-widths turned into metres, along a line contact's length too."""
+        section, line = self.contents.grid, self.conditions.geometry == "line"
+        a, b = self.conditions.hertz.half_widths
+        if line:
+            b = a  # y runs along the line: its piece is measured in the same half-width
         (left, right), (front, back) = section.x, section.y
-        grid = Grid(section.cells, (left * a, front * a), (right * a, back * a))
-        if not (left < -1.0 and right > 1.0):
-            raise BadInput(
-                f"x must reach beyond the contact on both sides, got {left:g} to {right:g} half-widths; use -4.5 to 1.9"
-            )
+        grid = Grid(section.cells, (left * a, front * b), (right * a, back * b), periodic=(False, line))
+        for axis, low, high in [("x", left, right)] if line else [("x", left, right), ("y", front, back)]:
+            if not (low < -1.0 and high > 1.0):
+                raise BadInput(
+                    f"{axis} must reach beyond the contact on both sides, got {low:g} to {high:g} half-widths; "
+                    f"use {'-4.5 to 1.9' if axis == 'x' else '-3 to 3'}"
+                )
         return grid
 
     @cached_property
@@ -830,6 +838,10 @@ def _toml_value(text: str) -> object:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text  # the shell took the quotes away
+
+
+def _plain_radius(radius: float | tuple[float, float]) -> float | tuple[float, float]:
+    return (float(radius[0]), float(radius[1])) if isinstance(radius, tuple) else float(radius)
 
 
 def _law(laws: Mapping[str, type[L]], section: Section) -> L:

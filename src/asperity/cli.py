@@ -358,7 +358,7 @@ def _print_run(run: "Run") -> None:
             ("CRFA, its spectral height", f"{resonance.crfa:.3g} ± {resonance.crfa_std:.2g} (m/s^2)^2/Hz"),
         ]
     rows += [
-        ("oil lost or re-created, over oil carried through", f"{100 * state.mass_flux_imbalance:.1f} %"),
+        ("oil lost or re-created, over oil carried", f"{100 * state.mass_flux_imbalance:.1f} %"),
         ("load error, Reynolds residual", f"{state.load_error:.1e}, {state.reynolds_residual:.1e}"),
         ("solver", convergence.explain()),
     ]

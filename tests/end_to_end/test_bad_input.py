@@ -47,7 +47,7 @@ MISTAKES = {
     "load 0": ('load = "500 N"', 'load = "0 N"', ("contact.load", "0 N", "positive")),
     "grid of 3 cells": ("cells = [64, 64]", "cells = [3, 3]", ("grid", "at least 8 cells", "3")),
     "no TOML": ("[contact]", "[contact", ("case.toml", "not valid TOML")),
-    "other geometry": ('geometry = "line"', 'geometry = "point"', ("contact.geometry", "cannot be solved yet")),
+    "other geometry": ('geometry = "line"', 'geometry = "point"', ("length belongs to a line contact", "leave it out")),
     "missing surface file": ('kind = "gaussian"', 'file = "ring.x3p"', ("surface",)),
     "fine surface on coarse grid": ("cells = [64, 64]", "cells = [16, 16]", ("correlation length", "20 um")),
     "slow sampling": ("damping_ratio", 'rate = "5 kHz"\ndamping_ratio', ("sampling rate", "5000 Hz")),

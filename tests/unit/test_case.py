@@ -150,7 +150,9 @@ BAD = [
     ("contact.length", "-10 mm", 'contact.length must be positive and finite, got "-10 mm"'),
     ("contact.slip", "nan", "contact.slip"),
     ("contact.slip", True, "contact.slip"),
-    ("contact.geometry", "point", "cannot be solved yet"),
+    ("contact.geometry", "point", "length belongs to a line contact"),
+    ("contact.radius", ["5 mm", "9 mm", "2 mm"], "contact.radius must be one length or a pair"),
+    ("contact.radius", ["5 mm", "9 mm"], "radius of a line contact is one number"),
     ("contact.geometry", "lien", "contact.geometry"),
     ("material.youngs_modulus", ["200 GPa"], "material.youngs_modulus"),
     ("material.poisson_ratio", 0.7, "Poisson's ratio must lie above -1"),
@@ -204,3 +206,19 @@ def test_files_that_are_no_case_are_named(tmp_path):
     for name in ("absent.toml", "binary.toml", "broken.toml", "."):
         with pytest.raises(UnreadableFile, match=name.replace(".", r"\.") if name != "." else str(tmp_path)):
             load_case(tmp_path / name)
+
+
+def test_ball_and_barrel_are_measured_in_their_own_half_widths(paper):
+    ball = paper.with_overrides(
+        {"contact.geometry": "point", "contact.length": "none", "contact.load": "20 N", "grid.y": [-3, 3]}
+    )
+    a = ball.conditions.hertz.half_widths[0]
+    assert ball.grid.periodic == (False, False)
+    assert ball.grid.extent == pytest.approx((6.4 * a, 6.0 * a))
+    barrel = ball.with_overrides({"contact.geometry": "elliptic", "contact.radius": ["5.4 mm", "20 mm"]})
+    a, b = barrel.conditions.hertz.half_widths
+    assert b > 1.5 * a
+    assert barrel.grid.extent == pytest.approx((6.4 * a, 6.0 * b))
+    assert load_case(barrel.text) == barrel
+    with pytest.raises(BadInput, match="y must reach beyond the contact on both sides"):
+        barrel.with_overrides({"grid.y": [-0.9, 0.9]})

@@ -1,10 +1,15 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.deflection import line_deflection
+from asperity.ehl.deflection import Deflection
+from asperity.ehl.deflection import deflection as half_space
 from reference_solvers.half_space import periodic_compliance
 
 CELLS, SPACING = (16, 12), (0.11, 0.07)
+
+
+def line_deflection(cells: tuple[int, int], spacing: tuple[float, float]) -> Deflection:
+    return half_space(cells, spacing, 1.0 / (2.0 * np.pi), True)
 
 
 @pytest.fixture
@@ -94,3 +99,17 @@ def test_the_near_row_is_the_compliance_itself(deflection):
     pressure = np.zeros(CELLS)
     pressure[0, 0] = 1.0
     np.testing.assert_allclose(deflection.near, deflection(pressure)[[0, 1, 2, 8], 0], rtol=1e-12)
+
+
+def test_a_hertz_pressure_on_a_circle_flattens_the_sphere():
+    """V = const - (X^2 + Y^2)/2 inside the circle for compliance 2/pi^2, and const = 1; second order, edge and all."""
+    errors = []
+    for cells in (32, 64, 128):
+        step = 3.0 / cells
+        x = -1.5 + (np.arange(cells) + 0.5) * step
+        squared = x[:, None] ** 2 + x**2
+        pressure = np.sqrt(np.maximum(1.0 - squared, 0.0))
+        bent = half_space((cells, cells), (step, step), 2.0 / np.pi**2, False)(pressure) + squared / 2.0
+        errors.append(float(np.abs(bent[squared < 0.8] - 1.0).max()))
+    assert errors[-1] < 1e-3
+    assert errors[0] / errors[-1] > 4.0**2 / 2.0

@@ -19,15 +19,17 @@ CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the c
 class ContactState:
     """Scalars of a solved contact, SI.
 
-    `car` contact cells in |x| <= a over all cells there; `car_domain` contact area of the whole domain over the Hertz
-    area; `clr` load on contact cells over the load; `capped_oil_load_ratio` load on cells that stand at the pressure
-    cap without touching, over the load: oil that the model holds at the hardness, which a coarser contact threshold
-    would count as contact; `sq` composite roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact
-    film where bodies touch), `h_central` mean over |x| <= a/10, `h_mean` mean over |x| <= a; `lambda_ratio` Dowson and
-    Higginson's smooth-contact film over Sq, the usual definition (None for a smooth surface or a dry contact); `p_max`
-    [Pa]; `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h;
-    `load_error` relative; `mass_flux_imbalance` oil that vanishes or appears in cells where Reynolds' equation does
-    not hold, in sum, over the oil that the surfaces carry through the Hertz zone, u times mean film (0 when dry).
+    The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others. `car` contact cells in it
+    over all cells there; `car_domain` contact area of the whole domain over the Hertz area; `clr` load on contact cells
+    over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap without touching, over the load:
+    oil that the model holds at the hardness, which a coarser contact threshold would count as contact; `sq` composite
+    roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies touch), `h_central` mean
+    over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the usual fit of the
+    smooth contact's least film over Sq (`smooth_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
+    `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
+    relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
+    equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when
+    dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream.
     """
 
     car: float
@@ -49,23 +51,25 @@ def contact_state(solution: ContactSolution) -> ContactState:
     """Read the scalars off a solution; the residuals are evaluated anew from its fields."""
     scales = Scales.of(solution.conditions, solution.lubricant)
     grid, touching = solution.grid, solution.in_contact
-    hertz_zone = _inside(solution.conditions, grid, 1.0)
-    centre = _inside(solution.conditions, grid, CENTRE)
+    zone = hertz_zone(solution.conditions, grid)
+    centre = hertz_zone(solution.conditions, grid, CENTRE)
     sq, oil = solution.surface.sq, solution.lubricant
     problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
     balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
     capped = balance.rows.state == CAPPED
-    unbalanced = np.abs(balance.outflow[balance.rows.state != LUBRICATED]).sum() * problem.spacing[0] / grid.cells[1]
-    carried = balance.film.content[hertz_zone].mean() if balance.film else np.inf
+    dx, dy = problem.spacing
+    unbalanced = np.abs(balance.outflow[zone & (balance.rows.state != LUBRICATED)]).sum() * dx * dy
+    width = grid.cells[1] * dy if problem.form.periodic else 2.0 * problem.form.aspect
+    carried = balance.film.content[zone].mean() * width if balance.film else np.inf
     return ContactState(
-        car=float(touching[hertz_zone].mean()),
+        car=float(touching[zone].mean()),
         car_domain=float(touching.mean() * _hertz_areas(solution.conditions, grid)),
         clr=float(solution.pressure[touching].sum() / solution.pressure.sum()),
         capped_oil_load_ratio=float(solution.pressure[capped & ~touching].sum() / solution.pressure.sum()),
         sq=sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
-        h_mean=float(solution.gap[hertz_zone].mean()),
+        h_mean=float(solution.gap[zone].mean()),
         lambda_ratio=smooth_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
@@ -74,8 +78,8 @@ def contact_state(solution: ContactSolution) -> ContactState:
     )
 
 
-def _inside(conditions: ContactConditions, grid: Grid, share: float) -> Mask:
-    """Cells within `share` of the Hertz half-widths, at least the middle ones, shape (nx, ny)."""
+def hertz_zone(conditions: ContactConditions, grid: Grid, share: float = 1.0) -> Mask:
+    """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
     a, b = conditions.hertz.half_widths
     dx, dy = grid.spacing
     along = np.abs(grid.x) / max(share * a, dx)

@@ -22,6 +22,7 @@ from matplotlib.patches import Patch
 from asperity.arrays import Field, Mask
 from asperity.coupling import Vibration
 from asperity.ehl.solution import ContactSolution, Convergence
+from asperity.ehl.state import hertz_zone
 from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput
 from asperity.hertz import line_pressure
@@ -72,7 +73,7 @@ def svg(figure: Figure) -> str:
 
 
 class ZoneShares(NamedTuple):
-    """Shares of the cells in |x| <= a that are asperity contact, ruptured oil, and neither."""
+    """Shares of the cells in the Hertz zone that are asperity contact, ruptured oil, and neither."""
 
     contact: float
     cavitated: float
@@ -81,7 +82,7 @@ class ZoneShares(NamedTuple):
 
 def zone_shares(solution: ContactSolution) -> ZoneShares:
     """What the Hertz zone is made of; `contact` is the state's CAR."""
-    zone = np.abs(solution.grid.x) <= solution.conditions.hertz.half_widths[0]
+    zone = hertz_zone(solution.conditions, solution.grid)
     contact = float(solution.in_contact[zone].mean())
     cavitated = float(solution.cavitated[zone].mean())
     return ZoneShares(contact, cavitated, 1.0 - contact - cavitated)
@@ -112,9 +113,14 @@ def _show(axes: Axes, values: Field, solution: ContactSolution, **style: Any) ->
 
 
 def _mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
-    half_width = solution.conditions.hertz.half_widths[0] * MICRO
-    for side in (-half_width, half_width):
-        axes.axvline(side, color=colour, linestyle=(0, (4, 3)), linewidth=1.0)
+    a, b = (half_width * MICRO for half_width in solution.conditions.hertz.half_widths)
+    style: dict[str, Any] = {"color": colour, "linestyle": (0, (4, 3)), "linewidth": 1.0}
+    if solution.conditions.geometry == "line":
+        for side in (-a, a):
+            axes.axvline(side, **style)
+    else:
+        turn = np.linspace(0.0, 2.0 * np.pi, 200)
+        axes.plot(a * np.cos(turn), b * np.sin(turn), **style)
 
 
 def _colour_bar(figure: Figure, axes: Axes, image: AxesImage, label: str, extend: str = "neither") -> None:
@@ -152,7 +158,7 @@ def contact_map(solution: ContactSolution) -> Figure:
                 label=f"cavitated {100 * shares.cavitated:.1f} %",
             )
         )
-    keys.append(Line2D([], [], color="black", linestyle=(0, (4, 3)), linewidth=1.0, label="Hertz zone |x| = a"))
+    keys.append(Line2D([], [], color="black", linestyle=(0, (4, 3)), linewidth=1.0, label="Hertz zone"))
     figure.legend(handles=keys, loc="lower center", ncols=2, borderaxespad=0.2)
     return figure
 
@@ -168,7 +174,7 @@ def _stripes(cells: tuple[int, int]) -> Mask:
 def film_map(solution: ContactSolution) -> Figure:
     """Gap between the deformed surfaces; the colours end where the Hertz zone's gaps do (its 99th percentile)."""
     figure, axes = _map_figure(solution.grid.extent)
-    zone = np.abs(solution.grid.x) <= solution.conditions.hertz.half_widths[0]
+    zone = hertz_zone(solution.conditions, solution.grid)
     top = float(np.percentile(solution.gap[zone], 99.0)) * MICRO or 1.0
     image = _show(axes, solution.gap * MICRO, solution, cmap="viridis", vmin=0.0, vmax=top)
     _mark_hertz_zone(axes, solution, "white")

@@ -187,16 +187,26 @@ QUANTITIES = (
         ".1f",
     ),
     Quantity(
-        "car", "Contact area share in the Hertz zone, CAR", "%", "contact cells in |x| ≤ a over all there", 100.0, ".1f"
+        "car",
+        "Contact area share in the Hertz zone, CAR",
+        "%",
+        "contact cells over all cells there",
+        100.0,
+        ".1f",
     ),
     Quantity(
-        "car_domain", "Contact area of the whole domain", "%", "over the Hertz area; counts |x| > a too", 100.0, ".1f"
+        "car_domain",
+        "Contact area of the whole domain",
+        "%",
+        "over the Hertz area; outside it too",
+        100.0,
+        ".1f",
     ),
     Quantity("sq_m", "Composite roughness, Sq", "µm", "root-mean-square height before deformation", 1e6),
     Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap anywhere", 1e6),
-    Quantity("h_central_m", "Central film", "µm", "mean gap in |x| ≤ a/10", 1e6),
-    Quantity("h_mean_m", "Mean film", "µm", "mean gap in |x| ≤ a", 1e6),
-    Quantity("lambda_ratio", "Film ratio, Λ", "", "smooth-contact film (Dowson-Higginson) over Sq", 1.0, ".2f"),
+    Quantity("h_central_m", "Central film", "µm", "mean gap in a tenth of the Hertz zone", 1e6),
+    Quantity("h_mean_m", "Mean film", "µm", "mean gap in the Hertz zone", 1e6),
+    Quantity("lambda_ratio", "Film ratio, Λ", "", "least film of the smooth contact (usual fit) over Sq", 1.0, ".2f"),
     Quantity("p_max_pa", "Largest pressure", "GPa", "oil and asperities together", 1e-9),
     Quantity("crf_hz", "Contact resonance frequency, CRF", "Hz", "of one simulated record", deviation="crf_std_hz"),
     Quantity(
@@ -212,7 +222,7 @@ QUANTITIES = (
         "mass_flux_imbalance",
         "Oil-flow imbalance",
         "%",
-        "oil lost or re-created over oil carried through",
+        "oil lost or re-created in the Hertz zone, over oil carried through",
         100.0,
         ".1f",
     ),
@@ -282,7 +292,7 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
     solution = run.solution
     shares = figures.zone_shares(solution)
     dry = solution.lubricant is None
-    zone = "The dashed lines bound the Hertz zone |x| ≤ a; oil enters from the left."
+    zone = "The dashed lines bound the Hertz zone; oil enters from the left."
     return [
         _picture(
             figures.contact_map(solution),
@@ -407,6 +417,7 @@ LAW_FIELDS = {
     "alpha": ("α", 1e9, "1/GPa"),
     "p0": ("p₀", 1e-6, "MPa"),
     "rho0": ("ρ₀", 1.0, "kg/m³"),
+    "tau0": ("τ₀", 1e-6, "MPa"),
 }
 
 
@@ -427,6 +438,8 @@ def _pair(values: tuple[float, float], unit: str = "", scale: float = 1.0) -> st
 def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
     pair, hertz, hardness = conditions.pair, conditions.hertz, conditions.hardness
     contact = f"{conditions.geometry} contact, effective radius {conditions.radius_along_rolling * 1e3:.4g} mm"
+    if conditions.geometry == "elliptic":
+        contact += f" along rolling, {conditions.radius_across_rolling * 1e3:.4g} mm across"
     load = f"{conditions.load:.4g} N"
     if conditions.length is not None:
         contact += f", length {conditions.length * 1e3:.4g} mm"
@@ -442,7 +455,9 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         "Reduced modulus": f"E* = {pair.reduced_modulus * 1e-9:.5g} GPa (E′ = 2 E* = "
         f"{pair.effective_modulus * 1e-9:.5g} GPa)",
         "Pressure cap (hardness)": "none: purely elastic" if hardness is None else f"{hardness * 1e-9:.4g} GPa",
-        "Hertz (smooth, dry)": f"half-width a = {hertz.half_widths[0] * 1e6:.2f} µm, largest pressure "
+        "Hertz (smooth, dry)": f"half-width a = {hertz.half_widths[0] * 1e6:.2f} µm"
+        + ("" if conditions.geometry == "line" else f", across rolling b = {hertz.half_widths[1] * 1e6:.2f} µm")
+        + ", largest pressure "
         f"{hertz.p_max * 1e-9:.4f} GPa",
     }
 
