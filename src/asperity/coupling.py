@@ -311,6 +311,11 @@ def _loaded_oscillator(
     )
 
 
+def needs_solution(model: VibrationModel) -> bool:
+    """Whether the model asks for more than the dry, fully loaded contact of the paper's section 2 can tell."""
+    return model.stiffness_law not in ASPERITIES_ALONE or model.excitation == "surface"
+
+
 def cutoff_hz(state: ContactState, model: VibrationModel) -> float:
     """Cut-off of the profile [Hz]: fc = fc_ref (CAR/CAR_ref)^q, CAR counted in the Hertz zone as the paper does."""
     return float(model.cutoff_reference_hz * (state.car / model.car_reference) ** model.cutoff_exponent)

@@ -139,14 +139,18 @@ class FilteredNoise:
         if self.filter == "bilinear":
             from scipy.signal import butter, sosfilt
 
-            white = np.random.default_rng(seed).standard_normal(samples)
-            white *= np.sqrt(white_density * rate_hz / 2.0)
+            white = white_noise(samples, seed) * np.sqrt(white_density * rate_hz / 2.0)
             return np.asarray(sosfilt(butter(self.order, cutoff, fs=rate_hz, output="sos"), white))
         if self.order == 2:
             rms = float(np.sqrt(white_density * self._noise_bandwidth(cutoff, rate_hz)))
             return _butterworth_noise(samples, cutoff / rate_hz, rms, seed)
         source = replace(self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz)
         return synthesised(source, samples, rate_hz, seed)
+
+
+def white_noise(samples: int, seed: int) -> Field:
+    """Independent Gaussian samples of variance 1: what a digital filter of that seed is fed, the paper's Fig 3a."""
+    return np.random.default_rng(seed).standard_normal(samples)
 
 
 def require_filter(order: int, filter_name: str, height_as: str, height_of: str) -> None:
