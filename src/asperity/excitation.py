@@ -267,21 +267,20 @@ PATCHES = {"line": _line_patch, "point": _point_patch}
 
 
 def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
-    """Gaussian heights with the source's spectrum: random waves on the lines of a record twice as long, cut in half.
+    """Gaussian heights with the source's spectrum: random waves on the lines of a record a quarter longer, cut off.
 
-    The half is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
+    What is left is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
     """
     import scipy.fft as fft
 
-    length = fft.next_fast_len(2 * samples, real=True)
+    length = fft.next_fast_len(samples + samples // 4, real=True)
     frequency = fft.rfftfreq(length, 1.0 / rate_hz)
     density = source.density(frequency, rate_hz)
     rng = np.random.default_rng(seed)
-    waves = (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)) * np.sqrt(
-        density * rate_hz * length / 4.0
-    )
+    waves = rng.standard_normal(2 * frequency.size).view(complex)
+    waves *= np.sqrt(density * (rate_hz * length / 4.0))
     waves[0] = 0.0
-    return np.ascontiguousarray(fft.irfft(waves, length)[:samples])
+    return np.ascontiguousarray(fft.irfft(waves, length, overwrite_x=True)[:samples])
 
 
 def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:
