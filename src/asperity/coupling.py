@@ -157,7 +157,9 @@ class VibrationModel:
         3.5 kHz it is 0.8 %)
     duration_s : length of the record [s]; sd(CRF) = sqrt(ζ f0 / (2π duration)), 1.7 Hz for the paper's case and 4 s
     seed : of the profile; one seed, one record
-    method : how the resonance is found, name in INDICATOR_METHODS
+    method : how the resonance is found, name in INDICATOR_METHODS. The likeliest line supposes a base that is white in
+        acceleration, as noise behind a filter of order 2 is; over a surface's own spectrum, or averaged by a patch,
+        take "peak", or `Vibration.expected`
 
     Raises
     ------
