@@ -7,7 +7,7 @@ import sys
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks import roughness_levels
+from benchmarks import roughness_levels, vibration
 from benchmarks.first_call import first_call
 
 
@@ -36,6 +36,10 @@ def main() -> None:
         f"\nFirst `asperity solve` after installation, compilation included: {seconds:.1f} s; "
         f"{'says what the wait is for' if said else 'SAYS NOTHING about the wait'}."
     )
+    print()
+    with threadpool_limits(1):
+        for line in vibration.lines(fast=wanted.fast):
+            print(line, flush=True)
 
 
 if __name__ == "__main__":

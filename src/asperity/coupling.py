@@ -157,7 +157,9 @@ class VibrationModel:
         3.5 kHz it is 0.8 %)
     duration_s : length of the record [s]; sd(CRF) = sqrt(ζ f0 / (2π duration)), 1.7 Hz for the paper's case and 4 s
     seed : of the profile; one seed, one record
-    method : how the resonance is found, name in INDICATOR_METHODS
+    method : how the resonance is found, name in INDICATOR_METHODS. The likeliest line supposes a base that is white in
+        acceleration, as noise behind a filter of order 2 is; over a surface's own spectrum, or averaged by a patch,
+        take "peak", or `Vibration.expected`
 
     Raises
     ------
@@ -309,6 +311,11 @@ def _loaded_oscillator(
         damping_ratio=require_damping_ratio(DAMPING_LAWS[model.damping_law](model, stiffness)),
         load=(clr if model.stiffness_law in ASPERITIES_ALONE else 1.0) * conditions.load,
     )
+
+
+def needs_solution(model: VibrationModel) -> bool:
+    """Whether the model asks for more than the dry, fully loaded contact of the paper's section 2 can tell."""
+    return model.stiffness_law not in ASPERITIES_ALONE or model.excitation == "surface"
 
 
 def cutoff_hz(state: ContactState, model: VibrationModel) -> float:

@@ -139,14 +139,18 @@ class FilteredNoise:
         if self.filter == "bilinear":
             from scipy.signal import butter, sosfilt
 
-            white = np.random.default_rng(seed).standard_normal(samples)
-            white *= np.sqrt(white_density * rate_hz / 2.0)
+            white = white_noise(samples, seed) * np.sqrt(white_density * rate_hz / 2.0)
             return np.asarray(sosfilt(butter(self.order, cutoff, fs=rate_hz, output="sos"), white))
         if self.order == 2:
             rms = float(np.sqrt(white_density * self._noise_bandwidth(cutoff, rate_hz)))
             return _butterworth_noise(samples, cutoff / rate_hz, rms, seed)
         source = replace(self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz)
         return synthesised(source, samples, rate_hz, seed)
+
+
+def white_noise(samples: int, seed: int) -> Field:
+    """Independent Gaussian samples of variance 1: what a digital filter of that seed is fed, the paper's Fig 3a."""
+    return np.random.default_rng(seed).standard_normal(samples)
 
 
 def require_filter(order: int, filter_name: str, height_as: str, height_of: str) -> None:
@@ -263,21 +267,20 @@ PATCHES = {"line": _line_patch, "point": _point_patch}
 
 
 def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
-    """Gaussian heights with the source's spectrum: random waves on the lines of a record twice as long, cut in half.
+    """Gaussian heights with the source's spectrum: random waves on the lines of a record a quarter longer, cut off.
 
-    The half is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
+    What is left is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
     """
     import scipy.fft as fft
 
-    length = fft.next_fast_len(2 * samples, real=True)
+    length = fft.next_fast_len(samples + samples // 4, real=True)
     frequency = fft.rfftfreq(length, 1.0 / rate_hz)
     density = source.density(frequency, rate_hz)
     rng = np.random.default_rng(seed)
-    waves = (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)) * np.sqrt(
-        density * rate_hz * length / 4.0
-    )
+    waves = rng.standard_normal(2 * frequency.size).view(complex)
+    waves *= np.sqrt(density * (rate_hz * length / 4.0))
     waves[0] = 0.0
-    return np.ascontiguousarray(fft.irfft(waves, length)[:samples])
+    return np.ascontiguousarray(fft.irfft(waves, length, overwrite_x=True)[:samples])
 
 
 def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:

@@ -8,9 +8,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from asperity.case import Case, load_case
-from asperity.coupling import Vibration, contact_vibration
+from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load, needs_solution
 from asperity.ehl.solution import ContactSolution, Iteration
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, contact_state
@@ -139,6 +140,79 @@ def solve_case(
     except NotConverged as unfinished:
         raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None
     return _run(case, replace(solution, attributes=kept), notes)
+
+
+def vibrate_case(case: Case, *, progress: Callable[[Iteration], None] | None = None) -> tuple[Vibration, ContactState]:
+    """The vibration model alone: what the case sounds like, and the contact that was listened to.
+
+    That is the paper's section 2, dry and with all load on asperities of the case's Sq; or the solved contact, where
+    the case's stiffness law or excitation needs one.
+
+    Raises
+    ------
+    BadInput
+        for a case without [vibration], or one that `contact_vibration` refuses.
+    NotConverged
+        if the contact is needed and cannot be solved.
+    """
+    model = case.vibration
+    if model is None:
+        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+    if needs_solution(model):
+        run = solve_case(case, progress=progress)
+        assert run.vibration is not None  # the case has a model
+        return run.vibration, run.state
+    state = dry_full_load(case.conditions, case.surface().sq)
+    with case.naming("vibration"):
+        return contact_vibration(state, case.conditions, model), state
+
+
+def vibration_scalars(heard: Vibration, state: ContactState, case: Case) -> dict[str, Any]:
+    """Every number of `asperity vibrate --json` by its name, SI; None where there is none."""
+    found, spring = heard.resonance, heard.oscillator
+    return {
+        "verdict": vibration_verdict(heard, state, case),
+        "crf_hz": _finite(found.crf_hz),
+        "crfa": _finite(found.crfa),
+        "crf_std_hz": _finite(found.crf_std_hz),
+        "crfa_std": _finite(found.crfa_std),
+        "found": found.found,
+        "reason": found.reason,
+        "band_hz": list(heard.band_hz),
+        "full_load_crf_hz": heard.full_load_crf_hz,
+        "natural_frequency_hz": None if spring is None else spring.natural_frequency_hz,
+        "stiffness_n_per_m": None if spring is None else spring.stiffness,
+        "damping_ratio": None if spring is None else spring.damping_ratio,
+        "expected_crfa": heard.expected_crfa,
+        "dynamic_load": heard.dynamic_load,
+        "contact_loss": heard.contact_loss,
+        "clr": state.clr,
+        "car": state.car,
+        "sq_m": state.sq,
+        "load_n": case.conditions.load,
+    }
+
+
+def vibration_verdict(heard: Vibration, state: ContactState, case: Case) -> str:
+    """One sentence: the resonance, of which contact, and whether its spring may be taken as linear."""
+    found, model = heard.resonance, case.vibration
+    solved = model is not None and needs_solution(model)
+    contact = (
+        f"solved contact, {100 * state.clr:.0f} % of {case.conditions.load:g} N on asperities"
+        if solved
+        else f"dry contact, all {case.conditions.load:g} N on asperities"
+    )
+    if not found.found:
+        return f"No contact resonance ({found.reason.rstrip('.')}): {contact}."
+    deviation = f" ± {found.crf_std_hz:.1f}" if _finite(found.crf_std_hz) is not None else ""
+    sentence = f"Contact resonance at {found.crf_hz:.1f}{deviation} Hz, CRFA {found.crfa:.3g} (m/s^2)^2/Hz: {contact}"
+    linear = model is not None and model.response != "nonlinear"
+    if linear and heard.dynamic_load is not None and heard.dynamic_load > LINEAR_UP_TO:
+        sentence += (
+            f"; but the dynamic force is {100 * heard.dynamic_load:.0f} % of the load, too much for a linear spring: "
+            "take vibration.response = nonlinear"
+        )
+    return f"{sentence}."
 
 
 def load_run(path: str | Path) -> Run:

@@ -91,6 +91,7 @@ def test_a_contact_vibrates_on_its_own_stiffness_and_its_own_surface(mixed):
         patch="line",
         rate_hz=200e3,
         duration_s=1.0,
+        method="peak",  # the fitted line takes the base for white in acceleration, which this surface's is not
     )
     heard = contact_vibration(contact_state(mixed), mixed.conditions, model, solution=mixed)
     expected = np.sqrt(tangent_stiffness(mixed).total / 0.1) / (2.0 * np.pi)

@@ -22,8 +22,9 @@ class TangentStiffness:
     """dF/dδ of a contact [N/m] and its parts: `asperity` by the load on touching cells, `film` by all other load.
 
     δ is the approach of the bodies measured from points `reference_depth` [m] away: a line contact's approach depends
-    on it. `step` is the load step behind the figures, as a share of the load; `step_change` how far the total moves,
-    relatively, from a step twice as large to this one.
+    on it. `step` is the load step behind the figures, as a share of the load; `step_change` and `split_change` are how
+    far the total, relatively, and the asperities' share of it move from a step twice as large to this one. The total
+    is sharp to a few per cent; the split is not, because few cells change hands in a small step.
     """
 
     asperity: float
@@ -31,6 +32,7 @@ class TangentStiffness:
     reference_depth: float
     step: float
     step_change: float
+    split_change: float
 
     @property
     def total(self) -> float:
@@ -71,6 +73,7 @@ def tangent_stiffness(
         reference_depth=depth,
         step=step / 2.0,
         step_change=sum(fine) / sum(coarse) - 1.0,
+        split_change=fine[0] / sum(fine) - coarse[0] / sum(coarse),
     )
 
 
