@@ -105,7 +105,6 @@ class Problem:
             film, outflow, fluid_scale = self._flow(pressure, gap, self.lubricant)
             fluid = outflow * fluid_scale
             wet = fluid < touching
-            film = film.held_where(~wet & (touching <= 0.0))  # pressing overlapping bodies together moves no film
             residual = np.minimum(fluid, touching)
             state = np.where(wet, np.int8(LUBRICATED), np.int8(TOUCHING))
         ruptured = pressure < residual
@@ -117,6 +116,8 @@ class Problem:
         if not self.form.periodic:
             for rim in (0, -1):
                 residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
+        if film is not None:  # pressing overlapping bodies together moves no film
+            film = film.held_where((touching <= 0.0) & (state != LUBRICATED))
         return Balance(self, pressure, gap, residual, Rows(state, fluid_scale, contact_scale), film, outflow)
 
     def _flow(self, pressure: Field, gap: Field, oil: Lubricant) -> tuple[Film, Field, Field]:
