@@ -5,7 +5,7 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.grid import Grid
-from asperity.surface import MeasuredSurface, gaussian_surface, level, prepare_surface
+from asperity.surface import CompositeSurface, MeasuredSurface, gaussian_surface, level, prepare_surface
 
 
 def measured(heights, pixel=1e-6):
@@ -160,3 +160,68 @@ def test_unknown_options_are_refused(option, said):
 def test_a_flat_map_cannot_be_scaled():
     with pytest.raises(BadInput, match="flat"):
         prepare_surface(measured(np.full((300, 240), 1e-3)), contact(), sq=1e-6)
+
+
+def profile(length=400e-6, pixel=1e-6, seed=2):
+    n = round(length / pixel)
+    line = rough((n, 64), seed=seed, pixel=pixel)[:, 0]
+    grid = Grid((n, 8), (-length / 2.0, -4.0 * pixel), (length / 2.0, 4.0 * pixel), (False, False))
+    return MeasuredSurface(line[:, None] * np.ones(8), grid, "line.hfm", "xyz", uniform=1)
+
+
+def test_a_profile_becomes_roughness_that_goes_on_along_y():
+    prepared = prepare_surface(profile(), contact((120, 64)), form="none")
+    heights = prepared.surface.heights
+    np.testing.assert_allclose(heights, heights[:, :1] * np.ones(64), atol=1e-18)
+    line = profile().profile[140:260]
+    np.testing.assert_allclose(heights[:, 0], line - line.mean(), atol=1e-12)
+    assert any("go on unchanged along y" in step for step in prepared.steps)
+
+
+def test_a_turned_profile_repeats_along_y_and_goes_on_along_x():
+    prepared = prepare_surface(profile(), contact((64, 96)), turn=True)
+    heights = prepared.surface.heights
+    np.testing.assert_allclose(heights, heights[:1] * np.ones((64, 1)), atol=1e-18)
+    assert abs(heights[0, 0] - heights[0, -1]) < 4.0 * np.std(np.diff(heights[0]))
+
+
+def test_a_profile_shorter_than_the_contact_is_refused_and_mirrored_when_asked():
+    with pytest.raises(BadInput, match=r"profile of 80 um, shorter than the contact's 120 um"):
+        prepare_surface(profile(80e-6), contact())
+    prepared = prepare_surface(profile(80e-6), contact((120, 64)), fit="tile", form="none")
+    np.testing.assert_allclose(prepared.surface.heights[:20], prepared.surface.heights[20:40][::-1], atol=1e-12)
+
+
+def test_resampling_keeps_the_spectrum_up_to_nine_tenths_of_the_last_wave():
+    grid = Grid((100, 80), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False))  # 2 um cells over 1 um pixels
+    fine = Grid((200, 160), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False))
+    heights = rough(length=2e-6)
+    coarse, same = (prepare_surface(measured(heights), g, form="none").surface for g in (grid, fine))
+    window = np.outer(np.hanning(100), np.hanning(80))
+    found = np.abs(np.fft.fft2(coarse.heights * window))[:45, :36]
+    truth = np.abs(np.fft.fft2(same.heights * np.kron(window, np.ones((2, 2)))))[:45, :36] / 4.0
+    assert np.sum(found**2) / np.sum(truth**2) == pytest.approx(1.0, abs=0.01)
+    assert np.sum(found[30:40] ** 2) / np.sum(truth[30:40] ** 2) == pytest.approx(1.0, abs=0.03)
+
+
+def test_turning_a_map_turns_what_is_prepared():
+    heights = rough((300, 300))
+    square = contact((80, 80), (80e-6, 80e-6), periodic=(False, False))
+    plain, turned = (prepare_surface(measured(heights), square, turn=turn).surface for turn in (False, True))
+    np.testing.assert_allclose(turned.heights, plain.heights[:, ::-1].T, atol=1e-12)
+
+
+def test_two_surfaces_add_up_face_to_face():
+    first, second = (prepare_surface(measured(rough(seed=s)), contact()).surface for s in (1, 2))
+    both = CompositeSurface(first, second, (2.2, 1.8))
+    np.testing.assert_allclose(both.surface.heights, first.heights + second.heights[:, ::-1])
+    assert both.surface.sq == pytest.approx(np.hypot(first.sq, second.sq), rel=0.1)
+    other = prepare_surface(measured(rough(seed=2)), contact((64, 64))).surface
+    with pytest.raises(BadInput, match="one grid"):
+        CompositeSurface(first, other, (2.2, 1.8))
+
+
+def test_blending_says_what_it_changes():
+    steps = prepare_surface(measured(rough(seed=4)), contact()).steps
+    blending = next(step for step in steps if step.startswith("blended"))
+    assert all(name in blending for name in ("Sq", "Sdq", "Ssk", "Sku"))

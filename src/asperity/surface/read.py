@@ -4,6 +4,7 @@ SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that i
 tables. Nothing is corrected here: levelling, filling and resampling are left to `asperity.surface.prepare`.
 """
 
+import logging
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -24,6 +25,7 @@ from asperity.surface.text import read_table
 _TEXT = {"xyz", "asc"}  # columns of numbers: any name will do for them
 _UNMARKED = {"nms", "hgt"}  # formats that accept nearly any bytes, so only the file's name can call for them
 _PLAUSIBLE_PIXEL = 1e-10, 1e-3  # an atom to a millimetre [m]
+_POSSIBLE = 1e-15, 1e6  # [m]: lengths beyond are a damaged file's
 _PLAUSIBLE_SLOPE = 3.0  # median over neighbours; 72 degrees, which no instrument sees everywhere
 _EVEN = 0.01  # of the mean step of a profile, up to which its steps may differ before that is noted
 _REMEDY = "export it again, as standard x3p or SDF if need be"
@@ -89,8 +91,14 @@ def read_surface(
     heights = np.where(np.isfinite(found.heights), found.heights, np.nan) * height_scale
     if np.isnan(heights).all():
         raise UnreadableFile(f"{path.name} holds no valid height among its {heights.size}; measure it again")
-    if not all(0.0 < size < np.inf for size in sizes):
+    if not all(_POSSIBLE[0] < size < _POSSIBLE[1] for size in sizes):
         raise UnreadableFile(f"{path.name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
+    impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE[1]
+    notes = found.notes
+    if impossible.any():
+        heights[impossible] = np.nan
+        count = int(np.count_nonzero(impossible))
+        notes += (f"{count} heights, more than a thousand kilometres off, count as missing; check the file",)
     uniform = 1 if heights.shape[1] == 1 else None
     if uniform:
         heights, sizes = np.repeat(heights, FEWEST_CELLS, axis=1), (sizes[0], sizes[0])
@@ -106,7 +114,7 @@ def read_surface(
         upper=(half[0], half[1]),
         periodic=(False, False),
     )
-    notes = (*found.notes, *_oddities(sizes, heights))
+    notes += tuple(_oddities(sizes, heights))
     return MeasuredSurface(heights, grid, path.name, found.format, notes, uniform)
 
 
@@ -272,7 +280,7 @@ def _array(path: Path) -> _Map:
     """Heights of shape (nx, ny) as NumPy saves them; SurfaceTopography would leave the file open."""
     try:
         heights = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
-    except (ValueError, EOFError, OSError, TypeError, SyntaxError) as error:
+    except Exception as error:
         raise UnreadableFile(f"{path.name} is no readable .npy file ({_first_line(error)}); {_REMEDY}") from error
     if heights.ndim != 2:
         raise UnreadableFile(f"{path.name} holds an array of {heights.ndim} axes; give heights along x and y")
@@ -319,8 +327,17 @@ def library() -> Any:
 
 @contextmanager
 def _quietly() -> Iterator[list[str]]:
-    """Collect a reader's warnings as notes, and drop what it prints: the terminal belongs to the caller."""
+    """Collect a reader's warnings as notes, and drop what it prints or logs: the terminal belongs to the caller."""
     notes: list[str] = []
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield from _collecting(notes)
+    finally:
+        logging.disable(before)
+
+
+def _collecting(notes: list[str]) -> Iterator[list[str]]:
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", UserWarning)

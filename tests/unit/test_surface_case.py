@@ -1,0 +1,113 @@
+"""The case file's [surface]: every kind it takes, and what it says when one cannot be meant."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.case import load_case
+from asperity.errors import BadInput
+
+PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
+COARSE = {"grid.cells": [64, 64]}
+KINDS = {
+    "gaussian": {"correlation_length": ["40 um", "20 um"], "direction_deg": 30},
+    "non-gaussian": {"correlation_length": "20 um", "skewness": -0.8, "kurtosis": 4},
+    "self-affine": {"hurst": 0.8, "cutoffs": ["20 um", "100 um"]},
+    "ground": {"groove_width": "30 um", "groove_length": "80 um", "direction_deg": 90},
+    "sandblasted": {"crater_radius": "20 um"},
+    "run-in": {"correlation_length": "20 um", "plateau_share": 0.4},
+}
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return load_case(PAPER).with_overrides(COARSE)
+
+
+def ring(folder, name="ring.x3p", seed=1):
+    import x3pio
+
+    heights = np.random.default_rng(seed).standard_normal((200, 220)).cumsum(0).cumsum(1)
+    heights *= 1e-6 / heights.std()
+    x3pio.write(folder / name, heights.T, x_scale=2e-6, y_scale=2e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_surface_is_made_and_restated(paper, kind):
+    case = paper.with_overrides({"surface": {"kind": kind, "sq": "0.7 um", "seed": 3, **KINDS[kind]}})
+    assert case.surface().sq == pytest.approx(0.7e-6, rel=1e-9)
+    again = load_case(case.text, folder=case.folder)
+    assert again == case
+    np.testing.assert_array_equal(again.surface().heights, case.surface().heights)
+    other = case.with_overrides({"surface.seed": 4})
+    assert not np.allclose(other.surface().heights, case.surface().heights)
+
+
+def test_a_sample_that_strays_from_its_correlation_lengths_says_so(paper):
+    notes = paper.with_overrides({"surface.correlation_length": ["150 um", "60 um"]}).surface_notes
+    assert len(notes) == 1
+    assert "150 x 60 um was asked for" in notes[0]
+
+
+def test_two_measured_surfaces_keep_their_speeds(paper, tmp_path):
+    ring(tmp_path)
+    ring(tmp_path, "roller.x3p", seed=2)
+    text = paper.with_overrides(
+        {
+            "surface": {
+                "file": "ring.x3p",
+                "sq": "0.5 um",
+                "second": {"file": "roller.x3p", "sq": "0.2 um", "turn": True, "l_filter": "0.2 mm"},
+            }
+        }
+    ).text
+    case = load_case(text, folder=tmp_path)
+    composite = case.composite()
+    assert composite.speeds == case.conditions.surface_speeds
+    assert (composite.first.sq, composite.second.sq) == pytest.approx((0.5e-6, 0.2e-6))
+    np.testing.assert_array_equal(composite.surface.heights, case.surface().heights)
+    assert any("face down" in note for note in case.surface_notes)
+    assert any(note.startswith("roller.x3p: turned by 90 degrees") for note in case.surface_notes)
+    assert paper.composite() is None
+
+
+def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_path):
+    import x3pio
+
+    grooves = 1e-6 * np.sin(np.arange(200) / 3.0)[:, None] * np.ones(220)
+    x3pio.write(tmp_path / "ring.x3p", grooves.T, x_scale=2e-6, y_scale=2e-6)
+    across = load_case(paper.with_overrides({"surface": {"file": "ring.x3p"}}).text, folder=tmp_path)
+    along = across.with_overrides({"surface.turn": True})
+    assert np.ptp(across.surface().heights, axis=1).max() < 1e-12  # nothing changes along y ...
+    assert np.ptp(along.surface().heights, axis=0).max() < 1e-12  # ... and turned, nothing along x
+    assert along.surface().sq == pytest.approx(across.surface().sq, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("surface", "said"),
+    [
+        ({"kind": "grund"}, 'did you mean "ground"'),
+        ({"kind": "ground", "sq": "1 um", "groove_width": "30 um"}, "groove_length is missing"),
+        ({"file": "ring.x3p", "form": "sphere"}, "surface.form"),
+        ({"file": "ring.x3p", "turn": 90}, "surface.turn"),
+        ({"file": "ring.x3p", "pixel": "5"}, "without a unit"),
+        ({"file": "ring.x3p", "second": {"fil": "x"}}, "surface.second.fil is not a known key; did you mean file"),
+        (
+            {"kind": "non-gaussian", "sq": "1 um", "correlation_length": "20 um", "skewness": -3, "kurtosis": 4},
+            "kurtosis must be above 1",
+        ),
+        ({"kind": "sandblasted", "sq": "1 um", "crater_radius": "1 um"}, "crater_radius must lie between"),
+        (
+            {"kind": "run-in", "sq": "1 um", "correlation_length": "20 um", "plateau_share": 1.5},
+            "plateau_share must lie between 0 and 1",
+        ),
+        (
+            {"kind": "gaussian", "sq": "1 um", "correlation_length": ["20 um", "5 um"], "direction_deg": 45},
+            "across it must be at least 2 cells",
+        ),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(paper, surface, said):
+    with pytest.raises(BadInput, match=said):
+        paper.with_overrides({"surface": surface}).surface()
