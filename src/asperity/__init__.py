@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
     from asperity.ehl.solve import solve_contact
     from asperity.ehl.state import ContactState, contact_state
+    from asperity.ehl.stiffness import TangentStiffness, tangent_stiffness
     from asperity.ehl.storage import load_solution
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+    from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack
     from asperity.grid import Grid
     from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
     from asperity.report import write_report
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
         self_affine_surface,
         surface_parameters,
     )
-    from asperity.vibration import ContactOscillator, acceleration
+    from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
     from asperity.wear.indicators import Resonance, contact_resonance
 
 _NAMES = {
@@ -41,8 +43,10 @@ _NAMES = {
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
     "ehl.solve": ("solve_contact",),
     "ehl.state": ("ContactState", "contact_state"),
+    "ehl.stiffness": ("TangentStiffness", "tangent_stiffness"),
     "ehl.storage": ("load_solution",),
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
+    "excitation": ("FilteredNoise", "PatchAverage", "SurfaceTrack"),
     "grid": ("Grid",),
     "lubricant": ("Barus", "DowsonHigginson", "Incompressible", "Lubricant", "Newtonian", "ReeEyring", "Roelands"),
     "report": ("write_report",),
@@ -58,7 +62,7 @@ _NAMES = {
         "self_affine_surface",
         "surface_parameters",
     ),
-    "vibration": ("ContactOscillator", "acceleration"),
+    "vibration": ("ContactOscillator", "acceleration", "expected_spectrum", "motion"),
     "wear.indicators": ("Resonance", "contact_resonance"),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
@@ -75,6 +79,7 @@ __all__ = [
     "Convergence",
     "DowsonHigginson",
     "ElasticPair",
+    "FilteredNoise",
     "Grid",
     "Incompressible",
     "Iteration",
@@ -82,6 +87,7 @@ __all__ = [
     "Newtonian",
     "NotConverged",
     "Options",
+    "PatchAverage",
     "ReeEyring",
     "Resonance",
     "Roelands",
@@ -91,6 +97,8 @@ __all__ = [
     "Status",
     "Surface",
     "SurfaceParameters",
+    "SurfaceTrack",
+    "TangentStiffness",
     "UnreadableFile",
     "Vibration",
     "VibrationModel",
@@ -98,11 +106,13 @@ __all__ = [
     "contact_resonance",
     "contact_state",
     "contact_vibration",
+    "expected_spectrum",
     "flat_surface",
     "gaussian_surface",
     "load_case",
     "load_run",
     "load_solution",
+    "motion",
     "power_spectrum",
     "prepare_surface",
     "read_surface",
@@ -111,6 +121,7 @@ __all__ = [
     "solve_case",
     "solve_contact",
     "surface_parameters",
+    "tangent_stiffness",
     "write_report",
 ]
 
