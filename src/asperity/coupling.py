@@ -14,7 +14,7 @@ from asperity.conditions import ContactConditions
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.state import ContactState
 from asperity.ehl.stiffness import roller_depth, tangent_stiffness
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput, NotConverged, require_positive
 from asperity.excitation import PATCHES, Excitation, FilteredNoise, PatchAverage, SurfaceTrack, require_filter
 from asperity.hertz import line_stiffness, point_contact, point_stiffness
 from asperity.signals import Signal, Spectrum, power_spectrum
@@ -432,7 +432,12 @@ def contact_vibration(
             f"{full_load_crf_hz:.0f} Hz, got {model.rate_hz:g} Hz; raise it to {np.ceil(slowest):.0f} Hz"
         )
     silence = _why_silent(state, model)
-    spring = None if silence is not None else oscillator(state, conditions, model, solution=solution)
+    spring = None
+    if silence is None:
+        try:
+            spring = oscillator(state, conditions, model, solution=solution)
+        except NotConverged as unfinished:
+            silence = f"the tangent stiffness takes neighbouring loads, and at one of them: {unfinished}"
     if asperities_alone:
         band_hz = search_band(conditions, model)
     else:

@@ -74,6 +74,16 @@ def test_a_stiffness_that_needs_the_solved_contact_solves_it(asp):
     assert 5000.0 < heard["crf_hz"] < heard["full_load_crf_hz"] < 10e3
 
 
+def test_a_contact_that_cannot_be_solved_is_kept_without_its_tangent_stiffness(asp):
+    wanted = ("vibration.stiffness_law=tangent", "vibration.rate=200 kHz", "solver.max_iterations=1")
+    sets = [word for key in wanted for word in ("--set", key)]
+    code, out, _ = asp("solve", "case.toml", "--out", "run.nc", *sets)
+    assert code == 1
+    assert out.startswith("NOT CONVERGED")
+    assert "neighbouring loads" in out
+    assert Path("run.nc").exists()
+
+
 def test_too_strong_a_shaking_for_a_linear_spring_is_said(asp):
     loud = ("--set", "vibration.cutoff_reference=5 kHz")
     assert "too much for a linear spring" in asp("vibrate", "case.toml", *loud)[1].splitlines()[0]
