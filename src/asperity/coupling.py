@@ -422,8 +422,9 @@ def contact_vibration(
         `excitation` and its records refuse.
     """
     asperities_alone = model.stiffness_law in ASPERITIES_ALONE
-    # a tangent stiffness belongs to its own load share; with all load on asperities the contact is a smooth dry line
-    whole = replace(model, stiffness_law="hertz-line") if model.stiffness_law == "tangent" else model
+    # a tangent stiffness belongs to its own load share; with all load on asperities the contact is smooth and dry
+    smooth = "hertz-line" if conditions.geometry == "line" else "hertz-point"
+    whole = replace(model, stiffness_law=smooth) if model.stiffness_law == "tangent" else model
     full_load_crf_hz = _loaded_oscillator(1.0, state, conditions, whole).natural_frequency_hz
     slowest = model.samples_per_period * full_load_crf_hz
     if model.rate_hz < slowest:

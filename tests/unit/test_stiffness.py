@@ -43,6 +43,20 @@ def test_a_smooth_dry_line_contact_has_johnsons_stiffness(load, depth):
     assert abs(found.step_change) < 2e-3
 
 
+@pytest.mark.parametrize("radius", [5.4e-3, (5.4e-3, 10.8e-3), (10.8e-3, 5.4e-3)], ids=str)
+def test_a_smooth_dry_point_contact_has_hertzs_stiffness(radius):
+    """δ ~ F^(2/3), so S = 1.5 F/δ; for a sphere the paper's Eq 3."""
+    geometry = "elliptic" if isinstance(radius, tuple) else "point"
+    conditions = replace(STEEL, geometry=geometry, radius=radius, length=None, load=200.0)
+    a, b = conditions.hertz.half_widths
+    grid = Grid((64, 64), (-1.5 * a, -1.5 * b), (1.5 * a, 1.5 * b), (False, False))
+    found = tangent_stiffness(solve_contact(conditions, None, flat_surface(grid)))
+    assert found.total == pytest.approx(1.5 * 200.0 / conditions.hertz.approach, rel=0.01)
+    if geometry == "point":
+        assert found.total == pytest.approx(point_stiffness(200.0, 5.4e-3, STEEL.pair.reduced_modulus), rel=0.01)
+    assert found.reference_depth is None
+
+
 @pytest.mark.parametrize("load", [50.0, 200.0])
 def test_a_row_of_point_contacts_has_hertzs_stiffness(load):
     """A sphere a period L, as roughness on a line contact: the paper's Eq 3 within 2 %.
@@ -61,6 +75,18 @@ def test_a_row_of_point_contacts_has_hertzs_stiffness(load):
     assert solved.pressure.max() == pytest.approx(point_contact(load, radius, modulus).p_max, rel=0.01)
     found = tangent_stiffness(solved, reference_depth=2.0 * period * np.exp(-np.euler_gamma))
     assert found.total == pytest.approx(point_stiffness(load, radius, modulus), rel=0.01)
+
+
+def test_a_point_contact_vibrates_on_its_tangent_stiffness():
+    conditions = replace(STEEL, geometry="point", length=None, load=200.0)
+    a = conditions.hertz.half_widths[0]
+    solved = solve_contact(
+        conditions, None, flat_surface(Grid((64, 64), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), (False, False)))
+    )
+    model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent")
+    heard = contact_vibration(replace(contact_state(solved), sq=1e-6), conditions, model, solution=solved)
+    assert heard.full_load_crf_hz == pytest.approx(3292.0, abs=1.0)  # docs/paper.md: 200 N, E* 109.89 GPa
+    assert heard.resonance.crf_hz == pytest.approx(3292.0, rel=0.005)
 
 
 @pytest.fixture(scope="module")

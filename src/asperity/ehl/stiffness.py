@@ -21,15 +21,16 @@ TIGHT = 1e-6  # solver tolerance: the approach differs by some per cent of a^2/R
 class TangentStiffness:
     """dF/dδ of a contact [N/m] and its parts: `asperity` by the load on touching cells, `film` by all other load.
 
-    δ is the approach of the bodies measured from points `reference_depth` [m] away: a line contact's approach depends
-    on it. `step` is the load step behind the figures, as a share of the load; `step_change` and `split_change` are how
-    far the total, relatively, and the asperities' share of it move from a step twice as large to this one. The total
-    is sharp to a few per cent; the split is not, because few cells change hands in a small step.
+    δ is the approach of the bodies, of a line contact measured from points `reference_depth` [m] away, on which it
+    depends (None for the others, measured from far away). `step` is the load step behind the figures, as a share of
+    the load; `step_change` and `split_change` are how far the total, relatively, and the asperities' share of it move
+    from a step twice as large to this one. The total is sharp to a few per cent; the split is not, because few cells
+    change hands in a small step.
     """
 
     asperity: float
     film: float
-    reference_depth: float
+    reference_depth: float | None
     step: float
     step_change: float
     split_change: float
@@ -43,11 +44,11 @@ class TangentStiffness:
 def tangent_stiffness(
     solution: ContactSolution, *, reference_depth: float | None = None, step: float = LOAD_STEP
 ) -> TangentStiffness:
-    """Tangent stiffness of a solved line contact, by central differences over load steps of `step` and half of it.
+    """Tangent stiffness of a solved contact, by central differences over load steps of `step` and half of it.
 
     Parameters
     ----------
-    reference_depth : see `TangentStiffness` [m]; None takes `roller_depth` of the conditions
+    reference_depth : of a line contact [m]; None takes `roller_depth` of the conditions
     step : share of the load
 
     Raises
@@ -59,13 +60,7 @@ def tangent_stiffness(
     """
     if not 1e-3 <= step <= 0.2:
         raise BadInput(f"load step must lie between 0.001 and 0.2 of the load, got {step:g}; {LOAD_STEP:g} is usual")
-    depth = roller_depth(solution.conditions) if reference_depth is None else reference_depth
-    require_positive("reference depth", depth, "m")
-    half_width = solution.conditions.hertz.half_widths[0]
-    if depth <= half_width:
-        raise BadInput(
-            f"reference depth must be greater than the contact's half-width of {half_width:.3g} m, got {depth:.3g} m"
-        )
+    depth = _checked_depth(solution.conditions, reference_depth) if solution.conditions.geometry == "line" else None
     coarse, fine = (_central_difference(solution, depth, share) for share in (step, step / 2.0))
     return TangentStiffness(
         asperity=fine[0],
@@ -77,6 +72,17 @@ def tangent_stiffness(
     )
 
 
+def _checked_depth(conditions: ContactConditions, reference_depth: float | None) -> float:
+    depth = roller_depth(conditions) if reference_depth is None else reference_depth
+    require_positive("reference depth", depth, "m")
+    half_width = conditions.hertz.half_widths[0]
+    if depth <= half_width:
+        raise BadInput(
+            f"reference depth must be greater than the contact's half-width of {half_width:.3g} m, got {depth:.3g} m"
+        )
+    return depth
+
+
 def roller_depth(conditions: ContactConditions) -> float:
     """Depth 2R/e [m] that makes a half-space as stiff as a cylinder pressed at its centre; R is the effective radius.
 
@@ -86,20 +92,22 @@ def roller_depth(conditions: ContactConditions) -> float:
     return 2.0 * conditions.radius_along_rolling / float(np.e)
 
 
-def _central_difference(solution: ContactSolution, depth: float, share: float) -> tuple[float, float]:
+def _central_difference(solution: ContactSolution, depth: float | None, share: float) -> tuple[float, float]:
     """Asperity and film part [N/m]."""
     less, more = (_state_at(solution, depth, 1.0 + sign * share) for sign in (-1.0, 1.0))
     asperity, film, approach = (b - a for a, b in zip(less, more, strict=True))
     return asperity / approach, film / approach
 
 
-def _state_at(solution: ContactSolution, depth: float, factor: float) -> tuple[float, float, float]:
+def _state_at(solution: ContactSolution, depth: float | None, factor: float) -> tuple[float, float, float]:
     """Load on asperities, load on film, approach of points `depth` away; at `factor` times the load."""
     conditions = replace(solution.conditions, load=factor * solution.conditions.load)
     options = replace(solution.options, tolerance=min(TIGHT, solution.options.tolerance))
     solved = solve_contact(conditions, solution.lubricant, solution.surface, options=options, start=solution)
     borne = float(solved.pressure[solved.in_contact].sum() / solved.pressure.sum())
-    # the solver measures displacement from points one half-width away, and the half-width grows with the load
-    reference = 2.0 * conditions.line_load / (np.pi * conditions.pair.reduced_modulus)
-    approach = reference * np.log(depth / conditions.hertz.half_widths[0]) - solved.rigid_approach
-    return borne * conditions.load, (1.0 - borne) * conditions.load, float(approach)
+    approach = -solved.rigid_approach
+    if depth is not None:
+        # the solver measures a line contact from points one half-width away, and the half-width grows with the load
+        slope = 2.0 * conditions.line_load / (np.pi * conditions.pair.reduced_modulus)
+        approach += slope * float(np.log(depth / conditions.hertz.half_widths[0]))
+    return borne * conditions.load, (1.0 - borne) * conditions.load, approach
