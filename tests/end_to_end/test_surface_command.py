@@ -1,0 +1,84 @@
+"""`asperity surface` and `solve --surface` as a user types them, on files of several kinds."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import x3pio
+
+from asperity.cli import main
+
+PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
+
+
+@pytest.fixture
+def asp(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("case.toml").write_text(PAPER.replace("[256, 256]", "[32, 32]"), "utf-8")
+    x = np.arange(300) * 2e-6
+    grooves = 0.5e-6 * np.sin(2.0 * np.pi * x / 40e-6)[:, None] * np.ones(260)
+    x3pio.write("ground.x3p", (grooves + 50e-6 * (x[:, None] / x.max()) ** 2).T, x_scale=2e-6, y_scale=2e-6)
+    Path("line.csv").write_text("".join(f'"0,{i:04d}";"{np.sin(i / 9):.4f}"\n'.replace(".", ",") for i in range(1000)))
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        said = capsys.readouterr()
+        return end.value.code or 0, said.out, said.err
+
+    return run
+
+
+def test_surface_names_what_it_did_and_found(asp):
+    code, out, err = asp("surface", "ground.x3p", "--form", "quadratic", "--l-filter", "0.2 mm", "--out", "map.png")
+    assert (code, err) == (0, "")
+    assert out.startswith("ground.x3p: Sq 0.3")
+    for expected in ("Sk, Spk, Svk", "Smr1, Smr2", "Sp, Sv, Sz", "Sdq, Sdr", "quadratic form", "longer than 200 um"):
+        assert expected in out
+    assert Path("map.png").read_bytes().startswith(b"\x89PNG")
+    found = json.loads(asp("surface", "ground.x3p", "--json")[1])["files"][0]
+    assert {"sz_m", "sdr", "sk_m", "spk_m", "svk_m", "smr1", "smr2", "str", "steps", "notes"} <= set(found)
+    assert found["profile"] is None
+
+
+def test_a_profile_has_profile_parameters_and_a_figure(asp):
+    code, out, _ = asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--out", "line.png")
+    assert code == 0
+    assert out.startswith("line.csv: profile, Rq 0.7")
+    assert "Ra, Rq" in out
+    assert "Rsm, Rdq" in out
+    assert Path("line.png").read_bytes().startswith(b"\x89PNG")
+    found = json.loads(asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--json")[1])["files"][0]
+    assert found["profile"]["rsm_m"] == pytest.approx(2.0 * np.pi * 9 * 0.1e-6, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("surface", "ground.x3p", "--form", "sphere"), "form must be one of"),
+        (("surface", "ground.x3p", "--l-filter", "3"), "--l-filter must be a length"),
+        (("surface", "ground.x3p", "--pixel", "2 um"), "states its own pixel"),
+        (("surface", "line.csv"), "give unit"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_a_sentence(asp, arguments, said):
+    code, out, err = asp(*arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_a_ground_surface_is_solved_with_its_lay_across_and_along(asp):
+    """Across rolling the ridges carry oil in and lift the contact; along it the oil runs off between them."""
+    clr = {}
+    for lay, turn in (("across", "false"), ("along", "true")):
+        code, out, _ = asp(
+            "solve", "case.toml", "--surface", "ground.x3p", "--set", "surface.sq=1 um",
+            "--set", f"surface.turn={turn}", "--out", f"{lay}.nc", "--json",
+        )  # fmt: skip
+        assert code == 0
+        clr[lay] = json.loads(out)["clr"]
+    assert clr["across"] < clr["along"]
+    assert asp("report", "across.nc", "along.nc", "--out", "lay.html")[0] == 0
+    assert "turn True" in Path("lay.html").read_text("utf-8")
