@@ -534,7 +534,13 @@ class Case:
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
-        built = {"contact and material": "conditions", "grid": "grid", "solver": "options", "vibration": "vibration"}
+        built = {
+            "contact and material": "conditions",
+            "lubricant": "lubricant",
+            "grid": "grid",
+            "solver": "options",
+            "vibration": "vibration",
+        }
         for part, name in built.items():
             with self.naming(part):
                 getattr(self, name)

@@ -227,3 +227,15 @@ def test_a_start_or_grid_that_does_not_fit_says_so(usual):
         solve_contact(contact(geometry="point", length=None), barus(), flat_surface(COARSE))
     with pytest.raises(BadInput, match="solve without start"):
         solved(rough(COARSE, SQ), start=usual)
+
+
+def test_a_smooth_contact_too_slow_for_a_film_is_nearly_all_contact():
+    """At 10 um/s the oil's own film would be far below the contact film: the solids carry the load, as when dry.
+
+    Not quite all of it: contact cells at the rim press oil into their neighbours (see the dry limit above).
+    """
+    slow = contact(surface_speeds=(1e-5, 1e-5))
+    state = contact_state(solve_contact(slow, barus(), flat_surface(grid((128, 8)))))
+    assert state.clr > 0.9
+    assert state.car > 0.9
+    assert state.p_max == pytest.approx(slow.hertz.p_max, rel=0.02)

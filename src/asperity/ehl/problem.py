@@ -18,6 +18,9 @@ from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Fi
 from asperity.lubricant import Lubricant
 
 
+CLOSED_WITHIN = 0.01  # of the contact film
+
+
 @dataclass(frozen=True, slots=True)
 class Form:
     """Shape and compliance of the smooth bodies.
@@ -174,8 +177,12 @@ class Balance:
 
     @property
     def in_contact(self) -> Mask:
-        """Cells where the bodies touch: gap closed to the contact film, or flattened below it."""
-        return np.asarray((self.rows.state == TOUCHING) | (self.gap <= self.problem.contact_gap))
+        """Cells where the bodies touch: gap closed to the contact film, or flattened below it.
+
+        Within 1 %, because oil leaves a contact at just that film and may keep it for many cells.
+        """
+        closed = self.gap <= (1.0 + CLOSED_WITHIN) * self.problem.contact_gap
+        return np.asarray((self.rows.state == TOUCHING) | closed)
 
     @property
     def unknown(self) -> Mask:
