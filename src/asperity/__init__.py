@@ -103,6 +103,7 @@ __all__ = [
     "NotConverged",
     "Options",
     "PatchAverage",
+    "ProfileParameters",
     "ReeEyring",
     "Resonance",
     "Roelands",
