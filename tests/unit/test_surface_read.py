@@ -1,9 +1,12 @@
+import logging
+import warnings
+
 import numpy as np
 import pytest
 
 from asperity.errors import BadInput, UnreadableFile
 from asperity.surface import read_surface
-from asperity.surface.read import library
+from asperity.surface.read import _quietly, library
 
 
 def xyz(path, cells=(20, 12), pixel=(2.0, 3.0)):
@@ -210,3 +213,13 @@ def test_heights_as_steep_as_walls_are_questioned(tmp_path):
 
 def test_the_library_stays_quiet_about_mpi():
     assert library().__name__ == "SurfaceTopography"
+
+
+def test_what_a_reader_logs_does_not_reach_the_terminal(caplog):
+    with _quietly() as notes:
+        logging.getLogger("reader").error("could not reshape")
+        warnings.warn("odd header", UserWarning, stacklevel=1)
+    assert caplog.records == []
+    assert notes == ["the reader warns: odd header"]
+    logging.getLogger("reader").error("and afterwards it does")
+    assert len(caplog.records) == 1

@@ -20,6 +20,17 @@ def test_the_density_integrates_to_sq_squared():
     assert np.mean(np.log(c[some] / expected[some])) == pytest.approx(0.0, abs=0.1)
 
 
+def test_tapering_the_edges_takes_no_power():
+    on = Grid((256, 256), (0.0, 0.0), (256e-6, 256e-6), (False, False))
+    sq = []
+    for seed in range(8):
+        surface = gaussian_surface(on, sq=1.3e-6, correlation_length=8e-6, rng=np.random.default_rng(seed))
+        spectrum = surface_spectrum(surface)
+        power = np.trapezoid(spectrum.density * spectrum.wavenumber**2, np.log(spectrum.wavenumber))
+        sq.append(np.sqrt(power / (2.0 * np.pi)))
+    assert np.mean(sq) == pytest.approx(1.3e-6, rel=0.03)
+
+
 @pytest.mark.parametrize("degrees", [0, 45, 90, 150])
 def test_ridges_are_found_where_they_run(degrees):
     on = Grid((128, 128), (0.0, 0.0), (128e-6, 128e-6), (False, False))

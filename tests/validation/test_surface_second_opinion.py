@@ -98,7 +98,7 @@ def test_the_profile_of_a_sinusoid():
 
 def test_ripples_lower_than_a_tenth_of_rz_are_no_elements():
     x = np.arange(5000) * 0.1e-6
-    ripple = np.sin(2.0 * np.pi * x / 20e-6) + 0.05 * np.sin(2.0 * np.pi * x / 1e-6)
+    ripple = np.sin(2.0 * np.pi * x / 20e-6) + 0.15 * np.sin(2.0 * np.pi * x / 1e-6)
     assert profile_parameters(1e-6 * ripple, 0.1e-6).rsm == pytest.approx(20e-6, rel=0.01)
 
 
