@@ -40,6 +40,22 @@ def test_x_comes_first_missing_is_nan_and_lengths_are_metres(x3p):
     assert any("not square" in note for note in measured.notes)
 
 
+def test_an_x3p_in_a_folder_of_its_own_is_read_and_noted(x3p, tmp_path):
+    import zipfile
+
+    path, heights = x3p
+    with zipfile.ZipFile(path) as standard, zipfile.ZipFile(tmp_path / "loose.x3p", "w") as loose:
+        for name in standard.namelist():
+            content = standard.read(name)
+            loose.writestr(
+                f"inner/{name}", content.replace(b"ISO5436_2", b"ISO5436") if name == "main.xml" else content
+            )
+    measured = read_surface(tmp_path / "loose.x3p")
+    np.testing.assert_allclose(measured.heights, heights, rtol=1e-12)
+    assert measured.grid.spacing == pytest.approx((2e-6, 3e-6))
+    assert any("strays from the standard" in note for note in measured.notes)
+
+
 def test_sdf_gives_the_same_surface_as_x3p(tmp_path):
     import sdfio
 

@@ -62,7 +62,15 @@ def test_profiles_read_as_their_readme_says():
     assert track["profile"]["rt_m"] == pytest.approx(1.2e-6, rel=0.02)  # the file's extremes, -0.45 and 0.75, less form
 
 
-@pytest.mark.parametrize("name", ["bullet_land.x3p", "nanovea_test1.txt", "wear_track_C1.csv"])
+def test_an_archive_that_strays_from_the_standard_reads_as_its_readme_says():
+    found = describe_surface(FILES / "bullet_land.x3p", form="cylinder").scalars()
+    assert found["cells"] == [918, 256]
+    assert found["pixel_m"] == pytest.approx([2.58e-6, 2.58e-6], rel=1e-3)
+    assert found["missing"] == pytest.approx(0.11, abs=0.01)
+    assert any("strays from the standard" in note for note in found["notes"])
+
+
+@pytest.mark.parametrize("name", ["nanovea_test1.txt", "wear_track_C1.csv"])
 def test_what_cannot_be_read_as_it_stands_is_refused_in_a_sentence(name, capfd):
     with pytest.raises(BadInput, match=name):
         read_surface(FILES / name)

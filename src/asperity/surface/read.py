@@ -6,6 +6,7 @@ tables. Nothing is corrected here: levelling, filling and resampling are left to
 
 import logging
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -290,12 +291,51 @@ def _array(path: Path) -> _Map:
 def _x3p(path: Path) -> _Map:
     import x3pio
 
-    content: Any = x3pio.read(path)
+    try:
+        content: Any = x3pio.read(path)
+    except Exception:
+        loose = _loose_x3p(path)
+        if loose is None:
+            raise
+        return loose
     if not isinstance(content, x3pio.Surface):
         kind = type(content).__name__.lower()
         raise UnreadableFile(f"{path.name} holds a {kind}, not a map on a regular grid; give an areal map")
     pixel = (float(content.header.x.increment), float(content.header.y.increment))
     return _Map(_x_first(content.layers[0].z), pixel, "x3p", "m")
+
+
+def _loose_x3p(path: Path) -> _Map | None:
+    """An x3p map whose archive strays from the standard: in a folder of its own, or with elements unknown to it.
+
+    Damage is none of these: the archive's checksums find it. None for what is no map on a regular grid.
+    """
+    import zipfile
+    from xml.etree import ElementTree
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            mains = [name for name in archive.namelist() if name.split("/")[-1] == "main.xml"]
+            root = ElementTree.fromstring(archive.read(mains[0]))
+            said = {element.tag.split("}")[-1]: (element.text or "").strip() for element in root.iter()}
+            steps = [float(root.findtext(f".//{{*}}{axis}/{{*}}Increment") or "nan") for axis in ("CX", "CY", "CZ")]
+            data = archive.read(mains[0].removesuffix("main.xml") + said["PointDataLink"])
+        kind = {"D": "<f8", "F": "<f4"}[root.findtext(".//{*}CZ/{*}DataType") or ""]
+        cells = int(said["SizeX"]), int(said["SizeY"])
+        rows = np.frombuffer(data, dtype=kind).reshape(cells[1], cells[0]) * steps[2]
+    except (
+        zipfile.BadZipFile,
+        ElementTree.ParseError,
+        OSError,
+        ValueError,
+        LookupError,
+        NotImplementedError,
+        zlib.error,
+    ):
+        return None
+    return _Map(
+        _x_first(rows), (steps[0], steps[1]), "x3p", "m", ("the x3p archive strays from the standard, yet holds a map",)
+    )
 
 
 def _sdf(path: Path) -> _Map:
