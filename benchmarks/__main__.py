@@ -7,7 +7,7 @@ import sys
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks import roughness_levels, surfaces, vibration
+from benchmarks import robustness, roughness_levels, surfaces, vibration
 from benchmarks.first_call import first_call
 
 
@@ -38,6 +38,9 @@ def main() -> None:
     )
     print()
     with threadpool_limits(1):
+        for line in robustness.lines(fast=wanted.fast):
+            print(line, flush=True)
+        print()
         for line in vibration.lines(fast=wanted.fast):
             print(line, flush=True)
         print()

@@ -17,7 +17,6 @@ from asperity.kernels import relax, reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
 from asperity.lubricant import Lubricant
 
-
 CLOSED_WITHIN = 0.01  # of the contact film
 
 

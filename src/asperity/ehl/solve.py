@@ -20,6 +20,8 @@ Progress = Callable[[Iteration], None]
 FEWEST_COARSE_CELLS = 48
 COARSE_TOLERANCE = 1e-3  # a coarse solution only has to be a good start
 MOST_COARSE_ITERATIONS = 40
+MOST_POSITIONS = 20
+FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 
 
 def solve_contact(
@@ -68,6 +70,9 @@ def solve_contact(
                 progress(iteration)
             yield step
 
+    def held(problem: Problem, pressure: Field, approach: float) -> Iterator[Step]:
+        return watched(problem, newton(problem, pressure, approach, held=True))
+
     def level(problem: Problem, pressure: Field, approach: float, tolerance: float, most: int) -> Step:
         for step in watched(problem, newton(problem, pressure, approach)):
             if _settled(history[-1], tolerance) or step.number >= most or not np.isfinite(step.change):
@@ -79,9 +84,15 @@ def solve_contact(
         while _can_halve(levels[-1].cells):
             levels.append(levels[-1].coarsened())
         pressure, approach = first_guess(levels[-1], conditions, lubricant, scales)
+        most, tolerance = min(options.max_iterations, MOST_COARSE_ITERATIONS), max(COARSE_TOLERANCE, options.tolerance)
         for problem in levels[:0:-1]:
-            most = min(options.max_iterations, MOST_COARSE_ITERATIONS)
-            step = level(problem, pressure, approach, max(COARSE_TOLERANCE, options.tolerance), most)
+            step = level(problem, pressure, approach, tolerance, most)
+            if problem is levels[-1] and not _settled(history[-1], FAR_OFF):
+                # a capped contact answers its approach too unevenly for Newton: hold the bodies, search from outside
+                guess = first_guess(problem, conditions, lubricant, scales)
+                found = find_approach(problem, *guess, held)
+                if _settled(history[-1], FAR_OFF):
+                    step = found
             pressure, approach = refined(step.balance.pressure), step.approach
     else:
         pressure, approach = _warm_start(start, surface, scales)
@@ -167,6 +178,39 @@ def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
     load = conditions.load / (modulus * radius**2)
     side_leakage = 1.0 - np.exp(-0.68 * b / a)
     return float(3.63 * speed**0.68 * material**0.49 * load**-0.073 * side_leakage * radius)
+
+
+def find_approach(
+    problem: Problem, pressure: Field, approach: float, steps: Callable[[Problem, Field, float], Iterator[Step]]
+) -> Step:
+    """The contact held at approach after approach until it carries the load: slower, but each problem is a simple one.
+
+    The load falls as the bodies part; the approach is bracketed, then found by false position.
+    """
+    roughness = float(np.std(problem.roughness))
+    approach += 2.0 * roughness
+    stride = max(0.5, 0.5 * roughness)
+    near: tuple[float, float] | None = None  # approach and load error of the nearest position that carries too much ...
+    apart: tuple[float, float] | None = None  # ... and of the farthest that carries too little
+    for _ in range(MOST_POSITIONS):
+        for step in steps(problem, pressure, approach):
+            settled = step.balance.residual_rms < COARSE_TOLERANCE and step.change < COARSE_TOLERANCE
+            if settled or step.number >= MOST_COARSE_ITERATIONS or not np.isfinite(step.change):
+                break
+        pressure, error = step.balance.pressure, step.balance.load_error
+        if settled and abs(error) < COARSE_TOLERANCE:
+            break
+        if error > 0.0:
+            near = approach, error
+        else:
+            apart = approach, error
+        if near is not None and apart is not None:
+            share = min(max(near[1] / (near[1] - apart[1]), 0.1), 0.9)
+            approach = near[0] + share * (apart[0] - near[0])
+        else:
+            approach += stride if error > 0.0 else -stride
+            stride *= 1.5
+    return step
 
 
 def refined(pressure: Field) -> Field:
