@@ -144,7 +144,8 @@ def lines(*, fast: bool, artefact: Path = Path("build/robustness.csv")) -> Itera
     yield ""
     yield (
         f"{len(solved)} of {len(results)} solved, the rest refused loudly; "
-        f"median {np.median([one.seconds for one in solved]):.2f} s, {np.median([one.steps for one in solved]):.0f} steps. "
+        f"median {np.median([one.seconds for one in solved]):.2f} s and "
+        f"{np.median([one.steps for one in solved]):.0f} steps. "
         f"Least gap anywhere {min(one.least_gap_nm for one in results):.3f} nm. "
         f"{len(errors)} solved again 100 times tighter: {sum(np.isnan(errors))} of those did not converge, "
         f"the load share of the others is off by {np.nanmax(errors):.1e} at most. All of it: {artefact}."
