@@ -9,7 +9,6 @@ import x3pio
 
 import asperity.run
 from asperity import NotConverged, load_case, load_run, solve_case
-from asperity.cli import main
 from asperity.errors import BadInput
 from asperity.surface import flat_surface
 
@@ -20,21 +19,6 @@ KEYS = [  # design.md, section 4, the load on capped oil, and the standard devia
     *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
 ]
-
-
-@pytest.fixture
-def asp(tmp_path, monkeypatch, capsys):
-    """Run a command in a folder that holds a small case; return exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    Path("case.toml").write_text(PAPER.replace("[256, 256]", "[64, 64]"), "utf-8")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main(arguments)
-        said = capsys.readouterr()
-        return end.value.code or 0, said.out, said.err
-
-    return run
 
 
 def numbers(text: str) -> dict[str, float]:

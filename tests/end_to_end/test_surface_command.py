@@ -7,27 +7,17 @@ import numpy as np
 import pytest
 import x3pio
 
-from asperity.cli import main
-
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
 
 
 @pytest.fixture
-def asp(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def asp(asp):
     Path("case.toml").write_text(PAPER.replace("[256, 256]", "[32, 32]"), "utf-8")
     x = np.arange(300) * 2e-6
     grooves = 0.5e-6 * np.sin(2.0 * np.pi * x / 40e-6)[:, None] * np.ones(260)
     x3pio.write("ground.x3p", (grooves + 50e-6 * (x[:, None] / x.max()) ** 2).T, x_scale=2e-6, y_scale=2e-6)
     Path("line.csv").write_text("".join(f'"0,{i:04d}";"{np.sin(i / 9):.4f}"\n'.replace(".", ",") for i in range(1000)))
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main(arguments)
-        said = capsys.readouterr()
-        return end.value.code or 0, said.out, said.err
-
-    return run
+    return asp
 
 
 def test_surface_names_what_it_did_and_found(asp):

@@ -6,24 +6,8 @@ from pathlib import Path
 import pytest
 
 from asperity import load_case
-from asperity.cli import main
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
-
-
-@pytest.fixture
-def asp(tmp_path, monkeypatch, capsys):
-    """Run a command in a folder that holds a small case; return exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    Path("case.toml").write_text(PAPER.replace("[256, 256]", "[64, 64]"), "utf-8")
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main(arguments)
-        said = capsys.readouterr()
-        return end.value.code or 0, said.out, said.err
-
-    return run
 
 
 def test_table_1_has_the_contracts_rows(asp):
