@@ -531,6 +531,7 @@ class Case:
     folder: Path = field(compare=False, repr=False)
     source: str = field(compare=False)
     stored: Surface | None = field(default=None, compare=False, repr=False)
+    stored_notes: tuple[str, ...] = field(default=(), compare=False, repr=False)  # what was done to make `stored`
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
@@ -546,7 +547,7 @@ class Case:
                 getattr(self, name)
 
     def __reduce__(self) -> tuple[Any, ...]:  # the sections of laws are made at run time, which pickle cannot follow
-        return _case_again, (self.text, self.folder, self.source, self.stored)
+        return _case_again, (self.text, self.folder, self.source, self.stored, self.stored_notes)
 
     @contextmanager
     def naming(self, part: str) -> Iterator[None]:
@@ -625,7 +626,7 @@ class Case:
     def _roughness(self) -> tuple[Surface, tuple[str, ...]]:
         section = self.contents.surface
         if self.stored is not None:
-            return self.stored, ()
+            return self.stored, self.stored_notes
         if isinstance(section, FileSection):
             return self._measured(section)
         if isinstance(section, FlatSection):
@@ -782,7 +783,7 @@ class Case:
             table[key] = _toml_value(value) if isinstance(value, str) else value
         case = _case(tables, self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface
-        return replace(case, stored=self.stored) if same else case
+        return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case
 
 
 def load_case(
@@ -828,8 +829,8 @@ def _case(tables: dict[str, Any], folder: Path, source: str, stored: Surface | N
     return Case(contents, folder, source, stored)
 
 
-def _case_again(text: str, folder: Path, source: str, stored: Surface | None) -> Case:
-    return load_case(text, folder=folder, name=source, stored=stored)
+def _case_again(text: str, folder: Path, source: str, stored: Surface | None, stored_notes: tuple[str, ...]) -> Case:
+    return replace(load_case(text, folder=folder, name=source, stored=stored), stored_notes=stored_notes)
 
 
 def _tables(text: str, source: str) -> dict[str, Any]:

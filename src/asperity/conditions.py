@@ -67,8 +67,11 @@ class ContactConditions:
         if self.geometry not in get_args(Geometry):
             raise BadInput(f"geometry must be one of {', '.join(get_args(Geometry))}, got {self.geometry!r}")
         if (self.geometry == "elliptic") != isinstance(self.radius, tuple):
+            article = "an" if self.geometry == "elliptic" else "a"
             wanted = "a pair (Rx, Ry)" if self.geometry == "elliptic" else "one number"
-            raise BadInput(f"radius of a {self.geometry} contact is {wanted}, got {self.radius!r}")
+            raise BadInput(
+                f"radius of {article} {self.geometry} contact is {wanted} in metres, got {self.radius!r}; correct it"
+            )
         for radius in self.radius if isinstance(self.radius, tuple) else (self.radius,):
             require_positive("radius", radius, "m")
         require_positive("load", self.load, "N")

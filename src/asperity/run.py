@@ -231,7 +231,9 @@ def load_run(path: str | Path) -> Run:
         raise UnreadableFile(
             f"{path} holds a solution without its case; solve the case with asperity solve --out"
         ) from None
-    return _run(load_case(text, folder=path.parent, name=str(path), stored=solution.surface), solution, notes)
+    case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
+    case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
+    return _run(case, solution, notes)
 
 
 def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:

@@ -65,6 +65,8 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     Path("maps/ring.x3p").unlink()
     assert numbers(asp("solve", "run.nc", "--json")[1]) == {k: v for k, v in first.scalars().items() if k != "seconds"}
     assert any("removed a quadratic form" in note for note in first.notes)
+    assert "note: removed a quadratic form" in asp("solve", "run.nc", "--out", "again.nc")[1]
+    assert load_run("again.nc").notes == first.notes
 
 
 def test_set_changes_the_case(asp):

@@ -274,6 +274,14 @@ def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
     assert run_like().case.text in single.text
 
 
+def test_what_is_left_out_follows_what_the_run_took():
+    thinning = CASE.replace('law = "newtonian"', 'law = "ree-eyring", tau0 = "5 MPa"')
+    assert thinning != CASE
+    assert "Newtonian." not in Page(page.render_page([run_like(thinning)])).text
+    line = CASE.replace("[vibration]", '[vibration]\nstiffness_law = "hertz-line"\nrate = "150 kHz"')
+    assert "Stiffness of a sphere" not in Page(page.render_page([run_like(line)])).text
+
+
 def test_silent_dry_and_deaf_runs_have_a_page_too():
     smooth = CASE.replace('kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', 'kind = "flat"')
     silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))

@@ -87,7 +87,7 @@ def solve_contact(
         most, tolerance = min(options.max_iterations, MOST_COARSE_ITERATIONS), max(COARSE_TOLERANCE, options.tolerance)
         for problem in levels[:0:-1]:
             step = level(problem, pressure, approach, tolerance, most)
-            if problem is levels[-1] and not _settled(history[-1], FAR_OFF):
+            if problem is levels[-1] and most == MOST_COARSE_ITERATIONS and not _settled(history[-1], FAR_OFF):
                 # a capped contact answers its approach too unevenly for Newton: hold the bodies, search from outside
                 guess = first_guess(problem, conditions, lubricant, scales)
                 found = find_approach(problem, *guess, held)

@@ -22,7 +22,7 @@ from asperity.coupling import VibrationModel
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import BadInput
-from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant, Newtonian
 from asperity.report import figures
 
 if TYPE_CHECKING:
@@ -87,6 +87,11 @@ def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
         numbers=[quantity.row(scalars) for quantity in QUANTITIES],
         conditions=_side_by_side([_conditions(run) for run in runs]),
         lubricated=any(run.solution.lubricant is not None for run in runs),
+        newtonian=any(
+            run.solution.lubricant and isinstance(run.solution.lubricant.rheology, Newtonian) for run in runs
+        ),
+        sphere=any(run.case.vibration and run.case.vibration.stiffness_law == "hertz-point" for run in runs),
+        line=any(run.solution.conditions.geometry == "line" for run in runs),
         imbalance=_span([one["mass_flux_imbalance"] for one in scalars]),
         paper=PAPER,
     )
