@@ -401,6 +401,25 @@ def dry_full_load(conditions: ContactConditions, sq: float) -> ContactState:
     )
 
 
+def require_sampling(conditions: ContactConditions, model: VibrationModel, sq: float) -> float:
+    """The full-load resonance [Hz] of a contact with roughness `sq` [m], where the model samples it finely enough.
+
+    Needs no solved contact, so that it can be asked before one is solved. Raises BadInput for a sampling rate below
+    `samples_per_period` times that resonance.
+    """
+    # a tangent stiffness belongs to its own load share; with all load on asperities the contact is smooth and dry
+    smooth = "hertz-line" if conditions.geometry == "line" else "hertz-point"
+    whole = replace(model, stiffness_law=smooth) if model.stiffness_law == "tangent" else model
+    spring = _loaded_oscillator(1.0, dry_full_load(conditions, sq), conditions, whole)
+    slowest = model.samples_per_period * spring.natural_frequency_hz
+    if model.rate_hz < slowest:
+        raise BadInput(
+            f"vibration sampling rate must be at least {model.samples_per_period:g} times the full-load resonance of "
+            f"{spring.natural_frequency_hz:.0f} Hz, got {model.rate_hz:g} Hz; raise it to {np.ceil(slowest):.0f} Hz"
+        )
+    return spring.natural_frequency_hz
+
+
 def contact_vibration(
     state: ContactState,
     conditions: ContactConditions,
@@ -422,16 +441,7 @@ def contact_vibration(
         `excitation` and its records refuse.
     """
     asperities_alone = model.stiffness_law in ASPERITIES_ALONE
-    # a tangent stiffness belongs to its own load share; with all load on asperities the contact is smooth and dry
-    smooth = "hertz-line" if conditions.geometry == "line" else "hertz-point"
-    whole = replace(model, stiffness_law=smooth) if model.stiffness_law == "tangent" else model
-    full_load_crf_hz = _loaded_oscillator(1.0, state, conditions, whole).natural_frequency_hz
-    slowest = model.samples_per_period * full_load_crf_hz
-    if model.rate_hz < slowest:
-        raise BadInput(
-            f"vibration sampling rate must be at least {model.samples_per_period:g} times the full-load resonance of "
-            f"{full_load_crf_hz:.0f} Hz, got {model.rate_hz:g} Hz; raise it to {np.ceil(slowest):.0f} Hz"
-        )
+    full_load_crf_hz = require_sampling(conditions, model, state.sq)
     silence = _why_silent(state, model)
     spring = None
     if silence is None:

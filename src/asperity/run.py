@@ -11,7 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from asperity.case import Case, load_case
-from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load, needs_solution
+from asperity.coupling import (
+    LINEAR_UP_TO,
+    Vibration,
+    contact_vibration,
+    dry_full_load,
+    needs_solution,
+    require_sampling,
+)
 from asperity.ehl.solution import ContactSolution, Iteration
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, contact_state
@@ -131,11 +138,15 @@ def solve_case(
                 "make it on case.grid"
             )
         case = replace(case, stored=surface)
+    roughness = case.surface()
+    if case.vibration is not None:
+        with case.naming("vibration"):
+            require_sampling(case.conditions, case.vibration, roughness.sq)  # before the time a solution takes
     notes = (*case.surface_notes, *case.notes)
     kept = {"case": case.text, "notes": json.dumps(notes)}
     try:
         solution = solve_contact(
-            case.conditions, case.lubricant, case.surface(), options=case.options, progress=progress, strict=strict
+            case.conditions, case.lubricant, roughness, options=case.options, progress=progress, strict=strict
         )
     except NotConverged as unfinished:
         raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None

@@ -249,6 +249,12 @@ def test_several_runs_are_drawn_against_roughness(single, several):
     assert "20.0 % to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
 
 
+def test_runs_of_one_roughness_are_not_drawn_against_it():
+    shown = Page(page.render_page([run_like(), run_like()]))
+    assert not any("Load and area share of asperities" in unquote(image["src"]) for image in shown.images())
+    assert "2 runs, Sq 1.25 µm" in shown.text
+
+
 def test_page_can_be_read_without_seeing_it(several):
     assert ("html", {"lang": "en"}) in several.tags
     assert all(len(image["alt"]) > 30 for image in several.images())

@@ -83,7 +83,7 @@ def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
         title=title or _title(scalars),
         version=version("asperity"),
         runs=[_RunView(run, label, f"run-{n}") for n, (run, label) in enumerate(zip(runs, labels, strict=True), 1)],
-        overview=_overview(runs, scalars) if len(runs) > 1 else [],
+        overview=_overview(runs, scalars) if len({run.state.sq for run in runs}) > 1 else [],
         numbers=[quantity.row(scalars) for quantity in QUANTITIES],
         conditions=_side_by_side([_conditions(run) for run in runs]),
         lubricated=any(run.solution.lubricant is not None for run in runs),
@@ -386,9 +386,9 @@ def _labels(scalars: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _title(scalars: Sequence[Mapping[str, Any]]) -> str:
     rough = [one["sq_m"] * 1e6 for one in scalars]
-    if len(rough) == 1:
-        return f"Rough lubricated contact, Sq {rough[0]:.2f} µm"
-    return f"Rough lubricated contact: {len(rough)} runs, Sq {min(rough):.2f} to {max(rough):.2f} µm"
+    low, high = f"{min(rough):.2f}", f"{max(rough):.2f}"
+    heights = f"Sq {low} µm" if low == high else f"Sq {low} to {high} µm"
+    return f"Rough lubricated contact{f': {len(rough)} runs' if len(rough) > 1 else ''}, {heights}"
 
 
 def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> list[_Picture]:
