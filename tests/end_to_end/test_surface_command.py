@@ -43,6 +43,19 @@ def test_a_profile_has_profile_parameters_and_a_figure(asp):
     assert found["profile"]["rsm_m"] == pytest.approx(2.0 * np.pi * 9 * 0.1e-6, rel=0.01)
 
 
+def test_good_surfaces_are_shown_beside_a_bad_one(asp):
+    code, out, err = asp("surface", "ground.x3p", "missing.x3p", "line.csv")
+    assert code == 2
+    assert out.startswith("ground.x3p: Sq 0.3")
+    assert "missing.x3p" in err
+    assert "--unit um --lateral-unit mm" in err  # line.csv
+    assert err.count("\n") == 1
+    code, out, err = asp("surface", "ground.x3p", "missing.x3p", "--json")
+    said = json.loads(out)
+    assert [one["file"] for one in said["files"] + said["refused"]] == ["ground.x3p", "missing.x3p"]
+    assert said["refused"][0]["reason"] in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

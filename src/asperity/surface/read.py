@@ -147,7 +147,10 @@ def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str |
             raise BadInput(f"{name} states its own unit, {stated}; leave out unit and lateral_unit")
         return metres(stated), metres(stated)
     if unit is None or lateral_unit is None:
-        raise BadInput(f"{name} names no units; give unit (of the heights) and lateral_unit, such as um and mm")
+        raise BadInput(
+            f"{name} names no units; give unit (of the heights) and lateral_unit, such as "
+            "--unit um --lateral-unit mm, or surface.unit in a case"
+        )
     return metres(unit), metres(lateral_unit)
 
 

@@ -1,0 +1,159 @@
+"""`asperity demo`, `solve` and `report`: contacts from case file to page."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from asperity.cli.app import AsJson, Quiet, app
+from asperity.cli.common import (
+    chosen_case,
+    make_folder,
+    print_json,
+    print_rows,
+    require_output,
+    save_report,
+    solve_shown,
+    write_text,
+)
+from asperity.errors import AsperityError
+
+if TYPE_CHECKING:
+    from asperity.run import Run
+
+DEMO_SQ = ("0.5 um", "1.5 um", "3 um")
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for the case, the runs and the report.")] = Path("asperity-demo"),
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Solve the paper's contact at a few roughness levels, from case file to report."""
+    from importlib.resources import files
+
+    from asperity.case import load_case
+
+    make_folder(out)
+    case_file, report_file = out / "paper.toml", out / "report.html"
+    write_text(case_file, files("asperity").joinpath("paper.toml").read_text("utf-8"))
+    case = load_case(case_file)
+    runs = []
+    for sq in DEMO_SQ:
+        run = solve_shown(case.with_overrides({"surface.sq": sq}), label=f"Sq {sq}", quiet=quiet)
+        run.save(out / f"run-sq-{sq.replace(' ', '')}.nc")
+        runs.append(run)
+    save_report(runs, report_file)
+    first, last = runs[0], runs[-1]
+    less, more = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
+    verdict = (
+        f"From Sq {DEMO_SQ[0]} to {DEMO_SQ[-1]} the asperities' share of the load goes from {less} to {more}: "
+        f"{first.resonance_in_words()} at first, {last.resonance_in_words()} at last."
+    )
+    unfinished = [sq for sq, run in zip(DEMO_SQ, runs, strict=True) if not run.solution.convergence.converged]
+    if unfinished:
+        verdict = f"NOT CONVERGED at Sq {', '.join(unfinished)}, do not use: {verdict}"
+    if as_json:
+        print_json({"verdict": verdict, "report": str(report_file), "runs": [run.scalars() for run in runs]})
+    else:
+        print(verdict)
+        if not quiet:
+            print()
+            for sq, run in zip(DEMO_SQ, runs, strict=True):
+                print(f"  Sq {sq:7}{run.verdict()}")
+            print()
+            print(f"Report: {report_file}")
+            print(f"Try next: asperity solve {case_file} --set contact.load='400 N'")
+    if unfinished:
+        raise AsperityError(f"not converged at Sq {', '.join(unfinished)}; the unfinished states are in {out}")
+
+
+@app.command()
+def solve(
+    case: Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a run to solve again.")],
+    surface: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A measured surface in place of the case's own.")
+    ] = None,
+    override: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the case: contact.load='400 N'."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Solve one contact: film, load sharing, contact resonance."""
+    if out is not None:
+        require_output(out, ".nc")
+    run = solve_shown(chosen_case(case, surface, override or []), label=case.name, quiet=quiet)
+    if out is not None:
+        run.save(out)
+    if as_json:
+        print_json(run.scalars())
+    else:
+        print(run.verdict())
+        if not quiet:
+            _print_run(run)
+            if out is not None:
+                print(f"\nKept in {out}; asperity report {out} makes a page of it")
+    if not run.solution.convergence.converged:
+        where = f"; the unfinished state is in {out}" if out is not None else ""
+        raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
+
+
+@app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Runs kept by asperity solve --out.")],
+    out: Annotated[Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make one self-contained HTML page of one run or several."""
+    out = out or (runs[0].with_suffix(".html") if len(runs) == 1 else Path("report.html"))
+    require_output(out, ".html")
+    from asperity.run import load_run
+
+    loaded = [load_run(path) for path in runs]
+    save_report(loaded, out)
+    if as_json:
+        print_json({"report": str(out), "runs": [run.scalars() for run in loaded]})
+        return
+    for run in loaded:
+        print(run.verdict())
+    if not quiet:
+        print(f"\nReport: {out}")
+
+
+def _print_run(run: "Run") -> None:
+    state, convergence = run.state, run.solution.convergence
+    lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
+    rows = [
+        ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
+        ("load on oil at the pressure cap, not in CLR", f"{100 * state.capped_oil_load_ratio:.2f} %"),
+        ("CAR, contact in the Hertz zone", f"{100 * state.car:.2f} %"),
+        ("CAR of the domain, over the Hertz area", f"{100 * state.car_domain:.2f} %"),
+        ("asperities count as touching below", f"{1e9 * run.solution.options.contact_film:g} nm"),
+        ("Sq, composite roughness", f"{1e6 * state.sq:.3f} um"),
+        (
+            "film: least, central, mean",
+            f"{1e6 * state.h_min:.3f}, {1e6 * state.h_central:.3f}, {1e6 * state.h_mean:.3f} um",
+        ),
+        ("lambda, smooth-contact film over Sq", lambda_ratio),
+        ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),
+    ]
+    resonance = None if run.vibration is None else run.vibration.resonance
+    if resonance is not None and resonance.found:
+        rows += [
+            ("CRF, contact resonance", f"{resonance.crf_hz:.1f} ± {resonance.crf_std_hz:.1f} Hz"),
+            ("CRFA, its spectral height", f"{resonance.crfa:.3g} ± {resonance.crfa_std:.2g} (m/s^2)^2/Hz"),
+        ]
+    rows += [
+        ("oil lost or re-created, over oil carried", f"{100 * state.mass_flux_imbalance:.1f} %"),
+        ("load error, Reynolds residual", f"{state.load_error:.1e}, {state.reynolds_residual:.1e}"),
+        ("solver", convergence.explain()),
+    ]
+    print()
+    print_rows(rows)
+    for note in run.notes:
+        print(f"  note: {note}")
