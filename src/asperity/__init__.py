@@ -11,15 +11,32 @@ if TYPE_CHECKING:
     from asperity.case import Case, load_case
     from asperity.conditions import ContactConditions, ElasticPair
     from asperity.coupling import Vibration, VibrationModel, contact_vibration
+    from asperity.ehl.flash import FlashTemperature, flash_temperature
+    from asperity.ehl.friction import Friction, friction
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
     from asperity.ehl.solve import solve_contact
     from asperity.ehl.state import ContactState, contact_state
     from asperity.ehl.stiffness import TangentStiffness, tangent_stiffness
     from asperity.ehl.storage import load_solution
+    from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
     from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack
     from asperity.grid import Grid
-    from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
+    from asperity.lubricant import (
+        BairWiner,
+        Barus,
+        DowsonHigginson,
+        EyringShear,
+        Incompressible,
+        LinearBairWiner,
+        Lubricant,
+        Newtonian,
+        NewtonianShear,
+        ReeEyring,
+        Roelands,
+        Solid,
+        Thermal,
+    )
     from asperity.report import write_report
     from asperity.run import Run, load_run, solve_case
     from asperity.signals import Signal, Spectrum, power_spectrum, smooth
@@ -47,15 +64,32 @@ _NAMES = {
     "case": ("Case", "load_case"),
     "conditions": ("ContactConditions", "ElasticPair"),
     "coupling": ("Vibration", "VibrationModel", "contact_vibration"),
+    "ehl.flash": ("FlashTemperature", "flash_temperature"),
+    "ehl.friction": ("Friction", "friction"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
     "ehl.solve": ("solve_contact",),
     "ehl.state": ("ContactState", "contact_state"),
     "ehl.stiffness": ("TangentStiffness", "tangent_stiffness"),
     "ehl.storage": ("load_solution",),
+    "ehl.thermal": ("friction_and_heat", "solve_thermal_contact"),
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
     "excitation": ("FilteredNoise", "PatchAverage", "SurfaceTrack"),
     "grid": ("Grid",),
-    "lubricant": ("Barus", "DowsonHigginson", "Incompressible", "Lubricant", "Newtonian", "ReeEyring", "Roelands"),
+    "lubricant": (
+        "BairWiner",
+        "Barus",
+        "DowsonHigginson",
+        "EyringShear",
+        "Incompressible",
+        "LinearBairWiner",
+        "Lubricant",
+        "Newtonian",
+        "NewtonianShear",
+        "ReeEyring",
+        "Roelands",
+        "Solid",
+        "Thermal",
+    ),
     "report": ("write_report",),
     "run": ("Run", "load_run", "solve_case"),
     "signals": ("Signal", "Spectrum", "power_spectrum", "smooth"),
@@ -84,6 +118,7 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = [
     "AsperityError",
     "BadInput",
+    "BairWiner",
     "Barus",
     "Case",
     "CompositeSurface",
@@ -94,12 +129,17 @@ __all__ = [
     "Convergence",
     "DowsonHigginson",
     "ElasticPair",
+    "EyringShear",
     "FilteredNoise",
+    "FlashTemperature",
+    "Friction",
     "Grid",
     "Incompressible",
     "Iteration",
+    "LinearBairWiner",
     "Lubricant",
     "Newtonian",
+    "NewtonianShear",
     "NotConverged",
     "Options",
     "PatchAverage",
@@ -109,12 +149,14 @@ __all__ = [
     "Roelands",
     "Run",
     "Signal",
+    "Solid",
     "Spectrum",
     "Status",
     "Surface",
     "SurfaceParameters",
     "SurfaceTrack",
     "TangentStiffness",
+    "Thermal",
     "UnreadableFile",
     "Vibration",
     "VibrationModel",
@@ -123,7 +165,10 @@ __all__ = [
     "contact_state",
     "contact_vibration",
     "expected_spectrum",
+    "flash_temperature",
     "flat_surface",
+    "friction",
+    "friction_and_heat",
     "gaussian_surface",
     "ground_surface",
     "load_case",
@@ -141,6 +186,7 @@ __all__ = [
     "smooth",
     "solve_case",
     "solve_contact",
+    "solve_thermal_contact",
     "surface_parameters",
     "tangent_stiffness",
     "write_report",

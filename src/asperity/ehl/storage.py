@@ -17,14 +17,19 @@ from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
-from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
     import xarray
 
 FORMAT = 1  # counts up when a reader of the format before could not read the file
-_LAWS: dict[str, dict[str, Any]] = {"viscosity": VISCOSITY_LAWS, "density": DENSITY_LAWS, "rheology": RHEOLOGY_LAWS}
+_LAWS: dict[str, dict[str, Any]] = {
+    "viscosity": VISCOSITY_LAWS,
+    "density": DENSITY_LAWS,
+    "rheology": RHEOLOGY_LAWS,
+    "friction": FRICTION_LAWS,
+}
 _OWN = (
     "Conventions",
     "title",
