@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from asperity.ehl.state import ContactState, contact_state
     from asperity.ehl.stiffness import TangentStiffness, tangent_stiffness
     from asperity.ehl.storage import load_solution
+    from asperity.ehl.stress import StressTensor, SubsurfaceStress, subsurface_stress
     from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
     from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack
@@ -71,6 +72,7 @@ _NAMES = {
     "ehl.state": ("ContactState", "contact_state"),
     "ehl.stiffness": ("TangentStiffness", "tangent_stiffness"),
     "ehl.storage": ("load_solution",),
+    "ehl.stress": ("StressTensor", "SubsurfaceStress", "subsurface_stress"),
     "ehl.thermal": ("friction_and_heat", "solve_thermal_contact"),
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
     "excitation": ("FilteredNoise", "PatchAverage", "SurfaceTrack"),
@@ -152,6 +154,8 @@ __all__ = [
     "Solid",
     "Spectrum",
     "Status",
+    "StressTensor",
+    "SubsurfaceStress",
     "Surface",
     "SurfaceParameters",
     "SurfaceTrack",
@@ -187,6 +191,7 @@ __all__ = [
     "solve_case",
     "solve_contact",
     "solve_thermal_contact",
+    "subsurface_stress",
     "surface_parameters",
     "tangent_stiffness",
     "write_report",
