@@ -20,9 +20,9 @@ from asperity.coupling import (
     require_sampling,
 )
 from asperity.ehl.solution import ContactSolution, Iteration
-from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, contact_state
 from asperity.ehl.storage import load_solution
+from asperity.ehl.thermal import solve_thermal_contact
 from asperity.errors import BadInput, NotConverged, UnreadableFile
 from asperity.surface import Surface
 
@@ -145,8 +145,15 @@ def solve_case(
     notes = (*case.surface_notes, *case.notes)
     kept = {"case": case.text, "notes": json.dumps(notes)}
     try:
-        solution = solve_contact(
-            case.conditions, case.lubricant, roughness, options=case.options, progress=progress, strict=strict
+        solution = solve_thermal_contact(
+            case.conditions,
+            case.lubricant,
+            roughness,
+            boundary_friction=case.boundary_friction,
+            thermal=case.thermal,
+            options=case.options,
+            progress=progress,
+            strict=strict,
         )
     except NotConverged as unfinished:
         raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None

@@ -98,17 +98,19 @@ class LinearBairWiner:
 
     tau_l0: float  # limiting stress at ambient pressure [Pa]
     slope: float  # ξ
-    softening: float = 0.0  # b [1/K]
+    softening: float | None = None  # b [1/K]; None: 0
     ratio: float = 0.25  # τ_L over G
 
     def __post_init__(self) -> None:
         require_positive("limiting stress tau_l0", self.tau_l0, "Pa")
         require_positive("slope of the limiting stress", self.slope)
+        if self.softening is not None:
+            require_positive("softening of the limiting stress", self.softening, "1/K")
         require_positive("ratio of limiting stress to modulus", self.ratio)
 
     def limits(self, pressure: Field, temperature: Field) -> tuple[Field, Field]:
         """τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""
-        softer = np.exp(-self.softening * (temperature - FREEZING - 40.0))
+        softer = np.exp(-(self.softening or 0.0) * (temperature - FREEZING - 40.0))
         limit = (self.tau_l0 + self.slope * pressure) * softer
         return limit, limit / self.ratio
 
