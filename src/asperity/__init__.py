@@ -38,9 +38,10 @@ if TYPE_CHECKING:
         Solid,
         Thermal,
     )
+    from asperity.recording import Recording, check_recording, open_recording, read_recording
     from asperity.report import write_report
     from asperity.run import Run, load_run, solve_case
-    from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+    from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
     from asperity.surface import (
         CompositeSurface,
         ProfileParameters,
@@ -92,9 +93,10 @@ _NAMES = {
         "Solid",
         "Thermal",
     ),
+    "recording": ("Recording", "check_recording", "open_recording", "read_recording"),
     "report": ("write_report",),
     "run": ("Run", "load_run", "solve_case"),
-    "signals": ("Signal", "Spectrum", "power_spectrum", "smooth"),
+    "signals": ("Signal", "Spectrum", "averaged_spectrum", "power_spectrum", "smooth"),
     "surface": (
         "CompositeSurface",
         "ProfileParameters",
@@ -146,6 +148,7 @@ __all__ = [
     "Options",
     "PatchAverage",
     "ProfileParameters",
+    "Recording",
     "ReeEyring",
     "Resonance",
     "Roelands",
@@ -165,6 +168,8 @@ __all__ = [
     "Vibration",
     "VibrationModel",
     "acceleration",
+    "averaged_spectrum",
+    "check_recording",
     "contact_resonance",
     "contact_state",
     "contact_vibration",
@@ -180,9 +185,11 @@ __all__ = [
     "load_solution",
     "motion",
     "non_gaussian_surface",
+    "open_recording",
     "power_spectrum",
     "prepare_surface",
     "profile_parameters",
+    "read_recording",
     "read_surface",
     "run_in_surface",
     "sandblasted_surface",
