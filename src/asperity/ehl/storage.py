@@ -122,7 +122,12 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
 
 
 def save_solution(solution: ContactSolution, path: str | Path) -> Path:
-    """Write a solution as netCDF, whole or not at all, and return the path.
+    """Write a solution as netCDF, whole or not at all, and return the path; raises what `save_dataset` does."""
+    return save_dataset(solution_to_dataset(solution), path)
+
+
+def save_dataset(dataset: "xarray.Dataset", path: str | Path) -> Path:
+    """Write a solution's dataset, with whatever was added to it, as netCDF, whole or not at all; return the path.
 
     Raises
     ------
@@ -132,11 +137,11 @@ def save_solution(solution: ContactSolution, path: str | Path) -> Path:
         if writing fails half way, as on a full disk; nothing is left behind then.
     """
     path = Path(path)
-    dataset = solution_to_dataset(solution)
     checked = {"zlib": True, "complevel": 1, "shuffle": True}  # zlib's checksum tells a flipped bit on reading
     encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in dataset.variables}
-    for name in {*_FIELDS, _FACTOR, "in_contact"} & set(encoding):
-        encoding[name] |= checked
+    for name, variable in dataset.variables.items():
+        if variable.ndim == 2:
+            encoding[str(name)] |= checked
     with whole_file(path) as part:
         dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
     return path
