@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     )
     from asperity.recording import Recording, check_recording, open_recording, read_recording
     from asperity.report import write_report
+    from asperity.rig import Disturbance, Rig, RigRecording, simulate_rig
     from asperity.run import Run, load_run, solve_case
     from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
     from asperity.surface import (
@@ -61,6 +62,9 @@ if TYPE_CHECKING:
     )
     from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
     from asperity.wear.indicators import Resonance, contact_resonance
+    from asperity.wear.series import series_resonances
+    from asperity.wear.stages import Stages, split_stages
+    from asperity.wear.trend import Alarm, Facts, LoadShare, alarm, consistency, load_share
 
 _NAMES = {
     "case": ("Case", "load_case"),
@@ -95,6 +99,7 @@ _NAMES = {
     ),
     "recording": ("Recording", "check_recording", "open_recording", "read_recording"),
     "report": ("write_report",),
+    "rig": ("Disturbance", "Rig", "RigRecording", "simulate_rig"),
     "run": ("Run", "load_run", "solve_case"),
     "signals": ("Signal", "Spectrum", "averaged_spectrum", "power_spectrum", "smooth"),
     "surface": (
@@ -116,10 +121,14 @@ _NAMES = {
     ),
     "vibration": ("ContactOscillator", "acceleration", "expected_spectrum", "motion"),
     "wear.indicators": ("Resonance", "contact_resonance"),
+    "wear.series": ("series_resonances",),
+    "wear.stages": ("Stages", "split_stages"),
+    "wear.trend": ("Alarm", "Facts", "LoadShare", "alarm", "consistency", "load_share"),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
+    "Alarm",
     "AsperityError",
     "BadInput",
     "BairWiner",
@@ -131,9 +140,11 @@ __all__ = [
     "ContactSolution",
     "ContactState",
     "Convergence",
+    "Disturbance",
     "DowsonHigginson",
     "ElasticPair",
     "EyringShear",
+    "Facts",
     "FilteredNoise",
     "FlashTemperature",
     "Friction",
@@ -141,6 +152,7 @@ __all__ = [
     "Incompressible",
     "Iteration",
     "LinearBairWiner",
+    "LoadShare",
     "Lubricant",
     "Newtonian",
     "NewtonianShear",
@@ -151,11 +163,14 @@ __all__ = [
     "Recording",
     "ReeEyring",
     "Resonance",
+    "Rig",
+    "RigRecording",
     "Roelands",
     "Run",
     "Signal",
     "Solid",
     "Spectrum",
+    "Stages",
     "Status",
     "StressTensor",
     "SubsurfaceStress",
@@ -168,8 +183,10 @@ __all__ = [
     "Vibration",
     "VibrationModel",
     "acceleration",
+    "alarm",
     "averaged_spectrum",
     "check_recording",
+    "consistency",
     "contact_resonance",
     "contact_state",
     "contact_vibration",
@@ -182,6 +199,7 @@ __all__ = [
     "ground_surface",
     "load_case",
     "load_run",
+    "load_share",
     "load_solution",
     "motion",
     "non_gaussian_surface",
@@ -194,10 +212,13 @@ __all__ = [
     "run_in_surface",
     "sandblasted_surface",
     "self_affine_surface",
+    "series_resonances",
+    "simulate_rig",
     "smooth",
     "solve_case",
     "solve_contact",
     "solve_thermal_contact",
+    "split_stages",
     "subsurface_stress",
     "surface_parameters",
     "tangent_stiffness",
