@@ -15,10 +15,11 @@ from asperity.conditions import ContactConditions
 from asperity.ehl.influence import COMPONENTS, Tractions
 from asperity.ehl.solution import ContactSolution
 from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.grid import FEWEST_CELLS, Grid
 
 DEPTHS = 16  # where none are given, the surface among them
 DEEPEST = 2.5  # Hertz half-widths
+HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then right to 0.1 %
 REFINEMENTS = 3  # depths looked at between the given ones for the largest stress
 
 
@@ -147,6 +148,18 @@ def subsurface_stress(
         poisson_ratio=solution.conditions.pair.poisson_ratios[body - 1],
         body=body,
     )
+
+
+def hertz_stress(conditions: ContactConditions, depths: Field, *, body: int = 1) -> SubsurfaceStress:
+    """Stresses below the smooth, dry, frictionless contact of the same conditions, on a grid of its own."""
+    line = conditions.geometry == "line"
+    (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS
+    reach = (1.25 * a, a if line else 1.25 * b)
+    grid = Grid((cells, FEWEST_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line))
+    inside = 1.0 - (grid.x[:, None] / a) ** 2 - (0.0 if line else (grid.y / b) ** 2) + np.zeros(grid.cells)
+    pressure = conditions.hertz.p_max * np.sqrt(np.maximum(inside, 0.0))
+    ratio = conditions.pair.poisson_ratios[body - 1]
+    return stress_below(pressure, None, grid, depths, poisson_ratio=ratio, body=body)
 
 
 def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
