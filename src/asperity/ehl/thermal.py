@@ -5,6 +5,7 @@ without it heat is only a result.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,7 +23,7 @@ SETTLED = 1e-3  # change of the film's temperature, over its largest rise
 LEAST_RISE = 1.0  # [K]; below it the change is measured against this
 MOST_ROUNDS = 100
 MOST_SOLVES = 25
-SLOW = 0.7  # a round that leaves more of the change than this takes half the step from then on
+MEMORY = 5  # rounds that the next guess is mixed from
 
 
 def friction_and_heat(
@@ -38,12 +39,11 @@ def friction_and_heat(
         if friction and temperature do not settle.
     """
     thermal = thermal or Thermal()
-    rubbing = friction(solution, boundary_friction=boundary_friction, thermal=thermal)
-    heat = flash_temperature(solution, rubbing, thermal=thermal)
     if not thermal.feedback or solution.lubricant is None:
-        return rubbing, heat
+        rubbing = friction(solution, boundary_friction=boundary_friction, thermal=thermal)
+        return rubbing, flash_temperature(solution, rubbing, thermal=thermal)
     rise: Field = np.zeros(solution.grid.cells)
-    share, before = 1.0, np.inf
+    mixer = Mixer()
     for _ in range(MOST_ROUNDS):
         rubbing = friction(
             solution,
@@ -56,14 +56,39 @@ def friction_and_heat(
         left = float(np.max(np.abs(change)))
         if left < SETTLED * max(heat.film_max_k, LEAST_RISE):
             return rubbing, heat
-        if left > SLOW * before:
-            share *= 0.5
-        before = left
-        rise = rise + share * change
+        rise = mixer(rise, change)
     raise AsperityError(
         f"friction and temperature did not settle: {left:.2g} K apart after {MOST_ROUNDS} rounds; "
         "take the feedback of heat out, or a friction law with a limit"
     )
+
+
+class Mixer:
+    """The next guess of a fixed point from the last few: Anderson's method, with half the step after a worse round.
+
+    Source: D. G. Anderson, J. ACM 12 (1965) 547.
+    """
+
+    def __init__(self) -> None:
+        self.share, self.before = 1.0, np.inf
+        self.guesses: list[Field] = []
+        self.changes: list[Field] = []
+
+    def __call__(self, guess: Field, change: Field) -> Field:
+        """A better guess than `guess`, which the iteration would change by `change`."""
+        left = float(np.linalg.norm(change))
+        if left > self.before:
+            self.share = max(0.5 * self.share, 0.05)
+            self.guesses, self.changes = [], []
+        self.before = left
+        self.guesses = [*self.guesses[-MEMORY:], guess]
+        self.changes = [*self.changes[-MEMORY:], change]
+        if len(self.guesses) == 1:
+            return np.asarray(guess + self.share * change)
+        guesses = np.stack([(new - old).ravel() for old, new in pairwise(self.guesses)], axis=1)
+        changes = np.stack([(new - old).ravel() for old, new in pairwise(self.changes)], axis=1)
+        weights = np.linalg.lstsq(changes, change.ravel(), rcond=1e-10)[0]
+        return guess + self.share * change - ((guesses + self.share * changes) @ weights).reshape(guess.shape)
 
 
 def solve_thermal_contact(
