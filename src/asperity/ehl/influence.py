@@ -103,6 +103,12 @@ def _influence(
 _kept_influence = lru_cache(maxsize=32)(_influence)
 
 
+def clear_kernels() -> None:
+    """Forget the kernels kept so far: 100 MB after one contact of 256 x 256 cells that does not repeat."""
+    _kept_influence.cache_clear()
+    _below_surface.cache_clear()
+
+
 # Loaded rectangles and strips ----------------------------------------------------------------------------------------
 
 

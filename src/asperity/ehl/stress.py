@@ -20,7 +20,8 @@ from asperity.grid import FEWEST_CELLS, Grid
 DEPTHS = 16  # where none are given, the surface among them
 DEEPEST = 2.5  # Hertz half-widths
 HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then right to 0.1 %
-REFINEMENTS = 3  # depths looked at between the given ones for the largest stress
+REFINEMENTS = 3  # depths looked at between the given ones for the largest stress, at most
+CLOSE = 0.001  # depths nearer to one another than twice this share are not told apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,5 +250,7 @@ def _largest(levels: _Levels, measure: int, look: Callable[[float], Field]) -> P
         if left == right:  # level
             break
         vertex = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+        if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < CLOSE:
+            break
         look(float(np.exp(vertex) - shift))
     return max((level[measure] for level in levels.values()), key=lambda peak: peak.value)
