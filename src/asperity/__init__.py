@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     )
     from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
     from asperity.wear.indicators import Resonance, contact_resonance
+    from asperity.wear.lines import CleanSpectrum, remove_lines
     from asperity.wear.series import series_resonances
     from asperity.wear.stages import Stages, split_stages
     from asperity.wear.trend import Alarm, Facts, LoadShare, alarm, consistency, load_share
@@ -121,6 +122,7 @@ _NAMES = {
     ),
     "vibration": ("ContactOscillator", "acceleration", "expected_spectrum", "motion"),
     "wear.indicators": ("Resonance", "contact_resonance"),
+    "wear.lines": ("CleanSpectrum", "remove_lines"),
     "wear.series": ("series_resonances",),
     "wear.stages": ("Stages", "split_stages"),
     "wear.trend": ("Alarm", "Facts", "LoadShare", "alarm", "consistency", "load_share"),
@@ -134,6 +136,7 @@ __all__ = [
     "BairWiner",
     "Barus",
     "Case",
+    "CleanSpectrum",
     "CompositeSurface",
     "ContactConditions",
     "ContactOscillator",
@@ -209,6 +212,7 @@ __all__ = [
     "profile_parameters",
     "read_recording",
     "read_surface",
+    "remove_lines",
     "run_in_surface",
     "sandblasted_surface",
     "self_affine_surface",

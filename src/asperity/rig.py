@@ -39,6 +39,7 @@ ROLLER_HZ, RING_HZ, MAINS_HZ = 3375.0 / 60.0, 300.0 / 60.0, 50.0
 RING_HARMONICS, MAINS_HARMONICS = 40, 20
 LOWPASS = 0.45  # corner of the anti-aliasing filter over the sampling rate
 MOUNTED_HZ, MOUNTED_DAMPING = 46e3, 0.02  # resonance of the accelerometer on its stud: + 5 % at 10 kHz, as printed
+FLAT_BELOW_HZ = 100.0  # machine noise, which falls with frequency above
 RATE_PER_BAND = 3.0  # sampling rate over the upper end of the search band, at least
 SHORTEST_RECORD = 1000
 GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten times as wide
@@ -416,9 +417,7 @@ def _background(
     power = heights * damping * mode_hz
     power *= shares[0] / max(float(np.sum(power[: disturbance.modes])), np.finfo(float).tiny)
     inside = (frequency >= low) & (frequency <= high)
-    floor = np.zeros(frequency.size)
-    floor[1:] = (frequency[1:] / low) ** -rng.uniform(0.0, 1.5)
-    floor[0] = floor[1]
+    floor = (1.0 + (frequency / FLAT_BELOW_HZ) ** 2) ** (-0.5 * rng.uniform(0.0, 1.5))
     floor *= shares[1] / (float(np.sum(floor[inside])) * GRID_HZ)
 
     roller = np.arange(1.0, np.floor(0.8 * frequency[-1] / ROLLER_HZ))

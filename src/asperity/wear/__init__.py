@@ -1,6 +1,7 @@
 """What vibration spectra say about wear: contact-resonance indicators, their series, stages and alarms."""
 
 from asperity.wear.indicators import INDICATOR_METHODS, Resonance, contact_resonance, no_resonance
+from asperity.wear.lines import CleanSpectrum, Line, remove_lines
 from asperity.wear.series import series_resonances
 from asperity.wear.stages import Stages, split_stages
 from asperity.wear.trend import Alarm, Facts, LoadShare, alarm, consistency, load_share
@@ -8,7 +9,9 @@ from asperity.wear.trend import Alarm, Facts, LoadShare, alarm, consistency, loa
 __all__ = [
     "INDICATOR_METHODS",
     "Alarm",
+    "CleanSpectrum",
     "Facts",
+    "Line",
     "LoadShare",
     "Resonance",
     "Stages",
@@ -17,6 +20,7 @@ __all__ = [
     "contact_resonance",
     "load_share",
     "no_resonance",
+    "remove_lines",
     "series_resonances",
     "split_stages",
 ]
