@@ -120,6 +120,22 @@ def test_the_peak_between_depths_hardly_depends_on_the_depths():
     assert peaks[0].peak.depth not in peaks[0].depths
 
 
+def test_the_core_is_what_lies_below_a_depth():
+    grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
+    pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
+    depths = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 12)])
+    stress = stress_below(pressure, 0.4 * pressure, grid, depths, poisson_ratio=0.3)
+    assert stress.peak.depth == 0.0
+    assert stress.peak_below(0.0) == stress.peak
+    for depth in (0.25, 1.0):
+        core = stress.peak_below(depth)
+        fine = [stress.at(z).von_mises.max() for z in np.linspace(depth, 3.0, 60)]
+        assert core.value == pytest.approx(max(fine), rel=1e-3)
+        assert core.depth >= depth
+    with pytest.raises(BadInput, match="at most 3 m"):
+        stress.peak_below(4.0)
+
+
 def test_maps_and_section_are_of_the_same_stresses():
     generator = np.random.default_rng(8)
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0))

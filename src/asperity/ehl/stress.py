@@ -19,6 +19,7 @@ from asperity.grid import FEWEST_CELLS, Grid
 
 DEPTHS = 16  # where none are given, the surface among them
 DEEPEST = 2.5  # Hertz half-widths
+CORE = 0.1  # Hertz half-widths below which the cell size has no say
 HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then right to 0.1 %
 REFINEMENTS = 3  # depths looked at between the given ones for the largest stress, at most
 CLOSE = 0.001  # depths nearer to one another than twice this share are not told apart
@@ -107,6 +108,32 @@ class SubsurfaceStress:
         levels = [self.tractions.stresses(float(depth), self.poisson_ratio)[:, :, self.row] for depth in self.depths]
         return StressTensor(*np.stack(levels, axis=-1))
 
+    def peak_below(self, depth: float) -> Peak:
+        """The largest von Mises stress `depth` [m] below the surface or deeper.
+
+        A rough, sliding contact needs this beside `peak`: where pressure and traction end suddenly, as at the edge of a
+        capped asperity, the stress on the surface has no bound but the cell size.
+
+        Raises
+        ------
+        BadInput
+            for a depth above the surface or below the deepest of `depths`.
+        """
+        (checked,) = _checked_depths(np.array([depth]))
+        if checked > self.depths[-1]:
+            raise BadInput(f"depth must be at most {self.depths[-1]:.3g} m, the deepest looked at, got {depth:.3g} m")
+        levels: _Levels = {}
+
+        def look(level: float) -> None:
+            tensor = self.at(level)
+            levels[level] = _peaks(tensor, tensor.von_mises, level, self.grid)
+
+        look(float(checked))
+        for k in np.flatnonzero(self.depths > checked):
+            peak = _peak(self.von_mises[..., k], float(self.depths[k]), self.grid)
+            levels[float(self.depths[k])] = (peak, peak)
+        return _largest(levels, 0, look)
+
     def at(self, depth: float) -> StressTensor:
         """The whole tensor at any depth [m], 0 included, shape (nx, ny).
 
@@ -163,12 +190,21 @@ def hertz_stress(conditions: ContactConditions, depths: Field, *, body: int = 1)
     return stress_below(pressure, None, grid, depths, poisson_ratio=ratio, body=body)
 
 
+def core_peak(stress: SubsurfaceStress, conditions: ContactConditions) -> Peak:
+    """The largest von Mises stress a tenth of the (smaller) half-width deep or deeper: it hardly knows the grid."""
+    return stress.peak_below(min(CORE * _half_width(conditions), float(stress.depths[-1])))
+
+
+def _half_width(conditions: ContactConditions) -> float:
+    widths = conditions.hertz.half_widths
+    return widths[0] if conditions.geometry == "line" else min(widths)
+
+
 def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
     """The surface, and 15 depths from half the smaller cell side to 2.5 (smaller) half-widths, in equal ratios [m]."""
-    widths = conditions.hertz.half_widths
-    half_width = widths[0] if conditions.geometry == "line" else min(widths)
     first = 0.5 * min(grid.spacing)
-    return np.concatenate([[0.0], np.geomspace(first, max(DEEPEST * half_width, 10.0 * first), DEPTHS - 1)])
+    last = max(DEEPEST * _half_width(conditions), 10.0 * first)
+    return np.concatenate([[0.0], np.geomspace(first, last, DEPTHS - 1)])
 
 
 def stress_below(
@@ -234,7 +270,7 @@ def _peak(stress: Field, depth: float, grid: Grid) -> Peak:
     return Peak(float(stress[i, j]), depth, float(grid.x[i]), float(grid.y[j]))
 
 
-def _largest(levels: _Levels, measure: int, look: Callable[[float], Field]) -> Peak:
+def _largest(levels: _Levels, measure: int, look: Callable[[float], object]) -> Peak:
     """The largest of a measure, sought between depths too: parabolas through the highest and its neighbours."""
     for _ in range(REFINEMENTS):
         depths = sorted(levels)
