@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from asperity.case import Case, load_case
     from asperity.conditions import ContactConditions, ElasticPair
     from asperity.coupling import Vibration, VibrationModel, contact_vibration
+    from asperity.curves import FrictionCurve, stribeck_curve, traction_curve
     from asperity.ehl.flash import FlashTemperature, flash_temperature
     from asperity.ehl.friction import Friction, friction
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
@@ -71,6 +72,7 @@ _NAMES = {
     "case": ("Case", "load_case"),
     "conditions": ("ContactConditions", "ElasticPair"),
     "coupling": ("Vibration", "VibrationModel", "contact_vibration"),
+    "curves": ("FrictionCurve", "stribeck_curve", "traction_curve"),
     "ehl.flash": ("FlashTemperature", "flash_temperature"),
     "ehl.friction": ("Friction", "friction"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
@@ -151,6 +153,7 @@ __all__ = [
     "FilteredNoise",
     "FlashTemperature",
     "Friction",
+    "FrictionCurve",
     "Grid",
     "Incompressible",
     "Iteration",
@@ -223,9 +226,11 @@ __all__ = [
     "solve_contact",
     "solve_thermal_contact",
     "split_stages",
+    "stribeck_curve",
     "subsurface_stress",
     "surface_parameters",
     "tangent_stiffness",
+    "traction_curve",
     "write_report",
 ]
 
