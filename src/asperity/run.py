@@ -28,7 +28,7 @@ from asperity.ehl.friction import Friction
 from asperity.ehl.solution import ContactSolution, Iteration
 from asperity.ehl.state import ContactState, contact_state
 from asperity.ehl.storage import load_solution, save_dataset
-from asperity.ehl.stress import Peak, SubsurfaceStress, core_peak, subsurface_stress
+from asperity.ehl.stress import SubsurfaceStress, subsurface_stress
 from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.surface import Surface
@@ -86,11 +86,6 @@ class Run:
         """Stresses in body 1 under the solved pressure and friction's traction."""
         return subsurface_stress(self.solution, shear=None if self.friction is None else self.friction.shear)
 
-    @cached_property
-    def core_stress(self) -> Peak:
-        """The largest von Mises stress a tenth of the half-width deep or deeper, in body 1."""
-        return core_peak(self.stress, self.case.conditions)
-
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its name in `asperity solve --json`, SI; None where there is none."""
         state, convergence = self.state, self.solution.convergence
@@ -116,8 +111,8 @@ class Run:
             "film_temperature_max_k": None if heat is None else heat.film_max_k,
             "von_mises_max_pa": stress.peak.value,
             "von_mises_depth_m": stress.peak.depth,
-            "von_mises_core_pa": self.core_stress.value,
-            "von_mises_core_depth_m": self.core_stress.depth,
+            "von_mises_core_pa": stress.core.value,
+            "von_mises_core_depth_m": stress.core.depth,
             "shear_stress_max_pa": stress.shear_peak.value,
             "shear_stress_depth_m": stress.shear_peak.depth,
             "converged": convergence.converged,

@@ -127,7 +127,7 @@ def report(
 
 def _print_run(run: "Run") -> None:
     state, convergence = run.state, run.solution.convergence
-    peak, core = run.stress.peak, run.core_stress
+    peak, core = run.stress.peak, run.stress.core
     lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
     rows = [
         ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
