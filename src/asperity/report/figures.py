@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
@@ -125,11 +126,11 @@ def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
         axes.plot(a * np.cos(turn), b * np.sin(turn), **style)
 
 
-def colour_bar(figure: Figure, axes: Axes, image: AxesImage, label: str, extend: str = "neither") -> None:
+def colour_bar(figure: Figure, axes: Axes, image: AxesImage, label: str, extend: str = "neither") -> Colorbar:
     """A key to the colours, below the map."""
     box, total = axes.get_position(), figure.get_size_inches()[1]
     place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
-    figure.colorbar(image, cax=place, orientation="horizontal", label=label, extend=extend)
+    return figure.colorbar(image, cax=place, orientation="horizontal", label=label, extend=extend)
 
 
 @styled()

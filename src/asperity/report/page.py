@@ -422,7 +422,7 @@ def _stress_pictures(run: "Run") -> list[Picture]:
     return [
         picture(
             rubbing_figures.stress_map(solution, stress),
-            "The largest von Mises stress below each cell, of the surface and fifteen depths in body 1. Pressure and "
+            "The largest von Mises stress below each cell, of sixteen depths in body 1. Pressure and "
             "friction load an elastic, smooth half-space: above its yield stress the material would flow.",
             f"Map of the largest von Mises stress below the surface: {peak}.",
         ),

@@ -40,11 +40,13 @@ def traction_map(solution: ContactSolution, rubbing: Friction) -> Figure:
     """Shear stress on the surfaces; colours go with its root, or the oil's could not be seen beside the asperities'."""
     figure, axes = map_figure(solution.grid.extent)
     values = np.abs(rubbing.shear) * MEGA
-    norm = PowerNorm(0.5, 0.0, float(values.max()) or 1.0)
+    top = float(values.max()) or 1.0
+    norm = PowerNorm(0.5, 0.0, top)
     image = show_map(axes, values, solution, cmap="magma", norm=norm)
     mark_hertz_zone(axes, solution, "white")
     axes.set_title(f"Shear stress, friction coefficient {rubbing.coefficient:.4f}")
-    colour_bar(figure, axes, image, "shear stress [MPa]")
+    bar = colour_bar(figure, axes, image, "shear stress [MPa]")
+    bar.set_ticks([float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)])
     return figure
 
 
