@@ -63,6 +63,8 @@ class Run:
             return friction_and_heat(
                 self.solution, boundary_friction=self.case.boundary_friction, thermal=self.case.thermal
             )
+        except BadInput:
+            raise
         except AsperityError as error:  # the film, the load sharing and the stress are as good without it
             return str(error)
 

@@ -7,8 +7,8 @@ import pytest
 import xarray
 
 import asperity.run
-from asperity import AsperityError, Run, load_case, load_run, solve_case
-from asperity.cli.contact import _friction_rows
+from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
+from asperity.cli.contact import _friction_rows, _print_run
 
 SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
 
@@ -67,3 +67,18 @@ def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypa
     assert found["clr"] == run.scalars()["clr"]
     assert _friction_rows(apart) == [("friction", "not found: friction and temperature did not settle")]
     assert "shear" not in apart.to_dataset()
+
+
+def test_the_command_line_prints_friction_heat_and_stress(run, capsys):
+    _print_run(run)
+    rows = dict(line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines() if "  " in line.strip())
+    assert rows["friction coefficient"].strip().startswith(f"{run.friction.coefficient:.4f} (asperities ")
+    assert f"{run.heat.max_k:.1f} K" in rows["heat of friction, largest rise"]
+    assert f"{run.stress.peak.value / 1e9:.3f} GPa" in rows["von Mises stress in body 1, largest"]
+
+
+@pytest.mark.parametrize("coefficient", [2.5, -0.1])
+def test_a_boundary_friction_that_cannot_be_is_refused_before_the_solve(coefficient):
+    case = load_case(files("asperity").joinpath("paper.toml").read_text("utf-8"))
+    with pytest.raises(BadInput, match="boundary_friction must be"):
+        case.with_overrides({"material.boundary_friction": coefficient})
