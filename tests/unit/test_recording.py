@@ -44,7 +44,7 @@ def test_facts_name_their_source(folder):
     assert (facts["rate"].source, facts["unit"].value, facts["unit"].source) == (
         "command line",
         "unknown",
-        "stated nowhere",
+        "nobody",
     )
     assert (facts["started"].value, facts["started"].source) == (datetime(2024, 1, 31, 12), "file name")
     assert read_recording(where / "german.csv").facts["rate"].source == "file (column 'Zeit')"

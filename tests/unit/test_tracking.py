@@ -1,5 +1,6 @@
 """How a series is put together: which files, which order, which band; what is kept of it."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -131,7 +132,10 @@ def test_time_is_the_place_where_all_recordings_know_theirs(tmp_path):
 
 def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
-    assert track.method != "joint"
+    assert (track.method, track.found) == ("likelihood", 0)
+    assert re.search(r"a line at (2\d|30)\d\d Hz stands out, but one spectrum cannot tell", track.verdict())
     assert any("needs 6 recordings and has 1" in note for note in track.notes)
+    trusted = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").recordings[0].resonance
+    assert trusted.crf_hz == pytest.approx(3000.0, rel=0.01)
     with pytest.raises(BadInput, match="x needs one value for each of 1"):
         track_recordings([tmp_path / "a.npz"], case=CASE, x=[1.0, 2.0])

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from asperity.tracking.listen import Heard
 
 ALARM = 3
+IN_FULL = 4  # recordings that `check` shows with every fact
 
 Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sampling rate, for files that do not state it.")]
 Unit = Annotated[str | None, typer.Option(help="Unit of the values, such as g, for files that do not state it.")]
@@ -84,8 +85,7 @@ def check(
         print(_check_verdict(checked, refused))
         if not quiet:
             print(f"  for a resonance {target.width_hz:.0f} Hz wide in {target.source}")
-            for one, quality in checked:
-                _print_check(one, quality)
+            _print_checks(checked)
     if refused:
         raise BadInput("; ".join(dict.fromkeys(reason for _, reason in refused)))
 
@@ -96,7 +96,8 @@ def _check_verdict(checked: "Sequence[tuple[OpenRecording, Quality]]", refused: 
     if total == 1 and checked:
         one, quality = checked[0]
         return f"{one.path.name}: " + ("can be used." if quality.usable else f"cannot be used: {quality.faults[0]}.")
-    sentence = f"{good} of {total} recordings can be used"
+    things = "channels" if len({one.path for one, _ in checked}) < len(checked) else "recordings"
+    sentence = f"{good} of {total} {things} can be used"
     reasons = dict.fromkeys(quality.faults[0].partition(":")[0] for _, quality in checked if not quality.usable)
     return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}."
 
@@ -125,23 +126,43 @@ def _check_row(one: "OpenRecording", quality: "Quality") -> dict[str, Any]:
     }
 
 
-def _print_check(one: "OpenRecording", quality: "Quality") -> None:
+def _print_checks(checked: "Sequence[tuple[OpenRecording, Quality]]") -> None:
+    """Few recordings in full; many a line each, and what was found wrong once."""
+    if len(checked) <= IN_FULL:
+        for one, quality in checked:
+            print(f"\n{one.path}, channel {one.channel.name}: {'usable' if quality.usable else 'NOT USABLE'}")
+            print_rows(_check_rows(one, quality))
+            for sentence in (*quality.faults, *quality.remarks):
+                print(f"  {'fault' if sentence in quality.faults else 'note'}: {sentence}")
+        return
+    print()
+    names = [f"{one.path.name}, {one.channel.name}" for one, _ in checked]
+    width = max(map(len, names))
+    said: dict[str, list[str]] = {}
+    for name, (one, quality) in zip(names, checked, strict=True):
+        state = "usable" if quality.usable else "NOT USABLE"
+        print(f"  {name:{width}}  {one.rate_hz:9g} Hz  {quality.duration_s:9.4g} s  rms {quality.rms:9.3g}  {state}")
+        for sentence in (*quality.faults, *quality.remarks):
+            said.setdefault(sentence, []).append(name)
+    for sentence, holders in said.items():
+        where = "all" if len(holders) == len(checked) else "; ".join(holders[:3])
+        print(
+            f"  note: {sentence} ({where}{f' and {len(holders) - 3} more' if 3 < len(holders) < len(checked) else ''})"
+        )
+
+
+def _check_rows(one: "OpenRecording", quality: "Quality") -> list[tuple[str, str]]:
     facts = one.facts
-    print(f"\n{one.path}, channel {one.channel.name}: {'usable' if quality.usable else 'NOT USABLE'}")
     rows = [
         ("format", str(facts["format"].value)),
-        ("rate", f"{one.rate_hz:g} Hz, from {facts['rate'].source}"),
-        ("unit", f"{facts['unit'].value}, from {facts['unit'].source}"),
+        ("rate", f"{one.rate_hz:g} Hz, stated by {facts['rate'].source}"),
+        ("unit", f"{facts['unit'].value}, stated by {facts['unit'].source}"),
         ("length", f"{quality.duration_s:.4g} s, {quality.samples} samples"),
-        ("rms, peak, offset", f"{quality.rms:.4g}, {quality.peak:.4g}, {quality.offset:.4g} {one.unit}"),
+        ("rms, peak, offset", f"{quality.rms:.4g}, {quality.peak:.4g}, {quality.offset:.4g}; unit: {one.unit}"),
     ]
     if one.started is not None:
-        rows.insert(3, ("started", f"{one.started}, from {facts['started'].source}"))
-    print_rows(rows)
-    for sentence in quality.faults:
-        print(f"  fault: {sentence}")
-    for sentence in quality.remarks:
-        print(f"  note: {sentence}")
+        rows.insert(3, ("started", f"{one.started}, stated by {facts['started'].source}"))
+    return rows
 
 
 @app.command()

@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.recording.model import OpenRecording
+from asperity.recording.model import UNKNOWN, OpenRecording
 
 QUIET = 0.01  # m/s^2 rms: the noise of an accelerometer, not a machine
 STEPS_OF_NOISE = 1.5  # standard deviation in steps of the converter, below which only its last digit moves
@@ -124,7 +124,7 @@ class Gauge:
         clipped = (self.clipped_low + self.clipped_high) / max(self.finite, 1)
         if self.high == self.low:
             clipped = 0.0
-        unit = recording.unit
+        unit = recording.unit if recording.unit != UNKNOWN else "(unit unknown)"
         off = _off(rms, self.step, comparable=recording.comparable) if self.finite else False
         faults: list[str] = []
         remarks = list(recording.notes)
@@ -159,7 +159,8 @@ class Gauge:
                     f"offset of {self.mean:.3g} {unit}, {abs(self.mean) / rms:.1f} times the rms; it is removed"
                 )
         if not recording.comparable:
-            remarks.append(f"amplitudes in {unit} are not accelerations: CRF can be used, CRFA is not comparable")
+            what = "are of unknown unit" if recording.unit == UNKNOWN else f"in {unit} are no accelerations"
+            remarks.append(f"amplitudes {what}: CRF can be used, CRFA is not comparable")
         return Quality(
             samples=self.samples,
             duration_s=duration,

@@ -17,6 +17,7 @@ from asperity.recording.quiet import quietly
 from asperity.signals import Signal
 
 ACCELERATION = "m/s^2"
+UNKNOWN = "unknown"  # unit of values where nothing states one
 FULL_SCALE = "full scale"  # what integer samples are shares of, when nothing says how much that is
 BLOCK = 1 << 18  # samples read at a time
 IMPOSSIBLE = 1e15  # in any unit: a damaged file's

@@ -11,7 +11,16 @@ from typing import Any
 from asperity.errors import BadInput, UnreadableFile, require_positive
 from asperity.recording import hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
 from asperity.recording.common import REMEDY, when, why
-from asperity.recording.model import ACCELERATION, FULL_SCALE, Channel, Contents, Fact, OpenRecording, Recording
+from asperity.recording.model import (
+    ACCELERATION,
+    FULL_SCALE,
+    UNKNOWN,
+    Channel,
+    Contents,
+    Fact,
+    OpenRecording,
+    Recording,
+)
 from asperity.recording.quiet import quietly
 from asperity.recording.sidecar import beside
 from asperity.recording.units import acceleration_scale
@@ -249,7 +258,7 @@ def _unit(path: Path, one: Channel, given: str | None, sidecar: tuple[str | None
         )
     if unit is not None:
         return Fact(unit, source if one.unit is None or scaled else "file")
-    return Fact("unknown", "stated nowhere") if one.unit is None else Fact(one.unit, "file")
+    return Fact(UNKNOWN, "nobody") if one.unit is None else Fact(one.unit, "file")
 
 
 def _same_unit(one: str, other: str) -> bool:

@@ -3,6 +3,7 @@
 Reading is left to `listen`, the methods to `asperity.wear`; what is said here is how they are put together.
 """
 
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from asperity.recording.model import ACCELERATION
 from asperity.tracking.files import Place, Table, read_table, recordings_in
 from asperity.tracking.listen import WINDOW, Asked, Heard, common_spacing, listen_to_all
 from asperity.tracking.target import Target, search_target
-from asperity.wear.indicators import Resonance
+from asperity.wear.indicators import Resonance, no_resonance
 from asperity.wear.lines import CleanSpectrum, remove_lines
 from asperity.wear.series import FEWEST_RECORDINGS, series_resonances
 from asperity.wear.stages import Stages, split_stages
@@ -123,10 +124,10 @@ class Track:
         several = f"{total} recordings" if total != 1 else "1 recording"
         if self.stages is None:
             reasons = Counter(_kind(one.resonance.reason) for one in self.recordings)
-            (reason, count), *_ = reasons.most_common(1)
-            share = "" if total == 1 else f" ({count} of {total}: {reason})" if count < total else f" ({reason})"
-            reason = f" ({reason})" if total == 1 else share
-            return f"These recordings cannot tell: no contact resonance found in {several}{reason}."
+            (kind, count), *_ = reasons.most_common(1)
+            reason = next(one.resonance.reason for one in self.recordings if _kind(one.resonance.reason) == kind)
+            share = f"{count} of {total}: " if count < total else ""
+            return f"These recordings cannot tell: no contact resonance found in {several} ({share}{reason})."
         heard = f"contact resonance found in {self.found} of {several}"
         level = {"alarm": "ALARM: ", "alert": "Alert: "}.get(self.alarm.level, "")
         return f"{level}{self.stages.verdict.rstrip('.')}; {heard}."
@@ -273,7 +274,8 @@ def track_recordings(
     x : place of each recording in the series, shape (recordings,); or `table`, a csv as `read_table` takes it;
         otherwise the hours since the first, where all say when they began, or their number
     shaft_hz : speeds of shafts whose harmonics are removed; None finds them
-    method : of `series_resonances`; None takes "joint" from 6 recordings on, "likelihood" below
+    method : of `series_resonances`; None takes "joint" from 6 recordings on, and of fewer says that one spectrum
+        cannot tell whose resonance it shows
     detector : of `split_stages`
     workers : processes that read at the same time
     progress : called with each file that was read
@@ -323,8 +325,8 @@ def judge(
     chosen = method or ("joint" if len(used) >= FEWEST_RECORDINGS else ALONE)
     if method is None and chosen != "joint" and used:
         notes.append(
-            f"Method {chosen}: the joint separation, which tells the contact from the machine by what moves, needs "
-            f"{FEWEST_RECORDINGS} recordings and has {len(used)}."
+            f"The joint separation, which tells the contact from the machine by what moves, needs {FEWEST_RECORDINGS} "
+            f"recordings and has {len(used)}; --method {chosen} takes for the contact's what stands out of each."
         )
     resonances: tuple[Resonance, ...] = ()
     if used:
@@ -334,6 +336,8 @@ def judge(
             method=chosen,
             kept=[one.kept for one in cleaned],
         )
+    if method is None and chosen == ALONE:
+        resonances = tuple(_whose(resonance) for resonance in resonances)
     by_number = dict(zip(used, zip(cleaned, resonances, strict=True), strict=True))
     tracked = []
     for number, one in enumerate(series):
@@ -506,9 +510,19 @@ def _spectrum(one: Heard) -> Any:
     return one.spectrum
 
 
-def _unheard(reason: str, target: Target, method: str) -> Resonance:
-    from asperity.wear.indicators import no_resonance
+def _whose(resonance: Resonance) -> Resonance:
+    """A line that stands out of one spectrum may as well be a structure's: on real bearings it mostly is."""
+    if not resonance.found:
+        return resonance
+    reason = (
+        f"a line at {resonance.crf_hz:.0f} Hz stands out, but one spectrum cannot tell whether it is the contact's or "
+        "the machine's"
+    )
+    nothing = no_resonance(reason, resonance.band_hz, resonance.method, resonance.floor, resonance.evidence)
+    return replace(nothing, background=resonance.background)
 
+
+def _unheard(reason: str, target: Target, method: str) -> Resonance:
     return no_resonance(reason, target.band_hz, method)
 
 
@@ -521,8 +535,8 @@ def _unit_of(x_name: str) -> str:
 
 
 def _kind(reason: str) -> str:
-    """A reason without its numbers, so that equal ones can be counted: up to the first bracket or colon."""
-    return reason.partition(" (")[0].rstrip(".")
+    """A reason without its numbers, so that equal ones can be counted."""
+    return re.sub(r"[-+]?\d[\d.]*", "#", reason)
 
 
 def _require_pyarrow(path: Path) -> None:
