@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.signal import welch
 
 from asperity.errors import BadInput
-from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
 
 
 def white(samples: int, seed: int = 0) -> Signal:
@@ -105,3 +106,32 @@ def test_what_has_no_spectrum_is_refused_by_name():
         power_spectrum(Signal(np.where(np.arange(100) == 7, np.nan, 1.0), 1.0, "m"))
     with pytest.raises(BadInput, match="at least 1 pass"):
         smooth(power_spectrum(white(100)), 0)
+
+
+@pytest.mark.parametrize(
+    ("samples", "segment", "window"), [(1000, 100, "hann"), (1001, 101, "hann"), (999, 64, "boxcar")]
+)
+def test_a_record_in_blocks_has_the_spectrum_of_the_whole(samples, segment, window):
+    values = np.random.default_rng(3).standard_normal(samples) + 5.0
+    blocks = [values[:13], values[13:200], values[200:200], values[200:]]
+    spectrum = averaged_spectrum(blocks, 10.0, "m", segment=segment, window=window)
+    whole = power_spectrum(Signal(values, 10.0, "m"), segment=segment, window=window)
+    assert np.allclose(spectrum.density, whole.density, rtol=1e-12)
+    overlap = 0 if window == "boxcar" else segment // 2
+    frequency, density = welch(values, 10.0, window, segment, overlap)
+    assert np.allclose(spectrum.density[1:], density[1:], rtol=1e-12)
+    assert np.array_equal(spectrum.frequency_hz, frequency)
+    assert (spectrum.duration_s, spectrum.averages) == (whole.duration_s, whole.averages)
+
+
+def test_pieces_with_a_gap_are_left_out_of_a_spectrum():
+    values = np.random.default_rng(4).standard_normal(1000)
+    holed = values.copy()
+    holed[310:330] = np.nan
+    spectrum = averaged_spectrum([holed], 1.0, "m", segment=100, window="boxcar")
+    kept = np.delete(values.reshape(10, 100), 3, axis=0).ravel()
+    expected = averaged_spectrum([kept], 1.0, "m", segment=100, window="boxcar")
+    assert np.allclose(spectrum.density, expected.density, rtol=1e-12)
+    assert spectrum.averages == pytest.approx(9.0)
+    with pytest.raises(BadInput, match="without a gap"):
+        averaged_spectrum([np.full(500, np.nan)], 1.0, "m", segment=100)

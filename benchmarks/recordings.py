@@ -1,0 +1,197 @@
+"""What docs/recordings.md quotes: seconds and memory from disk to report, damaged files, false finds on real bearings.
+
+Recordings come from the rig simulator; what it costs to make them is not counted.
+"""
+
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from asperity.case import load_case
+from asperity.errors import BadInput
+from asperity.recording import check_recording, open_channels, read_recording
+from asperity.rig import simulate_rig, write_rig
+from asperity.tracking import track_recordings
+from asperity.tracking.listen import FINEST_HZ, Asked, listen
+from asperity.tracking.target import search_target
+from asperity.wear.indicators import contact_resonance
+from asperity.wear.lines import remove_lines
+
+CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
+MEASURED = Path(__file__).parents[2] / "shared" / "data" / "vibration"
+ASPERITY = [sys.executable, "-m", "asperity"]
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    """The tables, as Markdown."""
+    duration = 30.0 if fast else 300.0
+    yield f"## Recordings: 60 of {duration:g} s at 20 kHz, from disk to report\n"
+    with tempfile.TemporaryDirectory() as folder:
+        where = Path(folder, "rig")
+        write_rig(simulate_rig(duration_s=duration, seed=7), where)
+        table = ["--table", str(where / "table.csv"), "--case", str(where / "rig.toml")]
+        page = ["--report", str(where.parent / "report.html"), "--out", str(where.parent / "track.nc")]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds, peak, said = measured([*ASPERITY, "track", str(where), *table, *page, "--quiet"])
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        worked = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        yield (
+            f"- `asperity track`: {seconds:.1f} s, {worked:.1f} s of processor time, {peak:.0f} MB at most, all processes "
+            f"together. {said}"
+        )
+        yield f"- {one_file(next(iter(sorted(where.glob('*.h5')))))}"
+        if not fast:
+            yield f"- {large_file(Path(folder))}"
+    yield "\n## Damaged files\n"
+    yield from damaged_files(100 if fast else 500)
+    yield "\n## Real bearings, which have no contact resonance of this kind\n"
+    if MEASURED.is_dir():
+        yield from false_finds()
+    else:
+        yield "The measured recordings are not on this machine."
+
+
+def measured(command: list[str]) -> tuple[float, float, str]:
+    """Seconds, peak of the memory [MB] of a command and its children (proportional set size), its first line."""
+    began = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    peak = 0.0
+    while process.poll() is None:
+        peak = max(peak, sum(map(_megabytes, _family(process.pid))))
+        time.sleep(0.05)
+    seconds = time.perf_counter() - began
+    assert process.stdout is not None
+    with process.stdout:
+        return seconds, peak, process.stdout.readline().strip()
+
+
+def _family(pid: int) -> list[int]:
+    try:
+        threads = list(Path(f"/proc/{pid}/task").iterdir())
+        children = [(thread / "children").read_text().split() for thread in threads]
+    except OSError:
+        return [pid]
+    return [pid, *(one for group in children for child in group for one in _family(int(child)))]
+
+
+def _megabytes(pid: int) -> float:
+    try:
+        rollup = Path(f"/proc/{pid}/smaps_rollup").read_text()
+    except OSError:
+        return 0.0
+    return sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:")) / 1024
+
+
+def one_file(path: Path) -> str:
+    """From one file to its CRF."""
+    target = search_target(load_case(CASE))
+    times, processor = [], []
+    for _ in range(5):
+        began, worked = time.perf_counter(), time.process_time()
+        heard = listen(path, Asked(), target, FINEST_HZ)
+        assert heard.spectrum is not None
+        found = contact_resonance(remove_lines(heard.spectrum).spectrum, band_hz=target.band_hz)
+        times.append(time.perf_counter() - began)
+        processor.append(time.process_time() - worked)
+    return (
+        f"one of them from disk to CRF ({found.crf_hz:.1f} Hz): {np.median(times):.2f} s, "
+        f"{np.median(processor):.2f} s of processor time (medians of 5)"
+    )
+
+
+def large_file(folder: Path) -> str:
+    """Files of 2 GB (npy, wav) and of 0.5 GB (csv), checked."""
+    told = []
+    rng = np.random.default_rng(0)
+    block = rng.standard_normal(1 << 20).astype(np.float32)
+    large = np.lib.format.open_memmap(folder / "large.npy", "w+", np.float32, (500 << 20,))
+    for start in range(0, large.size, block.size):
+        large[start : start + block.size] = block
+    large.flush()
+    del large
+    text = "".join(f"{value:.6f}\n" for value in block)
+    with (folder / "large.csv").open("w") as file:
+        for _ in range(54):
+            file.write(text)
+    for name in ("large.npy", "large.csv"):
+        size = (folder / name).stat().st_size / 1e9
+        command = [*ASPERITY, "check", str(folder / name), "--rate", "20000", "--unit", "m/s^2", "--quiet"]
+        seconds, peak, _ = measured(command)
+        told.append(f"{name.split('.')[1]} of {size:.1f} GB in {seconds:.0f} s and {peak:.0f} MB")
+        (folder / name).unlink()
+    return f"`asperity check` of {', '.join(told)}"
+
+
+def damaged_files(count: int) -> Iterator[str]:
+    """Read or refused in a sentence, each in how long and how much."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    from recordings_made import damaged, vibration, write_all
+
+    warnings.simplefilter("ignore")  # readers that fail leave files open
+    rng = np.random.default_rng(11)
+    outcomes: Counter[str] = Counter()
+    slowest = (0.0, "")
+    with tempfile.TemporaryDirectory() as folder:
+        said = write_all(Path(folder), vibration())
+        contents = [(name, Path(folder, name).read_bytes()) for name in said]
+        if MEASURED.is_dir():
+            contents.append(("endaq.ide", (MEASURED / "endaq" / "ActTest_009.IDE").read_bytes()))
+        for number in range(count):
+            name, content = contents[number % len(contents)]
+            path = Path(folder, f"{number}-{name}")
+            path.write_bytes(damaged(content, rng))
+            began = time.perf_counter()
+            try:
+                for one in open_channels(path, **said.get(name, {})):
+                    check_recording(one)
+                outcomes["read"] += 1
+            except BadInput as refusal:
+                outcomes["refused" if "\n" not in str(refusal) else "TRACEBACK IN THE SENTENCE"] += 1
+            except Exception as error:  # noqa: BLE001 - what must not happen is counted
+                outcomes[f"TRACEBACK {type(error).__name__}"] += 1
+            slowest = max(slowest, (time.perf_counter() - began, name))
+            path.unlink()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    told = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.most_common())
+    yield (
+        f"{count} files of {len(contents)} kinds, cut, flipped, lengthened, with huge counts, NaN and text in numbers: "
+        f"{told}; slowest {slowest[0]:.2f} s ({slowest[1]}); the process never held more than {peak:.0f} MB."
+    )
+
+
+def false_finds() -> Iterator[str]:
+    """How often a contact resonance is found on bearings that have none."""
+    yield "| recordings | method | found | of |"
+    yield "|---|---|---|---|"
+    alone = {"none given": None, "likelihood": "likelihood", "peak": "peak"}
+    running = []
+    for path in [*sorted((MEASURED / "mfpt").iterdir()), *sorted((MEASURED / "ims").iterdir())]:
+        given = {"rate_hz": 20e3} if path.parent.name == "ims" else {"unit": "g"}
+        running += [(path, given | {"channel": one.channel.name}) for one in open_channels(path, **given)]
+    for name, method in alone.items():
+        tracks = [track_recordings([path], method=method, **given) for path, given in running]
+        usable = [track for track in tracks if track.recordings[0].heard.usable]
+        found = sum(track.found for track in usable)
+        yield f"| MFPT and IMS channels one by one (the machine runs) | {name} | {found} | {len(usable)} |"
+    with tempfile.TemporaryDirectory() as folder:
+        found = total = 0
+        for path in sorted((MEASURED / "mfpt").iterdir()):
+            recording = read_recording(path, unit="g")
+            names = []
+            for number, piece in enumerate(np.array_split(recording.values, 8)):
+                names.append(Path(folder, f"{path.stem}-{number}.npz"))
+                np.savez(names[-1], acc=piece, fs=recording.rate_hz, unit="m/s^2")
+            track = track_recordings(names)
+            found, total = found + track.found, total + len(names)
+        yield f"| MFPT, each record in 8 pieces as a series | none given (joint) | {found} | {total} |"
+        every = sorted(Path(folder).iterdir())
+        track = track_recordings(every)
+        yield f"| MFPT, all pieces of all four as one series | none given (joint) | {track.found} | {len(every)} |"
