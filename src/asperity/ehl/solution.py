@@ -53,7 +53,10 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """One Newton step: grid cells, step number on that grid, and the three relative figures that must become small."""
+    """Where a Newton step led: grid cells, step number on that grid, and three relative figures that must become small.
+
+    Number 0 is the start on that grid, which no step has led to: its change is infinite.
+    """
 
     cells: tuple[int, int]
     number: int
@@ -79,7 +82,7 @@ class Convergence:
     @property
     def iterations(self) -> int:
         """Newton steps on all grid levels together."""
-        return len(self.history)
+        return sum(step.number > 0 for step in self.history)
 
     def explain(self) -> str:
         """One sentence on how the solve ended."""

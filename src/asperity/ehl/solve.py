@@ -75,7 +75,7 @@ def solve_contact(
 
     def level(problem: Problem, pressure: Field, approach: float, tolerance: float, most: int) -> Step:
         for step in watched(problem, newton(problem, pressure, approach)):
-            if _settled(history[-1], tolerance) or step.number >= most or not np.isfinite(step.change):
+            if _settled(history[-1], tolerance) or step.number >= most or _lost(step):
                 return step
         raise AssertionError("newton never ends by itself")
 
@@ -100,10 +100,8 @@ def solve_contact(
 
     if _settled(history[-1], options.tolerance):
         status = Status.CONVERGED
-    elif np.isfinite(step.change):
-        status = Status.OUT_OF_ITERATIONS
     else:
-        status = Status.STALLED
+        status = Status.STALLED if _lost(step) else Status.OUT_OF_ITERATIONS
     balance = step.balance
     solution = ContactSolution(
         conditions=conditions,
@@ -195,7 +193,7 @@ def find_approach(
     for _ in range(MOST_POSITIONS):
         for step in steps(problem, pressure, approach):
             settled = step.balance.residual_rms < COARSE_TOLERANCE and step.change < COARSE_TOLERANCE
-            if settled or step.number >= MOST_COARSE_ITERATIONS or not np.isfinite(step.change):
+            if settled or step.number >= MOST_COARSE_ITERATIONS or _lost(step):
                 break
         pressure, error = step.balance.pressure, step.balance.load_error
         if settled and abs(error) < COARSE_TOLERANCE:
@@ -227,6 +225,10 @@ def refined(pressure: Field) -> Field:
 
 def _settled(last: Iteration, tolerance: float) -> bool:
     return last.residual < tolerance and last.load_error < tolerance and last.change < tolerance
+
+
+def _lost(step: Step) -> bool:
+    return step.number > 0 and not np.isfinite(step.change)
 
 
 def _can_halve(cells: tuple[int, int]) -> bool:
