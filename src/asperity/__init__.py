@@ -11,18 +11,38 @@ if TYPE_CHECKING:
     from asperity.case import Case, load_case
     from asperity.conditions import ContactConditions, ElasticPair
     from asperity.coupling import Vibration, VibrationModel, contact_vibration
+    from asperity.ehl.flash import FlashTemperature, flash_temperature
+    from asperity.ehl.friction import Friction, friction
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
     from asperity.ehl.solve import solve_contact
     from asperity.ehl.state import ContactState, contact_state
     from asperity.ehl.stiffness import TangentStiffness, tangent_stiffness
     from asperity.ehl.storage import load_solution
+    from asperity.ehl.stress import StressTensor, SubsurfaceStress, subsurface_stress
+    from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
     from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack
     from asperity.grid import Grid
-    from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
+    from asperity.lubricant import (
+        BairWiner,
+        Barus,
+        DowsonHigginson,
+        EyringShear,
+        Incompressible,
+        LinearBairWiner,
+        Lubricant,
+        Newtonian,
+        NewtonianShear,
+        ReeEyring,
+        Roelands,
+        Solid,
+        Thermal,
+    )
+    from asperity.recording import Recording, check_recording, open_recording, read_recording
     from asperity.report import write_report
+    from asperity.rig import Disturbance, Rig, RigRecording, simulate_rig
     from asperity.run import Run, load_run, solve_case
-    from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+    from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
     from asperity.surface import (
         CompositeSurface,
         ProfileParameters,
@@ -42,23 +62,47 @@ if TYPE_CHECKING:
     )
     from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
     from asperity.wear.indicators import Resonance, contact_resonance
+    from asperity.wear.lines import CleanSpectrum, remove_lines
+    from asperity.wear.series import series_resonances
+    from asperity.wear.stages import Stages, split_stages
+    from asperity.wear.trend import Alarm, Facts, LoadShare, alarm, consistency, load_share
 
 _NAMES = {
     "case": ("Case", "load_case"),
     "conditions": ("ContactConditions", "ElasticPair"),
     "coupling": ("Vibration", "VibrationModel", "contact_vibration"),
+    "ehl.flash": ("FlashTemperature", "flash_temperature"),
+    "ehl.friction": ("Friction", "friction"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
     "ehl.solve": ("solve_contact",),
     "ehl.state": ("ContactState", "contact_state"),
     "ehl.stiffness": ("TangentStiffness", "tangent_stiffness"),
     "ehl.storage": ("load_solution",),
+    "ehl.stress": ("StressTensor", "SubsurfaceStress", "subsurface_stress"),
+    "ehl.thermal": ("friction_and_heat", "solve_thermal_contact"),
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
     "excitation": ("FilteredNoise", "PatchAverage", "SurfaceTrack"),
     "grid": ("Grid",),
-    "lubricant": ("Barus", "DowsonHigginson", "Incompressible", "Lubricant", "Newtonian", "ReeEyring", "Roelands"),
+    "lubricant": (
+        "BairWiner",
+        "Barus",
+        "DowsonHigginson",
+        "EyringShear",
+        "Incompressible",
+        "LinearBairWiner",
+        "Lubricant",
+        "Newtonian",
+        "NewtonianShear",
+        "ReeEyring",
+        "Roelands",
+        "Solid",
+        "Thermal",
+    ),
+    "recording": ("Recording", "check_recording", "open_recording", "read_recording"),
     "report": ("write_report",),
+    "rig": ("Disturbance", "Rig", "RigRecording", "simulate_rig"),
     "run": ("Run", "load_run", "solve_case"),
-    "signals": ("Signal", "Spectrum", "power_spectrum", "smooth"),
+    "signals": ("Signal", "Spectrum", "averaged_spectrum", "power_spectrum", "smooth"),
     "surface": (
         "CompositeSurface",
         "ProfileParameters",
@@ -78,69 +122,108 @@ _NAMES = {
     ),
     "vibration": ("ContactOscillator", "acceleration", "expected_spectrum", "motion"),
     "wear.indicators": ("Resonance", "contact_resonance"),
+    "wear.lines": ("CleanSpectrum", "remove_lines"),
+    "wear.series": ("series_resonances",),
+    "wear.stages": ("Stages", "split_stages"),
+    "wear.trend": ("Alarm", "Facts", "LoadShare", "alarm", "consistency", "load_share"),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
+    "Alarm",
     "AsperityError",
     "BadInput",
+    "BairWiner",
     "Barus",
     "Case",
+    "CleanSpectrum",
     "CompositeSurface",
     "ContactConditions",
     "ContactOscillator",
     "ContactSolution",
     "ContactState",
     "Convergence",
+    "Disturbance",
     "DowsonHigginson",
     "ElasticPair",
+    "EyringShear",
+    "Facts",
     "FilteredNoise",
+    "FlashTemperature",
+    "Friction",
     "Grid",
     "Incompressible",
     "Iteration",
+    "LinearBairWiner",
+    "LoadShare",
     "Lubricant",
     "Newtonian",
+    "NewtonianShear",
     "NotConverged",
     "Options",
     "PatchAverage",
     "ProfileParameters",
+    "Recording",
     "ReeEyring",
     "Resonance",
+    "Rig",
+    "RigRecording",
     "Roelands",
     "Run",
     "Signal",
+    "Solid",
     "Spectrum",
+    "Stages",
     "Status",
+    "StressTensor",
+    "SubsurfaceStress",
     "Surface",
     "SurfaceParameters",
     "SurfaceTrack",
     "TangentStiffness",
+    "Thermal",
     "UnreadableFile",
     "Vibration",
     "VibrationModel",
     "acceleration",
+    "alarm",
+    "averaged_spectrum",
+    "check_recording",
+    "consistency",
     "contact_resonance",
     "contact_state",
     "contact_vibration",
     "expected_spectrum",
+    "flash_temperature",
     "flat_surface",
+    "friction",
+    "friction_and_heat",
     "gaussian_surface",
     "ground_surface",
     "load_case",
     "load_run",
+    "load_share",
     "load_solution",
     "motion",
     "non_gaussian_surface",
+    "open_recording",
     "power_spectrum",
     "prepare_surface",
     "profile_parameters",
+    "read_recording",
     "read_surface",
+    "remove_lines",
     "run_in_surface",
     "sandblasted_surface",
     "self_affine_surface",
+    "series_resonances",
+    "simulate_rig",
     "smooth",
     "solve_case",
     "solve_contact",
+    "solve_thermal_contact",
+    "split_stages",
+    "subsurface_stress",
     "surface_parameters",
     "tangent_stiffness",
     "write_report",

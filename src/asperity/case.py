@@ -34,10 +34,20 @@ from pydantic import (
 
 from asperity.conditions import ContactConditions, ElasticPair, Geometry
 from asperity.coupling import PRESETS, VibrationModel, preset_choices
+from asperity.ehl.friction import BOUNDARY_FRICTION
 from asperity.ehl.solution import Options
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
-from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.lubricant import (
+    DENSITY_LAWS,
+    FRICTION_LAWS,
+    RHEOLOGY_LAWS,
+    VISCOSITY_LAWS,
+    WARMTH_LAWS,
+    Lubricant,
+    Solid,
+    Thermal,
+)
 from asperity.surface import (
     CompositeSurface,
     PreparedSurface,
@@ -74,9 +84,23 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "s": ("a time", "2 s"),
     "Hz": ("a frequency", "50 kHz"),
     "N s/m": ("a damping coefficient", "80 N s/m"),
+    "K": ("a temperature", "40 degC"),
+    "1/K": ("an inverse temperature", "0.037 1/K"),
+    "W/m/K": ("a thermal conductivity", "46 W/m/K"),
+    "J/kg/K": ("a heat capacity", "460 J/kg/K"),
 }
 # parameters of laws that are not listed are plain numbers
-_LAW_UNITS = {"eta0": "Pa s", "alpha": "1/Pa", "p0": "Pa", "rho0": "kg/m^3", "tau0": "Pa"}
+_LAW_UNITS = {
+    "eta0": "Pa s",
+    "alpha": "1/Pa",
+    "p0": "Pa",
+    "rho0": "kg/m^3",
+    "tau0": "Pa",
+    "floor": "Pa",
+    "tau_l0": "Pa",
+    "softening": "1/K",
+    "beta": "1/K",
+}
 _VIBRATION_UNITS = {
     "mass": "kg",
     "damping": "N s/m",
@@ -167,6 +191,14 @@ def read_length(name: str, text: str) -> float:
         raise BadInput(f"{name} {error}") from None
 
 
+def _twice_if_any(value: object) -> object:
+    return None if value is None else _twice(value)
+
+
+def _both(value: float, unit: str) -> tuple[Amount, Amount]:
+    return _restated(value, unit), _restated(value, unit)
+
+
 def _none(value: object) -> object:
     """Let the word none leave an optional thing out: `--set material.hardness=none`."""
     return None if value == "none" else value
@@ -180,11 +212,16 @@ Length: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "m"))]
 Force: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "N"))]
 Speed: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "m/s"))]
 Pressure: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "Pa"))]
+Temperature: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "K"))]
+Conductivity: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "W/m/K"))]
+Density: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "kg/m^3"))]
+HeatCapacity: TypeAlias = Annotated[float, PlainValidator(partial(_amount, "J/kg/K"))]
 Number: TypeAlias = Annotated[float, Strict()]
 Count: TypeAlias = Annotated[PositiveInt, Strict()]
 Seed: TypeAlias = Annotated[int, Strict(), Field(ge=0)]
 _Twice = BeforeValidator(_twice)
 _Optional = BeforeValidator(_none)
+_TwiceIfAny = BeforeValidator(_twice_if_any)
 
 
 L = TypeVar("L")
@@ -223,7 +260,7 @@ class MaterialSection(Section):
     youngs_modulus: Annotated[tuple[Pressure, Pressure], _Twice]
     poisson_ratio: Annotated[tuple[Number, Number], _Twice]
     hardness: Annotated[Pressure | None, _Optional] = None
-    boundary_friction: Annotated[PositiveFloat, Strict()] | None = None  # read by the friction model to come
+    boundary_friction: Annotated[PositiveFloat, Strict()] = BOUNDARY_FRICTION
 
 
 class GaussianSection(Section):
@@ -418,16 +455,37 @@ def _surface_section(value: object) -> Section:
     return _choice("kind", _SURFACES, value)
 
 
+_FRICTION_SECTIONS = _law_sections(FRICTION_LAWS)
+
+
 class LubricantSection(Section):
     """[lubricant]: one law of each family."""
 
     viscosity: Annotated[Section, PlainValidator(partial(_choice, "law", _law_sections(VISCOSITY_LAWS)))]
     density: Annotated[Section, PlainValidator(partial(_choice, "law", _law_sections(DENSITY_LAWS)))]
     rheology: Annotated[Section, PlainValidator(partial(_choice, "law", _law_sections(RHEOLOGY_LAWS)))]
+    friction: Annotated[
+        Section, PlainValidator(partial(_choice, "law", _FRICTION_SECTIONS)), Field(validate_default=True)
+    ] = cast(Section, "bair-winer")
 
 
 def _lubricant_section(value: object) -> LubricantSection | None:
     return None if value == "none" else _validated(LubricantSection, value)
+
+
+class ThermalSection(Section):
+    """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
+
+    ambient: Temperature = _restated(Thermal().ambient, "K")
+    bulk: Annotated[tuple[Temperature, Temperature] | None, _TwiceIfAny, _Optional] = None  # of the bodies
+    conductivity: Annotated[tuple[Conductivity, Conductivity], _Twice] = _both(Solid().conductivity, "W/m/K")
+    density: Annotated[tuple[Density, Density], _Twice] = _both(Solid().density, "kg/m^3")
+    heat_capacity: Annotated[tuple[HeatCapacity, HeatCapacity], _Twice] = _both(Solid().heat_capacity, "J/kg/K")
+    oil_conductivity: Conductivity = _restated(Thermal().oil_conductivity, "W/m/K")
+    warmth: Annotated[
+        Section, PlainValidator(partial(_choice, "law", _law_sections(WARMTH_LAWS))), Field(validate_default=True)
+    ] = cast(Section, "exponential")
+    feedback: Annotated[bool, Strict()] = Thermal().feedback
 
 
 def _vibration_key(name: str) -> str:
@@ -473,6 +531,7 @@ class CaseFile(Section):
     surface: Annotated[Section, PlainValidator(_surface_section)]
     grid: GridSection
     solver: SolverSection = SolverSection()
+    thermal: ThermalSection = Field(default_factory=ThermalSection)
     vibration: Annotated[Any, PlainValidator(_vibration_section)] = None
     study: Annotated[StudySection | None, _Optional] = None
 
@@ -540,6 +599,7 @@ class Case:
             "lubricant": "lubricant",
             "grid": "grid",
             "solver": "options",
+            "thermal": "thermal",
             "vibration": "vibration",
         }
         for part, name in built.items():
@@ -583,6 +643,29 @@ class Case:
             viscosity=_law(VISCOSITY_LAWS, section.viscosity),
             density=_law(DENSITY_LAWS, section.density),
             rheology=_law(RHEOLOGY_LAWS, section.rheology),
+            friction=_law(FRICTION_LAWS, section.friction),
+        )
+
+    @property
+    def boundary_friction(self) -> float:
+        """Shear stress over pressure where the bodies touch."""
+        return float(self.contents.material.boundary_friction)
+
+    @cached_property
+    def thermal(self) -> Thermal:
+        """What takes up the heat of sliding."""
+        section = self.contents.thermal
+        first, second = (
+            Solid(conductivity=float(k), density=float(rho), heat_capacity=float(c))
+            for k, rho, c in zip(section.conductivity, section.density, section.heat_capacity, strict=True)
+        )
+        return Thermal(
+            ambient=float(section.ambient),
+            bulk=None if section.bulk is None else (float(section.bulk[0]), float(section.bulk[1])),
+            oil_conductivity=float(section.oil_conductivity),
+            warmth=_law(WARMTH_LAWS, section.warmth),
+            solids=(first, second),
+            feedback=section.feedback,
         )
 
     @cached_property

@@ -7,9 +7,13 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from asperity.arrays import Field
 from asperity.case import Case, load_case
 from asperity.coupling import (
     LINEAR_UP_TO,
@@ -19,12 +23,18 @@ from asperity.coupling import (
     needs_solution,
     require_sampling,
 )
+from asperity.ehl.flash import FlashTemperature
+from asperity.ehl.friction import Friction
 from asperity.ehl.solution import ContactSolution, Iteration
-from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, contact_state
-from asperity.ehl.storage import load_solution
-from asperity.errors import BadInput, NotConverged, UnreadableFile
+from asperity.ehl.storage import load_solution, save_dataset
+from asperity.ehl.stress import SubsurfaceStress, subsurface_stress
+from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
+from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.surface import Surface
+
+if TYPE_CHECKING:
+    import xarray
 
 FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
@@ -37,6 +47,7 @@ class Run:
     """A solved case: the contact, what a tribologist reads off it, and what an accelerometer would hear.
 
     `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the numbers has to know.
+    Friction, heat and stress are worked out when they are first asked for.
     """
 
     case: Case
@@ -45,9 +56,40 @@ class Run:
     vibration: Vibration | None
     notes: tuple[str, ...] = ()
 
+    @cached_property
+    def _rubbing(self) -> tuple[Friction, FlashTemperature] | str:
+        """Friction and heat, or why there are none."""
+        try:
+            return friction_and_heat(
+                self.solution, boundary_friction=self.case.boundary_friction, thermal=self.case.thermal
+            )
+        except AsperityError as error:  # the film, the load sharing and the stress are as good without it
+            return str(error)
+
+    @property
+    def friction(self) -> Friction | None:
+        """Friction under the case's boundary friction, oil and [thermal]; None where `friction_failure` says why."""
+        return None if isinstance(self._rubbing, str) else self._rubbing[0]
+
+    @property
+    def heat(self) -> FlashTemperature | None:
+        """Temperatures that friction causes; None where there is no friction."""
+        return None if isinstance(self._rubbing, str) else self._rubbing[1]
+
+    @property
+    def friction_failure(self) -> str | None:
+        """Why friction and heat could not be worked out; None when they were."""
+        return self._rubbing if isinstance(self._rubbing, str) else None
+
+    @cached_property
+    def stress(self) -> SubsurfaceStress:
+        """Stresses in body 1 under the solved pressure and friction's traction."""
+        return subsurface_stress(self.solution, shear=None if self.friction is None else self.friction.shear)
+
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its name in `asperity solve --json`, SI; None where there is none."""
         state, convergence = self.state, self.solution.convergence
+        rubbing, heat, stress = self.friction, self.heat, self.stress
         resonance = None if self.vibration is None else self.vibration.resonance
         heard = resonance is not None and resonance.found
         return {
@@ -61,6 +103,16 @@ class Run:
             "h_mean_m": state.h_mean,
             "p_max_pa": state.p_max,
             "lambda_ratio": state.lambda_ratio,
+            "friction_coefficient": None if rubbing is None else rubbing.coefficient,
+            "friction_asperity_part": None if rubbing is None else rubbing.asperity_part,
+            "friction_oil_part": None if rubbing is None else rubbing.oil_part,
+            "friction_power_w": None if rubbing is None else rubbing.power,
+            "flash_temperature_max_k": None if heat is None else heat.max_k,
+            "film_temperature_max_k": None if heat is None else heat.film_max_k,
+            "von_mises_max_pa": stress.peak.value,
+            "von_mises_depth_m": stress.peak.depth,
+            "shear_stress_max_pa": stress.shear_peak.value,
+            "shear_stress_depth_m": stress.shear_peak.depth,
             "converged": convergence.converged,
             "iterations": convergence.iterations,
             "reynolds_residual": state.reynolds_residual,
@@ -103,9 +155,35 @@ class Run:
         decimals = 1 if deviation < 2.0 else 0
         return f"contact resonance at {resonance.crf_hz:.{decimals}f} ± {deviation:.{decimals}f} Hz"
 
+    def to_dataset(self) -> "xarray.Dataset":
+        """The solution's dataset, with maps of traction, temperature and von Mises stress in single precision.
+
+        A run that is loaded takes nothing from these maps: they are worked out anew.
+        """
+        dataset, stress = self.solution.to_dataset(), self.stress
+        depth = {"long_name": "depth below the surface of body 1", "units": "m", "axis": "Z", "positive": "down"}
+        dataset = dataset.assign_coords(depth=("depth", stress.depths, depth))
+        where = f"largest below the surface of body 1, Poisson's ratio {stress.poisson_ratio:g}"
+        maps: dict[str, tuple[Field, str, str]] = {
+            "von_mises": (stress.largest, f"von Mises stress, {where}", "Pa"),
+            "von_mises_depth": (stress.depth_of_largest, "depth of the largest von Mises stress", "m"),
+        }
+        if self.friction is not None and self.heat is not None:
+            maps |= {
+                "shear": (self.friction.shear, "traction along rolling on body 1", "Pa"),
+                "temperature_1": (self.heat.surface_1, "temperature of surface 1 above ambient", "K"),
+                "temperature_2": (self.heat.surface_2, "temperature of surface 2 above ambient", "K"),
+                "film_temperature": (self.heat.film, "mean temperature across the film above ambient", "K"),
+            }
+        for name, (values, text, unit) in maps.items():
+            dataset[name] = (("x", "y"), values.astype(np.float32), {"long_name": text, "units": unit})
+        section = {"long_name": f"von Mises stress in the plane y = {stress.peak.y:g} m", "units": "Pa"}
+        dataset["von_mises_section"] = (("x", "depth"), stress.von_mises[:, stress.row].astype(np.float32), section)
+        return dataset
+
     def save(self, path: str | Path) -> Path:
         """Write the run as one netCDF that restates its case, whole or not at all, and return the path."""
-        return self.solution.save(path)
+        return save_dataset(self.to_dataset(), path)
 
 
 def solve_case(
@@ -145,8 +223,15 @@ def solve_case(
     notes = (*case.surface_notes, *case.notes)
     kept = {"case": case.text, "notes": json.dumps(notes)}
     try:
-        solution = solve_contact(
-            case.conditions, case.lubricant, roughness, options=case.options, progress=progress, strict=strict
+        solution = solve_thermal_contact(
+            case.conditions,
+            case.lubricant,
+            roughness,
+            boundary_friction=case.boundary_friction,
+            thermal=case.thermal,
+            options=case.options,
+            progress=progress,
+            strict=strict,
         )
     except NotConverged as unfinished:
         raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None

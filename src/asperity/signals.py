@@ -3,12 +3,15 @@
 Knows neither machines nor contacts. Finding a resonance in a spectrum is left to `asperity.wear`.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, require_positive
+
+SAMPLES_AT_ONCE = 1 << 18  # of a record, transformed together: what stays in a processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +82,6 @@ def power_spectrum(signal: Signal, *, segment: int | None = None, window: str = 
     BadInput
         for values that are not finite, a piece longer than the record or shorter than 8 samples, an unknown window.
     """
-    from scipy.signal import get_window, welch
-
     samples = signal.values.size
     length = samples if segment is None else segment
     if not 8 <= length <= samples:
@@ -88,38 +89,93 @@ def power_spectrum(signal: Signal, *, segment: int | None = None, window: str = 
     if not np.isfinite(signal.values).all():
         bad = int(np.count_nonzero(~np.isfinite(signal.values)))
         raise BadInput(f"a spectrum needs finite values, got {bad} of {samples} that are not; cut or repair the record")
+    return averaged_spectrum([signal.values], signal.rate_hz, signal.unit, segment=length, window=window)
+
+
+def averaged_spectrum(
+    blocks: Iterable[Field], rate_hz: float, unit: str, *, segment: int, window: str = "hann"
+) -> Spectrum:
+    """The same of a record that comes block by block and need never be in memory whole.
+
+    Parameters
+    ----------
+    blocks : the record's values in their order, each of any length; pieces with a value that is not finite, such as a
+        gap marked by NaN, are left out
+    segment : samples in each piece
+
+    Raises
+    ------
+    BadInput
+        for a record without a single whole piece, a piece shorter than 8 samples, an unknown window.
+    """
+    from scipy.fft import rfft
+    from scipy.signal import get_window
+
+    require_positive("sampling rate", rate_hz, "Hz")
+    if segment < 8:
+        raise BadInput(f"a spectrum's segment must have at least 8 samples, got {segment}; change it")
     try:
-        taper = get_window(window, length)
+        taper = get_window(window, segment)
     except ValueError as error:
         raise BadInput(f"spectrum window {window!r} is unknown ({error}); try hann or boxcar") from None
 
-    overlap = 0 if window == "boxcar" else length // 2
-    frequency, density = welch(signal.values, signal.rate_hz, window, length, overlap)  # removes each piece's mean
-    unit = signal.unit if signal.unit.isalpha() else f"({signal.unit})"
+    step = segment if window == "boxcar" else segment - segment // 2
+    many = max(1, SAMPLES_AT_ONCE // segment)
+    total = np.zeros(segment // 2 + 1)
+    kept: list[Mask] = []
+    samples = 0
+    waiting: Field = np.empty(0)
+    for block in blocks:
+        samples += block.size
+        waiting = np.concatenate([waiting, block]) if waiting.size else block
+        whole = (waiting.size - segment) // step + 1 if waiting.size >= segment else 0
+        pieces = np.lib.stride_tricks.sliding_window_view(waiting, segment)[::step] if whole else waiting[:0, None]
+        for first in range(0, whole, many):
+            group = pieces[first : min(first + many, whole)]
+            means = group.mean(axis=1, keepdims=True)
+            finite = np.isfinite(means[:, 0])
+            if not finite.all():
+                group, means = group[finite], means[finite]
+            lines = rfft((group - means) * taper, axis=1, overwrite_x=True)
+            total += np.einsum("ij,ij->j", lines.real, lines.real) + np.einsum("ij,ij->j", lines.imag, lines.imag)
+            kept.append(finite)
+        waiting = waiting[whole * step :]
+    complete = np.concatenate(kept) if kept else np.zeros(0, bool)
+    if not complete.any():
+        gaps = " without a gap" if complete.size else ""
+        raise BadInput(
+            f"a spectrum needs at least one piece of {segment} samples{gaps}, the record has {samples}; "
+            "shorten the segment"
+        )
+    density = 2.0 * total / (np.count_nonzero(complete) * rate_hz * np.sum(taper**2))
+    density[0] /= 2.0
+    if segment % 2 == 0:
+        density[-1] /= 2.0
     return Spectrum(
-        frequency_hz=frequency,
+        frequency_hz=np.arange(segment // 2 + 1) * (rate_hz / segment),
         density=density,
-        unit=f"{unit}^2/Hz",
-        duration_s=signal.duration_s,
-        segment=length,
+        unit=f"{unit if unit.isalpha() else f'({unit})'}^2/Hz",
+        duration_s=samples / rate_hz,
+        segment=segment,
         window=window,
-        resolution_hz=float(signal.rate_hz * np.sum(taper**2) / np.sum(taper) ** 2),
-        averages=_averages(taper, samples, length - overlap),
+        resolution_hz=float(rate_hz * np.sum(taper**2) / np.sum(taper) ** 2),
+        averages=_averages(taper, complete, step),
     )
 
 
-def _averages(taper: Field, samples: int, step: int) -> float:
+def _averages(taper: Field, kept: Mask, step: int) -> float:
     """How many independent ordinates a line is worth: 1 / (n sum w_t^2), w_t the share of sample t in the estimate.
 
-    Var of integral(phi P_hat) = rate integral(phi^2 P^2) sum w_t^2 for a smooth phi, whatever pieces and taper.
+    Var of integral(phi P_hat) = rate integral(phi^2 P^2) sum w_t^2 for a smooth phi, whatever pieces and taper. The sum
+    runs over pairs of pieces that overlap: those `apart` steps from each other share taper_t^2 taper_(t+apart)^2.
     """
-    length = taper.size
     energy = taper**2 / np.sum(taper**2)
-    starts = np.arange(0, samples - length + 1, step)
-    share = np.zeros(samples)
-    for start in starts:
-        share[start : start + length] += energy / starts.size
-    return float(1.0 / (length * np.sum(share**2)))
+    pieces = np.count_nonzero(kept)
+    shared = pieces * float(energy @ energy)
+    for apart in range(1, -(-taper.size // step)):
+        pairs = np.count_nonzero(kept[apart:] & kept[:-apart])
+        shared += 2.0 * pairs * float(energy[apart * step :] @ energy[: -apart * step])
+    return float(pieces**2 / (taper.size * shared))
 
 
 def smooth(spectrum: Spectrum, passes: int) -> Spectrum:

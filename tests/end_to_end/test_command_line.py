@@ -13,9 +13,12 @@ from asperity.errors import BadInput
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
-KEYS = [  # design.md, section 4, the load on capped oil, and the standard deviations of the last two
+KEYS = [  # design.md, section 4, the load on capped oil, parts of friction, shear, standard deviations of the last two
     *("car", "car_domain", "clr", "capped_oil_load_ratio", "sq_m"),
     *("h_min_m", "h_central_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
+    *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
+    *("flash_temperature_max_k", "film_temperature_max_k"),
+    *("von_mises_max_pa", "von_mises_depth_m", "shear_stress_max_pa", "shear_stress_depth_m"),
     *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
 ]
@@ -121,7 +124,7 @@ def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(asperity.run, "solve_contact", interrupted)
+    monkeypatch.setattr(asperity.run, "solve_thermal_contact", interrupted)
     code, out, err = asp("solve", "case.toml", "--out", "run.nc")
     assert (code, out) == (1, "")
     assert err.startswith("error: interrupted")

@@ -5,7 +5,7 @@ from asperity.errors import BadInput
 from asperity.signals import Signal, Spectrum, power_spectrum, smooth
 from asperity.vibration import ContactOscillator
 from asperity.wear import contact_resonance
-from asperity.wear.indicators import _line_and_slopes, line_shape
+from asperity.wear.indicators import line_and_slopes, line_shape
 
 BAND = (2500.0, 4000.0)
 FREQUENCY = np.arange(0.0, 10_000.0, 1.25)
@@ -36,7 +36,7 @@ def test_the_line_is_the_oscillators_gain_over_white_base_acceleration():
 
 def test_slopes_of_the_line_are_its_derivatives():
     f = np.linspace(2000.0, 5000.0, 40)
-    _, by_f0, by_damping = _line_and_slopes(f, 3300.0, 0.03)
+    _, by_f0, by_damping = line_and_slopes(f, 3300.0, 0.03)
     d = 1e-6
     assert by_f0 == pytest.approx(
         (line_shape(f, 3300.0 * np.exp(d), 0.03) - line_shape(f, 3300.0 * np.exp(-d), 0.03)) / (2 * d), abs=1e-6

@@ -14,10 +14,10 @@ from asperity.case import load_case
 from asperity.coupling import contact_vibration
 from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Status
 from asperity.ehl.state import ContactState
-from asperity.errors import BadInput
+from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure
-from asperity.report import figures, page, surface_map, write_report
+from asperity.report import figures, page, rubbing_figures, surface_map, write_report
 from asperity.run import Run
 from asperity.surface import MeasuredSurface, Surface, SurfaceDescription, flat_surface, surface_parameters
 
@@ -394,6 +394,94 @@ def test_every_axis_has_a_label_with_its_unit(name, labels):
     figure = getattr(figures, name)(*shown.get(name, (run.solution,)))
     written = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
     assert written == labels
+
+
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("traction_map", [*MAP, "shear stress [MPa]"]),
+        ("temperature_map", [*MAP, "hotter surface above ambient [K]"]),
+        ("temperature_line", ["x along rolling [µm]", "above ambient [K]"]),
+        ("stress_map", [*MAP, "largest von Mises stress below [GPa]"]),
+        ("stress_section", ["x along rolling [µm]", "depth [µm]", "von Mises stress [GPa]"]),
+        ("stress_over_depth", ["depth [µm]", "von Mises stress [GPa]"]),
+        ("friction_against_roughness", [ROUGH, "shear force over load"]),
+    ],
+)
+def test_every_axis_of_friction_heat_and_stress_has_a_label_with_its_unit(name, labels):
+    run = run_like()
+    part = {"traction": run.friction, "temperature": run.heat, "stress": run.stress}.get(name.partition("_")[0])
+    given = ([run.scalars()],) if part is None else (run.solution, part)
+    figure = getattr(rubbing_figures, name)(*given)
+    written = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+    assert written == labels
+
+
+def test_the_circle_in_the_section_stands_on_the_largest_stress():
+    run = run_like()
+    axes = rubbing_figures.stress_section(run.solution, run.stress).axes[0]
+    (image,), (circle,) = axes.images, axes.get_lines()
+    left, right, bottom, top = image.get_extent()
+    assert top == 0.0 < bottom  # depth grows downwards
+    peak = run.stress.peak
+    x, depth = (float(value[0]) for value in circle.get_data())
+    assert (x, depth) == pytest.approx((peak.x * 1e6, peak.depth * 1e6))
+    shown = image.get_array()
+    row, column = np.unravel_index(shown.argmax(), shown.shape)
+    assert left + (column + 0.5) / shown.shape[1] * (right - left) == pytest.approx(x)
+    assert (row + 0.5) / shown.shape[0] * bottom == pytest.approx(depth, abs=0.15 * bottom)
+
+
+def test_stress_over_depth_stands_beside_that_of_hertz():
+    run = run_like()
+    axes = rubbing_figures.stress_over_depth(run.solution, run.stress).axes[0]
+    lines = {line.get_label(): line for line in axes.get_lines()}
+    depth, smooth = lines["Hertz (smooth, dry, no friction)"].get_data()
+    hertz = run.solution.conditions.hertz
+    assert smooth.max() == pytest.approx(0.558 * hertz.p_max * 1e-9, rel=0.03)
+    assert 0.4 < depth[smooth.argmax()] * 1e-6 / hertz.half_widths[0] < 1.0
+    assert lines["solved"].get_ydata() == pytest.approx(run.stress.von_mises.max(axis=(0, 1))[1:] * 1e-9)
+
+
+def test_temperatures_are_cut_through_the_hottest_cell():
+    run = run_like()
+    axes = rubbing_figures.temperature_line(run.solution, run.heat).axes[0]
+    first, second = (line.get_ydata() for line in axes.get_lines()[:2])
+    assert max(first.max(), second.max()) == pytest.approx(run.heat.max_k)
+
+
+def test_friction_heat_and_stress_are_numbers_of_the_page(single):
+    rows = {row[0]: row[1] for row in single.rows}
+    run = run_like()
+    assert next(rows[name] for name in rows if name.startswith("Friction coefficient")) == (
+        f"{run.friction.coefficient:.4f}"
+    )
+    assert next(rows[name] for name in rows if name.startswith("Flash temp")) == f"{run.heat.max_k:.1f}"
+    assert next(rows[name] for name in rows if name.startswith("Largest von Mises")) == (
+        f"{run.stress.peak.value * 1e-9:.3f}"
+    )
+    assert next(rows[name] for name in rows if name.startswith("Boundary friction")) == "0.15"
+    assert "bair-winer" in next(rows[name] for name in rows if name.startswith("Friction of the film"))
+
+
+def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
+    rolling = Page(page.render_page([run_like(CASE.replace("slip = 0.2", "slip = 0.0"))]))
+    assert "both surfaces move at the same speed" in rolling.text
+    assert len(rolling.images()) == len(Page(page.render_page([run_like()])).images()) - 3
+
+    def refuse(*_, **__):
+        raise AsperityError("friction and temperature did not settle")
+
+    monkeypatch.setattr("asperity.run.friction_and_heat", refuse)
+    unsettled = Page(page.render_page([run_like()]))
+    assert "There is no friction and no temperature to show: friction and temperature did not" in unsettled.text
+    assert next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
+
+
+def test_heat_that_acts_back_is_not_left_out():
+    assert "Isothermal film." in Page(page.render_page([run_like()])).text
+    warm = CASE + "[thermal]\nfeedback = true\n"
+    assert "Isothermal film." not in Page(page.render_page([run_like(warm)])).text
 
 
 def test_contact_is_drawn_where_it_is():

@@ -127,6 +127,7 @@ def report(
 
 def _print_run(run: "Run") -> None:
     state, convergence = run.state, run.solution.convergence
+    peak = run.stress.peak
     lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
     rows = [
         ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
@@ -141,6 +142,8 @@ def _print_run(run: "Run") -> None:
         ),
         ("lambda, smooth-contact film over Sq", lambda_ratio),
         ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),
+        *_friction_rows(run),
+        ("largest von Mises stress in body 1", f"{1e-9 * peak.value:.3f} GPa, {1e6 * peak.depth:.2f} um deep"),
     ]
     resonance = None if run.vibration is None else run.vibration.resonance
     if resonance is not None and resonance.found:
@@ -157,3 +160,15 @@ def _print_run(run: "Run") -> None:
     print_rows(rows)
     for note in run.notes:
         print(f"  note: {note}")
+
+
+def _friction_rows(run: "Run") -> list[tuple[str, str]]:
+    rubbing, heat = run.friction, run.heat
+    if rubbing is None or heat is None:
+        return [("friction", f"not found: {run.friction_failure}")]
+    parts = f"asperities {rubbing.asperity_part:.4f}, oil {rubbing.oil_part:.4f}"
+    hottest = f"surfaces {heat.max_k:.1f} K, film {heat.film_max_k:.1f} K"
+    return [
+        ("friction coefficient", f"{rubbing.coefficient:.4f} ({parts})"),
+        ("heat of friction, largest rise", f"{rubbing.power:.3g} W, {hottest}"),
+    ]

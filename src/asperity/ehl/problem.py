@@ -44,8 +44,9 @@ class Problem:
 
     `form` is the bodies' own shape and `roughness` what stands out of it, shape (nx, ny); `load` the wanted sum of
     P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the speed number. For the oil's laws
-    `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]. A contact that does not repeat in y is
-    bounded by lines of cells at ambient pressure.
+    `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]; `viscosity_factor` is what warmth
+    leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by
+    lines of cells at ambient pressure.
     """
 
     form: Form
@@ -59,6 +60,7 @@ class Problem:
     sliding: float
     p_scale: float
     lubricant: Lubricant | None
+    viscosity_factor: Field | None = None
 
     @property
     def cells(self) -> tuple[int, int]:
@@ -87,11 +89,15 @@ class Problem:
         return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic)
 
     def coarsened(self) -> "Problem":
-        """The same contact on a grid of half as many cells each way; heights are averaged over each cell."""
+        """The same contact on a grid of half as many cells each way; fields are averaged over each cell."""
         nx, ny = self.cells
-        roughness = self.roughness.reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3))
+
+        def averaged(field: Field) -> Field:
+            return np.asarray(field.reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3)))
+
+        factor = None if self.viscosity_factor is None else averaged(self.viscosity_factor)
         dx, dy = self.spacing
-        return replace(self, roughness=roughness, spacing=(2.0 * dx, 2.0 * dy))
+        return replace(self, roughness=averaged(self.roughness), viscosity_factor=factor, spacing=(2.0 * dx, 2.0 * dy))
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
@@ -128,6 +134,8 @@ class Problem:
         density_slope = oil.density.slope(pascals) * (self.p_scale / oil.density.rho0)
         content = density * height
         viscosity = oil.viscosity(pascals)
+        if self.viscosity_factor is not None:
+            viscosity = viscosity * self.viscosity_factor
         log_slope = oil.viscosity.log_slope(pascals) * self.p_scale
         thinning, exponent = oil.rheology.thinning(viscosity * self.sliding / height)
         mobility = content * height**2 * (oil.viscosity.eta0 / self.speed) / (viscosity * thinning)

@@ -111,6 +111,7 @@ class ContactSolution:
     in_contact: Mask
     rigid_approach: float
     convergence: Convergence
+    viscosity_factor: Field | None = None  # what warmth left of the oil's viscosity, (nx, ny); None where it left all
     attributes: Mapping[str, str] = field(default_factory=dict)  # free text kept with the run, such as its case
 
     @property

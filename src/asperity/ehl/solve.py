@@ -31,6 +31,7 @@ def solve_contact(
     *,
     options: Options | None = None,
     start: ContactSolution | None = None,
+    viscosity_factor: Field | None = None,
     strict: bool = True,
     progress: Progress | None = None,
 ) -> ContactSolution:
@@ -42,13 +43,14 @@ def solve_contact(
     lubricant : the oil; None for a dry contact
     options : tolerances; `Options()` unless given
     start : a neighbouring solution on a grid of the same cells to start from (other load, speed or roughness)
+    viscosity_factor : local over isothermal viscosity, shape (nx, ny), where the film is not at ambient temperature
     strict : raise when the tolerance is not met; otherwise return the unfinished state
     progress : called after every Newton step
 
     Raises
     ------
     BadInput
-        for a grid that does not hold the contact or repeats along the wrong axis.
+        for a grid that does not hold the contact or repeats along the wrong axis, or factors that do not fit it.
     NotConverged
         when strict and the tolerance was not met; carries the unfinished solution.
     """
@@ -56,7 +58,9 @@ def solve_contact(
     began = time.perf_counter()
     scales = Scales.of(conditions, lubricant)
     _check_grid(conditions, surface)
-    finest = contact_problem(conditions, lubricant, surface, options)
+    if viscosity_factor is not None:
+        _check_factor(viscosity_factor, surface)
+    finest = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     history: list[Iteration] = []
 
     def watched(problem: Problem, steps: Iterator[Step]) -> Iterator[Step]:
@@ -113,6 +117,7 @@ def solve_contact(
         in_contact=balance.in_contact & (balance.pressure > 0.0),
         rigid_approach=step.approach * scales.gap,
         convergence=Convergence(status, tuple(history), options.tolerance, time.perf_counter() - began),
+        viscosity_factor=viscosity_factor,
     )
     if strict and status is not Status.CONVERGED:
         raise NotConverged(solution, f"contact not solved: {solution.convergence.explain()}")
@@ -120,7 +125,11 @@ def solve_contact(
 
 
 def contact_problem(
-    conditions: ContactConditions, lubricant: Lubricant | None, surface: Surface, options: Options
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    surface: Surface,
+    options: Options,
+    viscosity_factor: Field | None = None,
 ) -> Problem:
     """The dimensionless problem on the surface's own grid."""
     scales = Scales.of(conditions, lubricant)
@@ -145,6 +154,7 @@ def contact_problem(
         sliding=conditions.sliding_speed / scales.gap,
         p_scale=scales.pressure,
         lubricant=lubricant,
+        viscosity_factor=viscosity_factor,
     )
 
 
@@ -239,6 +249,14 @@ def _warm_start(start: ContactSolution, surface: Surface, scales: Scales) -> tup
     if start.grid.cells != surface.grid.cells:
         raise BadInput(f"start has {start.grid.cells} cells, the surface {surface.grid.cells}; solve without start")
     return start.pressure / scales.pressure, start.rigid_approach / scales.gap
+
+
+def _check_factor(factor: Field, surface: Surface) -> None:
+    if factor.shape != surface.grid.cells or not np.all((factor > 0.0) & (factor < np.inf)):
+        raise BadInput(
+            f"viscosity_factor must be positive on the surface's {surface.grid.cells} cells, "
+            f"got shape {factor.shape} from {np.min(factor):g} to {np.max(factor):g}"
+        )
 
 
 def _check_grid(conditions: ContactConditions, surface: Surface) -> None:

@@ -54,7 +54,7 @@ def contact_state(solution: ContactSolution) -> ContactState:
     zone = hertz_zone(solution.conditions, grid)
     centre = hertz_zone(solution.conditions, grid, CENTRE)
     sq, oil = solution.surface.sq, solution.lubricant
-    problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
+    problem = contact_problem(solution.conditions, oil, solution.surface, solution.options, solution.viscosity_factor)
     balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
     capped = balance.rows.state == CAPPED
     dx, dy = problem.spacing

@@ -103,7 +103,14 @@ def _state_at(solution: ContactSolution, depth: float | None, factor: float) -> 
     """Load on asperities, load on film, approach of points `depth` away; at `factor` times the load."""
     conditions = replace(solution.conditions, load=factor * solution.conditions.load)
     options = replace(solution.options, tolerance=min(TIGHT, solution.options.tolerance))
-    solved = solve_contact(conditions, solution.lubricant, solution.surface, options=options, start=solution)
+    solved = solve_contact(
+        conditions,
+        solution.lubricant,
+        solution.surface,
+        options=options,
+        start=solution,
+        viscosity_factor=solution.viscosity_factor,
+    )
     borne = float(solved.pressure[solved.in_contact].sum() / solved.pressure.sum())
     approach = -solved.rigid_approach
     if depth is not None:

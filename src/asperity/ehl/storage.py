@@ -12,18 +12,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
-from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
     import xarray
 
 FORMAT = 1  # counts up when a reader of the format before could not read the file
-_LAWS: dict[str, dict[str, Any]] = {"viscosity": VISCOSITY_LAWS, "density": DENSITY_LAWS, "rheology": RHEOLOGY_LAWS}
+_LAWS: dict[str, dict[str, Any]] = {
+    "viscosity": VISCOSITY_LAWS,
+    "density": DENSITY_LAWS,
+    "rheology": RHEOLOGY_LAWS,
+    "friction": FRICTION_LAWS,
+}
 _OWN = (
     "Conventions",
     "title",
@@ -37,6 +43,7 @@ _OWN = (
     "versions",
 )
 _FIELDS = ("pressure", "gap", "surface_height")
+_FACTOR = "viscosity_factor"
 
 
 def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
@@ -80,6 +87,7 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
         **{name: (("x", "y"), data, {"long_name": text, "units": unit}) for name, (data, text, unit) in fields.items()},
         "in_contact": (("x", "y"), solution.in_contact.astype(np.int8), contact),
         "rigid_approach": ((), solution.rigid_approach, approach),
+        **_factor_variable(solution.viscosity_factor),
         **{
             name: (("step",), np.array(data), {"long_name": text, "units": "1"}) for name, (text, data) in steps.items()
         },
@@ -114,7 +122,12 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
 
 
 def save_solution(solution: ContactSolution, path: str | Path) -> Path:
-    """Write a solution as netCDF, whole or not at all, and return the path.
+    """Write a solution as netCDF, whole or not at all, and return the path; raises what `save_dataset` does."""
+    return save_dataset(solution_to_dataset(solution), path)
+
+
+def save_dataset(dataset: "xarray.Dataset", path: str | Path) -> Path:
+    """Write a solution's dataset, with whatever was added to it, as netCDF, whole or not at all; return the path.
 
     Raises
     ------
@@ -124,11 +137,11 @@ def save_solution(solution: ContactSolution, path: str | Path) -> Path:
         if writing fails half way, as on a full disk; nothing is left behind then.
     """
     path = Path(path)
-    dataset = solution_to_dataset(solution)
     checked = {"zlib": True, "complevel": 1, "shuffle": True}  # zlib's checksum tells a flipped bit on reading
     encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in dataset.variables}
-    for name in (*_FIELDS, "in_contact"):
-        encoding[name] |= checked
+    for name, variable in dataset.variables.items():
+        if variable.ndim == 2:
+            encoding[str(name)] |= checked
     with whole_file(path) as part:
         dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
     return path
@@ -206,6 +219,12 @@ def require_writable(path: Path) -> None:
         raise BadInput(f"cannot write {path}: the folder {folder} is not writable; choose another")
 
 
+def _factor_variable(factor: Field | None) -> dict[str, Any]:
+    if factor is None:
+        return {}
+    return {_FACTOR: (("x", "y"), factor, {"long_name": "viscosity over that at ambient temperature", "units": "1"})}
+
+
 def _laws_in(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
     described = {}
     for family, laws in _LAWS.items():
@@ -253,5 +272,6 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
             described["convergence"]["tolerance"],
             described["convergence"]["seconds"],
         ),
+        viscosity_factor=dataset[_FACTOR].values if _FACTOR in dataset else None,
         attributes={str(name): value for name, value in dataset.attrs.items() if name not in _OWN},
     )

@@ -56,12 +56,13 @@ STYLE: Any = {
 
 
 @contextmanager
-def _styled() -> Iterator[None]:
+def styled() -> Iterator[None]:
+    """The look of every figure on a page."""
     with matplotlib.rc_context(STYLE):
         yield
 
 
-@_styled()
+@styled()
 def svg(figure: Figure) -> str:
     """The figure as SVG text, the same bytes for the same figure."""
     text = StringIO()
@@ -91,7 +92,7 @@ def zone_shares(solution: ContactSolution) -> ZoneShares:
 # Maps ----------------------------------------------------------------------------------------------------------------
 
 
-def _map_figure(extent: tuple[float, float]) -> tuple[Figure, Axes]:
+def map_figure(extent: tuple[float, float]) -> tuple[Figure, Axes]:
     """A figure with a map of that extent, all maps of a contact in the same place, and room for a key below."""
     width, below, above = 3.95, 1.0, 0.32
     height = width * min(max(extent[1] / extent[0], 0.15), 1.4)
@@ -100,7 +101,7 @@ def _map_figure(extent: tuple[float, float]) -> tuple[Figure, Axes]:
     return figure, figure.add_axes((0.64 / WIDTH, below / total, width / WIDTH, height / total))
 
 
-def _show(axes: Axes, values: Field, solution: ContactSolution, **style: Any) -> AxesImage:
+def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any) -> AxesImage:
     """Draw values of shape (nx, ny) or colours of shape (nx, ny, 3) over the contact, oil coming from the left."""
     (x0, y0), (x1, y1) = solution.grid.lower, solution.grid.upper
     corners = (x0 * MICRO, x1 * MICRO, y0 * MICRO, y1 * MICRO)
@@ -112,7 +113,8 @@ def _show(axes: Axes, values: Field, solution: ContactSolution, **style: Any) ->
     return image
 
 
-def _mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
+def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
+    """The outline of the smooth, dry contact, dashed."""
     a, b = (half_width * MICRO for half_width in solution.conditions.hertz.half_widths)
     style: dict[str, Any] = {"color": colour, "linestyle": (0, (4, 3)), "linewidth": 1.0}
     if solution.conditions.geometry == "line":
@@ -123,16 +125,17 @@ def _mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None
         axes.plot(a * np.cos(turn), b * np.sin(turn), **style)
 
 
-def _colour_bar(figure: Figure, axes: Axes, image: AxesImage, label: str, extend: str = "neither") -> None:
+def colour_bar(figure: Figure, axes: Axes, image: AxesImage, label: str, extend: str = "neither") -> None:
+    """A key to the colours, below the map."""
     box, total = axes.get_position(), figure.get_size_inches()[1]
     place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
     figure.colorbar(image, cax=place, orientation="horizontal", label=label, extend=extend)
 
 
-@_styled()
+@styled()
 def contact_map(solution: ContactSolution) -> Figure:
     """Where asperities touch, where oil fills the gap and where it has ruptured: the paper's Fig 6."""
-    figure, axes = _map_figure(solution.grid.extent)
+    figure, axes = map_figure(solution.grid.extent)
     shares = zone_shares(solution)
     dry = solution.lubricant is None
 
@@ -141,8 +144,8 @@ def contact_map(solution: ContactSolution) -> Figure:
     colours[solution.cavitated] = to_rgb(CAVITY_COLOUR)
     colours[solution.cavitated & _stripes(solution.grid.cells)] = to_rgb(CAVITY_STRIPE)
     colours[solution.in_contact] = to_rgb(CONTACT_COLOUR)
-    _show(axes, colours, solution)
-    _mark_hertz_zone(axes, solution, "black")
+    show_map(axes, colours, solution)
+    mark_hertz_zone(axes, solution, "black")
 
     axes.set_title(f"Asperity contact on {shares.contact:.1%} of the Hertz zone".replace("%", " %"))
     keys: list[Patch | Line2D] = [Patch(color=CONTACT_COLOUR, label=f"asperity contact {100 * shares.contact:.1f} %")]
@@ -170,44 +173,44 @@ def _stripes(cells: tuple[int, int]) -> Mask:
     return np.asarray((i + j) % period < max(period // 5, 1))
 
 
-@_styled()
+@styled()
 def film_map(solution: ContactSolution) -> Figure:
     """Gap between the deformed surfaces; the colours end where the Hertz zone's gaps do (its 99th percentile)."""
-    figure, axes = _map_figure(solution.grid.extent)
+    figure, axes = map_figure(solution.grid.extent)
     zone = hertz_zone(solution.conditions, solution.grid)
     top = float(np.percentile(solution.gap[zone], 99.0)) * MICRO or 1.0
-    image = _show(axes, solution.gap * MICRO, solution, cmap="viridis", vmin=0.0, vmax=top)
-    _mark_hertz_zone(axes, solution, "white")
+    image = show_map(axes, solution.gap * MICRO, solution, cmap="viridis", vmin=0.0, vmax=top)
+    mark_hertz_zone(axes, solution, "white")
     axes.set_title("Gap between the surfaces" if solution.lubricant is None else "Film thickness")
-    _colour_bar(figure, axes, image, "gap [µm]" if solution.lubricant is None else "film thickness [µm]", "max")
+    colour_bar(figure, axes, image, "gap [µm]" if solution.lubricant is None else "film thickness [µm]", "max")
     return figure
 
 
-@_styled()
+@styled()
 def pressure_map(solution: ContactSolution) -> Figure:
     """Pressure of oil and asperities together."""
-    figure, axes = _map_figure(solution.grid.extent)
-    image = _show(axes, solution.pressure * GIGA, solution, cmap="inferno", vmin=0.0)
-    _mark_hertz_zone(axes, solution, "white")
+    figure, axes = map_figure(solution.grid.extent)
+    image = show_map(axes, solution.pressure * GIGA, solution, cmap="inferno", vmin=0.0)
+    mark_hertz_zone(axes, solution, "white")
     axes.set_title(f"Pressure, at most {solution.pressure.max() * GIGA:.2f} GPa")
-    _colour_bar(figure, axes, image, "pressure [GPa]")
+    colour_bar(figure, axes, image, "pressure [GPa]")
     return figure
 
 
-@_styled()
+@styled()
 def roughness_map(solution: ContactSolution) -> Figure:
     """The roughness that was pressed into the contact, before it deformed."""
-    figure, axes = _map_figure(solution.grid.extent)
+    figure, axes = map_figure(solution.grid.extent)
     heights = solution.surface.heights * MICRO
     reach = float(np.percentile(np.abs(heights), 99.5)) or 1.0
-    image = _show(axes, heights, solution, cmap="cividis", vmin=-reach, vmax=reach)
-    _mark_hertz_zone(axes, solution, "white")
+    image = show_map(axes, heights, solution, cmap="cividis", vmin=-reach, vmax=reach)
+    mark_hertz_zone(axes, solution, "white")
     axes.set_title(f"Composite roughness, Sq {solution.surface.sq * MICRO:.2f} µm")
-    _colour_bar(figure, axes, image, "height, material up [µm]", "both")
+    colour_bar(figure, axes, image, "height, material up [µm]", "both")
     return figure
 
 
-@_styled()
+@styled()
 def height_distribution(heights: Field) -> Figure:
     """How often each height [m] occurs, beside the Gaussian of the same Sq."""
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
@@ -233,7 +236,7 @@ def _draw_height_distribution(axes: Axes, heights: Field) -> None:
 # Lines ---------------------------------------------------------------------------------------------------------------
 
 
-@_styled()
+@styled()
 def centre_line(solution: ContactSolution) -> Figure:
     """Pressure and gap along rolling at the cell row nearest y = 0, with Hertz's pressure dashed."""
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
@@ -266,7 +269,7 @@ def centre_line(solution: ContactSolution) -> Figure:
     return figure
 
 
-@_styled()
+@styled()
 def convergence_history(convergence: Convergence) -> Figure:
     """Residual, load error and change of every step, grid level after grid level, against the tolerance."""
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
@@ -300,7 +303,7 @@ def convergence_history(convergence: Convergence) -> Figure:
     return figure
 
 
-@_styled()
+@styled()
 def spectrum(vibration: Vibration) -> Figure:
     """Acceleration spectrum around the search band, with the fitted resonance and its two-standard-deviation interval.
 
@@ -351,7 +354,7 @@ def _mean_of_neighbours(values: Field, together: int) -> Field:
 # Several runs --------------------------------------------------------------------------------------------------------
 
 
-def _draw_against_roughness(
+def draw_against_roughness(
     axes: Axes, points: Sequence[Mapping[str, Any]], key: str, label: str, scale: float, stroke: str, colour: str
 ) -> None:
     """One curve of a scalar against Sq; hollow markers where the solve did not converge."""
@@ -369,24 +372,24 @@ def _draw_against_roughness(
     axes.set(xlabel="composite roughness Sq [µm]", xlim=(min(every) - margin, max(every) + margin))
 
 
-@_styled()
+@styled()
 def shares_against_roughness(points: Sequence[Mapping[str, Any]]) -> Figure:
     """CLR and CAR of several runs, given as their scalars, against Sq."""
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
     axes = figure.add_subplot()
-    _draw_against_roughness(axes, points, "clr", "CLR: share of the load", 100.0, "-o", VERMILION)
-    _draw_against_roughness(axes, points, "car", "CAR: share of the Hertz zone", 100.0, "--s", BLUE)
+    draw_against_roughness(axes, points, "clr", "CLR: share of the load", 100.0, "-o", VERMILION)
+    draw_against_roughness(axes, points, "car", "CAR: share of the Hertz zone", 100.0, "--s", BLUE)
     axes.set(ylabel="taken by asperities [%]", title="Load and area share of asperities", ylim=(0.0, 100.0))
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
-@_styled()
+@styled()
 def resonance_against_roughness(points: Sequence[Mapping[str, Any]], full_load_crf_hz: float | None) -> Figure:
     """CRF of several runs, given as their scalars, against Sq, with two standard deviations."""
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
     axes = figure.add_subplot()
-    _draw_against_roughness(axes, points, "crf_hz", "CRF ± 2 std of its fit", 1.0, "-o", VERMILION)
+    draw_against_roughness(axes, points, "crf_hz", "CRF ± 2 std of its fit", 1.0, "-o", VERMILION)
     for point in points:
         if point["crf_hz"] is not None and point["crf_std_hz"] is not None:
             reach = 2.0 * point["crf_std_hz"]
@@ -405,7 +408,7 @@ def resonance_against_roughness(points: Sequence[Mapping[str, Any]], full_load_c
 # Measured surfaces ---------------------------------------------------------------------------------------------------
 
 
-@_styled()
+@styled()
 def surface_map(described: SurfaceDescription, path: Path) -> Path:
     """Write a PNG of a measured surface, levelled: map, profile, bearing curve, radial and directional spectrum.
 

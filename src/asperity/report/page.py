@@ -22,8 +22,16 @@ from asperity.coupling import VibrationModel
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import BadInput
-from asperity.lubricant import DENSITY_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant, Newtonian
-from asperity.report import figures
+from asperity.lubricant import (
+    DENSITY_LAWS,
+    FRICTION_LAWS,
+    RHEOLOGY_LAWS,
+    VISCOSITY_LAWS,
+    WARMTH_LAWS,
+    Lubricant,
+    Newtonian,
+)
+from asperity.report import figures, rubbing_figures
 
 if TYPE_CHECKING:
     from asperity.run import Run
@@ -90,6 +98,7 @@ def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
         newtonian=any(
             run.solution.lubricant and isinstance(run.solution.lubricant.rheology, Newtonian) for run in runs
         ),
+        isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
         sphere=any(run.case.vibration and run.case.vibration.stiffness_law == "hertz-point" for run in runs),
         line=any(run.solution.conditions.geometry == "line" for run in runs),
         imbalance=_span([one["mass_flux_imbalance"] for one in scalars]),
@@ -213,6 +222,16 @@ QUANTITIES = (
     Quantity("h_mean_m", "Mean film", "µm", "mean gap in the Hertz zone", 1e6),
     Quantity("lambda_ratio", "Film ratio, Λ", "", "least film of the smooth contact (usual fit) over Sq", 1.0, ".2f"),
     Quantity("p_max_pa", "Largest pressure", "GPa", "oil and asperities together", 1e-9),
+    Quantity("friction_coefficient", "Friction coefficient", "", "shear force along rolling over the load", 1.0, ".4f"),
+    Quantity("friction_asperity_part", "… from asperities", "", "shear of touching cells", 1.0, ".4f"),
+    Quantity("friction_oil_part", "… from the oil", "", "shear of the film", 1.0, ".4f"),
+    Quantity("friction_power_w", "Heat of friction", "W", "shear force times sliding speed", 1.0, ".3g"),
+    Quantity(
+        "flash_temperature_max_k", "Flash temperature", "K", "largest rise of a surface above its body", 1.0, ".1f"
+    ),
+    Quantity("film_temperature_max_k", "Film temperature", "K", "largest rise of the film above ambient", 1.0, ".1f"),
+    Quantity("von_mises_max_pa", "Largest von Mises stress", "GPa", "in body 1, taken as elastic", 1e-9),
+    Quantity("von_mises_depth_m", "… at the depth", "µm", "below the surface", 1e6, ".2f"),
     Quantity("crf_hz", "Contact resonance frequency, CRF", "Hz", "of one simulated record", deviation="crf_std_hz"),
     Quantity(
         "crfa", "Resonance amplitude, CRFA", "(m/s²)²/Hz", "acceleration density at the CRF", deviation="crfa_std"
@@ -238,6 +257,8 @@ TILES = {
     "car": "Area share, CAR",
     "h_mean_m": "Mean film",
     "lambda_ratio": "Film ratio, Λ",
+    "friction_coefficient": "Friction coefficient",
+    "flash_temperature_max_k": "Flash temperature",
     "crf_hz": "Resonance, CRF",
     "crfa": "Amplitude, CRFA",
 }
@@ -337,6 +358,8 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
             "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
             f"Histogram of the heights, Sq {scalars['sq_m'] * 1e6:.3f} µm, beside a Gaussian curve.",
         ),
+        *_rubbing_pictures(run),
+        *_stress_pictures(run),
         *_spectrum_picture(run),
         _picture(
             figures.convergence_history(solution.convergence),
@@ -352,6 +375,59 @@ def _capped_oil(run: "Run") -> str:
         return ""
     share = _percent(run.state.capped_oil_load_ratio)
     return f" Cells that stand at the hardness without touching carry {share} of the load; CLR leaves them out."
+
+
+def _rubbing_pictures(run: "Run") -> list[_Picture]:
+    solution, rubbing, heat = run.solution, run.friction, run.heat
+    if rubbing is None or heat is None or solution.conditions.sliding_speed == 0.0:
+        return []
+    sliding = solution.conditions.sliding_speed
+    return [
+        _picture(
+            rubbing_figures.traction_map(solution, rubbing),
+            f"Shear stress of sliding at {sliding:.3g} m/s on both surfaces: {rubbing.boundary_friction:g} times "
+            f"the pressure where they touch (friction {rubbing.asperity_part:.4f}), the oil's own elsewhere "
+            f"({rubbing.oil_part:.4f}).",
+            f"Map of the shear stress: friction coefficient {rubbing.coefficient:.4f}.",
+        ),
+        _picture(
+            rubbing_figures.temperature_map(solution, heat),
+            f"Temperature of the hotter surface. Friction makes {rubbing.power:.3g} W; {heat.heat_1_w:.3g} W flow into "
+            f"body 1 and {heat.heat_2_w:.3g} W into body 2.",
+            f"Map of the flash temperature: at most {heat.max_k:.1f} K above the body.",
+        ),
+        _picture(
+            rubbing_figures.temperature_line(solution, heat),
+            "Temperatures along rolling through the hottest cell. The slower surface stays longer in the heat; the "
+            "film can be hotter than both, as the heat is made within it.",
+            f"Curves of both surfaces' temperatures along rolling; the film's largest rise is {heat.film_max_k:.1f} K.",
+        ),
+    ]
+
+
+def _stress_pictures(run: "Run") -> list[_Picture]:
+    solution, stress = run.solution, run.stress
+    peak = f"{stress.peak.value * 1e-9:.3f} GPa, {stress.peak.depth * 1e6:.2f} µm deep"
+    dx, dy = solution.grid.spacing
+    return [
+        _picture(
+            rubbing_figures.stress_map(solution, stress),
+            "The largest von Mises stress below each cell, of the surface and fifteen depths in body 1. Pressure and "
+            "friction load an elastic, smooth half-space: above its yield stress the material would flow.",
+            f"Map of the largest von Mises stress below the surface: {peak}.",
+        ),
+        _picture(
+            rubbing_figures.stress_section(solution, stress),
+            f"Von Mises stress below the surface, in the plane along rolling that holds the largest: {peak} (circle).",
+            f"Section of the von Mises stress along rolling and depth: largest {peak}.",
+        ),
+        _picture(
+            rubbing_figures.stress_over_depth(solution, stress),
+            "The largest von Mises stress at each depth. Asperities raise it near the surface, where it depends on the "
+            f"cell size ({dx * 1e6:.2g} × {dy * 1e6:.2g} µm); deeper down the contact as a whole decides.",
+            f"Curve of the largest von Mises stress over depth beside that of Hertz's contact: {peak}.",
+        ),
+    ]
 
 
 def _spectrum_picture(run: "Run") -> list[_Picture]:
@@ -371,9 +447,14 @@ def _spectrum_picture(run: "Run") -> list[_Picture]:
 
 def _silence(run: "Run") -> list[str]:
     """Why a figure is not there."""
-    if run.vibration is None or run.vibration.spectrum is not None:
-        return []
-    return [f"There is no spectrum to show: {run.vibration.resonance.reason}."]
+    reasons = []
+    if run.friction_failure is not None:
+        reasons.append(f"There is no friction and no temperature to show: {run.friction_failure}.")
+    elif run.solution.conditions.sliding_speed == 0.0:
+        reasons.append("There is no friction to show: both surfaces move at the same speed.")
+    if run.vibration is not None and run.vibration.spectrum is None:
+        reasons.append(f"There is no spectrum to show: {run.vibration.resonance.reason}.")
+    return reasons
 
 
 # Several runs --------------------------------------------------------------------------------------------------------
@@ -412,6 +493,21 @@ def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> li
                 for s in scalars
             ) + ".",
         ),
+        *_friction_overview(scalars),
+    ]  # fmt: skip
+
+
+def _friction_overview(scalars: Sequence[Mapping[str, Any]]) -> list[_Picture]:
+    rubbing = [one for one in scalars if one["friction_coefficient"]]
+    if not rubbing:
+        return []
+    return [
+        _picture(
+            rubbing_figures.friction_against_roughness(rubbing),
+            "Friction coefficient, and what asperities and oil contribute to it.",
+            "Friction coefficient against Sq: "
+            + "; ".join(f"at {s['sq_m'] * 1e6:.2f} µm {s['friction_coefficient']:.4f}" for s in rubbing) + ".",
+        )
     ]  # fmt: skip
 
 
@@ -423,6 +519,13 @@ LAW_FIELDS = {
     "p0": ("p₀", 1e-6, "MPa"),
     "rho0": ("ρ₀", 1.0, "kg/m³"),
     "tau0": ("τ₀", 1e-6, "MPa"),
+    "floor": ("least limit", 1e-6, "MPa"),
+    "ratio": ("τ_L/G", 1.0, ""),
+    "tau_l0": ("τ_L0", 1e-6, "MPa"),
+    "slope": ("ξ", 1.0, ""),
+    "softening": ("b", 1.0, "1/K"),
+    "beta": ("β", 1.0, "1/K"),
+    "s0": ("S₀", 1.0, ""),
 }
 
 
@@ -431,7 +534,9 @@ def _law(law: object, table: Mapping[str, type]) -> str:
     values = []
     for field in fields(law):  # type: ignore[arg-type]
         symbol, scale, unit = LAW_FIELDS[field.name]
-        values.append(f"{symbol} = {getattr(law, field.name) * scale:.4g} {unit}")
+        value = getattr(law, field.name)
+        if value is not None:
+            values.append(f"{symbol} = {value * scale:.4g} {unit}".rstrip())
     return ", ".join([name, *values])
 
 
@@ -474,6 +579,28 @@ def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:
         "Viscosity law": _law(lubricant.viscosity, VISCOSITY_LAWS),
         "Density law": _law(lubricant.density, DENSITY_LAWS),
         "Rheology": _law(lubricant.rheology, RHEOLOGY_LAWS),
+        "Friction of the film": _law(lubricant.friction, FRICTION_LAWS),
+    }
+
+
+def _thermal_rows(run: "Run") -> dict[str, str]:
+    thermal = run.case.thermal
+    bulk = "" if thermal.bulk is None else f", bodies at {_pair(thermal.bulk, 'K')}"
+    names = {"conductivity": ("W/m/K", 1.0), "density": ("kg/m³", 1.0), "heat_capacity": ("J/kg/K", 1.0)}
+    solids = [
+        f"{name.replace('_', ' ')} {_pair((getattr(first, name), getattr(second, name)), unit, scale)}"
+        for first, second in [thermal.solids]
+        for name, (unit, scale) in names.items()
+    ]
+    rows = {"Boundary friction": f"{run.case.boundary_friction:g}", "Bodies": ", ".join(solids)}
+    if run.solution.lubricant is None:
+        return rows
+    feedback = "the film's heat thins the oil" if thermal.feedback else "heat does not act back on the oil"
+    return {
+        **rows,
+        "Temperature": f"{thermal.ambient:.4g} K ambient{bulk}; {feedback}",
+        "Oil and heat": f"conductivity {thermal.oil_conductivity:g} W/m/K, viscosity falls by the law "
+        f"{_law(thermal.warmth, WARMTH_LAWS)}",
     }
 
 
@@ -545,6 +672,7 @@ def _conditions(run: "Run") -> dict[str, str]:
     return {
         **_contact_rows(solution.conditions),
         **_lubricant_rows(solution.lubricant),
+        **_thermal_rows(run),
         "Roughness": f"Sq {solution.surface.sq * 1e6:.4g} µm; case: {_roughness(run.case.text)}",
         **_numerical_rows(solution),
         **_vibration_rows(run.case.vibration),

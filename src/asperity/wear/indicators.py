@@ -5,7 +5,7 @@ highest point is kept beside it. Where to look, the band, is the caller's to say
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,8 +31,9 @@ class Resonance:
     `crf_hz` is the oscillator's natural frequency f0 [Hz]; `crfa` the fitted line at f0 without the floor below it
     [(m/s^2)^2/Hz]; `crf_std`, `crfa_std` their standard deviations from the Fisher information. `damping_ratio` with
     its `damping_ratio_std`, and `floor`, the density at the lower and upper end of `band_hz`, complete the fitted
-    curve. `evidence` is how much better, by BIC, a line and a floor explain the band than a floor alone (found needs
-    10, very strong). All of a line's figures are nan when it was not `found`; `reason` then says why.
+    curve; where more than a floor was fitted, `background` in its place: frequencies and densities. `evidence` is how
+    much better, by BIC, a line and the rest explain the band than the rest alone (found needs 10, very strong). All of
+    a line's figures are nan when it was not `found`; `reason` then says why.
     The paper's peak has no standard deviation, damping, floor or evidence: nan.
     """
 
@@ -48,6 +49,7 @@ class Resonance:
     damping_ratio_std: float = np.nan
     floor: tuple[float, float] = (np.nan, np.nan)
     evidence: float = np.nan
+    background: tuple[Field, Field] | None = field(default=None, compare=False, repr=False)
 
     @property
     def crf_std_hz(self) -> float:
@@ -60,24 +62,29 @@ class Resonance:
         nan everywhere for a method that fits no curve.
         """
         low, high = self.band_hz
-        share = (frequency_hz - low) / (high - low)
-        curve = self.floor[0] * (1.0 - share) + self.floor[1] * share
+        if self.background is None:
+            share = (frequency_hz - low) / (high - low)
+            curve = self.floor[0] * (1.0 - share) + self.floor[1] * share
+        else:
+            curve = np.interp(frequency_hz, *self.background)
         if self.found:
             curve = curve + self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
         return curve
 
 
-def line_shape(frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:
+def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float) -> Field:
     """Acceleration line of an oscillator that rides over white base acceleration, 1 at f = f0.
 
     T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 + 4ζ^2)/(4ζ^2). Roughness
     whose spectrum falls as f^-4 (a second-order low pass, far above its cut-off) is white base acceleration.
     """
-    return _line_and_slopes(frequency_hz, f0_hz, damping_ratio)[0]
+    return line_and_slopes(frequency_hz, f0_hz, damping_ratio)[0]
 
 
-def _line_and_slopes(frequency_hz: Field, f0_hz: float, damping_ratio: float) -> tuple[Field, Field, Field]:
-    """The line L, dL/d(ln f0) and dL/d(ln ζ)."""
+def line_and_slopes(
+    frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
+) -> tuple[Field, Field, Field]:
+    """The line L, dL/d(ln f0) and dL/d(ln ζ); shapes broadcast."""
     x2 = (frequency_hz / f0_hz) ** 2
     squared = 4.0 * damping_ratio**2
     top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
@@ -103,6 +110,12 @@ def contact_resonance(spectrum: Spectrum, *, band_hz: tuple[float, float], metho
     """
     if method not in INDICATOR_METHODS:
         raise BadInput(f"indicator method must be one of {', '.join(INDICATOR_METHODS)}, got {method!r}")
+    inside = require_band(spectrum, band_hz)
+    return INDICATOR_METHODS[method](spectrum, inside, (band_hz[0], band_hz[1]))
+
+
+def require_band(spectrum: Spectrum, band_hz: tuple[float, float]) -> Mask:
+    """Lines of the spectrum within the band; BadInput where a resonance cannot be looked for there."""
     low, high = band_hz
     top = float(spectrum.frequency_hz[-1])
     if not 0.0 < low < high <= top:
@@ -116,7 +129,7 @@ def contact_resonance(spectrum: Spectrum, *, band_hz: tuple[float, float], metho
         )
     if not np.isfinite(spectrum.density[inside]).all():
         raise BadInput(f"spectrum must be finite from {low:g} to {high:g} Hz, got some that is not; repair the record")
-    return INDICATOR_METHODS[method](spectrum, inside, (low, high))
+    return inside
 
 
 def _highest_point(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
@@ -310,8 +323,7 @@ def _line_model(frequency: Field, floors: Field, leakage: Field) -> Model:
     def model(theta: Field) -> tuple[Field, Field]:
         level, f0, zeta = np.exp(theta[:3])
         line, by_f0, by_damping = (
-            level * (np.convolve(part, leakage, "valid") if reach else part)
-            for part in _line_and_slopes(wide, f0, zeta)
+            level * (np.convolve(part, leakage, "valid") if reach else part) for part in line_and_slopes(wide, f0, zeta)
         )
         return line + floors @ theta[3:], np.column_stack([line, by_f0, by_damping, floors])
 

@@ -1,0 +1,71 @@
+"""What docs/theory/stress.md quotes: peaks below sliding Hertz contacts on several grids, and what stress costs."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from asperity.case import load_case
+from asperity.ehl.flash import moving_source
+from asperity.ehl.influence import clear_kernels
+from asperity.ehl.stress import SubsurfaceStress, stress_below, subsurface_stress
+from asperity.ehl.thermal import friction_and_heat
+from asperity.grid import Grid
+from asperity.run import solve_case
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.4)
+NU = 0.3
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    """The tables, line by line."""
+    yield "## Stress below the surface\n"
+    yield "Largest von Mises stress [p_h] and its depth [a] below sliding Hertz contacts, nu = 0.3:\n"
+    cells = (64, 128, 256) if fast else (64, 128, 256, 512)
+    yield "| contact | f | " + " | ".join(f"{n} cells" for n in cells) + " |"
+    yield "|---|---|" + "---|" * len(cells)
+    for name, solve in (("line", _line), ("point", _point)):
+        for friction in FRICTIONS:
+            peaks = [solve(friction, n).peak for n in cells]
+            shown = " | ".join(f"{peak.value:.4f} at {peak.depth:.3f}" for peak in peaks)
+            yield f"| {name} | {friction:g} | {shown} |"
+    yield "\nLargest shear stress without friction: " + ", ".join(
+        f"{name} {peak.value:.4f} p_h at {peak.depth:.3f} a"
+        for name, peak in (("line", _line(0.0, 256).shear_peak), ("point", _point(0.0, 256).shear_peak))
+    )
+    yield "\nSeconds, with kernels made anew and with kernels kept:\n"
+    yield "| case | cells | solve | friction and heat, anew | stress, anew | friction and heat, kept | stress, kept |"
+    yield "|---|---|---|---|---|---|---|"
+    for file, count in (("paper.toml", 256), ("ball-on-disc.toml", 256)):
+        case = load_case(EXAMPLES / file).with_overrides({"grid.cells": [count, count], "vibration": "none"})
+        solution = solve_case(case, strict=False).solution  # whatever has to be compiled is, after this
+        friction_and_heat(solution)
+        solution = solve_case(case, strict=False).solution
+        moving_source.cache_clear()
+        clear_kernels()
+        times = [solution.convergence.seconds]
+        for _ in range(2):
+            started = perf_counter()
+            rubbing = friction_and_heat(solution, thermal=case.thermal)[0]
+            heated = perf_counter()
+            subsurface_stress(solution, shear=rubbing.shear)
+            times += [heated - started, perf_counter() - heated]
+        yield f"| {file} | {count} x {count} | " + " | ".join(f"{value:.2f}" for value in times) + " |"
+
+
+def _depths(spacing: float) -> np.ndarray:
+    return np.concatenate([[0.0], np.geomspace(spacing / 2.0, 2.5, 15)])
+
+
+def _line(friction: float, cells: int) -> SubsurfaceStress:
+    grid = Grid((cells, 8), (-2.0, -2.0), (2.0, 2.0))
+    pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
+    return stress_below(pressure, friction * pressure, grid, _depths(4.0 / cells), poisson_ratio=NU)
+
+
+def _point(friction: float, cells: int) -> SubsurfaceStress:
+    grid = Grid((cells, cells), (-2.0, -2.0), (2.0, 2.0), (False, False))
+    pressure = np.sqrt(np.maximum(1.0 - grid.x[:, None] ** 2 - grid.y**2, 0.0))
+    return stress_below(pressure, friction * pressure, grid, _depths(4.0 / cells), poisson_ratio=NU)

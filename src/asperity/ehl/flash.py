@@ -1,0 +1,217 @@
+"""Flash temperature: sliding heat that both bodies take up as it passes, shared between them through the film.
+
+Per area q = |τ| Δu. Half of it flows to each surface, and k_f/h of their difference across the film (the paper's Eqs
+16 and 17): q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q - q_1. Each surface answers its heat by a convolution, exactly for
+heat that is constant over cells: the integral of an instantaneous source over time,
+
+    T(X, Y) = 2/(k sqrt(pi)) * int_0^inf E_x(X, s) E_y(Y, s) ds,   s = sqrt(kappa t),
+
+where E is a cell's share of the Gaussian of width 2 s around the source, which has moved by u s^2/kappa. It holds at
+any speed, forward, backward or at rest; the paper's one-dimensional integrals are its limit of great speed. A line
+contact repeats in y and is as long as it is: at rest its temperature has a limit for that reason alone.
+Source: H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from asperity.arrays import Field, Mask
+from asperity.ehl.friction import Friction, friction
+from asperity.ehl.solution import ContactSolution
+from asperity.errors import AsperityError
+from asperity.lubricant import Solid, Thermal
+
+NODES = 4  # of Gauss's rule in a panel
+RATIO = 1.25  # of the s at both ends of a panel, at most
+EARLIEST, LATEST = 1.0 / 16.0, 1e4  # first s in cells; last s in lengths of the source
+HARMONICS = 6
+SHARING_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class MovingSource:
+    """Surface temperature of a body that moves past a heat input: an exact cell-to-cell convolution by FFT.
+
+    `own` is the rise of a cell by its own heat [K m^2/W].
+    """
+
+    cells: tuple[int, int]
+    spectrum: npt.NDArray[np.complex128]
+    own: float
+    periodic: bool
+
+    def __call__(self, heat: Field) -> Field:
+        """Temperature rise [K] of a heat input [W/m^2], both (nx, ny)."""
+        import scipy.fft as fft
+
+        nx, ny = self.cells
+        length = ny if self.periodic else 2 * ny
+        waves = fft.fft(fft.rfft(heat, n=length, axis=1), n=2 * nx, axis=0, overwrite_x=True)
+        waves *= self.spectrum
+        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=length, axis=1)[:, :ny])
+
+
+@lru_cache(maxsize=16)
+def moving_source(
+    cells: tuple[int, int], spacing: tuple[float, float], speed: float, solid: Solid, *, length: float | None
+) -> MovingSource:
+    """A body of `solid` that moves at `speed` along x [m/s] under cells of `spacing` [m].
+
+    `length` of a line contact [m], which repeats in y; None for heat that is bounded both ways.
+    """
+    import scipy.fft as fft
+
+    (nx, ny), (dx, dy) = cells, spacing
+    drift = speed / solid.diffusivity
+    s, weight = _times(nx, dx, dy, drift, max(nx * dx, ny * dy, length or 0.0))
+    along = np.arange(2 * nx)
+    x = np.where(along < nx, along, along - 2.0 * nx) * dx  # downstream, then upstream of the source
+    edges = np.append(np.sort(x) - dx / 2.0, (nx - 0.5) * dx)
+    share_x = np.diff(_gaussian(edges[:, None] - drift * s**2, s), axis=0)
+    share_x = np.roll(share_x, nx, axis=0)
+    share_y = _share_in_line(ny, dy, length, s) if length is not None else _share(np.arange(ny + 1) * dy, dy, s)
+    kernel = 2.0 / (solid.conductivity * np.sqrt(np.pi)) * ((share_x * weight) @ share_y.T)
+    mirrored = np.concatenate([kernel, kernel[:, -2:0:-1]], axis=1) if length is None else kernel
+    spectrum = fft.fft(fft.rfft(mirrored, axis=1), axis=0)
+    spectrum.flags.writeable = False
+    return MovingSource(cells, spectrum, float(kernel[0, 0]), length is not None)
+
+
+def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[Field, Field]:
+    """The values of s and their weights, Gauss's rule in panels.
+
+    Panels grow by a ratio, and end where the source has drifted by half cells: however little the heat spreads, each
+    panel then lies on one side of a cell's edge.
+    """
+    first, last = EARLIEST * min(dx, dy), LATEST * reach
+    ends = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(RATIO))) + 1)
+    if drift != 0.0:
+        ends = np.concatenate([ends, np.sqrt(0.5 * dx * np.arange(1, 2 * nx + 8) / abs(drift))])
+    ends = np.concatenate([[0.0], np.unique(ends)])
+    node, share = np.polynomial.legendre.leggauss(NODES)
+    half = np.diff(ends) / 2.0
+    nodes = (ends[:-1] + half)[:, None] + half[:, None] * node
+    return nodes.ravel(), (half[:, None] * share).ravel()
+
+
+def _gaussian(x: Field, s: Field) -> Field:
+    """Heat that has spread by s, left of x."""
+    from scipy.special import erf
+
+    return np.asarray(0.5 * erf(x / (2.0 * s)))
+
+
+def _share(y: Field, dy: float, s: Field) -> Field:
+    """A cell's share of heat that started at distance y, shape (y, s)."""
+    return _gaussian(y[:, None] + dy / 2.0, s) - _gaussian(y[:, None] - dy / 2.0, s)
+
+
+def _share_in_line(ny: int, dy: float, length: float, s: Field) -> Field:
+    """The same where heat repeats in y: images while it has not spread far, a few harmonics afterwards."""
+    width = ny * dy
+    y = np.arange(ny) * dy
+    near = s < width / 8.0
+    out = np.empty((ny, s.size))
+    out[:, near] = sum(_share(y + image * width, dy, s[near]) for image in (-2, -1, 0, 1))
+    order = np.arange(1, HARMONICS + 1)
+    wave = 2.0 * np.pi * order / width
+    decay = 2.0 * np.exp(-((wave[:, None] * s[~near]) ** 2)) * np.sinc(order / ny)[:, None]
+    out[:, ~near] = (1.0 + np.cos(y[:, None] * wave) @ decay) / ny
+    return out * 2.0 * _gaussian(np.array([[length / 2.0]]), s)  # heat from beyond the line's ends is missing
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlashTemperature:
+    """What sliding heat does; fields of shape (nx, ny).
+
+    `surface_1`, `surface_2` and `film` (its mean over the thickness) are temperatures above ambient [K]; `heat` is what
+    a unit of area makes and `into_1` what of it flows into body 1 [W/m^2]. `max_k` is the largest rise of either
+    surface above its own bulk, `film_max_k` that of the film above ambient [K]; `heat_1_w` and `heat_2_w` flow into the
+    bodies [W], of a line contact over its length.
+    """
+
+    surface_1: Field
+    surface_2: Field
+    film: Field
+    heat: Field
+    into_1: Field
+    max_k: float
+    film_max_k: float
+    heat_1_w: float
+    heat_2_w: float
+
+
+def flash_temperature(
+    solution: ContactSolution, rubbing: Friction | None = None, *, thermal: Thermal | None = None
+) -> FlashTemperature:
+    """Temperatures of both surfaces and of the film, as friction heats them.
+
+    Parameters
+    ----------
+    rubbing : the friction; that of `friction(solution)` unless given
+    thermal : the bodies, the oil's conductivity, the temperatures around; `Thermal()` unless given
+
+    Raises
+    ------
+    AsperityError
+        if the two bodies' temperatures could not be matched.
+    """
+    thermal = thermal or Thermal()
+    conditions, grid = solution.conditions, solution.grid
+    rubbing = rubbing or friction(solution, thermal=thermal)
+    heat = np.abs(rubbing.shear) * conditions.sliding_speed
+    length = conditions.length
+    one, two = (
+        moving_source(grid.cells, grid.spacing, speed, solid, length=length)
+        for speed, solid in zip(conditions.surface_speeds, thermal.solids, strict=True)
+    )
+    bulk = tuple(temperature - thermal.ambient for temperature in thermal.bulk or (thermal.ambient, thermal.ambient))
+    resistance, exchanging = solution.gap / thermal.oil_conductivity, np.ones(grid.cells, dtype=bool)
+    if solution.lubricant is None:  # no film, and nothing beside the contact
+        resistance, exchanging = 0.0 * resistance, solution.in_contact
+    passed = _passed_on(one, two, heat, resistance, exchanging, bulk[1] - bulk[0])
+    into_1, into_2 = 0.5 * heat + passed, 0.5 * heat - passed
+    rise_1, rise_2 = one(into_1), two(into_2)
+    surface_1, surface_2 = bulk[0] + rise_1, bulk[1] + rise_2
+    film = 0.5 * (surface_1 + surface_2) + heat * resistance / 12.0  # a parabola across the film above the mean
+    dx, dy = grid.spacing
+    area = dx * dy * (length / grid.extent[1] if length is not None else 1.0)
+    return FlashTemperature(
+        surface_1=surface_1,
+        surface_2=surface_2,
+        film=film,
+        heat=heat,
+        into_1=into_1,
+        max_k=float(max(rise_1.max(), rise_2.max())),
+        film_max_k=float(film.max()),
+        heat_1_w=float(into_1.sum() * area),
+        heat_2_w=float(into_2.sum() * area),
+    )
+
+
+def _passed_on(
+    one: MovingSource, two: MovingSource, heat: Field, resistance: Field, exchanging: Mask, warmer: float
+) -> Field:
+    """Heat that crosses the film from body 2 to body 1 [W/m^2]: resistance times it is the surfaces' difference."""
+    from scipy.sparse.linalg import LinearOperator, gmres
+
+    half = 0.5 * heat
+    wanted = np.asarray(np.where(exchanging, warmer + two(half) - one(half), 0.0))
+    if not np.any(wanted):
+        return wanted
+    both = MovingSource(one.cells, one.spectrum + two.spectrum, one.own + two.own, one.periodic)
+    scale = 1.0 / (resistance + both.own)
+
+    def unbalanced(vector: Field) -> Field:
+        crossing = vector.reshape(heat.shape) * scale
+        answer = resistance * crossing + both(crossing)
+        return np.where(exchanging, answer, crossing / scale).ravel()
+
+    operator = LinearOperator((heat.size, heat.size), matvec=unbalanced, dtype=np.float64)
+    solved, failed = gmres(operator, wanted.ravel(), rtol=SHARING_TOLERANCE, atol=0.0, restart=80, maxiter=10)
+    if failed:
+        raise AsperityError("the heat could not be shared between the bodies; is the film far thinner than a cell?")
+    return np.asarray(np.where(exchanging, solved.reshape(heat.shape) * scale, 0.0))

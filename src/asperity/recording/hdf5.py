@@ -1,0 +1,91 @@
+"""HDF5 (and MATLAB 7.3, which is HDF5), by h5py: every data set of numbers is a channel or several.
+
+Rate, unit and start may stand as attributes on the data set or a group above it, or as scalars beside it.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import UnreadableFile
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, only, why
+from asperity.recording.model import Channel, Contents
+
+_DEEPEST = 8  # groups in groups
+
+
+def is_hdf5(head: bytes) -> bool:
+    """Whether the HDF5 signature stands at one of the places where it may."""
+    return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048))
+
+
+def read(path: Path) -> Contents:
+    """Channels named by their path in the file."""
+    import h5py
+
+    notes: list[str] = []
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise UnreadableFile(f"{path.name} is no readable HDF5 file ({why(error)}); {REMEDY}") from error
+    try:
+        channels = list(_channels(path, file, "", {}, notes))
+        matlab = any(str(key).startswith("MATLAB") for key in _every_attribute(file))
+    except UnreadableFile:
+        raise
+    except Exception as error:
+        raise UnreadableFile(f"{path.name} is a damaged HDF5 file ({why(error)}); {REMEDY}") from error
+    finally:
+        file.close()
+    return Contents(format="mat v7.3" if matlab else "hdf5", channels=only(channels, path.name), notes=notes)
+
+
+def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
+    import h5py
+
+    if name.count("/") > _DEEPEST:
+        return
+    around = above | _attributes(group)
+    members = [(str(key), group.get(key)) for key in group if not str(key).startswith("#")]
+    for key, one in members:
+        if isinstance(one, h5py.Dataset) and one.size is not None and one.size <= 64:
+            around[key] = _scalar(one)
+    for key, one in members:
+        inner = f"{name}/{key}" if name else key
+        if isinstance(one, h5py.Group):
+            yield from _channels(path, one, inner, around, notes)
+        elif isinstance(one, h5py.Dataset) and numeric(one) and one.size is not None and one.size > 64:
+            facts = facts_in(path.name, around | _attributes(one))
+            yield from columns(inner, _OnDisk(path, one.name, one.shape), notes, **facts)
+
+
+class _OnDisk:
+    """A data set that is opened for each slice, so that no file stays open between."""
+
+    def __init__(self, path: Path, name: str, shape: tuple[int, ...]) -> None:
+        self.path, self.name, self.shape = path, name, shape
+
+    def __getitem__(self, where: Any) -> Any:
+        import h5py
+
+        with h5py.File(self.path, "r") as file:
+            return file[self.name][where]
+
+
+def _scalar(one: Any) -> Any:
+    """A small data set as a number, or as text: MATLAB keeps that as 16-bit characters."""
+    value = one[()]
+    if isinstance(value, np.ndarray) and one.attrs.get("MATLAB_class") == b"char":
+        return "".join(map(chr, value.reshape(-1).tolist()))
+    return value
+
+
+def _attributes(one: Any) -> dict[str, Any]:
+    return {str(key): value for key, value in one.attrs.items()}
+
+
+def _every_attribute(file: Any) -> Iterator[str]:
+    for one in file.values():
+        yield from one.attrs

@@ -1,0 +1,64 @@
+"""MATLAB files up to version 7, by scipy.io; newer ones are HDF5 and left to `hdf5`.
+
+Structs are walked into: a rate or a unit in a struct belongs to the rows of samples in it.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import UnreadableFile
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, only, why
+from asperity.recording.model import Channel, Contents
+
+_DEEPEST = 8
+
+
+def is_matlab(head: bytes) -> bool:
+    """Whether a file has the header of MATLAB 5 to 7; version 4 has none and is known by its name only."""
+    return (
+        head.startswith(b"MATLAB")
+        and head[124:126] in (b"\x00\x01", b"\x01\x00")
+        and not head[512:520].startswith(b"\x89HDF")
+    )
+
+
+def read(path: Path) -> Contents:
+    """Channels named by variable and field: bearing.gs."""
+    from scipy.io import loadmat
+
+    notes: list[str] = []
+    try:
+        held = loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+        held = {key: value for key, value in held.items() if not key.startswith("__")}
+        channels = list(_channels(path.name, held, "", {}, notes))
+    except UnreadableFile:
+        raise
+    except Exception as error:
+        raise UnreadableFile(f"{path.name} is no readable MATLAB file ({why(error)}); {REMEDY}") from error
+    return Contents(format="mat v5", channels=only(channels, path.name), notes=notes)
+
+
+def _channels(file: str, held: dict[str, Any], name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
+    if name.count(".") > _DEEPEST:
+        return
+    around = above | {key: value for key, value in held.items() if np.size(value) == 1 and not _fields(value)}
+    for key, value in held.items():
+        inner = f"{name}.{key}" if name else key
+        if fields := _fields(value):
+            yield from _channels(file, fields, inner, around, notes)
+        elif isinstance(value, np.ndarray) and value.dtype == object:
+            for number, one in enumerate(value.reshape(-1)[:64], 1):
+                if fields := _fields(one):
+                    yield from _channels(file, fields, f"{inner}({number})", around, notes)
+                elif isinstance(one, np.ndarray) and numeric(one) and one.size > 64:
+                    yield from columns(f"{inner}({number})", one, notes, **facts_in(file, around))
+        elif isinstance(value, np.ndarray) and numeric(value) and value.size > 64:
+            yield from columns(inner, value, notes, **facts_in(file, around))
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    names = getattr(value, "_fieldnames", None)
+    return {name: getattr(value, name) for name in names} if names else {}

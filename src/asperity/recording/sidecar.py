@@ -1,0 +1,68 @@
+"""Facts that stand beside a recording: ring-07.csv.toml, ring-07.toml (or .json), or recordings.toml for a folder."""
+
+import json
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from asperity.errors import BadInput
+from asperity.recording.common import when
+
+FOLDER_WIDE = "recordings"
+KEYS = ("rate_hz", "unit", "channel", "scale", "started")
+SUFFIXES = (".toml", ".json")
+
+
+def is_sidecar(path: Path) -> bool:
+    """Whether a file tells about recordings instead of being one."""
+    return path.suffix.lower() in SUFFIXES
+
+
+def beside(path: Path) -> tuple[dict[str, Any], str]:
+    """What is stated beside `path`, and the name of the file that states it; nothing, if there is none.
+
+    Raises
+    ------
+    BadInput
+        for a sidecar that cannot be read, an unknown key, or a value that is none of its kind.
+    """
+    names = [f"{path.name}{suffix}" for suffix in SUFFIXES]
+    if path.suffix:
+        names += [f"{path.stem}{suffix}" for suffix in SUFFIXES]
+    names += [f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES]
+    for name in names:
+        there = path.with_name(name)
+        if there.is_file():
+            return _checked(there), name
+    return {}, ""
+
+
+def _checked(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_text("utf-8-sig")
+        stated = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadInput(f"{path.name} cannot be read as {path.suffix[1:]} ({error}); correct it") from None
+    if not isinstance(stated, dict):
+        raise BadInput(f"{path.name} must hold keys such as rate_hz, got a {type(stated).__name__}")
+    for key, value in stated.items():
+        if key not in KEYS:
+            near = get_close_matches(key, KEYS, 1)
+            hint = f"did you mean {near[0]}?" if near else f"it may state {', '.join(KEYS)}"
+            raise BadInput(f"{path.name} has an unknown key {key!r}; {hint}")
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if key in ("rate_hz", "scale") and not (
+            number and 0.0 < abs(value) < float("inf") and (value > 0 or key == "scale")
+        ):
+            raise BadInput(f"{path.name}: {key} must be a positive number, got {value!r}")
+        if key in ("unit", "channel") and not isinstance(value, str) and not (key == "channel" and number):
+            raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
+    if "started" in stated:
+        started = when(stated["started"])
+        if started is None:
+            raise BadInput(f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00")
+        stated["started"] = started
+    if "channel" in stated:
+        stated["channel"] = str(stated["channel"])
+    return stated

@@ -1,0 +1,85 @@
+"""Universal file format, data set 58 (function at nodal degrees of freedom), by pyuff."""
+
+from pathlib import Path
+from typing import Any
+
+from asperity.errors import UnreadableFile
+from asperity.recording.common import REMEDY, only, sliced, when, whole_rate, why
+from asperity.recording.model import Channel, Contents
+
+TIME_RESPONSE = 1
+_FUNCTIONS = {0: "a general function", 2: "an auto spectrum", 3: "a cross spectrum", 4: "a frequency response",
+              5: "a transmissibility", 6: "a coherence", 7: "an auto-correlation", 8: "a cross-correlation",
+              9: "a power spectral density", 10: "an energy spectral density", 11: "a probability density",
+              12: "a spectrum", 13: "a cumulative frequency distribution", 14: "a peaks-valley distribution",
+              15: "stress cycles", 16: "strain cycles", 17: "an orbit", 18: "a mode indicator function",
+              19: "a force pattern", 20: "a partial power", 21: "a partial coherence",
+              27: "a shock response spectrum"}  # fmt: skip
+_ROUNDING = 5e-6  # of the first digit: the step is printed with six
+
+
+def is_uff(head: bytes) -> bool:
+    """Whether a file opens a data set: a line with -1, then a line with its number."""
+    lines = head[:400].lstrip(b"\r\n").splitlines()
+    return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1].strip()[:2].isdigit()
+
+
+def read(path: Path) -> Contents:
+    """Time records, named by their response; anything else is refused in words."""
+    import pyuff
+
+    notes: list[str] = []
+    try:
+        file = pyuff.UFF(str(path))
+        kinds = [int(kind) for kind in file.get_set_types()]
+        sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
+    except Exception as error:
+        raise UnreadableFile(f"{path.name} is no readable universal file ({why(error)}); {REMEDY}") from error
+    if not sets:
+        raise UnreadableFile(f"{path.name} holds data sets {sorted(set(kinds))} and no 58; export the time record")
+    channels: list[Channel] = []
+    others: list[str] = []
+    for one in sets:
+        try:
+            if int(one["func_type"]) != TIME_RESPONSE:
+                others.append(_FUNCTIONS.get(int(one["func_type"]), f"function type {one['func_type']}"))
+            else:
+                channels.append(_channel(path, one, notes, taken=[channel.name for channel in channels]))
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+            raise UnreadableFile(f"{path.name} is a damaged universal file ({why(error)}); {REMEDY}") from error
+    if not channels:
+        raise UnreadableFile(
+            f"{path.name} holds {' and '.join(dict.fromkeys(others))}, not a time record; "
+            "export the time response itself (data set 58, function type 1)"
+        )
+    if others:
+        notes.append(f"left out {' and '.join(dict.fromkeys(others))}: no time record")
+    return Contents(format="uff 58", channels=only(channels, path.name), notes=notes)
+
+
+def _channel(path: Path, one: dict[str, Any], notes: list[str], taken: list[str]) -> Channel:
+    values = one["data"]
+    if values.dtype.kind == "c":
+        raise ValueError("its time record is complex")
+    if int(one["abscissa_spacing"]) != 1:
+        raise UnreadableFile(f"{path.name} is sampled unevenly; export it at an even step")
+    step = float(one["abscissa_inc"])
+    label = str(one.get("rsp_ent_name", "")).strip()
+    node = f"{one.get('rsp_node', '')}:{one.get('rsp_dir', '')}"
+    name = label if label and label != "NONE" else node
+    if name in taken:
+        name = f"{name} {node}" if f"{name} {node}" not in taken else f"{name} {len(taken) + 1}"
+    unit = str(one.get("ordinate_axis_units_lab", "")).strip()
+    samples, promised = int(values.size), int(one["num_pts"])
+    if samples < promised:
+        notes.append(f"cut short: {samples} of {promised} samples are there")
+    started = next((found for key in ("id3", "id2", "id4", "id5") if (found := when(one.get(key, "")))), None)
+    return Channel(
+        name=name,
+        blocks=sliced(lambda i, j: values[i:j], samples, notes, name),
+        samples=samples,
+        rate_hz=whole_rate(1.0 / step, _ROUNDING / float(f"{step:e}".split("e")[0])) if 0.0 < step < 1e9 else None,
+        rate_source=f"file (abscissa step {step:g} s)",
+        unit=unit if unit and unit != "NONE" else None,
+        started=started,
+    )

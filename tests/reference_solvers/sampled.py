@@ -1,0 +1,21 @@
+"""A contact that nobody solved: any pressure and gap, as a solution, to test what is worked out from solutions."""
+
+import numpy as np
+
+from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
+from asperity.surface import flat_surface
+
+
+def sampled(conditions, lubricant, grid, pressure, gap, in_contact=None):
+    """Numbers are spread over the grid."""
+    return ContactSolution(
+        conditions=conditions,
+        lubricant=lubricant,
+        surface=flat_surface(grid),
+        options=Options(),
+        pressure=np.broadcast_to(np.asarray(pressure, float), grid.cells).copy(),
+        gap=np.broadcast_to(np.asarray(gap, float), grid.cells).copy(),
+        in_contact=np.zeros(grid.cells, bool) if in_contact is None else in_contact,
+        rigid_approach=0.0,
+        convergence=Convergence(Status.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0),
+    )

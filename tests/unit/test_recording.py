@@ -1,0 +1,224 @@
+"""Reading recordings: every format gives the same signal; rate, unit and channel come from somewhere, or are asked."""
+
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput, UnreadableFile
+from asperity.recording import open_channels, open_recording, read_recording
+from asperity.recording.units import acceleration_scale, name_and_unit
+from recordings_made import RATE, SHARED, uff_set, vibration, write_all, write_uff
+
+G = 9.80665
+VALUES = vibration()
+LOSSY = {"short.wav": 16.0 / 2**15, "long.wav": 16.0 / 2**31}  # a step of the converter, in g
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    where = tmp_path_factory.mktemp("recordings")
+    return where, write_all(where, VALUES)
+
+
+def test_every_format_gives_the_same_signal(folder):
+    where, said = folder
+    assert len(said) == 21
+    for name, beside in said.items():
+        recording = read_recording(where / name, **beside)
+        assert recording.rate_hz == RATE, name
+        assert recording.unit == "m/s^2", name
+        off = np.abs(recording.values / G - VALUES).max()
+        assert off <= LOSSY.get(name, 1e-6) * 1.001, name
+        assert recording.facts["rate"].source, name
+        assert recording.notes == (), name
+
+
+def test_facts_name_their_source(folder):
+    where, _ = folder
+    facts = read_recording(where / "beside.dat").facts
+    assert facts["rate"].source == "beside.dat.json"
+    assert facts["started"].value == datetime(2024, 1, 31, 12)
+    facts = read_recording(where / "2024.01.31.12.00.00", rate_hz=RATE).facts
+    assert (facts["rate"].source, facts["unit"].value, facts["unit"].source) == (
+        "command line",
+        "unknown",
+        "stated nowhere",
+    )
+    assert (facts["started"].value, facts["started"].source) == (datetime(2024, 1, 31, 12), "file name")
+    assert read_recording(where / "german.csv").facts["rate"].source == "file (column 'Zeit')"
+
+
+def test_a_recording_comes_in_blocks(folder):
+    where, said = folder
+    for name, beside in said.items():
+        opened = open_recording(where / name, **beside)
+        blocks = list(opened.blocks(999))
+        assert max(block.size for block in blocks) <= 999, name
+        assert np.array_equal(np.concatenate(blocks), opened.read().values), name
+        assert opened.samples == VALUES.size, name
+
+
+def test_what_no_one_states_is_asked_for(folder, tmp_path):
+    where, _ = folder
+    with pytest.raises(BadInput, match=r"bare.npy states no sampling rate; give it with --rate"):
+        read_recording(where / "bare.npy")
+    (tmp_path / "a.csv").write_text("time,acc\n" + "".join(f"{i / 100:.2f},{i % 7}.5\n" for i in range(50)))
+    with pytest.raises(BadInput, match=r"names no unit; were it seconds, 100 Hz"):
+        read_recording(tmp_path / "a.csv")
+    np.save(tmp_path / "two.npy", np.ones((100, 2)))
+    with pytest.raises(BadInput, match=r"holds 2 channels \(two\[1\], two\[2\]\); give channel"):
+        read_recording(tmp_path / "two.npy", rate_hz=1.0)
+    assert read_recording(tmp_path / "two.npy", rate_hz=1.0, channel="2").facts["channel"].value == "two[2]"
+
+
+def test_contradictions_are_refused(folder):
+    where, _ = folder
+    with pytest.raises(BadInput, match=r"states 5000 Hz in its header, the command line says 4000 Hz"):
+        read_recording(where / "float.wav", rate_hz=4000.0)
+    with pytest.raises(BadInput, match=r"states its unit as g, the command line says m/s\^2"):
+        read_recording(where / "facts.npz", unit="m/s^2")
+    with pytest.raises(BadInput, match="has no channel 'z'; it has acc"):
+        read_recording(where / "facts.npz", channel="z")
+
+
+def test_integer_samples_without_scale_are_not_comparable(folder):
+    where, _ = folder
+    recording = read_recording(where / "short.wav")
+    assert (recording.unit, recording.comparable) == ("full scale", False)
+    with pytest.raises(BadInput, match="a unit needs its scale"):
+        read_recording(where / "short.wav", unit="g")
+    assert read_recording(where / "float.wav", unit="g").comparable
+
+
+def test_sidecars_are_checked(tmp_path):
+    np.save(tmp_path / "a.npy", VALUES)
+    side = tmp_path / "recordings.toml"  # for the whole folder
+    side.write_text('rate_hz = 5000\nunit = "mm/s^2"\n')
+    recording = read_recording(tmp_path / "a.npy")
+    assert recording.facts["rate"].source == "recordings.toml"
+    assert np.allclose(recording.values, 1e-3 * VALUES)
+    for text, said in (
+        ("rate = 5000", "did you mean rate_hz"),
+        ("rate_hz = -1", "positive"),
+        ("rate_hz = ", "correct it"),
+    ):
+        side.write_text(text)
+        with pytest.raises(BadInput, match=said):
+            read_recording(tmp_path / "a.npy")
+
+
+def test_a_spectrum_is_refused_in_words(tmp_path):
+    path = tmp_path / "psd.uff"
+    write_uff(path, uff_set(np.abs(VALUES), func_type=9))
+    with pytest.raises(UnreadableFile, match=r"psd\.uff holds a power spectral density, not a time record"):
+        read_recording(path)
+
+
+def test_cut_files_give_what_is_left(folder, tmp_path):
+    where, said = folder
+    for name in ("comma.csv", "float.wav", "group.tdms", "bare.npy"):
+        content = (where / name).read_bytes()
+        (tmp_path / name).write_bytes(content[: int(0.6 * len(content))])
+        recording = read_recording(tmp_path / name, **said[name])
+        assert 0.5 * VALUES.size < recording.values.size < 0.7 * VALUES.size, name
+        known = min(recording.values.size - 1, VALUES.size)  # the last number of a text may be cut, too
+        assert np.allclose(recording.values[:known] / G, VALUES[:known], atol=1e-6), name
+        if name != "comma.csv":  # a text cannot know how long it was to be
+            assert "cut short" in " ".join(recording.notes), name
+
+
+def test_text_with_holes_has_gaps(tmp_path):
+    rows = [f"{i / 100:.2f},{np.sin(i):.5f}\n" for i in range(200)]
+    rows[20] = "0.20,n/a\n"
+    rows[30] = "sensor lost\n"
+    del rows[50:60]
+    (tmp_path / "a.csv").write_text("time (s),acc (g)\n" + "".join(rows))
+    recording = read_recording(tmp_path / "a.csv")
+    assert recording.values.size == 200
+    missing = [20, 30, *range(50, 60)]
+    assert np.flatnonzero(np.isnan(recording.values)).tolist() == missing
+    kept = np.setdiff1d(np.arange(200), missing)
+    assert np.allclose(recording.values[kept], G * np.sin(kept), atol=1e-4)
+    assert any("11 samples are missing" in note for note in recording.notes)
+
+
+def test_several_blocks_are_channels_of_their_own(tmp_path):
+    block = "Step {0}\nStarted at: 12:00:0{0}.5 12 May 2022\n\nFx,acc,T\ng,g,sec\n\n{1}\n"
+    rows = ["\n".join(f"{k + i}.5,{i / 10},{i / 50}" for i in range(20)) for k in (100, 300)]
+    (tmp_path / "a.csv").write_text("".join(block.format(k + 1, text) for k, text in enumerate(rows)))
+    names = [one.channel.name for one in open_channels(tmp_path / "a.csv")]
+    assert names == ["1/Fx", "1/acc", "2/Fx", "2/acc"]
+    force, shaken = (read_recording(tmp_path / "a.csv", channel=name) for name in ("2/Fx", "2/acc"))
+    assert (force.unit, force.values[0]) == ("gram-force", 300.5)
+    assert (shaken.unit, shaken.rate_hz) == ("m/s^2", 50.0)
+    assert shaken.facts["started"].value == datetime(2022, 5, 12, 12, 0, 2, 500000)
+
+
+@pytest.mark.parametrize(
+    "line", ["0,5;1,25;", "0,5\t1,25", "0,5 1,25", '"0,5","1,25"', "0.5,1.25", "0.5;1.25", "5e-1 1.25"]
+)
+def test_dialects(tmp_path, line):
+    (tmp_path / "a.dat").write_text((line + "\n") * 20)
+    for channel, value in (("1", 0.5), ("2", 1.25)):
+        assert read_recording(tmp_path / "a.dat", rate_hz=1.0, channel=channel).values.tolist() == [value] * 20
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"),
+    [("m/s²", 1.0), ("m/s**2", 1.0), ("m s-2", 1.0), ("[g]", G), ("mg", G / 1000), ("in/s^2", 0.0254), ("kg", None),
+     ("V", None), ("mm/s", None)],
+)  # fmt: skip
+def test_units_of_acceleration(unit, metres):
+    assert acceleration_scale(unit) == metres
+
+
+def test_labels_end_in_units_only_where_these_are_units():
+    assert name_and_unit("acc_g") == ("acc", "g")
+    assert name_and_unit("Beschl. [m/s²]") == ("Beschl.", "m/s²")
+    assert name_and_unit("bearing_left") == ("bearing_left", None)
+
+
+def test_large_text_is_read_piece_by_piece(tmp_path, monkeypatch):
+    monkeypatch.setattr("asperity.recording.text._LARGE", 1000)
+    monkeypatch.setattr("asperity.recording.text._CHUNK", 5000)
+    rows = "".join(f"{i / RATE:.4f},{v:.6f}\n" for i, v in enumerate(VALUES))
+    (tmp_path / "a.csv").write_text("time_s,acc_g\n" + rows + "Step 2\nacc\n" + rows)
+    opened = open_recording(tmp_path / "a.csv")
+    assert opened.samples is None
+    recording = opened.read()
+    assert np.allclose(recording.values / G, VALUES, atol=1e-6)
+    assert recording.rate_hz == RATE
+    assert "another block" in recording.notes[0]
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' data are not on this machine")
+def test_six_copies_of_a_measured_second_are_one_signal():
+    folder = SHARED / "vibration" / "mfpt-formats"
+    unit = {".wav": "g"}
+    read = {path.suffix: read_recording(path, unit=unit.get(path.suffix)) for path in sorted(folder.iterdir())}
+    assert len(read) == 6
+    first = read[".h5"]
+    for suffix, recording in read.items():
+        assert recording.rate_hz == pytest.approx(first.rate_hz, rel=1e-9), suffix
+        assert recording.unit == first.unit == "m/s^2"
+        assert np.abs(recording.values - first.values).max() < 1e-6 * np.abs(first.values).max(), suffix
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' data are not on this machine")
+def test_every_measured_file_is_read_or_refused_in_words():
+    refused = {}
+    channels = {}
+    for path in sorted(Path(SHARED, "vibration").rglob("*")) + sorted(Path(SHARED, "tribometer").rglob("*")):
+        if not path.is_file():
+            continue
+        try:
+            channels[path.name] = len(open_channels(path, rate_hz=20e3 if path.parent.name == "ims" else None))
+        except BadInput as reason:
+            refused[path.name] = str(reason)
+    assert refused == {}
+    assert channels["ActTest_009.IDE"] == 15
+    assert channels["2003.10.22.12.06.24"] == 8
+    assert channels["HT-2n-6-4_2_001.csv"] == 20
+    assert len(channels) == 66

@@ -1,0 +1,67 @@
+"""What a run works out beside the contact: friction, heat and stress, kept as maps and worked out anew."""
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+import xarray
+
+import asperity.run
+from asperity import AsperityError, Run, load_case, load_run, solve_case
+from asperity.cli.contact import _friction_rows
+
+SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return solve_case(load_case(files("asperity").joinpath("paper.toml").read_text("utf-8")).with_overrides(SMALL))
+
+
+def test_scalars_state_friction_heat_and_stress(run):
+    found, p_max = run.scalars(), run.state.p_max
+    parts = found["friction_asperity_part"] + found["friction_oil_part"]
+    assert found["friction_coefficient"] == pytest.approx(parts)
+    assert found["friction_asperity_part"] == pytest.approx(0.15 * found["clr"])
+    assert found["friction_power_w"] == pytest.approx(found["friction_coefficient"] * 500.0 * 0.2 * 1.91)
+    assert 0.0 < found["flash_temperature_max_k"] < 200.0
+    assert 0.3 * p_max < found["von_mises_max_pa"] < p_max
+    assert found["von_mises_max_pa"] / 2.0 <= found["shear_stress_max_pa"] <= found["von_mises_max_pa"] / np.sqrt(3.0)
+
+
+def test_the_traction_of_friction_is_part_of_the_stress(run):
+    surface = run.stress.at(0.0)
+    np.testing.assert_allclose(surface.xz, -run.friction.shear, atol=1e-3 * run.state.p_max)
+    assert np.abs(run.friction.shear).max() > 0.1 * run.state.p_max
+
+
+def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
+    full, bare = run.save(tmp_path / "full.nc"), run.solution.save(tmp_path / "bare.nc")
+    with xarray.open_dataset(full) as kept:
+        for name, values in {
+            "shear": run.friction.shear,
+            "temperature_1": run.heat.surface_1,
+            "temperature_2": run.heat.surface_2,
+            "film_temperature": run.heat.film,
+            "von_mises": run.stress.largest,
+            "von_mises_depth": run.stress.depth_of_largest,
+        }.items():
+            np.testing.assert_allclose(kept[name], values, rtol=1e-6, atol=1e-6 * np.abs(values).max())
+            assert kept[name].attrs["units"] in ("Pa", "K", "m")
+        np.testing.assert_allclose(kept["von_mises_section"].max(), run.stress.largest.max(), rtol=1e-6)
+        np.testing.assert_array_equal(kept["depth"], run.stress.depths)
+    assert load_run(full).scalars() == load_run(bare).scalars() == run.scalars()
+
+
+def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypatch):
+    def refuse(*_, **__):
+        raise AsperityError("friction and temperature did not settle")
+
+    monkeypatch.setattr(asperity.run, "friction_and_heat", refuse)
+    apart = Run(case=run.case, solution=run.solution, state=run.state, vibration=None)
+    found = apart.scalars()
+    assert found["friction_coefficient"] is found["flash_temperature_max_k"] is None
+    assert found["von_mises_max_pa"] > 0.0
+    assert found["clr"] == run.scalars()["clr"]
+    assert _friction_rows(apart) == [("friction", "not found: friction and temperature did not settle")]
+    assert "shear" not in apart.to_dataset()

@@ -1,0 +1,153 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.signals import Spectrum
+from asperity.wear.indicators import line_shape
+from asperity.wear.series import _Blocks, _cost, _Parameters, _point, series_resonances
+
+BAND = (1800.0, 4000.0)
+FREQUENCY = np.arange(0.0, 6000.0, 1.0)
+TRUTH = np.linspace(2900.0, 3750.0, 12)
+
+
+def machine() -> np.ndarray:
+    """What stays: two structural modes, one of them where the contact passes, over a sloping floor."""
+    f = np.maximum(FREQUENCY, 1.0)
+    modes = sum(
+        height * (f / f0) ** 4 / ((1 - (f / f0) ** 2) ** 2 + (2 * z * f / f0) ** 2) * 4 * z**2
+        for f0, z, height in ((2300.0, 0.01, 1.0), (3400.0, 0.006, 0.8))
+    )
+    return 0.1 * (f / 2000.0) ** -0.7 + modes
+
+
+def series(contact_height=0.7, *, averages=100.0, seed=0, truth=TRUTH, damping=0.02):
+    rng = np.random.default_rng(seed)
+    gains = np.exp(0.2 * rng.standard_normal(truth.size))
+    densities = [
+        g * machine() + contact_height * line_shape(FREQUENCY, f, damping) for g, f in zip(gains, truth, strict=True)
+    ]
+    return [
+        Spectrum(
+            frequency_hz=FREQUENCY,
+            density=density * rng.gamma(averages, 1.0 / averages, density.size),
+            unit="(m/s^2)^2/Hz",
+            duration_s=averages,
+            segment=12_000,
+            window="boxcar",
+            resolution_hz=1.0,
+            averages=averages,
+        )
+        for density in densities
+    ]
+
+
+def test_the_moving_line_is_told_from_standing_modes_as_high():
+    found = series_resonances(series(), band_hz=BAND)
+    assert all(one.found for one in found)
+    errors = np.array([one.crf_hz for one in found]) - TRUTH
+    assert np.max(np.abs(errors)) < 3.0
+    assert [one.crfa for one in found] == pytest.approx(np.full(TRUTH.size, 0.7), rel=0.1)
+    fooled = series_resonances(series(), band_hz=BAND, method="peak")
+    assert np.mean([abs(one.crf_hz - f) > 100.0 for one, f in zip(fooled, TRUTH, strict=True)]) > 0.5
+
+
+def test_the_fit_scatters_as_it_says():
+    pulls = []
+    for seed in range(15):
+        for one, f in zip(series_resonances(series(seed=seed), band_hz=BAND), TRUTH, strict=True):
+            pulls.append([(one.crf_hz - f) / one.crf_std, (one.crfa - 0.7) / one.crfa_std])
+    assert np.mean(np.abs(pulls) < 1.645, axis=0) == pytest.approx(0.9, abs=0.06)
+
+
+def test_the_score_is_the_slope_of_the_cost():
+    rng = np.random.default_rng(4)
+    centre = np.linspace(2000.0, 4000.0, 50)
+    blocks = _Blocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
+    own = np.column_stack(
+        [rng.normal(0, 1, 7), np.log(rng.uniform(2500, 3500, 7)), rng.normal(-4, 0.3, 7), rng.normal(0, 1, 7)]
+    )
+    at = _Parameters(own, rng.normal(0.0, 0.5, 50), 0.3)
+    point, d = _point(blocks, at), 1e-6
+    for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
+        shift = np.zeros_like(own)
+        shift[row, column] = d
+        slope = (_cost(blocks, at._replace(own=own + shift)) - _cost(blocks, at._replace(own=own - shift))) / (2 * d)
+        assert point.own_score[row, column] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
+    shift = np.zeros(50)
+    shift[20] = d
+    slope = (_cost(blocks, at._replace(base=at.base + shift)) - _cost(blocks, at._replace(base=at.base - shift))) / (
+        2 * d
+    )
+    assert point.base_score[20] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
+
+
+def test_a_recording_without_the_contact_is_said_to_have_none():
+    spectra = series()
+    lifted = series(contact_height=1e-12, seed=5)[4]
+    found = series_resonances([*spectra[:4], lifted, *spectra[5:]], band_hz=BAND)
+    assert [one.found for one in found] == [True] * 4 + [False] + [True] * 7
+    assert "nothing moves" in found[4].reason
+    assert np.isnan(found[4].crf_hz)
+
+
+def test_where_nothing_moves_nothing_is_found():
+    found = series_resonances(series(contact_height=1e-12), band_hz=BAND)
+    assert not any(one.found for one in found)
+
+
+def test_a_line_that_keeps_its_place_is_found_by_its_changing_share_and_has_no_exact_height():
+    found = [one for one in series_resonances(series(truth=np.full(12, 3100.0)), band_hz=BAND) if one.found]
+    assert found
+    for one in found:
+        assert abs(one.crf_hz - 3100.0) < 4.0 * one.crf_std
+        assert one.crfa < 0.7
+        assert np.isnan(one.crfa_std)
+        assert "lower bound" in one.reason
+
+
+def test_lines_that_do_not_count_are_not_seen():
+    spectra = series()
+    kept = [np.ones(FREQUENCY.size, dtype=bool) for _ in spectra]
+    spoilt = []
+    for number, (spectrum, mask) in enumerate(zip(spectra, kept, strict=True)):
+        at = 2600 + 17 * number
+        density = spectrum.density.copy()
+        density[at - 1 : at + 2] *= 1e4
+        mask[at - 1 : at + 2] = False
+        spoilt.append(replace(spectrum, density=density))
+    clean = series_resonances(spectra, band_hz=BAND)
+    masked = series_resonances(spoilt, band_hz=BAND, kept=kept)
+    assert [one.crf_hz for one in masked] == pytest.approx([one.crf_hz for one in clean], abs=0.5)
+
+
+def test_the_fitted_curve_is_the_spectrum():
+    spectra = series(averages=1e4)
+    inside = (FREQUENCY > 1900) & (FREQUENCY < 3900)
+    for spectrum, one in zip(spectra, series_resonances(spectra, band_hz=BAND), strict=True):
+        off = one.curve(FREQUENCY[inside]) / spectrum.density[inside] - 1.0
+        assert np.sqrt(np.mean(off**2)) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("spectra", "method", "named"),
+    [
+        (lambda: series()[:5], "joint", "at least 6 recordings"),
+        (lambda: series(), "loudest", "series method"),
+        (lambda: [*series()[:6], replace(series()[0], frequency_hz=2 * FREQUENCY)], "joint", "same lines"),
+        (lambda: [*series()[:6], replace(series()[0], density=0 * FREQUENCY)], "joint", "no vibration"),
+        (lambda: [replace(one, smoothing_passes=3) for one in series()], "joint", "unsmoothed"),
+    ],
+)
+def test_what_cannot_be_separated_is_refused(spectra, method, named):
+    with pytest.raises(BadInput, match=named):
+        series_resonances(spectra(), band_hz=BAND, method=method)
+
+
+def test_other_methods_take_each_spectrum_by_itself():
+    spectra = series(averages=50.0)[:3]
+    alone = series_resonances(spectra, band_hz=(2600.0, 3300.0), method="likelihood")
+    assert len(alone) == 3
+    assert alone[0].method == "likelihood"

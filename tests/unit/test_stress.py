@@ -1,0 +1,178 @@
+import numpy as np
+import pytest
+
+from asperity import BadInput, ContactConditions, ElasticPair, flat_surface, solve_contact, subsurface_stress
+from asperity.ehl.influence import ODD_IN_X, ODD_IN_Y, Tractions, _rectangles
+from asperity.ehl.stress import StressTensor, default_depths, stress_below
+from asperity.grid import Grid
+
+NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")
+
+
+def random_tensor(count: int = 200) -> StressTensor:
+    return StressTensor(*np.random.default_rng(3).normal(size=(6, count)))
+
+
+def matrices(tensor: StressTensor) -> np.ndarray:
+    xx, yy, zz, xy, yz, xz = (getattr(tensor, name) for name in NAMES)
+    return np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), -1, 0)
+
+
+def test_equivalent_stresses_are_those_of_the_principal_stresses():
+    tensor = random_tensor()
+    principal = np.linalg.eigvalsh(matrices(tensor))
+    np.testing.assert_allclose(tensor.max_shear, (principal[:, 2] - principal[:, 0]) / 2.0, rtol=1e-9)
+    apart = np.diff(principal, axis=1).T
+    expected = np.sqrt((apart[0] ** 2 + apart[1] ** 2 + (apart[0] + apart[1]) ** 2) / 2.0)
+    np.testing.assert_allclose(tensor.von_mises, expected, rtol=1e-9)
+
+
+def test_equal_pressure_from_all_sides_has_no_equivalent_stress():
+    one = np.array([-2.0])
+    tensor = StressTensor(one, one, one, 0 * one, 0 * one, 0 * one)
+    assert tensor.von_mises[0] == tensor.max_shear[0] == 0.0
+
+
+def images_summed(cells, spacing, depth, loaded, images=60):
+    """Stresses of unit pressure and unit traction on one cell each of a grid that repeats in y, image by image."""
+    nx, ny = cells
+    kernels = _rectangles((nx, (images + 1) * ny), spacing, depth, 0.3)
+    total = np.zeros((6, nx, ny))
+    for traction, (i0, j0) in enumerate(loaded):
+        for component in range(6):
+            i, j = np.arange(nx) - i0, np.arange(ny) - j0
+            for image in range(-images, images + 1):
+                away = j + image * ny
+                sign_x = np.where(i < 0, -1.0 if ODD_IN_X[traction][component] else 1.0, 1.0)
+                sign_y = np.where(away < 0, -1.0 if ODD_IN_Y[component] else 1.0, 1.0)
+                found = kernels[traction, component][np.ix_(np.abs(i), np.abs(away))]
+                total[component] += sign_x[:, None] * sign_y * found
+    return total
+
+
+@pytest.mark.parametrize(("cells", "size"), [((16, 12), (1.2, 0.5)), ((12, 15), (0.5, 2.5)), ((13, 16), (1.0, 1.0))])
+@pytest.mark.parametrize("depth", [0.0, 0.3, 1.5, 3.0, 12.0])
+def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells, size, depth):
+    """Two derivations: the half-space's answer to waves, and Love's corners. Depths in cells along x."""
+    spacing = (size[0] / cells[0], size[1] / cells[1])
+    loaded = ((3, 5), (8, 2))
+    pressure, shear = np.zeros(cells), np.zeros(cells)
+    pressure[loaded[0]] = shear[loaded[1]] = 1.0
+    grid = Grid(cells, (0.0, 0.0), size)
+    found = Tractions.of(grid, pressure, shear).stresses(depth * spacing[0], 0.3, keep=False)
+    expected = images_summed(cells, spacing, depth * spacing[0], loaded)
+    np.testing.assert_allclose(found, expected, atol=2e-4)  # of the load; images left out matter as much
+
+
+@pytest.mark.parametrize("repeats", [True, False])
+def test_the_surface_carries_what_was_put_on_it(repeats):
+    generator = np.random.default_rng(5)
+    grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0), (False, repeats))
+    pressure, shear = generator.random(grid.cells), generator.normal(size=grid.cells)
+    surface = stress_below(pressure, shear, grid, np.array([0.0, 0.1]), poisson_ratio=0.25).at(0.0)
+    np.testing.assert_allclose(surface.zz, -pressure, atol=2e-5)
+    np.testing.assert_allclose(surface.xz, -shear, atol=2e-5)
+    np.testing.assert_allclose(surface.yz, 0.0, atol=2e-4)
+
+
+@pytest.mark.parametrize("repeats", [True, False])
+def test_every_plane_below_carries_the_load(repeats):
+    """The force through a plane is that on the surface; the plane's own width leaves a little of it out."""
+    generator = np.random.default_rng(6)
+    grid = Grid((96, 96), (-1.5, -1.5), (1.5, 1.5), (False, repeats))
+    loaded = (np.abs(grid.x) < 0.2)[:, None] & (np.abs(grid.y) < 0.2)
+    pressure, shear = np.where(loaded, generator.random((2, 96, 96)), 0.0)
+    plane = stress_below(pressure, shear, grid, np.array([0.05]), poisson_ratio=0.3).at(0.05)
+    assert -plane.zz.sum() == pytest.approx(pressure.sum(), rel=2e-3)
+    assert -plane.xz.sum() == pytest.approx(shear.sum(), rel=5e-2)  # shear spreads further
+
+
+def test_material_is_in_equilibrium():
+    """div sigma = 0 by central differences, all six components, between a rough pressure's cells."""
+    generator = np.random.default_rng(7)
+    grid = Grid((48, 32), (0.0, 0.0), (1.5, 1.0))
+    stress = stress_below(
+        generator.random(grid.cells), generator.normal(size=grid.cells), grid, np.array([0.4]), poisson_ratio=0.3
+    )
+    (dx, dy), dz = grid.spacing, 0.01
+    above, here, below = (stress.at(0.4 + shift) for shift in (-dz, 0.0, dz))
+
+    def divergence(name_x, name_y, name_z):
+        along = np.gradient(getattr(here, name_x), dx, axis=0)
+        across = (np.roll(getattr(here, name_y), -1, 1) - np.roll(getattr(here, name_y), 1, 1)) / (2.0 * dy)
+        down = (getattr(below, name_z) - getattr(above, name_z)) / (2.0 * dz)
+        return (along + across + down)[1:-1], np.abs(down).max()
+
+    for row in (("xx", "xy", "xz"), ("xy", "yy", "yz"), ("xz", "yz", "zz")):
+        left, scale = divergence(*row)
+        assert np.abs(left).max() < 0.02 * scale
+
+
+def test_the_peak_between_depths_hardly_depends_on_the_depths():
+    grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
+    pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
+    peaks = [
+        stress_below(pressure, None, grid, np.concatenate([[0.0], np.geomspace(0.02, 3.0, count)]), poisson_ratio=0.3)
+        for count in (9, 24)
+    ]
+    assert peaks[0].peak.value == pytest.approx(peaks[1].peak.value, rel=1e-4)
+    assert peaks[0].peak.depth == pytest.approx(peaks[1].peak.depth, rel=0.01)
+    assert peaks[0].peak.depth not in peaks[0].depths
+
+
+def test_maps_and_section_are_of_the_same_stresses():
+    generator = np.random.default_rng(8)
+    grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0))
+    stress = stress_below(generator.random(grid.cells), None, grid, np.array([0.0, 0.1, 0.3]), poisson_ratio=0.3)
+    np.testing.assert_allclose(stress.section.von_mises, stress.von_mises[:, stress.row, :], rtol=1e-9)
+    assert grid.y[stress.row] == stress.peak.y
+    assert stress.largest.max() <= stress.peak.value
+    k = list(stress.depths).index(stress.depth_of_largest[4, 7])
+    assert stress.von_mises[4, 7, k] == stress.largest[4, 7]
+
+
+def test_default_depths_go_from_the_surface_to_below_the_contact():
+    pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
+    ball = ContactConditions(pair=pair, geometry="point", radius=0.01, load=10.0, surface_speeds=(1.0, 1.0))
+    a = ball.hertz.half_widths[0]
+    grid = Grid((64, 64), (-2 * a, -2 * a), (2 * a, 2 * a), (False, False))
+    depths = default_depths(ball, grid)
+    assert depths.size == 16
+    assert depths[0] == 0.0
+    assert depths[1] == pytest.approx(grid.spacing[0] / 2.0)
+    assert depths[-1] == pytest.approx(2.5 * a)
+
+
+@pytest.mark.parametrize(
+    ("shear", "depths", "told"),
+    [
+        (np.zeros((4, 4)), [0.1], "shear must have the grid's shape"),
+        (None, [0.2, 0.1], "depths must grow"),
+        (None, [-0.1, 0.1], "from 0 m"),
+        (None, [], "from 0 m"),
+        (None, [np.nan], "from 0 m"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(shear, depths, told):
+    grid = Grid((8, 8), (0.0, 0.0), (1.0, 1.0))
+    with pytest.raises(BadInput, match=told):
+        stress_below(np.ones((8, 8)), shear, grid, np.array(depths), poisson_ratio=0.3)
+
+
+def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_ratio():
+    pair = ElasticPair((2e11, 1e11), (0.3, 0.2))
+    bodies = ContactConditions(
+        pair=pair, geometry="line", radius=0.01, load=500.0, length=0.01, surface_speeds=(1.0, 1.0)
+    )
+    a = bodies.hertz.half_widths[0]
+    grid = Grid((64, 8), (-2 * a, -a), (2 * a, a))
+    solution = solve_contact(bodies, None, flat_surface(grid))
+    shear = 0.1 * solution.pressure
+    first, second = (subsurface_stress(solution, shear=shear, body=body) for body in (1, 2))
+    np.testing.assert_allclose(second.at(0.3 * a).xz, first.at(0.3 * a).xz[::-1] * -1.0, atol=1e-4 * bodies.hertz.p_max)
+    assert second.peak.x < 0.0 < first.peak.x
+    sideways = second.at(0.5 * a)
+    np.testing.assert_allclose(sideways.yy, 0.2 * (sideways.xx + sideways.zz), atol=1e-5 * bodies.hertz.p_max)
+    assert first.peak.value == pytest.approx(0.565 * bodies.hertz.p_max, rel=0.01)
+    with pytest.raises(BadInput, match="body must be 1 or 2"):
+        subsurface_stress(solution, body=0)

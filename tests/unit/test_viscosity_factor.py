@@ -1,0 +1,49 @@
+"""A field of viscosity factors: the oil warmer in some cells than in others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.ehl.solution import Options
+from asperity.ehl.solve import contact_problem, solve_contact
+from asperity.ehl.state import contact_state
+from asperity.ehl.storage import load_solution
+from asperity.errors import BadInput
+from asperity.lubricant import Barus, ReeEyring
+from reference_solvers.paper import barus, contact, grid, rough
+
+COARSE = grid((64, 32))
+
+
+def oil(eta0):
+    return replace(barus(), viscosity=Barus(eta0, 18.2e-9), rheology=ReeEyring(5e6))
+
+
+def test_the_same_factor_everywhere_is_a_thinner_oil():
+    surface, rng = rough(COARSE, 1e-6), np.random.default_rng(3)
+    factor = np.full(COARSE.cells, 0.5)
+    warm = contact_problem(contact(), oil(0.096), surface, Options(), factor)
+    thin = contact_problem(contact(), oil(0.048), surface, Options())
+    pressure = rng.random(COARSE.cells)
+    one, other = warm.evaluate(pressure, 1.0), thin.evaluate(pressure, 1.0)
+    np.testing.assert_allclose(one.outflow, other.outflow, rtol=1e-12)
+    np.testing.assert_allclose(one.film.mobility_by_pressure, other.film.mobility_by_pressure, rtol=1e-12)
+    np.testing.assert_allclose(warm.coarsened().viscosity_factor, factor[::2, ::2])
+
+
+def test_a_warm_solution_says_so_on_disk_and_off_it(tmp_path):
+    factor = np.linspace(0.4, 1.0, COARSE.cells[0])[:, None] * np.ones(COARSE.cells)
+    solution = solve_contact(contact(), barus(), rough(COARSE, 1e-6), viscosity_factor=factor)
+    assert contact_state(solution).reynolds_residual < 1e-4
+    read = load_solution(solution.save(tmp_path / "warm.nc"))
+    assert read.viscosity_factor.tobytes() == factor.tobytes()
+    assert contact_state(read) == contact_state(solution)
+    cold = replace(solution, viscosity_factor=None)
+    assert contact_state(cold).reynolds_residual > 1e-3
+
+
+@pytest.mark.parametrize("factor", [np.ones((8, 8)), np.zeros(COARSE.cells), np.full(COARSE.cells, np.nan)])
+def test_factors_that_do_not_fit_are_refused(factor):
+    with pytest.raises(BadInput, match="viscosity_factor must be positive"):
+        solve_contact(contact(), barus(), rough(COARSE, 1e-6), viscosity_factor=factor)

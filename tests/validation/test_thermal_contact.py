@@ -1,0 +1,91 @@
+"""Heat that acts back on the film: what is fed back, that it settles, and which way it moves things."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.ehl.flash import flash_temperature
+from asperity.ehl.friction import friction
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.state import contact_state
+from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
+from asperity.errors import AsperityError, NotConverged
+from asperity.lubricant import ExponentialWarmth, EyringShear, NewtonianShear, Thermal
+from asperity.surface import flat_surface
+from reference_solvers.paper import barus, contact, grid, rough
+
+WARM = Thermal(feedback=True)
+SMOOTH = flat_surface(grid((96, 8)))
+ROUGH = rough(grid((64, 64)), 0.7e-6, correlation_length=30e-6)
+
+
+def oil(law):
+    return replace(barus(), friction=law)
+
+
+@pytest.fixture(scope="module", params=["smooth", "rough"])
+def pair(request):
+    """The same contact without and with the way back."""
+    surface = SMOOTH if request.param == "smooth" else ROUGH
+    given = (contact(hardness=2e9, surface_speeds=(2.9, 0.9)), oil(EyringShear(5e6)), surface)
+    return solve_contact(*given), solve_thermal_contact(*given, thermal=WARM)
+
+
+def test_friction_and_heat_agree_with_each_other(pair):
+    rubbing, heat = friction_and_heat(pair[1], thermal=WARM)
+    again = friction(pair[1], thermal=WARM, film_temperature=313.15 + heat.film)
+    assert again.coefficient == pytest.approx(rubbing.coefficient, rel=1e-3)
+    assert flash_temperature(pair[1], again, thermal=WARM).film_max_k == pytest.approx(heat.film_max_k, rel=2e-3)
+
+
+def test_the_film_is_as_viscous_as_its_temperature_leaves_it(pair):
+    cold, warm = pair
+    heat = friction_and_heat(warm, thermal=WARM)[1]
+    assert cold.viscosity_factor is None
+    solved_at = np.log(warm.viscosity_factor) / -0.037
+    assert np.sqrt(np.mean((solved_at - heat.film) ** 2)) < 1e-3 * heat.film_max_k
+    assert np.max(np.abs(solved_at - heat.film)) < 0.05 * heat.film_max_k
+    assert warm.viscosity_factor.min() < 0.8
+    assert contact_state(warm).reynolds_residual < 1e-4
+    assert warm.convergence.converged
+    assert len(warm.convergence.history) > len(cold.convergence.history)  # all rounds are told
+
+
+def test_warm_oil_shears_more_easily_and_parts_the_bodies_less(pair):
+    cold, warm = (contact_state(solution) for solution in pair)
+    assert warm.h_mean < cold.h_mean
+    assert warm.clr >= cold.clr
+    isothermal, fed_back = friction_and_heat(pair[0])[0], friction_and_heat(pair[1], thermal=WARM)[0]
+    assert fed_back.oil_part < 0.97 * isothermal.oil_part
+
+
+def test_without_feedback_heat_is_only_a_result():
+    given = (contact(surface_speeds=(2.9, 0.9)), barus(), SMOOTH)
+    plain, thermal = solve_contact(*given), solve_thermal_contact(*given, thermal=Thermal())
+    np.testing.assert_array_equal(plain.pressure, thermal.pressure)
+    rolling = solve_thermal_contact(contact(surface_speeds=(1.91, 1.91)), barus(), SMOOTH, thermal=WARM)
+    assert rolling.viscosity_factor is None
+
+
+def test_a_runaway_law_is_tamed_or_refused():
+    """Newtonian oil at full Barus viscosity makes thousands of kelvins isothermally; its own heat thins it."""
+    cold = solve_contact(contact(), barus(), SMOOTH)
+    unlimited = replace(cold, lubricant=oil(NewtonianShear()))
+    isothermal, fed_back = friction_and_heat(unlimited), friction_and_heat(unlimited, thermal=WARM)
+    assert isothermal[1].film_max_k > 1000.0
+    assert 10.0 < fed_back[1].film_max_k < 300.0
+    assert fed_back[0].coefficient < 0.5 * isothermal[0].coefficient
+    touchy = replace(WARM, warmth=ExponentialWarmth(50.0))
+    with pytest.raises(AsperityError, match="did not settle"):
+        friction_and_heat(unlimited, thermal=touchy)
+
+
+def test_an_unfinished_contact_is_told():
+    from asperity.ehl.solution import Options
+
+    given = (contact(hardness=2e9), barus(), ROUGH)
+    few = Options(max_iterations=2)
+    with pytest.raises(NotConverged):
+        solve_thermal_contact(*given, thermal=WARM, options=few)
+    assert not solve_thermal_contact(*given, thermal=WARM, options=few, strict=False).convergence.converged
