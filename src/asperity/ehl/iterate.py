@@ -33,8 +33,8 @@ class Manner(NamedTuple):
     storing: float
 
 
-# Steps that go round in circles leave them another way: in time steps (pseudo-transient continuation, Kelley and Keyes,
-# SIAM J. Numer. Anal. 35 (1998)), which cures waves that travel with the oil, or shortened, which cures cells that flip.
+# Steps that go round in circles leave them another way: in time steps (pseudo-transient continuation, Kelley and
+# Keyes, SIAM J. Numer. Anal. 35 (1998)) where waves travel with the oil, shortened where cells flip to and fro.
 MANNERS = (
     Manner(1.0, 0.0),
     Manner(1.0, 0.5),

@@ -76,7 +76,7 @@ class Linear:
     def _stencil(self) -> Stencil:
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
         nothing = np.zeros(self.cells, self.dtype)
-        film = self.film or Film(*[nothing] * 6, nothing[[0, -1]], nothing[[0, -1]])
+        film = self.film or Film(*[nothing] * 8)
         problem = self.balance.problem
         reynolds.local_stencil(self.rows, film, problem.deflection.near, problem.spacing, self.storing, stencil)
         return stencil

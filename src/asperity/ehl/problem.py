@@ -12,6 +12,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.deflection import Deflection, deflection
+from asperity.ehl.transfer import averaged
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
 from asperity.lubricant import Lubricant
@@ -88,16 +89,29 @@ class Problem:
         """The elastic half-space on this grid."""
         return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic)
 
-    def coarsened(self) -> "Problem":
-        """The same contact on a grid of half as many cells each way; fields are averaged over each cell."""
-        nx, ny = self.cells
+    @property
+    def uniform(self) -> bool:
+        """Whether nothing varies along y, so that one line of cells tells all."""
+        fields = [self.roughness] if self.viscosity_factor is None else [self.roughness, self.viscosity_factor]
+        return self.form.periodic and all(bool(np.all(field == field[:, :1])) for field in fields)
 
-        def averaged(field: Field) -> Field:
-            return np.asarray(field.reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3)))
+    def coarsened(self, cells: tuple[int, int]) -> "Problem":
+        """The same contact on a grid of fewer cells; fields are averaged over each cell."""
+        (nx, ny), (dx, dy) = self.cells, self.spacing
+        factor = self.viscosity_factor
+        return replace(
+            self,
+            roughness=averaged(self.roughness, cells),
+            viscosity_factor=None if factor is None else averaged(factor, cells),
+            spacing=(dx * (nx / cells[0]), dy * (ny / cells[1])),
+        )
 
-        factor = None if self.viscosity_factor is None else averaged(self.viscosity_factor)
+    def zone(self, share: float = 1.0) -> Mask:
+        """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
         dx, dy = self.spacing
-        return replace(self, roughness=averaged(self.roughness), viscosity_factor=factor, spacing=(2.0 * dx, 2.0 * dy))
+        along = self.x / max(share, dx)
+        across = self.y / max(share * self.form.aspect, dy)
+        return np.asarray((along**2)[:, None] + across**2 <= 1.0)
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
@@ -140,6 +154,8 @@ class Problem:
         thinning, exponent = oil.rheology.thinning(viscosity * self.sliding / height)
         mobility = content * height**2 * (oil.viscosity.eta0 / self.speed) / (viscosity * thinning)
         ambient = height[[0, -1]] ** 3 / self.speed
+        if self.viscosity_factor is not None:
+            ambient /= self.viscosity_factor[[0, -1]]
         film = Film(
             content,
             density,

@@ -13,7 +13,7 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.flash import FlashTemperature, flash_temperature
 from asperity.ehl.friction import BOUNDARY_FRICTION, Friction, friction, warm_factor
-from asperity.ehl.solution import ContactSolution, Convergence, Options, Status
+from asperity.ehl.solution import ContactSolution, Options, Status
 from asperity.ehl.solve import Progress, solve_contact
 from asperity.errors import AsperityError, NotConverged
 from asperity.lubricant import Lubricant, Thermal
@@ -144,9 +144,8 @@ def solve_thermal_contact(
         history, seconds = history + solution.convergence.history, seconds + solution.convergence.seconds
     else:
         solution = _unsettled(solution)
-    convergence = Convergence(solution.convergence.status, history, solution.convergence.tolerance, seconds)
-    solution = replace(solution, convergence=convergence)
-    if strict and not convergence.converged:
+    solution = replace(solution, convergence=replace(solution.convergence, history=history, seconds=seconds))
+    if strict and not solution.convergence.converged:
         raise NotConverged(solution, f"contact and heat did not settle in {MOST_SOLVES} rounds")
     return solution
 

@@ -98,7 +98,8 @@ def jacobian_product(
 ) -> None:
     """Every cell's scaled equation, linearised, applied to a change of pressure and the gap change it causes.
 
-    A lubricated cell also stores `storing` times the oil content it gains: the inverse of a time step. All arrays in one precision, which is also that of the arithmetic.
+    A lubricated cell also stores `storing` times the oil content it gains: the inverse of a time step. All arrays in
+    one precision, which is also that of the arithmetic.
     """
     nx, ny = pressure.shape
     real = pressure.dtype.type
