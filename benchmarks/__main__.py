@@ -7,7 +7,7 @@ import sys
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks import robustness, roughness_levels, stress, surfaces, vibration
+from benchmarks import friction, robustness, roughness_levels, stress, surfaces, vibration
 from benchmarks.first_call import first_call
 
 
@@ -45,6 +45,9 @@ def main() -> None:
             print(line, flush=True)
         print()
         for line in surfaces.lines(fast=wanted.fast):
+            print(line, flush=True)
+        print()
+        for line in friction.lines(fast=wanted.fast):
             print(line, flush=True)
         print()
         for line in stress.lines(fast=wanted.fast):

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from asperity.case import Case, load_case
     from asperity.conditions import ContactConditions, ElasticPair
     from asperity.coupling import Vibration, VibrationModel, contact_vibration
+    from asperity.curves import FrictionCurve, stribeck_curve, traction_curve
     from asperity.ehl.flash import FlashTemperature, flash_temperature
     from asperity.ehl.friction import Friction, friction
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     )
     from asperity.recording import Recording, check_recording, open_recording, read_recording
     from asperity.report import write_report
+    from asperity.report.track_page import write_track_report
     from asperity.rig import Disturbance, Rig, RigRecording, simulate_rig
     from asperity.run import Run, load_run, solve_case
     from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
         self_affine_surface,
         surface_parameters,
     )
+    from asperity.tracking import Track, track_recordings
     from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
     from asperity.wear.indicators import Resonance, contact_resonance
     from asperity.wear.lines import CleanSpectrum, remove_lines
@@ -71,6 +74,7 @@ _NAMES = {
     "case": ("Case", "load_case"),
     "conditions": ("ContactConditions", "ElasticPair"),
     "coupling": ("Vibration", "VibrationModel", "contact_vibration"),
+    "curves": ("FrictionCurve", "stribeck_curve", "traction_curve"),
     "ehl.flash": ("FlashTemperature", "flash_temperature"),
     "ehl.friction": ("Friction", "friction"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
@@ -100,6 +104,7 @@ _NAMES = {
     ),
     "recording": ("Recording", "check_recording", "open_recording", "read_recording"),
     "report": ("write_report",),
+    "report.track_page": ("write_track_report",),
     "rig": ("Disturbance", "Rig", "RigRecording", "simulate_rig"),
     "run": ("Run", "load_run", "solve_case"),
     "signals": ("Signal", "Spectrum", "averaged_spectrum", "power_spectrum", "smooth"),
@@ -120,6 +125,7 @@ _NAMES = {
         "self_affine_surface",
         "surface_parameters",
     ),
+    "tracking": ("Track", "track_recordings"),
     "vibration": ("ContactOscillator", "acceleration", "expected_spectrum", "motion"),
     "wear.indicators": ("Resonance", "contact_resonance"),
     "wear.lines": ("CleanSpectrum", "remove_lines"),
@@ -151,6 +157,7 @@ __all__ = [
     "FilteredNoise",
     "FlashTemperature",
     "Friction",
+    "FrictionCurve",
     "Grid",
     "Incompressible",
     "Iteration",
@@ -182,6 +189,7 @@ __all__ = [
     "SurfaceTrack",
     "TangentStiffness",
     "Thermal",
+    "Track",
     "UnreadableFile",
     "Vibration",
     "VibrationModel",
@@ -223,10 +231,14 @@ __all__ = [
     "solve_contact",
     "solve_thermal_contact",
     "split_stages",
+    "stribeck_curve",
     "subsurface_stress",
     "surface_parameters",
     "tangent_stiffness",
+    "track_recordings",
+    "traction_curve",
     "write_report",
+    "write_track_report",
 ]
 
 

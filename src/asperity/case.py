@@ -185,10 +185,7 @@ def read_length(name: str, text: str) -> float:
     BadInput
         for what is no positive length with a unit; the message begins with `name`.
     """
-    try:
-        return float(_amount("m", text))
-    except BadInput as error:
-        raise BadInput(f"{name} {error}") from None
+    return read_amount(name, "m", text)
 
 
 def _twice_if_any(value: object) -> object:
@@ -197,6 +194,20 @@ def _twice_if_any(value: object) -> object:
 
 def _both(value: float, unit: str) -> tuple[Amount, Amount]:
     return _restated(value, unit), _restated(value, unit)
+
+
+def read_amount(name: str, unit: str, text: str) -> float:
+    """A positive quantity on the command line, such as "300 s", in `unit`, an SI one.
+
+    Raises
+    ------
+    BadInput
+        for what is none with a unit of that kind; the message begins with `name`.
+    """
+    try:
+        return float(_amount(unit, text))
+    except BadInput as error:
+        raise BadInput(f"{name} {error}") from None
 
 
 def _none(value: object) -> object:

@@ -5,14 +5,17 @@ fools a search for the highest point, is drawn anew for each rig: structural mod
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib.resources import files
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.case import Case
+from asperity.case import Case, load_case
 from asperity.conditions import ContactConditions
 from asperity.coupling import (
     ASPERITIES_ALONE,
@@ -24,9 +27,10 @@ from asperity.coupling import (
 )
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, contact_state
+from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput, require_positive
 from asperity.signals import Signal, Spectrum, power_spectrum
-from asperity.table1 import DAMPING_RATIO, MASS, papers_contact
+from asperity.table1 import DAMPING_RATIO, MASS, PAIR, papers_contact
 
 LOAD = 500.0  # [N], the paper's tests
 SAMPLES_SQ_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)  # its section 4.1
@@ -42,6 +46,7 @@ MOUNTED_HZ, MOUNTED_DAMPING = 46e3, 0.02  # resonance of the accelerometer on it
 FLAT_BELOW_HZ = 100.0  # machine noise, which falls with frequency above
 RATE_PER_BAND = 3.0  # sampling rate over the upper end of the search band, at least
 SHORTEST_RECORD = 1000
+AT_ONCE = 2  # recordings made at the same time: 300 s at 20 kHz take 0.3 GB each
 GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten times as wide
 
 
@@ -117,6 +122,7 @@ class RigRecording:
     crf_hz: float
     crfa: float
     damping_ratio: float
+    snr_db: float
     rate_hz: float
     duration_s: float
     frequency_hz: Field
@@ -206,7 +212,8 @@ class Rig:
     """Recordings and what is true of them all.
 
     `band_hz` is the contact's search band, in which SNR is counted; `full_load_crf_hz` the resonance with all load on
-    asperities; `split_sq_m` where the trend has its knee, None where it has none.
+    asperities; `split_sq_m` where the trend has its knee, None where it has none; `case_text` a case file of the
+    contact.
     """
 
     recordings: tuple[RigRecording, ...]
@@ -216,6 +223,7 @@ class Rig:
     disturbance: Disturbance
     load_n: float
     shaft_hz: tuple[float, ...]
+    case_text: str
 
 
 def simulate_rig(
@@ -227,7 +235,7 @@ def simulate_rig(
     disturbance: Disturbance | None = None,
     trend: str = "knee",
     repeat_std_hz: float = 15.0,
-    seed: int = 1,
+    seed: int = 7,
     case: Case | None = None,
 ) -> Rig:
     """The paper's test, 12 worn rings 5 times each at 500 N, or another number of them spread over the same range.
@@ -308,7 +316,14 @@ def simulate_rig(
         disturbance=disturbance,
         load_n=conditions.load,
         shaft_hz=(ROLLER_HZ, RING_HZ),
+        case_text=_papers_case().text if case is None else case.text,
     )
+
+
+def _papers_case() -> Case:
+    """The paper's case file, with the Young's modulus of its section 4, which the rig's steel has."""
+    case = load_case(files("asperity").joinpath("paper.toml").read_text("utf-8"), name="paper.toml")
+    return case.with_overrides({"material.youngs_modulus": [f"{one * 1e-9:g} GPa" for one in PAIR.youngs_moduli]})
 
 
 def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
@@ -337,6 +352,90 @@ def _solved(case: Case, sq: float) -> ContactState:
             "tell; roughen the surface or thin the oil"
         )
     return state
+
+
+def write_rig(
+    rig: Rig,
+    folder: str | Path,
+    *,
+    file_format: str = "h5",
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Write every recording, what is known of it, and the truth; return the recordings' paths.
+
+    Beside the recordings stand table.csv (file, Sq and its deviation in um, load, roller speed: what a test engineer
+    knows), truth.csv (what nobody knows: CRF, CRFA, damping, CLR, true Sq, SNR) and rig.toml, the case behind it.
+
+    Parameters
+    ----------
+    file_format : "h5", 32-bit floats with rate and unit; "wav", 32-bit floats in m/s^2, with the rate alone
+    progress : called with how many of how many are written
+
+    Raises
+    ------
+    BadInput
+        for an unknown format, a folder that is not empty or cannot be made.
+    """
+    if file_format not in WRITERS:
+        raise BadInput(f"a rig's recordings are written as {' or '.join(WRITERS)}, got {file_format!r}")
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise BadInput(f"{folder} is not empty, and other files would be taken for recordings; name a new folder")
+    except OSError as error:
+        raise BadInput(f"cannot make the folder {folder}: {error.strerror}; choose another") from None
+    paths = [folder / f"{recording.name}.{file_format}" for recording in rig.recordings]
+
+    def write(recording: RigRecording, path: Path) -> None:
+        with whole_file(path) as part:
+            WRITERS[file_format](part, recording.signal())
+
+    with ThreadPoolExecutor(max_workers=AT_ONCE) as pool:
+        writing = [pool.submit(write, *pair) for pair in zip(rig.recordings, paths, strict=True)]
+        try:
+            for number, one in enumerate(writing, 1):
+                one.result()
+                if progress is not None:
+                    progress(number, len(writing))
+        finally:
+            for one in writing:
+                one.cancel()
+    known: list[tuple[str, ...]] = [("file", "sq_um", "sq_um_std", "load_n", "speed_hz")]
+    truth: list[tuple[str, ...]] = [
+        ("file", "sample", "repeat", "true_sq_um", "clr", "crf_hz", "crfa", "damping_ratio", "snr_db")
+    ]
+    for recording, path in zip(rig.recordings, paths, strict=True):
+        sq, sq_std, true_sq = (1e6 * m for m in (recording.sq_m, recording.sq_std_m, recording.true_sq_m))
+        known.append((path.name, f"{sq:.4g}", f"{sq_std:.3g}", f"{rig.load_n:g}", f"{rig.shaft_hz[0]:g}"))
+        figures = (true_sq, recording.clr, recording.crf_hz, recording.crfa, recording.damping_ratio, recording.snr_db)
+        truth.append((path.name, str(recording.sample), str(recording.repeat), *(f"{one:.6g}" for one in figures)))
+    for name, rows in (("table.csv", known), ("truth.csv", truth)):
+        with whole_file(folder / name) as part:
+            part.write_text("".join(",".join(row) + "\n" for row in rows), "utf-8")
+    with whole_file(folder / "rig.toml") as part:
+        part.write_text(rig.case_text, "utf-8")
+    return paths
+
+
+def _write_hdf5(path: Path, signal: Signal) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        values = file.create_dataset("acceleration", data=signal.values.astype(np.float32))
+        values.attrs["sampling_rate_hz"] = signal.rate_hz
+        values.attrs["unit"] = signal.unit
+
+
+def _write_wav(path: Path, signal: Signal) -> None:
+    from scipy.io import wavfile
+
+    if signal.rate_hz != round(signal.rate_hz):
+        raise BadInput(f"a wav file holds a whole number of samples a second, got {signal.rate_hz:g} Hz; take h5")
+    wavfile.write(path, round(signal.rate_hz), signal.values.astype(np.float32))
+
+
+WRITERS: dict[str, Callable[[Path, Signal], None]] = {"h5": _write_hdf5, "wav": _write_wav}
 
 
 class _Test(NamedTuple):
@@ -440,19 +539,23 @@ def _recording(
     """The background as loud as the SNR says, a little louder or softer each time, with its modes moved a little."""
     frequency = background.frequency
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    wanted = float(np.sum(contact.density[inside])) * GRID_HZ / 10.0 ** (disturbance.snr_db / 10.0)
+    power = float(np.sum(contact.density[inside])) * GRID_HZ
+    wanted = power / 10.0 ** (disturbance.snr_db / 10.0)
     level = wanted * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
     gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(background.mode_hz.size) / 10.0)
     mode_hz = background.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
     other = background.floor.copy()
-    for f0, damping, power in zip(mode_hz, background.mode_damping, background.mode_power * gains, strict=True):
+    for f0, damping, loud in zip(mode_hz, background.mode_damping, background.mode_power * gains, strict=True):
         # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
         x2 = (frequency / f0) ** 2
-        other += power * 4.0 * damping / (np.pi * f0) * x2**2 / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
+        other += loud * 4.0 * damping / (np.pi * f0) * x2**2 / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
     sources = np.array([ROLLER_HZ, RING_HZ, MAINS_HZ])
     sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
     at = background.order * sources[background.source]
     heard = _accelerometer(at, test.rate_hz)
+    heard_other = level * other * _accelerometer(frequency, test.rate_hz)
+    in_band = (at >= band_hz[0]) & (at <= band_hz[1])
+    tonal = level * float(np.sum((background.power * heard)[in_band]))
     return RigRecording(
         sample=test.sample,
         repeat=test.repeat,
@@ -463,11 +566,12 @@ def _recording(
         crf_hz=contact.crf_hz,
         crfa=contact.crfa,
         damping_ratio=contact.damping_ratio,
+        snr_db=float(10.0 * np.log10(power / (np.sum(heard_other[inside]) * GRID_HZ + tonal))),
         rate_hz=test.rate_hz,
         duration_s=test.duration_s,
         frequency_hz=frequency,
         contact_density=contact.density,
-        other_density=level * other * _accelerometer(frequency, test.rate_hz),
+        other_density=heard_other,
         tones=Tones(at, np.sqrt(2.0 * level * background.power * heard)),
         seed=int(rng.integers(2**63)),
     )

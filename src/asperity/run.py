@@ -111,6 +111,8 @@ class Run:
             "film_temperature_max_k": None if heat is None else heat.film_max_k,
             "von_mises_max_pa": stress.peak.value,
             "von_mises_depth_m": stress.peak.depth,
+            "von_mises_core_pa": stress.core.value,
+            "von_mises_core_depth_m": stress.core.depth,
             "shear_stress_max_pa": stress.shear_peak.value,
             "shear_stress_depth_m": stress.shear_peak.depth,
             "converged": convergence.converged,

@@ -18,7 +18,8 @@ KEYS = [  # design.md, section 4, the load on capped oil, parts of friction, she
     *("h_min_m", "h_central_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
     *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
     *("flash_temperature_max_k", "film_temperature_max_k"),
-    *("von_mises_max_pa", "von_mises_depth_m", "shear_stress_max_pa", "shear_stress_depth_m"),
+    *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),
+    *("shear_stress_max_pa", "shear_stress_depth_m"),
     *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
 ]

@@ -26,6 +26,8 @@ def test_scalars_state_friction_heat_and_stress(run):
     assert found["friction_power_w"] == pytest.approx(found["friction_coefficient"] * 500.0 * 0.2 * 1.91)
     assert 0.0 < found["flash_temperature_max_k"] < 200.0
     assert 0.3 * p_max < found["von_mises_max_pa"] < p_max
+    assert 0.0 < found["von_mises_core_pa"] <= found["von_mises_max_pa"]
+    assert found["von_mises_core_depth_m"] >= 0.1 * run.case.conditions.hertz.half_widths[0]
     assert found["von_mises_max_pa"] / 2.0 <= found["shear_stress_max_pa"] <= found["von_mises_max_pa"] / np.sqrt(3.0)
 
 

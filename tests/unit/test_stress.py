@@ -120,6 +120,18 @@ def test_the_peak_between_depths_hardly_depends_on_the_depths():
     assert peaks[0].peak.depth not in peaks[0].depths
 
 
+@pytest.mark.parametrize("core", [0.25, 1.0])
+def test_the_core_is_what_lies_below_a_depth(core):
+    grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
+    pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
+    depths = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 12)])
+    stress = stress_below(pressure, 0.4 * pressure, grid, depths, poisson_ratio=0.3, core_depth=core)
+    assert stress.peak.depth == 0.0
+    fine = [stress.at(depth).von_mises.max() for depth in np.linspace(core, 3.0, 60)]
+    assert stress.core.value == pytest.approx(max(fine), rel=1e-3)
+    assert stress.core.depth >= core == stress.core_depth
+
+
 def test_maps_and_section_are_of_the_same_stresses():
     generator = np.random.default_rng(8)
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0))
@@ -140,6 +152,7 @@ def test_default_depths_go_from_the_surface_to_below_the_contact():
     assert depths.size == 16
     assert depths[0] == 0.0
     assert depths[1] == pytest.approx(grid.spacing[0] / 2.0)
+    assert 0.1 * a in depths
     assert depths[-1] == pytest.approx(2.5 * a)
 
 

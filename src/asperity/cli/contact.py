@@ -127,7 +127,7 @@ def report(
 
 def _print_run(run: "Run") -> None:
     state, convergence = run.state, run.solution.convergence
-    peak = run.stress.peak
+    peak, core = run.stress.peak, run.stress.core
     lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
     rows = [
         ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
@@ -143,7 +143,8 @@ def _print_run(run: "Run") -> None:
         ("lambda, smooth-contact film over Sq", lambda_ratio),
         ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),
         *_friction_rows(run),
-        ("largest von Mises stress in body 1", f"{1e-9 * peak.value:.3f} GPa, {1e6 * peak.depth:.2f} um deep"),
+        ("von Mises stress in body 1, largest", f"{1e-9 * peak.value:.3f} GPa, {1e6 * peak.depth:.2f} um deep"),
+        ("... below a tenth of the half-width", f"{1e-9 * core.value:.3f} GPa, {1e6 * core.depth:.2f} um deep"),
     ]
     resonance = None if run.vibration is None else run.vibration.resonance
     if resonance is not None and resonance.found:

@@ -19,6 +19,7 @@ from asperity.grid import FEWEST_CELLS, Grid
 
 DEPTHS = 16  # where none are given, the surface among them
 DEEPEST = 2.5  # Hertz half-widths
+CORE = 0.1  # Hertz half-widths below which the cell size has no say
 HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then right to 0.1 %
 REFINEMENTS = 3  # depths looked at between the given ones for the largest stress, at most
 CLOSE = 0.001  # depths nearer to one another than twice this share are not told apart
@@ -74,7 +75,9 @@ class SubsurfaceStress:
 
     `depths` [m], shape (nz,), growing; `von_mises` [Pa], shape (nx, ny, nz), below the cell centres of `grid`;
     `peak` is the largest von Mises stress and `shear_peak` the largest shear stress (half the difference of principal
-    stresses), each sought at the depths and, by parabolas, between them. `body` is 1 or 2.
+    stresses), each sought at the depths and, by parabolas, between them; `core` is the largest von Mises stress at
+    least `core_depth` [m] deep. Where pressure and traction end suddenly, as at the edge of a capped asperity, `peak`
+    has no bound but the cell size, and `core` hardly knows it. `body` is 1 or 2.
     """
 
     grid: Grid
@@ -82,6 +85,8 @@ class SubsurfaceStress:
     von_mises: Field
     peak: Peak
     shear_peak: Peak
+    core: Peak
+    core_depth: float
     body: int
     poisson_ratio: float
     tractions: Tractions = field(repr=False)
@@ -128,8 +133,7 @@ def subsurface_stress(
     ----------
     shear : traction along x that the surface of body 1 feels [Pa], shape (nx, ny), such as `friction(...).shear`; body
         2 feels the opposite. None for a contact without friction
-    depths : where to work stresses out [m], 0 or more, growing; None takes the surface and 15 depths from half a cell
-        to 2.5 Hertz half-widths, in equal ratios
+    depths : where to work stresses out [m], 0 or more, growing; None takes `default_depths`
     body : 1 or 2; z points into it
 
     Raises
@@ -148,6 +152,7 @@ def subsurface_stress(
         default_depths(solution.conditions, solution.grid) if depths is None else depths,
         poisson_ratio=solution.conditions.pair.poisson_ratios[body - 1],
         body=body,
+        core_depth=CORE * _half_width(solution.conditions),
     )
 
 
@@ -160,19 +165,31 @@ def hertz_stress(conditions: ContactConditions, depths: Field, *, body: int = 1)
     inside = 1.0 - (grid.x[:, None] / a) ** 2 - (0.0 if line else (grid.y / b) ** 2) + np.zeros(grid.cells)
     pressure = conditions.hertz.p_max * np.sqrt(np.maximum(inside, 0.0))
     ratio = conditions.pair.poisson_ratios[body - 1]
-    return stress_below(pressure, None, grid, depths, poisson_ratio=ratio, body=body)
+    core = CORE * _half_width(conditions)
+    return stress_below(pressure, None, grid, depths, poisson_ratio=ratio, body=body, core_depth=core)
+
+
+def _half_width(conditions: ContactConditions) -> float:
+    widths = conditions.hertz.half_widths
+    return widths[0] if conditions.geometry == "line" else min(widths)
 
 
 def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
-    """The surface, and 15 depths from half the smaller cell side to 2.5 (smaller) half-widths, in equal ratios [m]."""
-    widths = conditions.hertz.half_widths
-    half_width = widths[0] if conditions.geometry == "line" else min(widths)
-    first = 0.5 * min(grid.spacing)
-    return np.concatenate([[0.0], np.geomspace(first, max(DEEPEST * half_width, 10.0 * first), DEPTHS - 1)])
+    """The surface, the core's depth, and 14 depths from half a cell to 2.5 half-widths in equal ratios [m]."""
+    half_width, first = _half_width(conditions), 0.5 * min(grid.spacing)
+    below = np.geomspace(first, max(DEEPEST * half_width, 10.0 * first), DEPTHS - 2)
+    return np.unique(np.concatenate([[0.0, CORE * half_width], below]))
 
 
 def stress_below(
-    pressure: Field, shear: Field | None, grid: Grid, depths: Field, *, poisson_ratio: float, body: int = 1
+    pressure: Field,
+    shear: Field | None,
+    grid: Grid,
+    depths: Field,
+    *,
+    poisson_ratio: float,
+    body: int = 1,
+    core_depth: float = 0.0,
 ) -> SubsurfaceStress:
     """Stresses below a pressure and a traction along x, both [Pa] and of shape (nx, ny), constant over each cell.
 
@@ -195,13 +212,21 @@ def stress_below(
         return von_mises
 
     von_mises = np.stack([look(float(depth), keep=True) for depth in depths], axis=-1)
-    peak, shear_peak = (_largest(levels, measure, look) for measure in (0, 1))
+    core_depth = max(core_depth, float(depths[0]))
+    if core_depth not in levels:
+        look(core_depth)
+    core, _, shear_peak = (
+        _largest(levels, measure, below, look) for measure, below in ((0, core_depth), (0, 0.0), (1, 0.0))
+    )
+    peak = max((level[0] for level in levels.values()), key=lambda one: one.value)  # of all depths looked at by now
     return SubsurfaceStress(
         grid=grid,
         depths=depths,
         von_mises=von_mises,
         peak=peak,
         shear_peak=shear_peak,
+        core=core,
+        core_depth=core_depth,
         body=body,
         poisson_ratio=poisson_ratio,
         tractions=tractions,
@@ -234,10 +259,10 @@ def _peak(stress: Field, depth: float, grid: Grid) -> Peak:
     return Peak(float(stress[i, j]), depth, float(grid.x[i]), float(grid.y[j]))
 
 
-def _largest(levels: _Levels, measure: int, look: Callable[[float], Field]) -> Peak:
-    """The largest of a measure, sought between depths too: parabolas through the highest and its neighbours."""
+def _largest(levels: _Levels, measure: int, below: float, look: Callable[[float], object]) -> Peak:
+    """The largest of a measure from a depth on, sought between depths by parabolas through the highest of them."""
     for _ in range(REFINEMENTS):
-        depths = sorted(levels)
+        depths = sorted(depth for depth in levels if depth >= below)
         values = [levels[depth][measure].value for depth in depths]
         top = int(np.argmax(values))
         if not 0 < top < len(depths) - 1:
@@ -253,4 +278,4 @@ def _largest(levels: _Levels, measure: int, look: Callable[[float], Field]) -> P
         if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < CLOSE:
             break
         look(float(np.exp(vertex) - shift))
-    return max((level[measure] for level in levels.values()), key=lambda peak: peak.value)
+    return max((level[measure] for depth, level in levels.items() if depth >= below), key=lambda peak: peak.value)

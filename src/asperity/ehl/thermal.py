@@ -23,6 +23,7 @@ SETTLED = 1e-3  # change of the film's temperature, over its largest rise
 LEAST_RISE = 1.0  # [K]; below it the change is measured against this
 MOST_ROUNDS = 100
 MOST_SOLVES = 25
+MOST_WARM_ITERATIONS = 40  # a solve that starts from one a little colder takes ten
 MEMORY = 5  # rounds that the next guess is mixed from
 
 
@@ -118,37 +119,39 @@ def solve_thermal_contact(
     solution = solve_contact(
         conditions, lubricant, surface, options=options, start=start, strict=strict, progress=progress
     )
-    if lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0:
+    nothing_fed_back = lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0
+    if nothing_fed_back or not solution.convergence.converged:
         return solution
     history, seconds = solution.convergence.history, solution.convergence.seconds
-    before: Field = np.zeros(surface.grid.cells)
+    options = options or Options()
+    few = replace(options, max_iterations=min(options.max_iterations, MOST_WARM_ITERATIONS))
+    solved_at: Field = np.zeros(surface.grid.cells)  # rise of the film that the solution's viscosity belongs to
+    share, settled = 1.0, False
     for _ in range(MOST_SOLVES):
-        if not solution.convergence.converged:
-            break
         film = friction_and_heat(solution, boundary_friction=boundary_friction, thermal=thermal)[1].film
-        left = float(np.sqrt(np.mean((film - before) ** 2)))
+        left = float(np.sqrt(np.mean((film - solved_at) ** 2)))
         settled = left < SETTLED * max(float(np.max(film)), LEAST_RISE)
         if settled:
             break
-        before = film
-        solution = solve_contact(
+        wanted = solved_at + share * (film - solved_at)
+        warmer = solve_contact(
             conditions,
             lubricant,
             surface,
-            options=options,
+            options=few,
             start=solution,
-            viscosity_factor=warm_factor(solution, thermal, thermal.ambient + film),
-            strict=strict,
+            viscosity_factor=warm_factor(solution, thermal, thermal.ambient + wanted),
+            strict=False,
             progress=progress,
         )
-        history, seconds = history + solution.convergence.history, seconds + solution.convergence.seconds
-    else:
-        solution = _unsettled(solution)
-    solution = replace(solution, convergence=replace(solution.convergence, history=history, seconds=seconds))
-    if strict and not solution.convergence.converged:
+        history, seconds = history + warmer.convergence.history, seconds + warmer.convergence.seconds
+        if warmer.convergence.converged:
+            solution, solved_at, share = replace(warmer, options=options), wanted, min(1.0, 2.0 * share)
+        else:  # too far from cold to hot: go part of the way
+            share *= 0.5
+    status = Status.CONVERGED if settled else Status.OUT_OF_ITERATIONS
+    ending = replace(solution.convergence, status=status, history=history, seconds=seconds)
+    solution = replace(solution, convergence=ending)
+    if strict and not ending.converged:
         raise NotConverged(solution, f"contact and heat did not settle in {MOST_SOLVES} rounds")
     return solution
-
-
-def _unsettled(solution: ContactSolution) -> ContactSolution:
-    return replace(solution, convergence=replace(solution.convergence, status=Status.OUT_OF_ITERATIONS))

@@ -62,16 +62,24 @@ def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: l
 
 
 class _OnDisk:
-    """A data set that is opened for each slice, so that no file stays open between."""
+    """A data set whose file is opened at its first slice and closed after its last."""
 
     def __init__(self, path: Path, name: str, shape: tuple[int, ...]) -> None:
         self.path, self.name, self.shape = path, name, shape
+        self._along = int(np.argmax(shape))
+        self._file: Any = None
 
     def __getitem__(self, where: Any) -> Any:
         import h5py
 
-        with h5py.File(self.path, "r") as file:
-            return file[self.name][where]
+        if self._file is None:
+            self._file = h5py.File(self.path, "r")
+        values = self._file[self.name][where]
+        ends = where if isinstance(where, tuple) else (where,)
+        if ends[self._along].stop >= self.shape[self._along]:
+            self._file.close()
+            self._file = None
+        return values
 
 
 def _scalar(one: Any) -> Any:

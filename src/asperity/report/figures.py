@@ -323,7 +323,7 @@ def spectrum(vibration: Vibration) -> Figure:
     near = (density.frequency_hz >= low - margin) & (density.frequency_hz <= high + margin)
     together = max(int(np.count_nonzero(near)) // 400, 1)
     frequency, level = (
-        _mean_of_neighbours(values[near], together) for values in (density.frequency_hz, density.density)
+        mean_of_neighbours(values[near], together) for values in (density.frequency_hz, density.density)
     )
     axes.axvspan(low, high, facecolor="#e8eef4", edgecolor=GREY, linewidth=0.7, label="search band")
     name = "spectrum" if together == 1 else f"spectrum, mean of {together} lines"
@@ -346,7 +346,8 @@ def spectrum(vibration: Vibration) -> Figure:
     return figure
 
 
-def _mean_of_neighbours(values: Field, together: int) -> Field:
+def mean_of_neighbours(values: Field, together: int) -> Field:
+    """Means of so many values at a time; a rest is left out."""
     whole = values.size // together * together
     return np.asarray(values[:whole].reshape(-1, together).mean(axis=1))
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from matplotlib.figure import Figure
 
 from asperity.conditions import ContactConditions
@@ -78,16 +78,9 @@ def write_report(runs: Sequence["Run"], path: str | Path, *, title: str | None =
 
 def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
     """The page as HTML text."""
-    environment = Environment(
-        loader=PackageLoader("asperity.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     scalars = [run.scalars() for run in runs]
     labels = _labels(scalars)
-    return environment.get_template("page.html.j2").render(
+    return page_template("page.html.j2").render(
         title=title or _title(scalars),
         version=version("asperity"),
         runs=[_RunView(run, label, f"run-{n}") for n, (run, label) in enumerate(zip(runs, labels, strict=True), 1)],
@@ -104,6 +97,18 @@ def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
         imbalance=_span([one["mass_flux_imbalance"] for one in scalars]),
         paper=PAPER,
     )
+
+
+def page_template(name: str) -> Template:
+    """A template of a page, of which all are escaped and complete."""
+    environment = Environment(
+        loader=PackageLoader("asperity.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(name)
 
 
 # Numbers -------------------------------------------------------------------------------------------------------------
@@ -232,6 +237,8 @@ QUANTITIES = (
     Quantity("film_temperature_max_k", "Film temperature", "K", "largest rise of the film above ambient", 1.0, ".1f"),
     Quantity("von_mises_max_pa", "Largest von Mises stress", "GPa", "in body 1, taken as elastic", 1e-9),
     Quantity("von_mises_depth_m", "… at the depth", "µm", "below the surface", 1e6, ".2f"),
+    Quantity("von_mises_core_pa", "Von Mises stress of the core", "GPa", "largest from a tenth of a down", 1e-9),
+    Quantity("von_mises_core_depth_m", "… at the depth", "µm", "below the surface", 1e6, ".2f"),
     Quantity("crf_hz", "Contact resonance frequency, CRF", "Hz", "of one simulated record", deviation="crf_std_hz"),
     Quantity(
         "crfa", "Resonance amplitude, CRFA", "(m/s²)²/Hz", "acceleration density at the CRF", deviation="crfa_std"
@@ -268,14 +275,16 @@ TILES = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Tile:
+class Tile:
+    """A number that stands out on a page."""
+
     name: str
     value: str
     rest: str  # deviation and unit
 
 
 @dataclass(frozen=True, slots=True)
-class _Picture:
+class Picture:
     """A figure as the page needs it; `width` and `height` in CSS pixels keep its place while it loads."""
 
     uri: str
@@ -285,11 +294,12 @@ class _Picture:
     caption: str
 
 
-def _picture(figure: Figure, caption: str, alt: str) -> _Picture:
+def picture(figure: Figure, caption: str, alt: str) -> Picture:
+    """A figure as a page embeds it."""
     text = re.sub(r"^.*?(?=<svg)", "", figures.svg(figure), flags=re.DOTALL)  # an image needs no XML prologue
     width, height = figure.get_size_inches() * 96.0
     uri = "data:image/svg+xml," + quote(re.sub(r"\s*\n\s*", " ", text), safe=" ='/:;,.()+-*!@?&$[]{}|~^`")
-    return _Picture(uri, round(float(width)), round(float(height)), in_print(alt), in_print(caption))
+    return Picture(uri, round(float(width)), round(float(height)), in_print(alt), in_print(caption))
 
 
 class _RunView:
@@ -308,19 +318,19 @@ class _RunView:
         self.case_text = run.case.text
 
 
-def _tile(quantity: Quantity, scalars: Mapping[str, Any]) -> _Tile:
+def _tile(quantity: Quantity, scalars: Mapping[str, Any]) -> Tile:
     value, _, deviation = quantity.show(scalars).partition(" ")
     unit = "" if value == NOT_FOUND else quantity.unit
-    return _Tile(TILES[quantity.key], value, f"{deviation} {unit}".strip())
+    return Tile(TILES[quantity.key], value, f"{deviation} {unit}".strip())
 
 
-def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
+def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[Picture]:
     solution = run.solution
     shares = figures.zone_shares(solution)
     dry = solution.lubricant is None
     zone = "The dashed lines bound the Hertz zone; oil enters from the left."
     return [
-        _picture(
+        picture(
             figures.contact_map(solution),
             "Contact state, shares of the Hertz zone. A cell counts as contact where the gap is at most "
             f"{solution.options.contact_film * 1e9:g} nm. {zone}",
@@ -331,29 +341,29 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
                 else f"oil fills {_percent(shares.film)}, {_percent(shares.cavitated)} has cavitated."
             ),
         ),
-        _picture(
+        picture(
             figures.film_map(solution),
             "Gap between the deformed surfaces. The colours end at the Hertz zone's 99th percentile.",
             f"Map of the film thickness: mean {scalars['h_mean_m'] * 1e6:.3f} µm in the Hertz zone, "
             f"smallest {scalars['h_min_m'] * 1e6:.3f} µm.",
         ),
-        _picture(
+        picture(
             figures.pressure_map(solution),
             "Pressure of oil and asperities together." + _capped_oil(run),
             f"Map of the pressure: at most {scalars['p_max_pa'] * 1e-9:.3f} GPa; Hertz's would be "
             f"{solution.conditions.hertz.p_max * 1e-9:.3f} GPa.",
         ),
-        _picture(
+        picture(
             figures.centre_line(solution),
             "Pressure and gap along rolling through the middle. The gap's axis ends where the Hertz zone's gaps do.",
             "Curves along rolling: pressure with the dashed Hertz ellipse, and below it the gap with contact marked.",
         ),
-        _picture(
+        picture(
             figures.roughness_map(solution),
             "The composite roughness of both surfaces before they deform, material up.",
             f"Map of the roughness heights, Sq {scalars['sq_m'] * 1e6:.3f} µm.",
         ),
-        _picture(
+        picture(
             figures.height_distribution(solution.surface.heights),
             "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
             f"Histogram of the heights, Sq {scalars['sq_m'] * 1e6:.3f} µm, beside a Gaussian curve.",
@@ -361,7 +371,7 @@ def _run_pictures(run: "Run", scalars: Mapping[str, Any]) -> list[_Picture]:
         *_rubbing_pictures(run),
         *_stress_pictures(run),
         *_spectrum_picture(run),
-        _picture(
+        picture(
             figures.convergence_history(solution.convergence),
             f"How the solver got there: {solution.convergence.explain()}.",
             f"Residual, load error and change against the Newton step: {solution.convergence.explain()}.",
@@ -377,26 +387,26 @@ def _capped_oil(run: "Run") -> str:
     return f" Cells that stand at the hardness without touching carry {share} of the load; CLR leaves them out."
 
 
-def _rubbing_pictures(run: "Run") -> list[_Picture]:
+def _rubbing_pictures(run: "Run") -> list[Picture]:
     solution, rubbing, heat = run.solution, run.friction, run.heat
     if rubbing is None or heat is None or solution.conditions.sliding_speed == 0.0:
         return []
     sliding = solution.conditions.sliding_speed
     return [
-        _picture(
+        picture(
             rubbing_figures.traction_map(solution, rubbing),
             f"Shear stress of sliding at {sliding:.3g} m/s on both surfaces: {rubbing.boundary_friction:g} times "
             f"the pressure where they touch (friction {rubbing.asperity_part:.4f}), the oil's own elsewhere "
             f"({rubbing.oil_part:.4f}).",
             f"Map of the shear stress: friction coefficient {rubbing.coefficient:.4f}.",
         ),
-        _picture(
+        picture(
             rubbing_figures.temperature_map(solution, heat),
             f"Temperature of the hotter surface. Friction makes {rubbing.power:.3g} W; {heat.heat_1_w:.3g} W flow into "
             f"body 1 and {heat.heat_2_w:.3g} W into body 2.",
             f"Map of the flash temperature: at most {heat.max_k:.1f} K above the body.",
         ),
-        _picture(
+        picture(
             rubbing_figures.temperature_line(solution, heat),
             "Temperatures along rolling through the hottest cell. The slower surface stays longer in the heat; the "
             "film can be hotter than both, as the heat is made within it.",
@@ -405,32 +415,33 @@ def _rubbing_pictures(run: "Run") -> list[_Picture]:
     ]
 
 
-def _stress_pictures(run: "Run") -> list[_Picture]:
+def _stress_pictures(run: "Run") -> list[Picture]:
     solution, stress = run.solution, run.stress
     peak = f"{stress.peak.value * 1e-9:.3f} GPa, {stress.peak.depth * 1e6:.2f} µm deep"
     dx, dy = solution.grid.spacing
     return [
-        _picture(
+        picture(
             rubbing_figures.stress_map(solution, stress),
             "The largest von Mises stress below each cell, of the surface and fifteen depths in body 1. Pressure and "
             "friction load an elastic, smooth half-space: above its yield stress the material would flow.",
             f"Map of the largest von Mises stress below the surface: {peak}.",
         ),
-        _picture(
+        picture(
             rubbing_figures.stress_section(solution, stress),
             f"Von Mises stress below the surface, in the plane along rolling that holds the largest: {peak} (circle).",
             f"Section of the von Mises stress along rolling and depth: largest {peak}.",
         ),
-        _picture(
+        picture(
             rubbing_figures.stress_over_depth(solution, stress),
-            "The largest von Mises stress at each depth. Asperities raise it near the surface, where it depends on the "
-            f"cell size ({dx * 1e6:.2g} × {dy * 1e6:.2g} µm); deeper down the contact as a whole decides.",
+            "The largest von Mises stress at each depth. Asperities raise it near the surface; at their edges it grows "
+            f"with a finer grid (here {dx * 1e6:.2g} × {dy * 1e6:.2g} µm), from a tenth of the half-width down it does "
+            "not.",
             f"Curve of the largest von Mises stress over depth beside that of Hertz's contact: {peak}.",
         ),
     ]
 
 
-def _spectrum_picture(run: "Run") -> list[_Picture]:
+def _spectrum_picture(run: "Run") -> list[Picture]:
     vibration = run.vibration
     if vibration is None or vibration.spectrum is None:
         return []
@@ -442,7 +453,7 @@ def _spectrum_picture(run: "Run") -> list[_Picture]:
         f"resonate; asperities that carry the whole load would give {vibration.full_load_crf_hz:.0f} Hz."
     )
     alt = f"Acceleration spectrum around the search band {low:.0f} to {high:.0f} Hz: {words}."
-    return [_picture(figures.spectrum(vibration), caption, alt)]
+    return [picture(figures.spectrum(vibration), caption, alt)]
 
 
 def _silence(run: "Run") -> list[str]:
@@ -472,11 +483,11 @@ def _title(scalars: Sequence[Mapping[str, Any]]) -> str:
     return f"Rough lubricated contact{f': {len(rough)} runs' if len(rough) > 1 else ''}, {heights}"
 
 
-def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> list[_Picture]:
+def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> list[Picture]:
     full_load = {run.vibration.full_load_crf_hz for run in runs if run.vibration is not None}
     unfinished = " Hollow markers are runs that did not converge." if not all(s["converged"] for s in scalars) else ""
     return [
-        _picture(
+        picture(
             figures.shares_against_roughness(scalars),
             "Share of the load (CLR) and of the Hertz zone (CAR) that asperities take, one surface each." + unfinished,
             "CLR and CAR against Sq: "
@@ -484,7 +495,7 @@ def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> li
                 f"at {s['sq_m'] * 1e6:.2f} µm CLR {_percent(s['clr'])} and CAR {_percent(s['car'])}" for s in scalars
             ) + ".",
         ),
-        _picture(
+        picture(
             figures.resonance_against_roughness(scalars, full_load.pop() if len(full_load) == 1 else None),
             "Contact resonance frequency with two standard deviations of its fit." + unfinished,
             "CRF against Sq: "
@@ -497,12 +508,12 @@ def _overview(runs: Sequence["Run"], scalars: Sequence[Mapping[str, Any]]) -> li
     ]  # fmt: skip
 
 
-def _friction_overview(scalars: Sequence[Mapping[str, Any]]) -> list[_Picture]:
+def _friction_overview(scalars: Sequence[Mapping[str, Any]]) -> list[Picture]:
     rubbing = [one for one in scalars if one["friction_coefficient"]]
     if not rubbing:
         return []
     return [
-        _picture(
+        picture(
             rubbing_figures.friction_against_roughness(rubbing),
             "Friction coefficient, and what asperities and oil contribute to it.",
             "Friction coefficient against Sq: "

@@ -133,7 +133,7 @@ def _bound(spectrum: Spectrum, chance: float) -> float:
     from scipy.stats import gamma
 
     shape = _shape(spectrum)
-    return float(gamma.isf(chance, shape) / shape) * (1.0 + 0.6 / np.sqrt(shape))
+    return float(gamma.isf(chance, shape) / shape * (1.0 + 0.6 / np.sqrt(shape)))
 
 
 def _peaks(rise: Field, bound: float) -> Field:
@@ -141,7 +141,7 @@ def _peaks(rise: Field, bound: float) -> Field:
     above = rise > bound
     above[:NEIGHBOURS] = above[-NEIGHBOURS:] = False  # too few neighbours to one side
     peaks = []
-    for at in np.flatnonzero(above):
+    for at in map(int, np.flatnonzero(above)):
         first, last = max(at - CORE, 0), min(at + CORE, rise.size - 1)
         if rise[at] >= np.max(rise[first : last + 1]):
             wide = rise[max(at - 2 * REACH, 0) : at + 2 * REACH + 1]

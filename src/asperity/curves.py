@@ -1,0 +1,223 @@
+"""Friction curves of a case: over speed (Stribeck) and over the slide-to-roll ratio (traction).
+
+Each point is a contact of its own, started from its neighbour's solution; prints and draws nothing.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from asperity.case import Case
+from asperity.conditions import ContactConditions
+from asperity.ehl.solution import ContactSolution, Iteration
+from asperity.ehl.state import contact_state
+from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
+from asperity.errors import BadInput, require_positive
+from asperity.surface import Surface
+
+Progress = Callable[[Iteration], None]
+
+SPEED_RANGE = (0.01, 10.0)  # of the case's entrainment speed
+SPEEDS = 13
+SLIP_RANGE = (1e-3, 0.5)
+SLIPS = 14
+MOST_SLIP = 1000.0
+HOT = 30.0  # rise of the film [K] that no oil stays as viscous through
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionPoint:
+    """One contact of a curve, SI.
+
+    `friction_coefficient` = `asperity_part` + `oil_part`; `lambda_ratio` is None for a smooth or dry contact;
+    temperatures are rises [K], the first of the hotter surface; a point that did not converge must not be used.
+    """
+
+    entrainment_speed_m_s: float
+    slide_to_roll: float
+    friction_coefficient: float
+    asperity_part: float
+    oil_part: float
+    clr: float
+    h_mean_m: float
+    lambda_ratio: float | None
+    flash_temperature_max_k: float
+    film_temperature_max_k: float
+    friction_power_w: float
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionCurve:
+    """Friction over speed ("stribeck") or over the slide-to-roll ratio ("traction"), by rising abscissa."""
+
+    kind: Literal["stribeck", "traction"]
+    points: tuple[FrictionPoint, ...]
+    boundary_friction: float
+    sq: float  # composite roughness [m]
+    feedback: bool  # whether the film's heat acted back on it
+
+    def scalars(self) -> dict[str, Any]:
+        """The curve as `--json` prints it."""
+        return {
+            "kind": self.kind,
+            "sq_m": self.sq,
+            "boundary_friction": self.boundary_friction,
+            "thermal_feedback": self.feedback,
+            "points": [asdict(point) for point in self.points],
+        }
+
+    def verdict(self) -> str:
+        """One sentence: from where to where friction goes."""
+        first, last = self.points[0], self.points[-1]
+        if self.kind == "stribeck":
+            sentence = (
+                f"Friction goes from {first.friction_coefficient:.4f} at {first.entrainment_speed_m_s:.3g} m/s to "
+                f"{last.friction_coefficient:.4f} at {last.entrainment_speed_m_s:.3g} m/s"
+            )
+        else:
+            highest = max(self.points, key=lambda point: point.friction_coefficient)
+            sentence = (
+                f"Friction is at most {highest.friction_coefficient:.4f}, at a slide-to-roll ratio of "
+                f"{100 * highest.slide_to_roll:.3g} %"
+            )
+        sentence += f" (Sq {1e6 * self.sq:.3g} um, boundary friction {self.boundary_friction:g})"
+        unfinished = sum(not point.converged for point in self.points)
+        return (
+            f"NOT CONVERGED at {unfinished} of {len(self.points)} points: {sentence}." if unfinished else f"{sentence}."
+        )
+
+    def hint(self) -> str | None:
+        """What a reader has to know about the figures, None if nothing."""
+        hottest = max(point.film_temperature_max_k for point in self.points)
+        if self.feedback or hottest < HOT:
+            return None
+        return (
+            f"the film warms up by up to {hottest:.0f} K, and its oil is taken as viscous as when cold; "
+            "set thermal.feedback=true to let it thin"
+        )
+
+
+def stribeck_curve(
+    case: Case, *, speeds: Sequence[float] | None = None, progress: Progress | None = None
+) -> FrictionCurve:
+    """Friction over entrainment speed at the case's slide-to-roll ratio.
+
+    Parameters
+    ----------
+    speeds : entrainment speeds [m/s]; by default 13 from a hundredth of the case's to ten times it
+    progress : called after every step of the solver
+
+    Raises
+    ------
+    BadInput
+        for a case in which nothing slides, or a speed that is not positive.
+    """
+    if case.conditions.sliding_speed == 0.0:
+        raise BadInput(f"{case.source}: contact.slip is 0 and nothing slides; set it, to 0.1 for instance")
+    if speeds is None:
+        low, high = (share * case.conditions.entrainment_speed for share in SPEED_RANGE)
+        speeds = [float(speed) for speed in np.geomspace(low, high, SPEEDS)]
+    for speed in speeds:
+        require_positive("entrainment speed", speed, "m/s")
+    ratios = [speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds]
+    wanted = [
+        replace(case.conditions, surface_speeds=(ratios[0] * speed, ratios[1] * speed)) for speed in sorted(speeds)
+    ]
+    points = _solved(case, case.surface(), wanted[::-1], progress)  # from full film down: each starts the next well
+    return _curve(case, "stribeck", points[::-1])
+
+
+def traction_curve(
+    case: Case, *, slips: Sequence[float] | None = None, progress: Progress | None = None
+) -> FrictionCurve:
+    """Friction over the slide-to-roll ratio (u1 - u2)/u at the case's entrainment speed; above 2 the surfaces oppose.
+
+    Parameters
+    ----------
+    slips : slide-to-roll ratios, not negative; by default 0 and 14 from 0.001 to 0.5
+    progress : called after every step of the solver
+
+    Raises
+    ------
+    BadInput
+        for a ratio that is negative or beyond 1000.
+    """
+    if slips is None:
+        slips = [0.0, *(float(slip) for slip in np.geomspace(*SLIP_RANGE, SLIPS))]
+    for slip in slips:
+        if not 0.0 <= slip <= MOST_SLIP:
+            raise BadInput(f"slide-to-roll ratio must lie between 0 and {MOST_SLIP:g}, got {slip:g}")
+    speed = case.conditions.entrainment_speed
+    wanted = [
+        replace(case.conditions, surface_speeds=(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)))
+        for slip in sorted(slips)
+    ]
+    return _curve(case, "traction", _solved(case, case.surface(), wanted, progress))
+
+
+def _curve(case: Case, kind: Literal["stribeck", "traction"], points: list[FrictionPoint]) -> FrictionCurve:
+    if not points:
+        raise BadInput("a curve needs at least one point, got none")
+    return FrictionCurve(
+        kind=kind,
+        points=tuple(points),
+        boundary_friction=case.boundary_friction,
+        sq=case.surface().sq,
+        feedback=case.thermal.feedback,
+    )
+
+
+def _solved(
+    case: Case, surface: Surface, wanted: Sequence[ContactConditions], progress: Progress | None
+) -> list[FrictionPoint]:
+    points: list[FrictionPoint] = []
+    start: ContactSolution | None = None
+    for conditions in wanted:
+        solution = _solve(case, surface, conditions, start, progress)
+        if start is not None and not solution.convergence.converged:
+            solution = _solve(case, surface, conditions, None, progress)
+        start = solution if solution.convergence.converged else None
+        points.append(_point(case, solution))
+    return points
+
+
+def _solve(
+    case: Case,
+    surface: Surface,
+    conditions: ContactConditions,
+    start: ContactSolution | None,
+    progress: Progress | None,
+) -> ContactSolution:
+    return solve_thermal_contact(
+        conditions,
+        case.lubricant,
+        surface,
+        boundary_friction=case.boundary_friction,
+        thermal=case.thermal,
+        options=case.options,
+        start=start,
+        strict=False,
+        progress=progress,
+    )
+
+
+def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
+    rubbing, heat = friction_and_heat(solution, boundary_friction=case.boundary_friction, thermal=case.thermal)
+    state, conditions = contact_state(solution), solution.conditions
+    return FrictionPoint(
+        entrainment_speed_m_s=conditions.entrainment_speed,
+        slide_to_roll=conditions.slide_to_roll,
+        friction_coefficient=rubbing.coefficient,
+        asperity_part=rubbing.asperity_part,
+        oil_part=rubbing.oil_part,
+        clr=state.clr,
+        h_mean_m=state.h_mean,
+        lambda_ratio=state.lambda_ratio,
+        flash_temperature_max_k=heat.max_k,
+        film_temperature_max_k=heat.film_max_k,
+        friction_power_w=rubbing.power,
+        converged=solution.convergence.converged,
+    )

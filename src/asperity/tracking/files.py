@@ -1,0 +1,147 @@
+"""Which files are recordings, in what order, and the table that says where each belongs."""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from asperity.errors import BadInput, UnreadableFile
+from asperity.recording.sidecar import is_sidecar
+
+_NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
+                  ".docx", ".xlsx", ".part", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
+_KNOWN = ("load_n", "speed_hz")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a recording stands in the series, as a table says it; None for what it does not say."""
+
+    x: float
+    x_std: float | None = None
+    load_n: float | None = None
+    speed_hz: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """A table of places by file name; `x_name` is the heading of its column of x."""
+
+    name: str
+    x_name: str
+    places: dict[str, Place]
+
+    def place(self, path: Path) -> Place:
+        """Where a recording stands.
+
+        Raises
+        ------
+        BadInput
+            for a recording that is not in the table.
+        """
+        found = self.places.get(path.name) or self.places.get(path.stem)
+        if found is None:
+            raise BadInput(f"{self.name} has no row for {path.name}; add one, or leave that recording out")
+        return found
+
+
+def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
+    """The files named, and those in the folders named, by name with numbers in their order.
+
+    Left out of a folder: hidden files, sidecars, tables with a column `file`, results.
+
+    Raises
+    ------
+    BadInput
+        for a path that does not exist, or nothing left.
+    """
+    found: list[Path] = []
+    for path in map(Path, paths):
+        if path.is_dir():
+            found += sorted(
+                (one for one in path.iterdir() if may_be_recording(one)), key=lambda one: _natural(one.name)
+            )
+        elif path.exists():
+            found.append(path)
+        else:
+            raise BadInput(f"{path} does not exist; check its name")
+    if not found:
+        raise BadInput(f"{', '.join(map(str, paths))} holds no recordings; name files or a folder with files")
+    return list(dict.fromkeys(found))
+
+
+def may_be_recording(path: Path) -> bool:
+    """Whether a file in a folder is taken for a recording."""
+    if not path.is_file() or path.name.startswith(".") or is_sidecar(path) or path.suffix.lower() in _NO_RECORDINGS:
+        return False
+    return path.suffix.lower() not in (".csv", ".tsv", ".txt") or "file" not in _heading(path)
+
+
+def read_table(path: str | Path) -> Table:
+    """Read a table (csv) of file, x and its deviation, load and speed.
+
+    The column of x is the first that is none of file, load_n, speed_hz; its heading names it, such as sq_um. A column
+    of that heading with _std behind is its standard deviation.
+
+    Raises
+    ------
+    UnreadableFile
+        for a file that is missing, no csv, or without the columns.
+    BadInput
+        for a row without a number where one is due.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UnreadableFile(f"{path} cannot be read as a table ({error}); give a csv with columns file, x") from None
+    delimiter = ";" if text.partition("\n")[0].count(";") else ","
+    reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
+    columns = [(name or "").strip() for name in reader.fieldnames or []]
+    reader.fieldnames = columns
+    others = [name for name in columns if name not in ("file", *_KNOWN) and not name.endswith("_std")]
+    if "file" not in columns or not others:
+        raise UnreadableFile(
+            f"{path} needs a column file and one of x, such as sq_um; got {', '.join(columns) or 'none'}"
+        )
+    x_name = "x" if "x" in others else others[0]
+    places = {}
+    for number, row in enumerate(reader, 2):
+        name = (row["file"] or "").strip()
+        if not name:
+            continue
+
+        def value(column: str, row: dict[str, str] = row, number: int = number) -> float | None:
+            said = (row.get(column) or "").strip()
+            if not said:
+                return None
+            try:
+                found = float(said.replace(",", ".") if delimiter == ";" else said)
+            except ValueError:
+                found = float("nan")
+            if not abs(found) < float("inf"):
+                raise BadInput(f"{path}, line {number}: {column} must be a number, got {said!r}")
+            return found
+
+        x = value(x_name)
+        if x is None:
+            raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
+        places[Path(name).name] = Place(
+            x=x, x_std=value(f"{x_name}_std"), load_n=value("load_n"), speed_hz=value("speed_hz")
+        )
+    return Table(name=path.name, x_name=x_name, places=places)
+
+
+def _heading(path: Path) -> list[str]:
+    """The fields of a file's first line."""
+    try:
+        with path.open("rb") as file:
+            first = file.readline(1 << 12).decode("utf-8-sig", errors="replace")
+    except OSError:
+        return []
+    return [one.strip().strip('"') for one in re.split(r"[,;\t]", first.strip())]
+
+
+def _natural(name: str) -> list[tuple[int, int | str]]:
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", name) if part]

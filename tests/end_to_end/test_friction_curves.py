@@ -1,0 +1,106 @@
+"""`asperity stribeck` and `asperity traction` as a user types them, and the same from Python."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from asperity import load_case, stribeck_curve, traction_curve
+from asperity.errors import BadInput
+
+SMALL = ("--set", "grid.cells=[48, 32]", "--set", "surface.correlation_length=40 um")
+PNG = b"\x89PNG"
+
+
+@pytest.fixture
+def case(asp):  # noqa: ARG001 - it makes the folder
+    overrides = {"grid.cells": [48, 32], "surface.correlation_length": "40 um"}
+    return load_case("case.toml").with_overrides(overrides)
+
+
+def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
+    code, out, err = asp("stribeck", "case.toml", *SMALL, "--sq", "0.5 um", "--json", "--out", "curve.png")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["figures"] == ["curve.png"]
+    assert Path("curve.png").read_bytes().startswith(PNG)
+    (curve,) = told["curves"]
+    points = curve["points"]
+    assert len(points) == 13
+    assert all(point["converged"] for point in points)
+    friction = [point["friction_coefficient"] for point in points]
+    assert 0.12 < friction[0] < 0.15
+    assert 0.02 < friction[-1] < 0.06
+    assert all(slower >= faster for slower, faster in pairwise(friction))
+    assert points[-1]["clr"] < 0.01 < points[0]["clr"]
+    assert all(
+        point["friction_coefficient"] == pytest.approx(point["asperity_part"] + point["oil_part"]) for point in points
+    )
+    assert told["verdict"].startswith(f"Friction goes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}")
+
+
+def test_traction_rises_from_nothing_and_meets_its_limit(asp):
+    wanted = [argument for slip in ("0", "0.3", "0.001", "3") for argument in ("--slip", slip)]
+    code, out, _ = asp("traction", "case.toml", *SMALL, "--sq", "0.5 um", "--sq", "1 um", *wanted, "--out", "curve.png")
+    assert code == 0
+    first, second = out.splitlines()[:2]
+    assert first.startswith("Friction is at most 0.0")
+    assert "(Sq 1 um, boundary friction 0.15)" in second
+    assert out.count("1.91") == 8
+    assert "thermal.feedback=true" in out  # it is hot at 300 % of sliding
+    assert Path("curve.png").read_bytes().startswith(PNG)
+
+
+def test_a_traction_curve_in_python(case):
+    seen = []
+    curve = traction_curve(case, slips=[0.3, 0.0, 0.001], progress=seen.append)
+    slips = [point.slide_to_roll for point in curve.points]
+    assert slips == pytest.approx([0.0, 0.001, 0.3])
+    friction = [point.friction_coefficient for point in curve.points]
+    assert friction[0] == curve.points[0].flash_temperature_max_k == curve.points[0].friction_power_w == 0.0
+    assert friction[1] < friction[2]
+    assert seen
+    assert (
+        len({round(point.clr, 4) for point in curve.points}) == 1
+    )  # Newtonian in the film: sliding moves nothing else
+
+
+def test_feedback_is_heard_by_the_curve(case):
+    speeds = [10.0]
+    cold = stribeck_curve(case, speeds=speeds)
+    warm = stribeck_curve(case.with_overrides({"thermal.feedback": "true"}), speeds=speeds)
+    assert warm.feedback
+    assert warm.points[0].oil_part < 0.9 * cold.points[0].oil_part
+    assert cold.hint() is not None
+    assert warm.hint() is None
+
+
+def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
+    code, out, err = asp("stribeck", "case.toml", *SMALL, "--speed", "1.9", "--set", "solver.max_iterations=1")
+    assert code == 1
+    assert out.startswith("NOT CONVERGED at 1 of 1 points: ")
+    assert "NOT CONVERGED" in out.splitlines()[-1]
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("stribeck", "case.toml", "--set", "contact.slip=0.0"), "contact.slip is 0 and nothing slides"),
+        (("stribeck", "case.toml", "--speed", "-1"), "entrainment speed must be positive"),
+        (("stribeck", "case.toml", "--out", "curve.pdf"), "must be a file that ends in .png"),
+        (("stribeck", "case.toml", "--sq", "1 kg"), "surface.sq must be a length"),
+        (("traction", "case.toml", "--slip", "-0.1"), "slide-to-roll ratio must lie between 0 and 1000, got -0.1"),
+    ],
+)
+def test_what_cannot_be_is_one_line(asp, arguments, says):
+    code, out, err = asp(*arguments, "--quiet")
+    assert (code, out) == (2, "")
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_an_empty_curve_is_refused(case):
+    with pytest.raises(BadInput, match="at least one point"):
+        traction_curve(case, slips=[])

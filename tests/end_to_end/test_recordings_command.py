@@ -1,0 +1,177 @@
+"""`asperity check`, `track` and `watch` as a user types them, on the simulated rig."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from asperity.rig import Disturbance, simulate_rig
+
+KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # the contract
+
+
+def write_rig(folder, trend, **shape):
+    """Recordings of the rig as HDF5, and the table of their roughness; the truth by file."""
+    rig = simulate_rig(trend=trend, duration_s=3.0, disturbance=Disturbance(snr_db=15.0), seed=4, **shape)
+    folder.mkdir()
+    rows, truth = ["file,sq_um,sq_um_std,load_n"], {}
+    for one in rig.recordings:
+        name = f"{one.name}.h5"
+        with h5py.File(folder / name, "w") as file:
+            data = file.create_dataset("acceleration", data=one.signal().values.astype(np.float32))
+            data.attrs["fs_hz"], data.attrs["unit"] = one.rate_hz, "m/s^2"
+        rows.append(f"{name},{1e6 * one.sq_m:.4f},{1e6 * one.sq_std_m:.4f},{rig.load_n:g}")
+        truth[name] = one.crf_hz
+    (folder / "table.csv").write_text("\n".join(rows) + "\n")
+    return truth
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig") / "knee"
+    return folder, write_rig(folder, "knee", repeats=2)
+
+
+def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
+    folder, truth = rig
+    code, out, err = asp(
+        "track", str(folder), "--table", str(folder / "table.csv"), "--case", "case.toml", "--report", "page.html",
+        "--out", "t.csv", "--out", "t.nc", "--out", "t.parquet", "--json",
+    )  # fmt: skip
+    said = json.loads(out)
+    assert (code, err) == (3, "")
+    assert said["verdict"].startswith("ALARM: ")
+    assert len(said["recordings"]) == len(truth) == 24
+    for row in said["recordings"]:
+        assert set(row) >= KEYS
+        assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
+        assert row["clr_low"] < row["clr"] < row["clr_high"]
+    assert said["stages"]["kind"] == "severe"
+    assert said["stages"]["interval"][0] < said["stages"]["split"] < said["stages"]["interval"][1]
+    assert len(said["stages"]["probability"]) == len(said["stages"]["labels"]) == 24
+    assert said["method"] == "joint"
+    assert [row["x"] for row in said["recordings"]] == sorted(row["x"] for row in said["recordings"])
+    assert Path("t.csv").read_text().count("\n") == 25
+    page = Path("page.html").read_text("utf-8")
+    assert page.index("ALARM") < page.index("Trend and stage") < page.index('id="limits"')
+    assert re.findall(r'(?:src|href)="(?!data:|#|https://doi\.org)[^"]*', page) == []
+    assert "NaN" not in out
+    import pandas
+    import xarray
+
+    with xarray.open_dataset("t.nc", engine="h5netcdf") as kept:
+        assert kept["density"].shape[0] == 24
+        assert kept.attrs["verdict"] == said["verdict"]
+        assert kept["crf_hz"].values.tolist() == [row["crf_hz"] for row in said["recordings"]]
+    assert pandas.read_parquet("t.parquet")["file"].tolist() == [row["file"] for row in said["recordings"]]
+
+
+def test_track_says_what_it_assumed_and_what_it_left_out(asp, rig):
+    folder, _ = rig
+    shutil.copytree(folder, "copy")
+    with h5py.File("copy/sample-01-test-1.h5", "r+") as file:
+        file["acceleration"][:] *= 1e-3
+    Path("copy/sample-01-test-2.h5").write_bytes(b"not HDF5")
+    code, out, _ = asp("track", "copy", "--method", "peak", "--out", "t.csv")
+    assert code in (0, 3)
+    assert "band" in out
+    assert "paper's contact, because neither a case nor a band was given" in out
+    assert "machine was off" in out
+    assert "named h5 but does not begin like one" in out
+    assert Path("t.csv").is_file()
+
+
+def test_constant_wear_is_no_alarm(asp, tmp_path):
+    write_rig(tmp_path / "still", "constant", repeats=1)
+    code, out, _ = asp("track", "still", "--table", "still/table.csv", "--case", "case.toml", "--json")
+    assert code == 0
+    assert json.loads(out)["stages"]["kind"] == "no change"
+
+
+def test_recordings_without_a_resonance_cannot_tell(asp):
+    rng = np.random.default_rng(1)
+    for number in range(7):
+        np.savez(f"noise-{number}.npz", acc=rng.standard_normal(40_000), fs=20e3, unit="m/s^2")
+    code, out, _ = asp("track", *(f"noise-{number}.npz" for number in range(7)), "--case", "case.toml")
+    assert code == 0
+    assert out.startswith("These recordings cannot tell: no contact resonance found in 7 recordings")
+
+
+def test_check_shows_the_good_beside_the_bad(asp, rig):
+    folder, _ = rig
+    good = str(folder / "sample-01-test-1.h5")
+    np.savez("off.npz", acc=np.zeros(30_000), fs=20e3, unit="V")
+    Path("cut.wav").write_bytes(b"RIFF")
+    code, out, err = asp("check", good, "off.npz", "--json")
+    said = json.loads(out)
+    assert (code, err) == (0, "")
+    assert [row["usable"] for row in said["recordings"]] == [True, False]
+    assert said["recordings"][0]["facts"]["rate"] == {"value": "20000.0", "source": "file (fs_hz)"}
+    assert said["recordings"][1]["off"]
+    code, out, err = asp("check", good, "off.npz", "cut.wav", "missing.wav")
+    assert code == 2
+    assert out.startswith("1 of 4 recordings can be used: the machine was off")
+    assert "cut.wav" in err
+    assert "missing.wav" in err
+    assert err.count("\n") == 1
+    code, out, _ = asp("check", good)
+    assert (code, out.splitlines()[0]) == (0, "sample-01-test-1.h5: can be used.")
+
+
+def test_watch_hears_each_file_once_and_goes_on(asp, rig):
+    folder, _ = rig
+    files = sorted(folder.glob("*.h5"))
+    Path("in").mkdir()
+    arguments = ("watch", "in", "--once", "--settle", "0", "--case", "case.toml", "--json")
+    assert json.loads(asp(*arguments)[1])["new"] == []
+    for file in files[:20]:
+        shutil.copy(file, "in")
+    first = json.loads(asp(*arguments)[1])
+    assert len(first["new"]) == len(first["recordings"]) == 20
+    assert json.loads(asp(*arguments)[1])["new"] == []
+    shutil.copy(files[20], "in")
+    second = json.loads(asp(*arguments)[1])
+    assert [Path(file).name for file in second["new"]] == [files[20].name]
+    assert len(second["recordings"]) == 21
+    for name in ("track.csv", "track.nc", "report.html"):
+        assert Path("in/asperity-watch", name).is_file()
+    direct = json.loads(asp("track", "in", "--case", "case.toml", "--json")[1])
+    assert direct["recordings"] == second["recordings"]  # what was kept is what was heard
+    code, _, err = asp(*arguments, "--unit", "g")
+    assert code == 2
+    assert "was begun with unit None" in err
+
+
+def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
+    folder, _ = rig
+    Path("in").mkdir()
+    shutil.copyfile(folder / "sample-01-test-1.h5", "in/a.h5")
+    said = json.loads(asp("watch", "in", "--once", "--settle", "60", "--json")[1])
+    assert said["new"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("track", "bare.npy"), "states no sampling rate"),
+        (("track", "empty"), "holds no recordings"),
+        (("track", "missing"), "missing does not exist"),
+        (("track", "bare.npy", "--rate", "20000", "--out", "t.txt"), "--out must end in"),
+        (("track", "bare.npy", "--rate", "20000", "--band", "4000", "2000"), "band must go from low to high"),
+        (("track", "bare.npy", "--rate", "20000", "--method", "guess"), "method must be one of"),
+        (("track", "bare.npy", "--rate", "20000", "--table", "t.csv"), "t.csv has no row for bare.npy"),
+        (("watch", "bare.npy"), "is not a folder"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_a_sentence(asp, arguments, said):
+    np.save("bare.npy", np.random.default_rng(0).standard_normal(40_000))
+    Path("empty").mkdir()
+    Path("t.csv").write_text("file,sq_um\na.npy,1.0\n")
+    code, out, err = asp(*arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1

@@ -1,0 +1,137 @@
+"""How a series is put together: which files, which order, which band; what is kept of it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.case import load_case
+from asperity.coupling import search_band
+from asperity.errors import BadInput, UnreadableFile
+from asperity.tracking.files import read_table, recordings_in
+from asperity.tracking.listen import Asked, common_spacing, keep, kept, listen, segment
+from asperity.tracking.target import search_target
+from asperity.tracking.track import judge, track_recordings
+
+RATE = 20e3
+CASE = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
+TARGET = search_target(CASE)
+
+
+def record(path, seed, *, level=1.0, seconds=2.0, rate=RATE, f0=3000.0):
+    """Noise through an oscillator at f0, kept with rate and unit."""
+    from scipy.signal import lfilter
+
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal(round(seconds * rate))
+    turn, shrink = 2.0 * np.pi * f0 / rate, np.exp(-2.0 * np.pi * 0.02 * f0 / rate)
+    ringing = lfilter([1.0], [1.0, -2.0 * shrink * np.cos(turn), shrink**2], noise)
+    np.savez(path, acc=level * (ringing + noise), fs=rate, unit="m/s^2")
+    return path
+
+
+def test_a_folder_is_its_recordings_in_the_order_of_their_numbers(tmp_path):
+    for name in (
+        "r10.wav",
+        "r9.wav",
+        "r2.csv",
+        "2003.10.22.12.06.24",
+        ".hidden.wav",
+        "r2.csv.toml",
+        "page.html",
+        "a.nc",
+    ):
+        (tmp_path / name).write_text("1\n2\n")
+    (tmp_path / "table.csv").write_text("file,sq_um\nr2.csv,1\n")
+    (tmp_path / "results").mkdir()
+    names = [path.name for path in recordings_in([tmp_path, tmp_path / "r9.wav"])]
+    assert names == ["2003.10.22.12.06.24", "r2.csv", "r9.wav", "r10.wav"]
+
+
+def test_a_table_places_recordings(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("file;sq_um;sq_um_std;load_n\na.wav;0,54;0,1;500\nb.wav;0,87;;\n")
+    table = read_table(path)
+    assert (table.x_name, table.places["a.wav"].x, table.places["a.wav"].x_std) == ("sq_um", 0.54, 0.1)
+    assert table.place(Path("there/b.wav")).x_std is None
+    for text, said in (("name,x\na,1\n", "needs a column file"), ("file,x\na,one\n", "line 2: x must be a number")):
+        path.write_text(text)
+        with pytest.raises(BadInput, match=said):
+            read_table(path)
+
+
+def test_the_band_is_the_contacts_and_its_origin_is_said():
+    assert TARGET.band_hz == search_band(CASE.conditions, CASE.vibration)
+    assert not TARGET.assumed
+    given = search_target(None, (2e3, 3e3))
+    assert (given.band_hz, given.full_load_crf_hz, given.assumed) == ((2e3, 3e3), None, False)
+    nobody = search_target()
+    assert nobody.assumed
+    assert "--case or --band" in nobody.source
+    assert search_target(CASE, (2e3, 3e3)).full_load_crf_hz == TARGET.full_load_crf_hz
+
+
+def test_lines_are_as_fine_as_the_records_are_long(tmp_path):
+    short, long = (record(tmp_path / f"{s}.npz", 1, seconds=s) for s in (2.0, 40.0))
+    assert common_spacing([long], Asked(), TARGET) == 0.5
+    assert common_spacing([short], Asked(), TARGET) == 4.0
+    assert segment(RATE, 0.5) == 40_000
+
+
+def test_what_was_heard_is_kept_in_full(tmp_path):
+    heard = listen(record(tmp_path / "a.npz", 1), Asked(), TARGET, 4.0)
+    keep(heard, tmp_path / "kept")
+    again = kept(tmp_path / "kept")
+    assert np.array_equal(again.spectrum.density, heard.spectrum.density)
+    assert np.array_equal(again.spectrum.frequency_hz, heard.spectrum.frequency_hz)
+    assert replace(again, spectrum=None) == replace(heard, spectrum=None)
+    (tmp_path / "kept").write_bytes((tmp_path / "kept").read_bytes()[:500])
+    with pytest.raises(UnreadableFile, match="delete it"):
+        kept(tmp_path / "kept")
+
+
+def test_processes_hear_what_one_alone_hears(tmp_path, monkeypatch):
+    files = [record(tmp_path / f"{k}.npz", k, f0=2500.0 + 100.0 * k) for k in range(7)]
+    alone = track_recordings(files, case=CASE)
+    monkeypatch.setattr("asperity.tracking.listen.WORTH_A_POOL", 0)
+    together = track_recordings(files, case=CASE, workers=2)
+    assert together.scalars() == alone.scalars()
+
+
+def test_recordings_far_quieter_than_the_series_are_off(tmp_path):
+    files = [record(tmp_path / f"{k}.npz", k, level=0.02 if k == 3 else 1.0) for k in range(7)]
+    track = track_recordings(files, case=CASE, method="likelihood")
+    reasons = [one.resonance.reason for one in track.recordings]
+    assert "machine was off" in reasons[3]
+    assert [one.resonance.found for one in track.recordings].count(False) == 1
+
+
+def test_another_sampling_rate_is_left_out_and_said(tmp_path):
+    files = [record(tmp_path / f"{k}.npz", k, rate=25e3 if k == 2 else RATE) for k in range(7)]
+    track = track_recordings(files, case=CASE, method="likelihood")
+    assert "sampled at 25000 Hz where the series has 20000 Hz" in track.recordings[2].resonance.reason
+    assert any("1 of 7 recordings have another sampling rate" in note for note in track.notes)
+
+
+def test_rates_that_differ_by_a_clocks_drift_are_one_series(tmp_path):
+    files = [record(tmp_path / f"{k}.npz", k, rate=RATE + 0.01 * k) for k in range(7)]
+    track = track_recordings(files, case=CASE, method="likelihood")
+    assert track.found == 7
+
+
+def test_time_is_the_place_where_all_recordings_know_theirs(tmp_path):
+    heard = [listen(record(tmp_path / f"{k}.npz", k), Asked(), TARGET, 4.0) for k in range(3)]
+    timed = [replace(one, started=f"2024-01-0{3 - k}T12:00:00") for k, one in enumerate(heard)]
+    track = judge(timed, TARGET)
+    assert (track.x_name, [one.x for one in track.recordings]) == ("time_h", [0.0, 24.0, 48.0])
+    assert Path(track.recordings[0].file).name == "2.npz"
+    assert judge([timed[0], heard[1]], TARGET).x_name == "recording"
+
+
+def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
+    track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
+    assert track.method != "joint"
+    assert any("needs 6 recordings and has 1" in note for note in track.notes)
+    with pytest.raises(BadInput, match="x needs one value for each of 1"):
+        track_recordings([tmp_path / "a.npz"], case=CASE, x=[1.0, 2.0])
