@@ -3,23 +3,26 @@
 import numpy as np
 
 
-def faces(pressure, content, mobility, inlet_content, dx, dy):
-    """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell; complex welcome."""
+def faces(pressure, content, mobility, ambient, inlet_content, dx, dy):
+    """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell; complex welcome.
+
+    `ambient` is the mobility that the first and the last cells would have at the ambient pressure of the outer faces.
+    """
     nx = pressure.shape[0]
     couette = np.empty((nx + 1, pressure.shape[1]), dtype=pressure.dtype)
     couette[0] = inlet_content
     couette[1] = content[0]
     couette[2:] = 1.5 * content[1:] - 0.5 * content[:-1]
     poiseuille = np.empty_like(couette)
-    poiseuille[0] = -mobility[0] * pressure[0] / (dx / 2.0)  # the outer faces are at ambient pressure
+    poiseuille[0] = -(mobility[0] + ambient[0]) / 2.0 * pressure[0] / (dx / 2.0)
     poiseuille[1:-1] = -(mobility[1:] + mobility[:-1]) / 2.0 * np.diff(pressure, axis=0) / dx
-    poiseuille[-1] = mobility[-1] * pressure[-1] / (dx / 2.0)
+    poiseuille[-1] = (mobility[-1] + ambient[1]) / 2.0 * pressure[-1] / (dx / 2.0)
     north = -(mobility + np.roll(mobility, -1, 1)) / 2.0 * (np.roll(pressure, -1, 1) - pressure) / dy
     return couette + poiseuille, north
 
 
-def net_outflow(pressure, content, mobility, inlet_content, dx, dy):
-    along, north = faces(pressure, content, mobility, inlet_content, dx, dy)
+def net_outflow(pressure, content, mobility, ambient, inlet_content, dx, dy):
+    along, north = faces(pressure, content, mobility, ambient, inlet_content, dx, dy)
     return np.diff(along, axis=0) / dx + (north - np.roll(north, 1, 1)) / dy
 
 
@@ -32,4 +35,5 @@ def mass_outflow(solution):
     u = conditions.entrainment_speed
     ahead = h[0] + ((grid.x[0] - dx) ** 2 - grid.x[0] ** 2) / (2.0 * conditions.radius)
     entering = oil.density.rho0 * u * (ahead + h[0]) / 2.0
-    return net_outflow(p, u * density * h, density * h**3 / (12.0 * oil.viscosity(p)), entering, dx, dy)
+    at_rest = oil.density.rho0 * h[[0, -1]] ** 3 / (12.0 * oil.viscosity.eta0)
+    return net_outflow(p, u * density * h, density * h**3 / (12.0 * oil.viscosity(p)), at_rest, entering, dx, dy)

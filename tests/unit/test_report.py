@@ -52,9 +52,9 @@ damping_ratio = 0.02
 duration = "1 s"
 """
 HISTORY = tuple(
-    Iteration((n, n * 3 // 4), k, 10.0 ** (-k / 2 - 1), 10.0 ** (-k - 1), 10.0 ** (-k / 3 - 1))
+    Iteration((n, n * 3 // 4), k, 10.0 ** (-k / 2 - 1), 10.0 ** (-k - 1), 10.0 ** (-k / 3 - 1) if k else np.inf)
     for n in (16, 32)
-    for k in range(6)
+    for k in range(7)
 )
 
 

@@ -6,7 +6,7 @@ import pytest
 import xarray
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
+from asperity.ehl.solution import ATTEMPTS, ContactSolution, Convergence, Figures, Iteration, Options, Status
 from asperity.ehl.storage import load_solution
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
@@ -37,7 +37,14 @@ def solution():
         gap=rng.random(cells) * 1e-6,
         in_contact=rng.random(cells) < 0.3,
         rigid_approach=-1e-6 / 3.0,
-        convergence=Convergence(Status.STALLED, steps, 3e-7, 0.1 + 0.2),
+        convergence=Convergence(
+            Status.STALLED,
+            steps,
+            3e-7,
+            0.1 + 0.2,
+            ATTEMPTS[1],
+            Figures(car=0.1 / 3.0, clr=0.1 / 7.0, h_min=1e-9 / 3.0, h_central=1e-9 / 7.0),
+        ),
         attributes={"case": 'model = "unified"\n# größer\n', "notes": "[]"},
     )
 

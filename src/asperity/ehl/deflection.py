@@ -21,23 +21,23 @@ NEAR_ALIASES, FAR_ALIASES, NEAR_CELLS = 200, 2, 3
 class Deflection:
     """Compliance of every cell on every other.
 
-    `spectrum` is the transformed kernel, `row` the compliance of cells 0, 1, ... along x on one line, shape (nx + 1,).
+    `spectrum` is the transformed kernel, in double and in single precision, `padded` the lengths it was transformed at
+    and `row` the compliance of cells 0, 1, ... along x on one line, shape (nx,).
     """
 
     cells: tuple[int, int]
-    spectrum: Field
+    padded: tuple[int, int]
+    spectrum: tuple[Field, Field]
     row: Field
-    periodic: bool
 
     def __call__(self, pressure: Field) -> Field:
-        """Surface displacement V of a pressure P, both dimensionless, shape (nx, ny)."""
+        """Surface displacement V of a pressure P, both dimensionless, shape (nx, ny) and of one precision."""
         import scipy.fft as fft
 
-        nx, ny = self.cells
-        length = ny if self.periodic else 2 * ny
-        waves = fft.fft(fft.rfft(pressure, n=length, axis=1), n=2 * nx, axis=0, overwrite_x=True)
-        waves *= self.spectrum  # zero padded to twice the length: the outlet must not feel the inlet
-        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=length, axis=1)[:, :ny])
+        (nx, ny), (long, wide) = self.cells, self.padded
+        waves = fft.fft(fft.rfft(pressure, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        waves *= self.spectrum[pressure.dtype == np.float32]
+        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
 
     @property
     def near(self) -> Field:
@@ -50,35 +50,44 @@ def deflection(cells: tuple[int, int], spacing: tuple[float, float], compliance:
     """Compliance of a grid; spacing in Hertz half-widths."""
     import scipy.fft as fft
 
+    nx, ny = cells
+    # zero padded to no less than twice the length: the outlet must not feel the inlet
+    padded = fft.next_fast_len(2 * nx - 1), ny if periodic else fft.next_fast_len(2 * ny - 1, real=True)
     if periodic:
         kernel = 2.0 * compliance * _line_kernel(cells, spacing)
-        row = fft.irfft(kernel, n=cells[1], axis=1)[:, 0]
-        mirrored = np.concatenate([kernel, kernel[-2:0:-1]])
-        spectrum = fft.fft(mirrored, axis=0).real
+        row = fft.irfft(kernel, n=ny, axis=1)[:, 0]
+        spectrum = fft.fft(_mirrored(kernel, padded[0]), axis=0).real
     else:
         kernel = compliance * _love_kernel(cells, spacing)
-        row = kernel[:, 0]
-        mirrored = np.concatenate([kernel, kernel[-2:0:-1]])
-        mirrored = np.concatenate([mirrored, mirrored[:, -2:0:-1]], axis=1)
-        spectrum = fft.rfft2(mirrored).real
-    spectrum, row = np.ascontiguousarray(spectrum), row.copy()
-    spectrum.flags.writeable = row.flags.writeable = False
-    return Deflection(cells, spectrum, row, periodic)
+        row = kernel[:, 0].copy()
+        spectrum = fft.rfft2(_mirrored(_mirrored(kernel, padded[0]).T, padded[1]).T).real
+    both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
+    for array in (*both, row):
+        array.flags.writeable = False
+    return Deflection(cells, padded, both, row)
+
+
+def _mirrored(kernel: Field, length: int) -> Field:
+    """A kernel of distances 0, 1, ... along the first axis, made even about 0 on a ring of `length`."""
+    ring = np.zeros((length, kernel.shape[1]))
+    ring[: len(kernel)] = kernel
+    ring[length - len(kernel) + 1 :] = kernel[:0:-1]
+    return ring
 
 
 def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
-    """(1/2) ∫∫ 1/distance over each cell of a line contact, transformed along y, shape (nx + 1, ny//2 + 1)."""
+    """(1/2) ∫∫ 1/distance over each cell of a line contact, transformed along y, shape (nx, ny//2 + 1)."""
     (nx, ny), (dx, dy) = cells, spacing
-    cell = np.arange(nx + 1)
-    kernel = np.zeros((nx + 1, ny // 2 + 1))
-    edges = (np.arange(nx + 2) - 0.5) * dx
+    cell = np.arange(nx)
+    kernel = np.zeros((nx, ny // 2 + 1))
+    edges = (np.arange(nx + 1) - 0.5) * dx
     kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
     waves = np.arange(ny // 2 + 1)
     for alias in range(-NEAR_ALIASES, NEAR_ALIASES + 1):
         number = waves + alias * ny
         real = number != 0
         wavenumber = 2.0 * np.pi * np.abs(number[real]) / (ny * dy)
-        count = nx + 1 if abs(alias) <= FAR_ALIASES else min(NEAR_CELLS, nx + 1)
+        count = nx if abs(alias) <= FAR_ALIASES else min(NEAR_CELLS, nx)
         kernel[:count, real] += _k0_over_cells(wavenumber, cell[:count], dx) * np.sinc(number[real] / ny)
     return kernel
 
@@ -95,8 +104,8 @@ def _k0_over_cells(wavenumber: Field, cell: np.ndarray, dx: float) -> Field:
 
 
 def _love_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
-    """∫∫ 1/distance over each cell, shape (nx + 1, ny + 1)."""
-    x, y = (((np.arange(n + 2) - 0.5) * d) for n, d in zip(cells, spacing, strict=True))
+    """∫∫ 1/distance over each cell, shape (nx, ny)."""
+    x, y = (((np.arange(n + 1) - 0.5) * d) for n, d in zip(cells, spacing, strict=True))
     x, y = x[:, None], y[None, :]
     corners = x * np.arcsinh(y / np.abs(x)) + y * np.arcsinh(x / np.abs(y))
     return np.asarray(np.diff(np.diff(corners, axis=0), axis=1))

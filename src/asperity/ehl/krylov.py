@@ -1,4 +1,4 @@
-"""GMRES, right-preconditioned, without restart.
+"""GMRES, right-preconditioned, without restart, in the precision of what is wanted.
 
 SciPy's preconditions from the left, so that it stops on a residual nobody asked for, and orthogonalises vector by
 vector; at 65 000 unknowns and a few dozen steps that costs as much as the physics.
@@ -12,32 +12,47 @@ from asperity.arrays import Field
 
 Operator = Callable[[Field], Field]
 
+CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more
+
 
 def gmres(product: Operator, precondition: Operator, wanted: Field, *, tolerance: float, most_steps: int) -> Field:
     """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x."""
-    norm = float(np.linalg.norm(wanted))
+    norm = _length(wanted)
     if norm == 0.0:
         return np.zeros_like(wanted)
-    basis = np.empty((most_steps + 1, wanted.size))
-    corrections = np.empty((most_steps, wanted.size))
-    hessenberg = np.zeros((most_steps + 1, most_steps))
+    basis = np.empty((most_steps + 1, wanted.size), dtype=wanted.dtype)
+    corrections = np.empty((most_steps, wanted.size), dtype=wanted.dtype)
+    triangle = np.zeros((most_steps, most_steps))
+    turns = np.zeros((most_steps, 2))  # cosine and sine of the rotations that make the Hessenberg matrix a triangle
     target = np.zeros(most_steps + 1)
     target[0] = norm
-    basis[0] = wanted / norm
-    weights: Field = np.zeros(0)
+    np.divide(wanted, norm, out=basis[0])
     for step in range(most_steps):
         corrections[step] = precondition(basis[step])
         new = product(corrections[step])
         known = basis[: step + 1]
-        for _ in range(2):  # once is not enough in floating point
+        before = _length(new)
+        overlaps = known @ new
+        new -= overlaps @ known
+        column, length = overlaps.astype(float), _length(new)
+        if length < CANCELLED * before:
             overlaps = known @ new
-            hessenberg[: step + 1, step] += overlaps
             new -= overlaps @ known
-        length = float(np.linalg.norm(new))
-        hessenberg[step + 1, step] = length
-        reduced = hessenberg[: step + 2, : step + 1]
-        weights, *_ = np.linalg.lstsq(reduced, target[: step + 2], rcond=None)
-        if np.linalg.norm(reduced @ weights - target[: step + 2]) < tolerance * norm or length < 1e-14 * norm:
+            column, length = column + overlaps, _length(new)
+        for i, (cosine, sine) in enumerate(turns[:step]):
+            column[i : i + 2] = cosine * column[i] + sine * column[i + 1], cosine * column[i + 1] - sine * column[i]
+        slant = float(np.hypot(column[step], length))
+        cosine, sine = turns[step] = (column[step] / slant, length / slant) if slant else (1.0, 0.0)
+        column[step] = slant
+        triangle[: step + 1, step] = column
+        target[step : step + 2] = cosine * target[step], -sine * target[step]
+        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(wanted.dtype).eps * before:
             break
-        basis[step + 1] = new / length
-    return np.asarray(weights @ corrections[: weights.size])
+        np.divide(new, length, out=basis[step + 1])
+    count = step + 1
+    weights = np.linalg.lstsq(triangle[:count, :count], target[:count], rcond=None)[0]
+    return np.asarray(weights.astype(wanted.dtype) @ corrections[:count])
+
+
+def _length(vector: Field) -> float:
+    return float(np.sqrt(vector @ vector))

@@ -7,14 +7,14 @@ R is the cell's net oil outflow, J its derivative, k the compliance of near cell
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.deflection import Deflection, deflection
-from asperity.kernels import relax, reynolds
-from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
+from asperity.ehl.transfer import averaged
+from asperity.kernels import reynolds
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
 from asperity.lubricant import Lubricant
 
 CLOSED_WITHIN = 0.01  # of the contact film
@@ -89,16 +89,29 @@ class Problem:
         """The elastic half-space on this grid."""
         return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic)
 
-    def coarsened(self) -> "Problem":
-        """The same contact on a grid of half as many cells each way; fields are averaged over each cell."""
-        nx, ny = self.cells
+    @property
+    def uniform(self) -> bool:
+        """Whether nothing varies along y, so that one line of cells tells all."""
+        fields = [self.roughness] if self.viscosity_factor is None else [self.roughness, self.viscosity_factor]
+        return self.form.periodic and all(bool(np.all(field == field[:, :1])) for field in fields)
 
-        def averaged(field: Field) -> Field:
-            return np.asarray(field.reshape(nx // 2, 2, ny // 2, 2).mean(axis=(1, 3)))
+    def coarsened(self, cells: tuple[int, int]) -> "Problem":
+        """The same contact on a grid of fewer cells; fields are averaged over each cell."""
+        (nx, ny), (dx, dy) = self.cells, self.spacing
+        factor = self.viscosity_factor
+        return replace(
+            self,
+            roughness=averaged(self.roughness, cells),
+            viscosity_factor=None if factor is None else averaged(factor, cells),
+            spacing=(dx * (nx / cells[0]), dy * (ny / cells[1])),
+        )
 
-        factor = None if self.viscosity_factor is None else averaged(self.viscosity_factor)
+    def zone(self, share: float = 1.0) -> Mask:
+        """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
         dx, dy = self.spacing
-        return replace(self, roughness=averaged(self.roughness), viscosity_factor=factor, spacing=(2.0 * dx, 2.0 * dy))
+        along = self.x / max(share, dx)
+        across = self.y / max(share * self.form.aspect, dy)
+        return np.asarray((along**2)[:, None] + across**2 <= 1.0)
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
@@ -140,6 +153,9 @@ class Problem:
         log_slope = oil.viscosity.log_slope(pascals) * self.p_scale
         thinning, exponent = oil.rheology.thinning(viscosity * self.sliding / height)
         mobility = content * height**2 * (oil.viscosity.eta0 / self.speed) / (viscosity * thinning)
+        ambient = height[[0, -1]] ** 3 / self.speed
+        if self.viscosity_factor is not None:
+            ambient /= self.viscosity_factor[[0, -1]]
         film = Film(
             content,
             density,
@@ -147,6 +163,8 @@ class Problem:
             mobility,
             (3.0 + exponent) * mobility / height,
             mobility * (density_slope / density - (1.0 + exponent) * log_slope),
+            ambient,
+            3.0 * ambient / height[[0, -1]],
         )
         dx, dy = self.spacing
         ahead = gap[0] + ((self.x[0] - dx) ** 2 - self.x[0] ** 2) / 2.0  # the gap one cell before the inlet
@@ -154,7 +172,7 @@ class Problem:
         entering = 0.5 * (
             np.maximum(ahead, self.contact_gap) + height[0]
         )  # unit density: the inlet is at ambient pressure
-        reynolds.net_outflow(pressure, content, mobility, entering, dx, dy, outflow)
+        reynolds.net_outflow(pressure, film, entering, dx, dy, outflow)
         reynolds.fluid_diagonal(film, self.deflection.near, dx, dy, diagonal)
         return film, outflow, 1.0 / diagonal
 
@@ -195,78 +213,3 @@ class Balance:
     def unknown(self) -> Mask:
         """Cells whose pressure the linear system decides; ruptured and capped cells know theirs."""
         return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == TOUCHING))
-
-    def product(self, d_pressure: Field, d_approach: float) -> Field:
-        """The linearised equations applied to a change of pressure and approach."""
-        d_gap = self.problem.deflection(d_pressure)
-        d_gap += d_approach
-        out = np.empty_like(d_pressure)
-        if self.film is None:
-            touching = self.rows.state == TOUCHING
-            return np.where(touching, d_gap * self.rows.contact_scale, d_pressure)
-        reynolds.jacobian_product(self.rows, self.film, self.pressure, d_pressure, d_gap, *self.problem.spacing, out)
-        return out
-
-    def local_stencil(self) -> Stencil:
-        """Five-point approximation of `product`."""
-        stencil = Stencil(*(np.zeros(self.problem.cells) for _ in range(5)))
-        film = self.film or Film(*[np.zeros(self.problem.cells)] * 6)
-        reynolds.local_stencil(self.rows, film, self.problem.deflection.near, *self.problem.spacing, stencil)
-        return stencil
-
-
-class Preconditioner:
-    """A cheap approximate inverse of a balance's linearisation.
-
-    Aggregated onto blocks of cells and factored, the five-point stencil of the lubricated cells removes what is slow
-    and smooth (thick, low-pressure valleys); zebra line relaxation along x removes the rest.
-    """
-
-    def __init__(self, balance: Balance, block: int) -> None:
-        self.balance = balance
-        self.block = block
-        self.stencil = balance.local_stencil()
-        self.lines = relax.Lines(np.empty(balance.problem.cells), np.empty(balance.problem.cells))
-        relax.factor_lines(self.stencil, self.lines)
-        self.unknown = balance.unknown
-        self.wet = balance.rows.state == LUBRICATED
-        self.work = np.empty(balance.problem.cells)
-        if balance.film is not None:
-            self.scale = 1.0 / balance.rows.fluid_scale
-            nx, ny = balance.problem.cells
-            self.coarse_cells = (-(-nx // block), -(-ny // block))
-            self.factors = self._factor()
-
-    def _factor(self) -> Any:  # SuperLU has no public type
-        from scipy.sparse import csc_array
-        from scipy.sparse.linalg import splu
-
-        coarse = Stencil(*(np.empty(self.coarse_cells) for _ in range(5)))
-        relax.aggregate_stencil(self.stencil, self.scale, self.wet, self.block, coarse)
-        cx, cy = self.coarse_cells
-        index = np.arange(cx * cy).reshape(cx, cy)
-        columns = np.stack(
-            [index, np.roll(index, 1, 0), np.roll(index, -1, 0), np.roll(index, -1, 1), np.roll(index, 1, 1)]
-        )
-        values = np.stack([part.ravel() for part in coarse])
-        rows = np.broadcast_to(index.ravel(), values.shape)
-        matrix = csc_array((values.ravel(), (rows.ravel(), columns.reshape(5, -1).ravel())), shape=(cx * cy, cx * cy))
-        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-    def __call__(self, residual: Field) -> Field:
-        """Approximate change of pressure that answers a residual, both (nx, ny)."""
-        smooth = np.zeros_like(residual)
-        rest = residual
-        if self.balance.film is not None:
-            coarse = np.empty(self.coarse_cells)
-            relax.restrict(residual, self.scale, self.wet, self.block, coarse)
-            coarse = self.factors.solve(coarse.ravel()).reshape(self.coarse_cells)
-            relax.prolong(coarse, self.wet, self.block, smooth)
-            rest = np.empty_like(residual)
-            relax.stencil_residual(self.stencil, residual, smooth, rest)
-        change = np.zeros_like(residual)
-        for parity in (0, 1, 0):
-            relax.relax_lines(self.stencil, self.lines, rest, change, parity, self.work)
-        change += smooth
-        change[~self.unknown] = 0.0
-        return change

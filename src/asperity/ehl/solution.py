@@ -1,6 +1,6 @@
 """What a contact solve returns: fields, how it converged, and the way to disk and back."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -26,7 +26,7 @@ class Options:
     Parameters
     ----------
     tolerance : bound on residual, load error and change, each relative
-    max_iterations : Newton steps allowed on each grid level
+    max_iterations : Newton steps allowed on each grid level and in each attempt
     contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
         some per cent per factor of ten, so it belongs beside every CLR.
     """
@@ -43,6 +43,10 @@ class Options:
         require_positive("contact film", self.contact_film, "m")
 
 
+# what is tried, one after the other, until one converges
+ATTEMPTS = ("coarse to fine", "with the bodies held while their distance was searched")
+
+
 class Status(StrEnum):
     """How a solve ended."""
 
@@ -53,7 +57,10 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """One Newton step: grid cells, step number on that grid, and the three relative figures that must become small."""
+    """Where a Newton step led: grid cells, step number on that grid, and three relative figures that must become small.
+
+    Number 0 is the start on that grid, which no step has led to: its change is infinite.
+    """
 
     cells: tuple[int, int]
     number: int
@@ -62,14 +69,59 @@ class Iteration:
     change: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors."""
+
+    car: float
+    clr: float
+    h_min: float
+    h_central: float
+
+    def off(self, other: "Figures") -> "Figures":
+        """Absolute differences."""
+        return self._each(other, lambda mine, theirs: abs(mine - theirs))
+
+    def plus(self, other: "Figures") -> "Figures":
+        """Sums."""
+        return self._each(other, lambda mine, theirs: mine + theirs)
+
+    def at_least(self, other: "Figures") -> "Figures":
+        """The larger of each pair."""
+        return self._each(other, max)
+
+    def times(self, factor: float) -> "Figures":
+        """All of them times a factor."""
+        return self._each(self, lambda mine, _: factor * mine)
+
+    def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
+        names = ("car", "clr", "h_min", "h_central")
+        return Figures(**{name: merge(getattr(self, name), getattr(other, name)) for name in names})
+
+
 @dataclass(frozen=True, slots=True)
 class Convergence:
-    """How the solve went: status, every step on every grid level, and the time it took [s]."""
+    """How the solve went: status, every step on every grid level, and the time it took [s].
+
+    `attempt` is the manner that led here: the first, unless what was tried before it failed. `iteration_error` is how
+    far the last step moved the figures, `discretisation_error` what the cells' size may have done to them, from the
+    solutions on coarser grids: None on a grid too small to have a coarser one. A warm start hands on its own.
+    """
 
     status: Status
     history: tuple[Iteration, ...]
     tolerance: float
     seconds: float
+    attempt: str = ATTEMPTS[0]
+    iteration_error: Figures | None = None
+    discretisation_error: Figures | None = None
+
+    @property
+    def error(self) -> Figures | None:
+        """How far off the figures may be: iteration and discretisation error together."""
+        if self.iteration_error is None or self.discretisation_error is None:
+            return None
+        return self.iteration_error.plus(self.discretisation_error)
 
     @property
     def converged(self) -> bool:
@@ -79,14 +131,16 @@ class Convergence:
     @property
     def iterations(self) -> int:
         """Newton steps on all grid levels together."""
-        return len(self.history)
+        return sum(step.number > 0 for step in self.history)
 
     def explain(self) -> str:
         """One sentence on how the solve ended."""
         last = self.history[-1]
+        tried = "" if self.attempt == ATTEMPTS[0] else f", at last {self.attempt},"
         return (
-            f"{self.status} after {self.iterations} steps in {self.seconds:.2f} s: residual {last.residual:.1e}, "
-            f"load error {last.load_error:.1e}, change {last.change:.1e}; tolerance {self.tolerance:.0e}"
+            f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "
+            f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change {last.change:.1e}; "
+            f"tolerance {self.tolerance:.0e}"
         )
 
 

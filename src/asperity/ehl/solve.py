@@ -1,16 +1,18 @@
 """From conditions, oil and surface to a solved contact: coarse to fine, and the decision when to stop."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.iterate import Step, newton
-from asperity.ehl.problem import Form, Problem
+from asperity.ehl.problem import Balance, Form, Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
+from asperity.ehl.solution import ATTEMPTS, ContactSolution, Convergence, Figures, Iteration, Options, Status
+from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Lubricant
 from asperity.surface.model import Surface
@@ -20,8 +22,9 @@ Progress = Callable[[Iteration], None]
 FEWEST_COARSE_CELLS = 48
 COARSE_TOLERANCE = 1e-3  # a coarse solution only has to be a good start
 MOST_COARSE_ITERATIONS = 40
-MOST_POSITIONS = 20
+MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
 FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
+CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the contact
 
 
 def solve_contact(
@@ -60,70 +63,169 @@ def solve_contact(
     _check_grid(conditions, surface)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
-    finest = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    history: list[Iteration] = []
-
-    def watched(problem: Problem, steps: Iterator[Step]) -> Iterator[Step]:
-        for step in steps:
-            balance = step.balance
-            iteration = Iteration(
-                problem.cells, step.number, balance.residual_rms, abs(balance.load_error), step.change
-            )
-            history.append(iteration)
-            if progress:
-                progress(iteration)
-            yield step
-
-    def held(problem: Problem, pressure: Field, approach: float) -> Iterator[Step]:
-        return watched(problem, newton(problem, pressure, approach, held=True))
-
-    def level(problem: Problem, pressure: Field, approach: float, tolerance: float, most: int) -> Step:
-        for step in watched(problem, newton(problem, pressure, approach)):
-            if _settled(history[-1], tolerance) or step.number >= most or not np.isfinite(step.change):
-                return step
-        raise AssertionError("newton never ends by itself")
-
+    whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
+    finest = _on_one_line(whole) if whole.uniform else whole
+    search = _Search(options, scales.gap, progress)
     if start is None:
+        levels = _levels(finest)
+        guess = first_guess(levels[-1], conditions, lubricant, scales)
+    else:
         levels = [finest]
-        while _can_halve(levels[-1].cells):
-            levels.append(levels[-1].coarsened())
-        pressure, approach = first_guess(levels[-1], conditions, lubricant, scales)
-        most, tolerance = min(options.max_iterations, MOST_COARSE_ITERATIONS), max(COARSE_TOLERANCE, options.tolerance)
-        for problem in levels[:0:-1]:
-            step = level(problem, pressure, approach, tolerance, most)
-            if problem is levels[-1] and most == MOST_COARSE_ITERATIONS and not _settled(history[-1], FAR_OFF):
-                # a capped contact answers its approach too unevenly for Newton: hold the bodies, search from outside
-                guess = first_guess(problem, conditions, lubricant, scales)
-                found = find_approach(problem, *guess, held)
-                if _settled(history[-1], FAR_OFF):
-                    step = found
-            pressure, approach = refined(step.balance.pressure), step.approach
-    else:
-        pressure, approach = _warm_start(start, surface, scales)
-    step = level(finest, pressure, approach, options.tolerance, options.max_iterations)
+        guess = _warm_start(start, finest.cells, scales)
+    for attempt in ATTEMPTS:
+        step = search.climb(levels, *guess, held=attempt != ATTEMPTS[0])
+        if search.settled(options.tolerance):
+            break
 
-    if _settled(history[-1], options.tolerance):
-        status = Status.CONVERGED
-    elif np.isfinite(step.change):
-        status = Status.OUT_OF_ITERATIONS
-    else:
-        status = Status.STALLED
+    converged = search.settled(options.tolerance)
+    stopped = Status.STALLED if search.lost else Status.OUT_OF_ITERATIONS
+    discretisation = search.discretisation_error
+    if start is not None:
+        discretisation = start.convergence.discretisation_error
     balance = step.balance
+    lines = whole.cells[1] // finest.cells[1]
+    pressure, gap = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.gap, lines, axis=1)
     solution = ContactSolution(
         conditions=conditions,
         lubricant=lubricant,
         surface=surface,
         options=options,
-        pressure=balance.pressure * scales.pressure,
-        gap=np.maximum(balance.gap, 0.0 if lubricant is None else finest.contact_gap) * scales.gap,
-        in_contact=balance.in_contact & (balance.pressure > 0.0),
+        pressure=pressure * scales.pressure,
+        gap=np.maximum(gap, 0.0 if lubricant is None else finest.contact_gap) * scales.gap,
+        in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
         rigid_approach=step.approach * scales.gap,
-        convergence=Convergence(status, tuple(history), options.tolerance, time.perf_counter() - began),
+        convergence=Convergence(
+            status=Status.CONVERGED if converged else stopped,
+            history=tuple(search.history),
+            tolerance=options.tolerance,
+            seconds=time.perf_counter() - began,
+            attempt=attempt,
+            iteration_error=search.iteration_error,
+            discretisation_error=discretisation,
+        ),
         viscosity_factor=viscosity_factor,
     )
-    if strict and status is not Status.CONVERGED:
+    if strict and not converged:
         raise NotConverged(solution, f"contact not solved: {solution.convergence.explain()}")
     return solution
+
+
+class _Search:
+    """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
+
+    def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
+        self.options, self.gap_scale, self.progress = options, gap_scale, progress
+        self.history: list[Iteration] = []
+        self.figures: list[Figures] = []  # a grid each, since the last climb began
+        self.iteration_error: Figures | None = None
+        self.lost = False
+
+    @property
+    def discretisation_error(self) -> Figures | None:
+        """From the last grids: their difference is three times what a second-order solution is off by.
+
+        A rough one has no such order, so no less than the whole difference is taken, and no less than a quarter of
+        that between the grids before, lest two grids agree by chance.
+        """
+        if len(self.figures) < 2:
+            return None
+        *before, coarse, fine = self.figures
+        error = fine.off(coarse)
+        return error.at_least(coarse.off(before[-1]).times(0.25)) if before else error
+
+    def settled(self, tolerance: float) -> bool:
+        """Whether the last step met the tolerance in residual, load and change."""
+        last = self.history[-1]
+        return last.residual < tolerance and last.load_error < tolerance and last.change < tolerance
+
+    def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
+        """Solve on grid after grid, from the last, coarsest one to the first."""
+        options, self.figures = self.options, []
+        for problem in reversed(levels):
+            coarsest, finest = problem is levels[-1], problem is levels[0]
+            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            if problem.cells != pressure.shape:
+                pressure = interpolated(pressure, problem.cells)
+            if held:
+                step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
+            else:
+                most = options.max_iterations if finest else min(options.max_iterations, MOST_COARSE_ITERATIONS)
+                step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
+                if coarsest and not finest and not self.settled(FAR_OFF):
+                    # a capped contact answers its approach too unevenly for Newton
+                    found = self.position(problem, pressure, approach, tolerance, from_outside=True)
+                    step = found if self.settled(FAR_OFF) else step
+            pressure, approach = step.balance.pressure, step.approach
+            self.figures.append(figures(step.balance, self.gap_scale))
+        return step
+
+    def run(
+        self, problem: Problem, steps: Iterator[Step], tolerance: float, most: int, *, of_load: bool = True
+    ) -> Step:
+        """Take steps until they meet the tolerance, `of_load` too, or there have been too many."""
+        before = step = next(steps)
+        while True:
+            self._record(problem, step)
+            last = self.history[-1]
+            load_error = last.load_error if of_load else 0.0
+            self.lost = step.number > 0 and not np.isfinite(step.change)
+            if max(last.residual, load_error, last.change) < tolerance or step.number >= most or self.lost:
+                break
+            before, step = step, next(steps)
+        self.iteration_error = figures(step.balance, self.gap_scale).off(figures(before.balance, self.gap_scale))
+        return step
+
+    def position(
+        self, problem: Problem, pressure: Field, approach: float, tolerance: float, *, from_outside: bool
+    ) -> Step:
+        """The contact held at approach after approach until it carries the load: slower, but each is a simple problem.
+
+        The load falls as the bodies part; the approach is bracketed, then found by false position (Illinois).
+        """
+        roughness = float(np.std(problem.roughness))
+        stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
+        approach += 2.0 * roughness if from_outside else 0.0
+        bracket: dict[bool, tuple[float, float]] = {}  # by whether too much is carried: approach and load error
+        last_side, left = None, self.options.max_iterations
+        while True:
+            most = min(left, MOST_HELD_ITERATIONS)
+            step = self.run(problem, newton(problem, pressure, approach, held=True), tolerance, most, of_load=False)
+            left -= max(step.number, 1)
+            pressure, error = step.balance.pressure, step.balance.load_error
+            if left <= 0 or self.lost or self.settled(tolerance):
+                return step
+            side = error > 0.0
+            bracket[side] = approach, error
+            if len(bracket) < 2:
+                approach += stride if side else -stride
+                stride *= 1.5
+                continue
+            if side == last_side:  # the other end is standing still: give it less weight
+                bracket[not side] = bracket[not side][0], 0.5 * bracket[not side][1]
+            last_side = side
+            (near, too_much), (apart, too_little) = bracket[True], bracket[False]
+            share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
+            approach = near + share * (apart - near)
+
+    def _record(self, problem: Problem, step: Step) -> None:
+        balance = step.balance
+        iteration = Iteration(problem.cells, step.number, balance.residual_rms, abs(balance.load_error), step.change)
+        self.history.append(iteration)
+        if self.progress:
+            self.progress(iteration)
+
+
+def figures(balance: Balance, gap_scale: float) -> Figures:
+    """The first figures of a balance; lengths in the unit of `gap_scale`."""
+    problem, pressure = balance.problem, balance.pressure
+    touching = balance.in_contact & (pressure > 0.0)
+    gap = np.maximum(balance.gap, problem.contact_gap)
+    return Figures(
+        car=float(touching[problem.zone()].mean()),
+        clr=float(pressure[touching].sum() / (pressure.sum() or 1.0)),
+        h_min=float(gap.min()) * gap_scale,
+        h_central=float(gap[problem.zone(CENTRE)].mean()) * gap_scale,
+    )
 
 
 def contact_problem(
@@ -190,63 +292,36 @@ def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
     return float(3.63 * speed**0.68 * material**0.49 * load**-0.073 * side_leakage * radius)
 
 
-def find_approach(
-    problem: Problem, pressure: Field, approach: float, steps: Callable[[Problem, Field, float], Iterator[Step]]
-) -> Step:
-    """The contact held at approach after approach until it carries the load: slower, but each problem is a simple one.
-
-    The load falls as the bodies part; the approach is bracketed, then found by false position.
-    """
-    roughness = float(np.std(problem.roughness))
-    approach += 2.0 * roughness
-    stride = max(0.5, 0.5 * roughness)
-    near: tuple[float, float] | None = None  # approach and load error of the nearest position that carries too much ...
-    apart: tuple[float, float] | None = None  # ... and of the farthest that carries too little
-    for _ in range(MOST_POSITIONS):
-        for step in steps(problem, pressure, approach):
-            settled = step.balance.residual_rms < COARSE_TOLERANCE and step.change < COARSE_TOLERANCE
-            if settled or step.number >= MOST_COARSE_ITERATIONS or not np.isfinite(step.change):
-                break
-        pressure, error = step.balance.pressure, step.balance.load_error
-        if settled and abs(error) < COARSE_TOLERANCE:
-            break
-        if error > 0.0:
-            near = approach, error
-        else:
-            apart = approach, error
-        if near is not None and apart is not None:
-            share = min(max(near[1] / (near[1] - apart[1]), 0.1), 0.9)
-            approach = near[0] + share * (apart[0] - near[0])
-        else:
-            approach += stride if error > 0.0 else -stride
-            stride *= 1.5
-    return step
+def _levels(finest: Problem) -> list[Problem]:
+    """The problem on its own grid and on coarser and coarser ones."""
+    levels = [finest]
+    while (cells := _halved(levels[-1].cells)) != levels[-1].cells:
+        levels.append(levels[-1].coarsened(cells))
+    return levels
 
 
-def refined(pressure: Field) -> Field:
-    """A cell-centred field on twice as many cells each way, bilinear; y wraps round, x ends level."""
-    ends = np.concatenate([pressure[:1], pressure, pressure[-1:]])
-    along = np.empty((2 * pressure.shape[0], pressure.shape[1]))
-    along[0::2] = 0.75 * pressure + 0.25 * ends[:-2]
-    along[1::2] = 0.75 * pressure + 0.25 * ends[2:]
-    fine = np.empty((along.shape[0], 2 * along.shape[1]))
-    fine[:, 0::2] = 0.75 * along + 0.25 * np.roll(along, 1, axis=1)
-    fine[:, 1::2] = 0.75 * along + 0.25 * np.roll(along, -1, axis=1)
-    return fine
+def _halved(cells: tuple[int, int]) -> tuple[int, int]:
+    nx, ny = ((n + 1) // 2 if n // 2 >= FEWEST_COARSE_CELLS else n for n in cells)
+    return nx, ny
 
 
-def _settled(last: Iteration, tolerance: float) -> bool:
-    return last.residual < tolerance and last.load_error < tolerance and last.change < tolerance
+def _on_one_line(problem: Problem) -> Problem:
+    factor, (dx, dy) = problem.viscosity_factor, problem.spacing
+    return replace(
+        problem,
+        roughness=problem.roughness[:, :1],
+        viscosity_factor=None if factor is None else factor[:, :1],
+        spacing=(dx, problem.cells[1] * dy),
+    )
 
 
-def _can_halve(cells: tuple[int, int]) -> bool:
-    return all(n % 2 == 0 and n // 2 >= FEWEST_COARSE_CELLS for n in cells)
-
-
-def _warm_start(start: ContactSolution, surface: Surface, scales: Scales) -> tuple[Field, float]:
-    if start.grid.cells != surface.grid.cells:
-        raise BadInput(f"start has {start.grid.cells} cells, the surface {surface.grid.cells}; solve without start")
-    return start.pressure / scales.pressure, start.rigid_approach / scales.gap
+def _warm_start(start: ContactSolution, cells: tuple[int, int], scales: Scales) -> tuple[Field, float]:
+    pressure = start.pressure / scales.pressure
+    if cells[1] == 1:
+        pressure = pressure.mean(axis=1, keepdims=True)
+    if pressure.shape != cells:
+        raise BadInput(f"start has {start.grid.cells} cells, the surface {cells}; solve without start")
+    return pressure, start.rigid_approach / scales.gap
 
 
 def _check_factor(factor: Field, surface: Surface) -> None:

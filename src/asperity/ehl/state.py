@@ -8,11 +8,9 @@ from asperity.arrays import Mask
 from asperity.conditions import ContactConditions
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.solve import contact_problem, smooth_film
+from asperity.ehl.solve import CENTRE, contact_problem, smooth_film
 from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
-
-CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the contact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,11 +49,10 @@ def contact_state(solution: ContactSolution) -> ContactState:
     """Read the scalars off a solution; the residuals are evaluated anew from its fields."""
     scales = Scales.of(solution.conditions, solution.lubricant)
     grid, touching = solution.grid, solution.in_contact
-    zone = hertz_zone(solution.conditions, grid)
-    centre = hertz_zone(solution.conditions, grid, CENTRE)
     sq, oil = solution.surface.sq, solution.lubricant
     problem = contact_problem(solution.conditions, oil, solution.surface, solution.options, solution.viscosity_factor)
     balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
+    zone, centre = problem.zone(), problem.zone(CENTRE)
     capped = balance.rows.state == CAPPED
     dx, dy = problem.spacing
     unbalanced = np.abs(balance.outflow[zone & (balance.rows.state != LUBRICATED)]).sum() * dx * dy
@@ -78,12 +75,12 @@ def contact_state(solution: ContactSolution) -> ContactState:
     )
 
 
-def hertz_zone(conditions: ContactConditions, grid: Grid, share: float = 1.0) -> Mask:
-    """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
+def hertz_zone(conditions: ContactConditions, grid: Grid) -> Mask:
+    """Cells within the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
     a, b = conditions.hertz.half_widths
     dx, dy = grid.spacing
-    along = np.abs(grid.x) / max(share * a, dx)
-    across = np.zeros(grid.cells[1]) if conditions.geometry == "line" else np.abs(grid.y) / max(share * b, dy)
+    along = np.abs(grid.x) / max(a, dx)
+    across = np.zeros(grid.cells[1]) if conditions.geometry == "line" else np.abs(grid.y) / max(b, dy)
     return np.asarray((along**2)[:, None] + across**2 <= 1.0)
 
 

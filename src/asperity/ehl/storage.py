@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
+from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Options, Status
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
@@ -42,6 +42,7 @@ _OWN = (
     "convergence",
     "versions",
 )
+_ERRORS = ("iteration_error", "discretisation_error")
 _FIELDS = ("pressure", "gap", "surface_height")
 _FACTOR = "viscosity_factor"
 
@@ -107,6 +108,8 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
             "status": convergence.status.value,
             "tolerance": convergence.tolerance,
             "seconds": convergence.seconds,
+            "attempt": convergence.attempt,
+            **{name: getattr(convergence, name) and asdict(getattr(convergence, name)) for name in _ERRORS},
         },
         "versions": {**versions, "python": python_version()},
     }
@@ -266,12 +269,13 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
         gap=gap,
         in_contact=dataset["in_contact"].values.astype(bool),
         rigid_approach=float(dataset["rigid_approach"].values),
-        convergence=Convergence(
-            Status(described["convergence"]["status"]),
-            history,
-            described["convergence"]["tolerance"],
-            described["convergence"]["seconds"],
-        ),
+        convergence=_convergence(described["convergence"], history),
         viscosity_factor=dataset[_FACTOR].values if _FACTOR in dataset else None,
         attributes={str(name): value for name, value in dataset.attrs.items() if name not in _OWN},
     )
+
+
+def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> Convergence:
+    rest: dict[str, Any] = {name: value for name, value in described.items() if name not in ("status", *_ERRORS)}
+    errors: dict[str, Any] = {name: described.get(name) and Figures(**described[name]) for name in _ERRORS}
+    return Convergence(**rest, **errors, status=Status(described["status"]), history=history)

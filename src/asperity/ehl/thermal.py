@@ -13,7 +13,7 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.flash import FlashTemperature, flash_temperature
 from asperity.ehl.friction import BOUNDARY_FRICTION, Friction, friction, warm_factor
-from asperity.ehl.solution import ContactSolution, Convergence, Options, Status
+from asperity.ehl.solution import ContactSolution, Options, Status
 from asperity.ehl.solve import Progress, solve_contact
 from asperity.errors import AsperityError, NotConverged
 from asperity.lubricant import Lubricant, Thermal
@@ -150,8 +150,8 @@ def solve_thermal_contact(
         else:  # too far from cold to hot: go part of the way
             share *= 0.5
     status = Status.CONVERGED if settled else Status.OUT_OF_ITERATIONS
-    convergence = Convergence(status, history, options.tolerance, seconds)
-    solution = replace(solution, convergence=convergence)
-    if strict and not convergence.converged:
+    ending = replace(solution.convergence, status=status, history=history, seconds=seconds)
+    solution = replace(solution, convergence=ending)
+    if strict and not ending.converged:
         raise NotConverged(solution, f"contact and heat did not settle in {MOST_SOLVES} rounds")
     return solution

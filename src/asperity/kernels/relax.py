@@ -1,132 +1,210 @@
 """Cheap approximate inverses of a five-point stencil: line relaxation along x and aggregation onto a coarse grid.
 
-All lines are eliminated side by side, so that the innermost loop runs along the contiguous axis.
+Every second x line is kept in arrays of its own and all of them are eliminated side by side, so that the innermost
+loop runs along a contiguous axis. All arrays of a call share one precision, which is also that of the arithmetic.
 """
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
-from asperity.arrays import Field, Mask
+from asperity.arrays import Field
 from asperity.kernels.reynolds import Stencil
 
 
 class Lines(NamedTuple):
-    """Thomas factors of every x line: elimination factors and inverse pivots."""
+    """Every second x line of a stencil: Thomas factors, and the couplings to the lines on both sides; (nx, lines)."""
 
     lower: Field
     inverse: Field
+    east: Field
+    north: Field
+    south: Field
 
 
 @njit(cache=True)
-def factor_lines(stencil: Stencil, lines: Lines) -> None:
-    """Eliminate all x lines of the stencil, in place of `lines`."""
+def factor_lines(stencil: Stencil, parity: int, lines: Lines) -> None:
+    """Eliminate every second x line, starting with `parity`, in place of `lines`.
+
+    Where an odd number of lines goes round, the first and the last are not coupled.
+    """
     nx, ny = stencil.centre.shape
-    for j in range(ny):
-        lines.lower[0, j] = 0.0
-        lines.inverse[0, j] = 1.0 / stencil.centre[0, j]
-    for i in range(1, nx):
-        for j in range(ny):
-            factor = stencil.west[i, j] * lines.inverse[i - 1, j]
-            lines.lower[i, j] = factor
-            lines.inverse[i, j] = 1.0 / (stencil.centre[i, j] - factor * stencil.east[i - 1, j])
+    one = stencil.centre.dtype.type(1.0)
+    count = lines.lower.shape[1]
+    for i in range(nx):
+        for k in range(count):
+            j = 2 * k + parity
+            lines.north[i, k] = stencil.north[i, j]
+            lines.south[i, k] = stencil.south[i, j]
+            lines.east[i, k] = stencil.east[i, j]
+            pivot = stencil.centre[i, j]
+            if i > 0:
+                factor = stencil.west[i, j] * lines.inverse[i - 1, k]
+                pivot -= factor * stencil.east[i - 1, j]
+                lines.lower[i, k] = factor
+            else:
+                lines.lower[i, k] = 0.0
+            lines.inverse[i, k] = one / pivot
+        if ny % 2 == 1 and parity == 0:
+            lines.north[i, count - 1] = 0.0
+            lines.south[i, 0] = 0.0
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def relax_lines(stencil: Stencil, lines: Lines, residual: Field, correction: Field, parity: int, work: Field) -> None:
-    """Solve every second x line, starting with `parity`, the others held; in place of `correction`."""
-    nx, ny = residual.shape
-    north, south, east = stencil.north, stencil.south, stencil.east
+def relax_lines(lines: Lines, parity: int, residual: Field, others: Field, change: Field) -> None:
+    """Solve every second x line for its residual, the lines between held at `others`; in place of `change`."""
+    nx, count = residual.shape
+    between = others.shape[1]
     for i in range(nx):
-        for j in range(parity, ny, 2):
-            jn = j + 1 if j < ny - 1 else 0
-            js = j - 1 if j > 0 else ny - 1
-            value = residual[i, j] - north[i, j] * correction[i, jn] - south[i, j] * correction[i, js]
-            if i > 0:
-                value -= lines.lower[i, j] * work[i - 1, j]
-            work[i, j] = value
-    for j in range(parity, ny, 2):
-        correction[nx - 1, j] = work[nx - 1, j] * lines.inverse[nx - 1, j]
+        for k in range(count):
+            change[i, k] = residual[i, k]
+        if between > 0:
+            if parity == 0:
+                for k in range(min(count, between)):
+                    change[i, k] -= lines.north[i, k] * others[i, k]
+                for k in range(1, count):
+                    change[i, k] -= lines.south[i, k] * others[i, k - 1]
+                change[i, 0] -= lines.south[i, 0] * others[i, between - 1]
+            else:
+                for k in range(count):
+                    change[i, k] -= lines.south[i, k] * others[i, k]
+                for k in range(min(count, between - 1)):
+                    change[i, k] -= lines.north[i, k] * others[i, k + 1]
+                if count == between:
+                    change[i, count - 1] -= lines.north[i, count - 1] * others[i, 0]
+        if i > 0:
+            for k in range(count):
+                change[i, k] -= lines.lower[i, k] * change[i - 1, k]
+    for k in range(count):
+        change[nx - 1, k] *= lines.inverse[nx - 1, k]
     for i in range(nx - 2, -1, -1):
-        for j in range(parity, ny, 2):
-            correction[i, j] = (work[i, j] - east[i, j] * correction[i + 1, j]) * lines.inverse[i, j]
+        for k in range(count):
+            change[i, k] = (change[i, k] - lines.east[i, k] * change[i + 1, k]) * lines.inverse[i, k]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def stencil_residual(stencil: Stencil, residual: Field, correction: Field, out: Field) -> None:
-    """What the stencil leaves of `residual` after `correction`."""
+def split_residual(stencil: Stencil, residual: Field, correction: Field, even: Field, odd: Field) -> None:
+    """What the stencil leaves of `residual` after `correction`, even and odd x lines apart."""
     nx, ny = residual.shape
+    left = np.empty(ny, residual.dtype)
+    last = ny - 1
     for i in range(nx):
         for j in range(ny):
-            jn = j + 1 if j < ny - 1 else 0
-            js = j - 1 if j > 0 else ny - 1
-            value = residual[i, j] - stencil.centre[i, j] * correction[i, j]
-            value -= stencil.north[i, j] * correction[i, jn] + stencil.south[i, j] * correction[i, js]
-            if i > 0:
-                value -= stencil.west[i, j] * correction[i - 1, j]
-            if i < nx - 1:
-                value -= stencil.east[i, j] * correction[i + 1, j]
-            out[i, j] = value
+            left[j] = residual[i, j] - stencil.centre[i, j] * correction[i, j]
+        for j in range(last):
+            left[j] -= stencil.north[i, j] * correction[i, j + 1]
+        for j in range(1, ny):
+            left[j] -= stencil.south[i, j] * correction[i, j - 1]
+        left[last] -= stencil.north[i, last] * correction[i, 0]
+        left[0] -= stencil.south[i, 0] * correction[i, last]
+        if i > 0:
+            for j in range(ny):
+                left[j] -= stencil.west[i, j] * correction[i - 1, j]
+        if i < nx - 1:
+            for j in range(ny):
+                left[j] -= stencil.east[i, j] * correction[i + 1, j]
+        for k in range(odd.shape[1]):
+            even[i, k] = left[2 * k]
+            odd[i, k] = left[2 * k + 1]
+        if ny % 2 == 1:
+            even[i, ny // 2] = left[last]
 
 
 @njit(cache=True)
-def aggregate_stencil(stencil: Stencil, scale: Field, active: Mask, factor: int, out: Stencil) -> None:
-    """Sum the unscaled rows of active cells over blocks of factor x factor; couplings to inactive cells are dropped."""
-    nx, ny = active.shape
-    out.centre[:] = 0.0
-    out.west[:] = 0.0
-    out.east[:] = 0.0
-    out.north[:] = 0.0
-    out.south[:] = 0.0
+def add_lines(even: Field, odd: Field, out: Field) -> None:
+    """Add even and odd x lines to the field they were split from."""
+    nx, ny = out.shape
     for i in range(nx):
+        for k in range(odd.shape[1]):
+            out[i, 2 * k] += even[i, k]
+            out[i, 2 * k + 1] += odd[i, k]
+        if ny % 2 == 1:
+            out[i, ny - 1] += even[i, ny // 2]
+
+
+@njit(cache=True)
+def aggregate_stencil(stencil: Stencil, weight: Field, block: tuple[int, int], out: Stencil) -> None:
+    """Sum the rows, times `weight`, over blocks of cells; cells without weight and couplings to them are left out.
+
+    A block without any gets the row of an identity.
+    """
+    nx, ny = weight.shape
+    cx, cy = out.centre.shape
+    west, east = np.zeros(ny, weight.dtype), np.zeros(ny, weight.dtype)
+    north, south = np.empty(ny, weight.dtype), np.empty(ny, weight.dtype)
+    nothing = weight.dtype.type(0.0)
+    for part in out:
+        part[:] = 0.0
+    for i in range(nx):
+        ci = i // block[0]
+        inside_west, inside_east = i > ci * block[0], i + 1 < (ci + 1) * block[0]
+        if i > 0:
+            for j in range(ny):
+                west[j] = stencil.west[i, j] * weight[i, j] if weight[i - 1, j] > nothing else nothing
+        if i < nx - 1:
+            for j in range(ny):
+                east[j] = stencil.east[i, j] * weight[i, j] if weight[i + 1, j] > nothing else nothing
+        else:
+            east[:] = nothing
         for j in range(ny):
-            if not active[i, j]:
-                continue
             jn = j + 1 if j < ny - 1 else 0
             js = j - 1 if j > 0 else ny - 1
-            ci, cj = i // factor, j // factor
-            out.centre[ci, cj] += stencil.centre[i, j] * scale[i, j]
-            if i > 0 and active[i - 1, j]:
-                if (i - 1) // factor == ci:
-                    out.centre[ci, cj] += stencil.west[i, j] * scale[i, j]
-                else:
-                    out.west[ci, cj] += stencil.west[i, j] * scale[i, j]
-            if i < nx - 1 and active[i + 1, j]:
-                if (i + 1) // factor == ci:
-                    out.centre[ci, cj] += stencil.east[i, j] * scale[i, j]
-                else:
-                    out.east[ci, cj] += stencil.east[i, j] * scale[i, j]
-            if active[i, jn]:
-                if jn // factor == cj:
-                    out.centre[ci, cj] += stencil.north[i, j] * scale[i, j]
-                else:
-                    out.north[ci, cj] += stencil.north[i, j] * scale[i, j]
-            if active[i, js]:
-                if js // factor == cj:
-                    out.centre[ci, cj] += stencil.south[i, j] * scale[i, j]
-                else:
-                    out.south[ci, cj] += stencil.south[i, j] * scale[i, j]
-    for ci in range(out.centre.shape[0]):
-        for cj in range(out.centre.shape[1]):
+            north[j] = stencil.north[i, j] * weight[i, j] if weight[i, jn] > nothing else nothing
+            south[j] = stencil.south[i, j] * weight[i, j] if weight[i, js] > nothing else nothing
+        for cj in range(cy):
+            first, end = cj * block[1], min((cj + 1) * block[1], ny)
+            own, to_west, to_east = 0.0, 0.0, 0.0
+            for j in range(first, end):
+                own += stencil.centre[i, j] * weight[i, j]
+                to_west += west[j]
+                to_east += east[j]
+            for j in range(first, end - 1):
+                own += north[j]
+            for j in range(first + 1, end):
+                own += south[j]
+            if inside_west:
+                own += to_west
+            else:
+                out.west[ci, cj] += to_west
+            if inside_east:
+                own += to_east
+            else:
+                out.east[ci, cj] += to_east
+            if cy > 1:
+                out.north[ci, cj] += north[end - 1]
+                out.south[ci, cj] += south[first]
+            else:
+                own += north[end - 1] + south[first]
+            out.centre[ci, cj] += own
+    for ci in range(cx):
+        for cj in range(cy):
             if out.centre[ci, cj] == 0.0:
                 out.centre[ci, cj] = 1.0
 
 
 @njit(cache=True)
-def restrict(residual: Field, scale: Field, active: Mask, factor: int, out: Field) -> None:
-    """Sum unscaled residuals of active cells over blocks."""
-    out[:] = 0.0
+def restrict(residual: Field, weight: Field, block: tuple[int, int], out: Field) -> None:
+    """Sum residuals, times `weight`, over blocks."""
     nx, ny = residual.shape
+    out[:] = 0.0
     for i in range(nx):
-        for j in range(ny):
-            if active[i, j]:
-                out[i // factor, j // factor] += residual[i, j] * scale[i, j]
+        ci = i // block[0]
+        for cj in range(out.shape[1]):
+            total = 0.0
+            for j in range(cj * block[1], min((cj + 1) * block[1], ny)):
+                total += residual[i, j] * weight[i, j]
+            out[ci, cj] += total
 
 
 @njit(cache=True)
-def prolong(coarse: Field, active: Mask, factor: int, out: Field) -> None:
-    """Give every active cell its block's value, and zero to the others."""
+def prolong(coarse: Field, weight: Field, block: tuple[int, int], out: Field) -> None:
+    """Give every cell with a weight its block's value, and zero to the others."""
     nx, ny = out.shape
+    nothing = weight.dtype.type(0.0)
     for i in range(nx):
-        for j in range(ny):
-            out[i, j] = coarse[i // factor, j // factor] if active[i, j] else 0.0
+        ci = i // block[0]
+        for cj in range(coarse.shape[1]):
+            value = weight.dtype.type(coarse[ci, cj])
+            for j in range(cj * block[1], min((cj + 1) * block[1], ny)):
+                out[i, j] = value if weight[i, j] > nothing else nothing

@@ -1,0 +1,174 @@
+"""A contact's equations linearised, and a cheap approximate inverse of that, both in single precision.
+
+Newton's step is only wanted to a tenth, and what it leaves is measured in double precision: single changes neither the
+answer nor the steps, and halves what has to be moved through memory.
+"""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.ehl.problem import Balance
+from asperity.kernels import relax, reynolds
+from asperity.kernels.reynolds import LUBRICATED, Film, Stencil
+
+MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors
+LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
+
+
+class Linear:
+    """The linearisation of a balance: `product` applies it, a call answers a residual by a change of pressure.
+
+    The approximate inverse has two parts. Aggregated onto blocks of cells and factored, the five-point stencil of the
+    lubricated cells removes what is slow and smooth (thick, low-pressure valleys); zebra line relaxation along x
+    removes the rest.
+    """
+
+    def __init__(self, balance: Balance, *, storing: float = 0.0, dtype: Any = np.float32) -> None:
+        self.balance, self.storing, self.dtype = balance, storing, dtype
+        self.cells = balance.problem.cells
+        self.unknown = balance.unknown
+        self.pressure = balance.pressure.astype(dtype)
+        scale = balance.rows.fluid_scale.astype(dtype)
+        self.rows = balance.rows._replace(fluid_scale=scale)
+        self.film = None if balance.film is None else _film(balance.film, dtype)
+        self.stencil = self._stencil()
+        self.even, self.odd = (self._lines(parity) for parity in (0, 1))
+        if self.film is not None:
+            self.weight = np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0))
+            self.block = (_block(self.cells[0]), _block(self.cells[1]))
+            nx, ny = (-(-n // size) for n, size in zip(self.cells, self.block, strict=True))
+            self.pattern = _pattern((nx, ny))
+            self.factors = self._factor()
+
+    def product(self, d_pressure: Field, d_approach: float) -> Field:
+        """The linearised equations applied to a change of pressure and approach."""
+        problem = self.balance.problem
+        d_gap = problem.deflection(d_pressure)
+        d_gap += self.dtype(d_approach)
+        if self.film is None:
+            touching = self.rows.state == reynolds.TOUCHING
+            return np.where(touching, d_gap * self.dtype(self.rows.contact_scale), d_pressure)
+        out = np.empty(self.cells, self.dtype)
+        reynolds.jacobian_product(
+            self.rows, self.film, self.pressure, d_pressure, d_gap, problem.spacing, self.storing, out
+        )
+        return out
+
+    def __call__(self, residual: Field) -> Field:
+        """Approximate change of pressure that answers a residual, both (nx, ny); none in cells that know theirs."""
+        change = np.zeros(self.cells, self.dtype)
+        if self.film is not None:
+            coarse = np.empty(self.pattern.cells)
+            relax.restrict(residual, self.weight, self.block, coarse)
+            relax.prolong(self.pattern.solve(self.factors, coarse), self.weight, self.block, change)
+        lines = [np.zeros((self.cells[0], part.lower.shape[1]), self.dtype) for part in (self.even, self.odd) * 2]
+        rest_even, rest_odd, even, odd = lines
+        relax.split_residual(self.stencil, residual, change, rest_even, rest_odd)
+        relax.relax_lines(self.even, 0, rest_even, odd[:, :0], even)
+        relax.relax_lines(self.odd, 1, rest_odd, even, odd)
+        relax.relax_lines(self.even, 0, rest_even, odd, even)
+        relax.add_lines(even, odd, change)
+        return change
+
+    def _stencil(self) -> Stencil:
+        stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
+        nothing = np.zeros(self.cells, self.dtype)
+        film = self.film or Film(*[nothing] * 8)
+        problem = self.balance.problem
+        reynolds.local_stencil(self.rows, film, problem.deflection.near, problem.spacing, self.storing, stencil)
+        return stencil
+
+    def _lines(self, parity: int) -> relax.Lines:
+        nx, ny = self.cells
+        lines = relax.Lines(*np.empty((5, nx, (ny + 1 - parity) // 2), self.dtype))
+        relax.factor_lines(self.stencil, parity, lines)
+        return lines
+
+    def _factor(self) -> Any:  # SuperLU has no public type
+        coarse = Stencil(*np.empty((5, *self.pattern.cells)))
+        relax.aggregate_stencil(self.stencil, self.weight, self.block, coarse)
+        return self.pattern.factored(coarse)
+
+
+def _block(cells: int) -> int:
+    """How many cells along an axis the factored grid puts into one."""
+    smallest = 1 if cells < 32 else 2 if cells < 128 else 4
+    return max(smallest, -(-cells // MOST_COARSE_CELLS))
+
+
+def _film(film: Film, dtype: Any) -> Film:
+    """In another precision; mobilities that would become denormal are none."""
+    least = LEAST * float(film.mobility.max())
+    flowing = film.mobility > least
+    return Film(*(
+        (np.where(flowing, part, 0.0) if name.startswith("mobility") else part).astype(dtype)
+        for name, part in film._asdict().items()
+    ))  # fmt: skip
+
+
+class _Pattern(NamedTuple):
+    """Where the entries of a five-point matrix on `cells` go, its rows and columns put in an order of little fill."""
+
+    cells: tuple[int, int]
+    order: Any
+    position: Any
+    rows: Any
+    columns: Any
+
+    def factored(self, stencil: Stencil) -> Any:
+        """LU factors of the stencil's matrix."""
+        from scipy.sparse import csc_array
+        from scipy.sparse.linalg import splu
+
+        count = self.order.size
+        entries = np.stack([part.ravel() for part in stencil]).ravel()
+        values = np.bincount(self.position, weights=entries, minlength=self.rows.size + 1)[:-1]
+        matrix = csc_array((values, self.rows, self.columns), shape=(count, count))
+        # small panels: these matrices are too sparse for the dense blocks that SuperLU looks for
+        return splu(
+            matrix,
+            permc_spec="NATURAL",
+            diag_pivot_thresh=0.0,
+            relax=1,
+            panel_size=1,
+            options={"SymmetricMode": True},
+        )
+
+    def solve(self, factors: Any, wanted: Field) -> Field:
+        """What the factored matrix turns into `wanted`, (cx, cy)."""
+        solved = np.empty(self.order.size)
+        solved[self.order] = factors.solve(wanted.ravel()[self.order])
+        return solved.reshape(self.cells)
+
+
+@lru_cache(maxsize=16)
+def _pattern(cells: tuple[int, int]) -> _Pattern:
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    index = np.arange(cells[0] * cells[1]).reshape(cells)
+    nowhere = np.full((1, cells[1]), -1)
+    columns = np.stack([
+        index,
+        np.concatenate([nowhere, index[:-1]]),
+        np.concatenate([index[1:], nowhere]),
+        np.roll(index, -1, 1),
+        np.roll(index, 1, 1),
+    ]).reshape(5, -1)  # fmt: skip
+    rows = np.broadcast_to(index.ravel(), columns.shape)
+    there = columns >= 0
+    shape = (index.size, index.size)
+    model = csc_array((np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])), shape=shape)
+    fill = splu(model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    order = np.argsort(fill.perm_c)
+    place = np.empty(index.size, int)
+    place[order] = np.arange(index.size)
+    keys = np.where(there, place[columns] * index.size + place[rows], -1).ravel()
+    entries, position = np.unique(keys[there.ravel()], return_inverse=True)
+    full = np.full(keys.size, entries.size)  # couplings across the ends go nowhere
+    full[there.ravel()] = position
+    starts = np.searchsorted(entries, np.arange(index.size + 1) * index.size)
+    return _Pattern(cells, order, full, (entries % index.size).astype(np.int32), starts.astype(np.int32))
