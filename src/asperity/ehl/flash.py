@@ -1,7 +1,7 @@
 """Flash temperature: sliding heat that both bodies take up as it passes, shared between them through the film.
 
 Per area q = |τ| Δu. Half of it flows to each surface, and k_f/h of their difference across the film (the paper's Eqs
-16 and 17): q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q - q_1. Each surface answers its heat by a convolution, exactly for
+15 and 16): q_1 = q/2 + k_f (T_2 - T_1)/h, q_2 = q - q_1. Each surface answers its heat by a convolution, exactly for
 heat that is constant over cells: the integral of an instantaneous source over time,
 
     T(X, Y) = 2/(k sqrt(pi)) * int_0^inf E_x(X, s) E_y(Y, s) ds,   s = sqrt(kappa t),
