@@ -111,7 +111,7 @@ def test_bad_input_is_named():
         contact_vibration(state(), CONDITIONS, slow)
     with pytest.raises(BadInput, match="hertz-point, hertz-line, parallel-film, tangent"):
         VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="palmgren")
-    with pytest.raises(BadInput, match="likelihood, peak"):
+    with pytest.raises(BadInput, match="likelihood, modes, peak"):
         VibrationModel(mass=0.1, damping_ratio=0.02, method="highest")
     with pytest.raises(BadInput, match=r"got -0\.1 kg"):
         VibrationModel(mass=-0.1, damping_ratio=0.02)

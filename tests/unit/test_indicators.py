@@ -163,7 +163,7 @@ def test_the_papers_peak_is_the_highest_smoothed_point():
 
 def test_bad_input_is_named():
     spectrum = chance_periodogram(np.ones(FREQUENCY.size), 0)
-    with pytest.raises(BadInput, match="likelihood, peak"):
+    with pytest.raises(BadInput, match="likelihood, modes, peak"):
         contact_resonance(spectrum, band_hz=BAND, method="kurtosis")
     for band in ((0.0, 100.0), (3000.0, 2000.0), (3000.0, 20e3)):
         with pytest.raises(BadInput, match=r"band must lie between 0 and 9998\.75 Hz"):
@@ -172,3 +172,39 @@ def test_bad_input_is_named():
         contact_resonance(spectrum, band_hz=(3000.0, 3010.0))
     with pytest.raises(BadInput, match="smoothed 2 times"):
         contact_resonance(smooth(spectrum, 2), band_hz=BAND)
+
+
+def several(lines, seed):
+    density = np.full(FREQUENCY.size, 0.02) + sum(a * line_shape(FREQUENCY, f, z) for a, f, z in lines)
+    return chance_periodogram(density, seed)
+
+
+def test_the_strongest_of_several_lines_is_found_and_scatters_as_it_says():
+    """0.8 s of three lines; alone, the one-line fit takes them for one wide line or trips over them."""
+    lines = [(1.0, 3200.0, 0.02), (0.6, 2800.0, 0.008), (0.5, 3650.0, 0.006)]
+    fits = [contact_resonance(several(lines, seed), band_hz=BAND, method="modes") for seed in range(25)]
+    assert all(fit.found for fit in fits)
+    pulls = np.array(
+        [[(fit.crf_hz - 3200.0) / fit.crf_std, np.log(fit.crfa) * fit.crfa / fit.crfa_std] for fit in fits]
+    )
+    assert np.std(pulls, axis=0) == pytest.approx([1.0, 1.0], abs=0.35)
+    assert np.abs(np.mean(pulls, axis=0)) == pytest.approx([0.0, 0.0], abs=0.6)
+    inside = np.abs(FREQUENCY - np.mean(BAND)) < np.ptp(BAND) / 2
+    truth = sum(a * line_shape(FREQUENCY, f, z) for a, f, z in lines) + 0.02
+    assert np.mean(np.abs(fits[0].curve(FREQUENCY[inside]) / truth[inside] - 1.0)) < 0.15
+
+
+def test_lines_about_as_strong_are_not_told_apart():
+    seen = contact_resonance(several([(1.0, 3200.0, 0.02), (1.0, 2800.0, 0.02)], 0), band_hz=BAND, method="modes")
+    assert not seen.found
+    assert "cannot tell" in seen.reason
+
+
+def test_one_line_is_the_same_by_modes_and_noise_has_none():
+    spectrum = several([(1.0, 3200.0, 0.02)], 3)
+    one, alone = (contact_resonance(spectrum, band_hz=BAND, method=method) for method in ("modes", "likelihood"))
+    assert one.crf_hz == pytest.approx(alone.crf_hz, abs=0.2 * alone.crf_std)
+    assert one.crf_std == pytest.approx(alone.crf_std, rel=0.05)
+    noise = [contact_resonance(several([], seed), band_hz=BAND, method="modes") for seed in range(25)]
+    assert not any(seen.found for seen in noise)
+    assert "nothing stands out" in noise[0].reason

@@ -6,6 +6,7 @@ highest point is kept beside it. Where to look, the band, is the caller's to say
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,10 @@ FEWEST_LINES = 20  # five parameters from fewer lines would be an interpolation,
 STRONG_EVIDENCE = 10.0  # BIC difference, "very strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
 PAPER_PASSES = 3  # "five-point triple smoothing"
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-5, 0.7  # above 0.7 an oscillator has no peak
+MOST_MODES = 8
+MODE_BLOCKS = 1024
+AMBIGUOUS = 0.5  # a second line with more than this share of the strongest's power could be the contact's as well
+START_DAMPINGS = (0.002, 0.007, 0.02, 0.06)
 MOST_BLOCKS = 512  # for the search of a start only
 
 Model = Callable[
@@ -99,8 +104,9 @@ def contact_resonance(spectrum: Spectrum, *, band_hz: tuple[float, float], metho
 
     Parameters
     ----------
-    method : "likelihood" fits one oscillator over a floor and tests it against the floor alone; "peak" takes the
-        highest point after the paper's smoothing, whatever it is
+    method : "likelihood" fits one oscillator over a floor and tests it against the floor alone; "modes" fits as many
+        as the spectrum needs and takes the strongest, if it is so by far; "peak" takes the highest point after the
+        paper's smoothing, whatever it is
 
     Raises
     ------
@@ -153,8 +159,18 @@ def _highest_point(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float
     )
 
 
-def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
-    """The oscillator line that makes the spectrum likeliest, if the spectrum needs one."""
+class _Band(NamedTuple):
+    """What a fit works on: ordinates over their mean, the band's lines, the floor's two columns."""
+
+    data: "_Data"
+    scale: float
+    frequency: Field
+    floors: Field
+    floor_only: "_Fit"
+
+
+def _band(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> _Band | None:
+    """The band's ordinates and the floor alone; None for a band without any vibration."""
     if spectrum.smoothing_passes:
         raise BadInput(
             f"the likelihood fit needs an unsmoothed spectrum, got one smoothed {spectrum.smoothing_passes} times; "
@@ -164,55 +180,193 @@ def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     frequency = spectrum.frequency_hz[inside]
     scale = float(np.mean(spectrum.density[inside]))
     if scale <= 0.0:
-        return no_resonance("the band holds no vibration at all", band_hz, "likelihood")
+        return None
     data = _Data(spectrum.density[inside] / scale, spectrum.averages)
-
     share = (frequency - low) / (high - low)
     floors = np.stack([1.0 - share, share], axis=1)
     any_floor = _Bounds(np.zeros(2), np.full(2, np.inf))
     floor_only = _scoring(lambda theta: (floors @ theta, floors), np.ones(2), any_floor, data)
-    fit = _fit_line(frequency, floors, data, spectrum, band_hz)
+    return _Band(data, scale, frequency, floors, floor_only)
 
-    independent = spectrum.averages * frequency.size
-    evidence = 2.0 * (floor_only.cost - fit.cost) - 3.0 * float(np.log(max(independent, np.e)))
-    level, f0, zeta = (float(value) for value in np.exp(fit.parameters[:3]))
-    level_std, f0_std, zeta_std = (float(std) for std in fit.std[:3] * [level, f0, zeta])
+
+def _objection(f0: float, f0_std: float, zeta: float, spectrum: Spectrum, band_hz: tuple[float, float]) -> str | None:
+    """Why a fitted line is no resonance of this band."""
+    low, high = band_hz
     width = 2.0 * zeta * f0
-    objection = None
-    if evidence < STRONG_EVIDENCE:
-        objection = f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {evidence:+.1f})"
-    elif not fit.settled:
-        objection = "the fit did not settle"
-    elif not low + 3.0 * f0_std < f0 < high - 3.0 * f0_std:
-        objection = f"what stands out peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
-    elif width < spectrum.resolution_hz:
-        objection = (
+    if not low + 3.0 * f0_std < f0 < high - 3.0 * f0_std:
+        return f"what stands out peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
+    if width < spectrum.resolution_hz:
+        return (
             f"the line at {f0:.0f} Hz is narrower than the spectrum resolves ({width:.2g} Hz wide, resolution "
             f"{spectrum.resolution_hz:.2g} Hz): a tone, or too short a segment"
         )
-    elif width > high - low:
-        objection = f"the line at {f0:.0f} Hz is wider than the band ({width:.0f} Hz): a slope, not a resonance"
+    if width > high - low:
+        return f"the line at {f0:.0f} Hz is wider than the band ({width:.0f} Hz): a slope, not a resonance"
+    return None
+
+
+def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
+    """The oscillator line that makes the spectrum likeliest, if the spectrum needs one."""
+    band = _band(spectrum, inside, band_hz)
+    if band is None:
+        return no_resonance("the band holds no vibration at all", band_hz, "likelihood")
+    low, high = band_hz
+    fit = _fit_line(band.frequency, band.floors, band.data, spectrum, band_hz)
+    independent = spectrum.averages * band.frequency.size
+    evidence = 2.0 * (band.floor_only.cost - fit.cost) - 3.0 * float(np.log(max(independent, np.e)))
+    level, f0, zeta = (float(value) for value in np.exp(fit.parameters[:3]))
+    level_std, f0_std, zeta_std = (float(std) for std in fit.std[:3] * [level, f0, zeta])
+    width = 2.0 * zeta * f0
+    if evidence < STRONG_EVIDENCE:
+        objection: str | None = (
+            f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {evidence:+.1f})"
+        )
+    elif not fit.settled:
+        objection = "the fit did not settle"
+    else:
+        objection = _objection(f0, f0_std, zeta, spectrum, band_hz)
     if objection is not None:
-        floor = (scale * float(floor_only.parameters[0]), scale * float(floor_only.parameters[1]))
-        return no_resonance(objection, band_hz, "likelihood", floor, evidence)
+        return no_resonance(objection, band_hz, "likelihood", _ends(band, band.floor_only.parameters), evidence)
     return Resonance(
         crf_hz=f0,
-        crfa=scale * level,
+        crfa=band.scale * level,
         crf_std=f0_std,
-        crfa_std=scale * level_std,
+        crfa_std=band.scale * level_std,
         found=True,
         reason=f"a line {width:.0f} Hz wide stands out of the floor (BIC {evidence:+.0f})",
         band_hz=band_hz,
         method="likelihood",
         damping_ratio=zeta,
         damping_ratio_std=zeta_std,
-        floor=(scale * float(fit.parameters[3]), scale * float(fit.parameters[4])),
+        floor=_ends(band, fit.parameters[3:]),
         evidence=evidence,
     )
 
 
+def _ends(band: _Band, floor: Field) -> tuple[float, float]:
+    return band.scale * float(floor[0]), band.scale * float(floor[1])
+
+
+def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
+    """As many oscillator lines as the spectrum needs, fitted together; the strongest, if it is so by far."""
+    band = _band(spectrum, inside, band_hz)
+    if band is None:
+        return no_resonance("the band holds no vibration at all", band_hz, "modes")
+    low, high = band_hz
+    leakage = _leakage(spectrum)
+    size = -(-band.frequency.size // MODE_BLOCKS)
+    if size > 1:  # blocks far narrower than a line lose nothing, and blur it more than the window does
+        band, leakage = _averaged(band, size), np.ones(1)
+    fit = _fit_modes(band, band_hz, leakage)
+    count = (fit.parameters.size - 2) // 3
+    floor = _ends(band, fit.parameters[3 * count :])
+    independent = band.data.weight * band.frequency.size
+    price = 3.0 * float(np.log(max(independent, np.e)))
+    if count == 0:
+        better = 2.0 * (band.floor_only.cost - fit.cost)
+        reason = f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {better - price:+.1f})"
+        return no_resonance(reason, band_hz, "modes", floor, better - price)
+    lines = np.exp(fit.parameters[: 3 * count]).reshape(count, 3)
+    deviations = fit.std[: 3 * count].reshape(count, 3) * lines
+    power = np.prod(lines, axis=1)  # A ζ f0, but for a factor the line's mean square
+    order = np.argsort(power)[::-1]
+    strongest = int(order[0])
+    level, f0, zeta = (float(value) for value in lines[strongest])
+    level_std, f0_std, zeta_std = (float(std) for std in deviations[strongest])
+    others = np.delete(np.arange(count), strongest)
+    beside = floor[0] + (floor[1] - floor[0]) * (band.frequency - low) / (high - low)
+    for number in others:
+        beside = beside + band.scale * lines[number, 0] * line_shape(band.frequency, *lines[number, 1:])
+    without = _cost(beside / band.scale, band.data)
+    evidence = 2.0 * (without - fit.cost) - price
+    objection = "the fit did not settle" if not fit.settled else _objection(f0, f0_std, zeta, spectrum, band_hz)
+    if objection is None and count > 1 and power[order[1]] > AMBIGUOUS * power[strongest]:
+        rivals = [number for number in order if power[number] > AMBIGUOUS * power[strongest]]
+        places = ", ".join(f"{place:.0f}" for place in sorted(lines[rivals, 1]))
+        objection = f"lines at {places} Hz are about as strong: one spectrum cannot tell which is the contact's"
+    if objection is not None:
+        return no_resonance(objection, band_hz, "modes", floor, evidence)
+    rest = f"; {count - 1} weaker beside it" if count > 1 else ""
+    return Resonance(
+        crf_hz=f0,
+        crfa=band.scale * level,
+        crf_std=f0_std,
+        crfa_std=band.scale * level_std,
+        found=True,
+        reason=f"the strongest of {count} resonances, {2.0 * zeta * f0:.0f} Hz wide{rest}",
+        band_hz=band_hz,
+        method="modes",
+        damping_ratio=zeta,
+        damping_ratio_std=zeta_std,
+        floor=floor,
+        evidence=evidence,
+        background=(band.frequency, beside),
+    )
+
+
+def _averaged(band: _Band, size: int) -> _Band:
+    """The band in blocks of `size` lines."""
+    count = band.frequency.size // size
+
+    def mean(values: Field) -> Field:
+        return np.asarray(values[: count * size].reshape(count, size, -1).mean(axis=1))
+
+    data = _Data(mean(band.data.density)[:, 0], band.data.weight * size)
+    floors = mean(band.floors)
+    start, bounds = band.floor_only.parameters, _Bounds(np.zeros(2), np.full(2, np.inf))
+    floor_only = _scoring(lambda theta: (floors @ theta, floors), start, bounds, data)
+    return _Band(data, band.scale, mean(band.frequency)[:, 0], floors, floor_only)
+
+
+def _fit_modes(band: _Band, band_hz: tuple[float, float], leakage: Field) -> "_Fit":
+    """Lines added one by one where the spectrum is farthest above the fit, all fitted anew, while BIC says so."""
+    from scipy.ndimage import uniform_filter1d
+
+    low, high = band_hz
+    best = band.floor_only
+    price = 3.0 * float(np.log(max(band.data.weight * band.frequency.size, np.e))) + STRONG_EVIDENCE
+    spacing = (band.frequency[-1] - band.frequency[0]) / (band.frequency.size - 1)
+    for count in range(1, MOST_MODES + 1):
+        expected = _lines_model(band.frequency, band.floors, leakage)(best.parameters)[0]
+        trials = []
+        for zeta in START_DAMPINGS:
+            width = min(max(1, round(2.0 * zeta * 0.5 * (low + high) / spacing)), band.frequency.size // 4)
+            excess = uniform_filter1d(band.data.density / expected, width, mode="nearest") - 1.0
+            at = int(np.argmax(excess * np.sqrt(width)))
+            level = max(float(excess[at] * expected[at]), 1e-3)
+            added = np.array([np.log(level), np.log(band.frequency[at]), np.log(zeta)])
+            start = np.concatenate([best.parameters[:-2], added, best.parameters[-2:]])
+            bounds = _Bounds(
+                np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING)] * count + [0.0, 0.0]),
+                np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING)] * count + [np.inf, np.inf]),
+            )
+            trials.append(_scoring(_lines_model(band.frequency, band.floors, leakage), start, bounds, band.data))
+        trial = min(trials, key=lambda fit: fit.cost)
+        if 2.0 * (best.cost - trial.cost) < price:
+            break
+        best = trial
+    return best
+
+
+def _lines_model(frequency: Field, floors: Field, leakage: Field) -> Model:
+    """Expected density and slopes of any number of lines over the floor."""
+    one = _line_model(frequency, floors, leakage)
+    none = np.zeros(2)
+
+    def model(theta: Field) -> tuple[Field, Field]:
+        total, columns = floors @ theta[-2:], []
+        for first in range(0, theta.size - 2, 3):
+            line, slopes = one(np.concatenate([theta[first : first + 3], none]))
+            total = total + line
+            columns.append(slopes[:, :3])
+        return total, np.column_stack([*columns, floors])
+
+    return model
+
+
 INDICATOR_METHODS: dict[str, Callable[[Spectrum, Mask, tuple[float, float]], Resonance]] = {
     "likelihood": _likeliest_line,
+    "modes": _strongest_mode,
     "peak": _highest_point,
 }
 
@@ -292,7 +446,7 @@ def _starts(frequency: Field, density: Field) -> list[Field]:
 
     spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
     starts = []
-    for zeta in (0.002, 0.007, 0.02, 0.06):
+    for zeta in START_DAMPINGS:
         width = max(1, round(2.0 * zeta * float(np.mean(frequency)) / spacing))
         averaged = uniform_filter1d(density, min(width, density.size // 4), mode="nearest")
         floor = float(np.quantile(averaged, 0.2)) / 2.0

@@ -41,6 +41,8 @@ STANDING = 0.1  # standard deviation of a line's places over its width, below wh
 MOVES = "moves against what all recordings share"
 STANDS = "keeps its place and changes its height; CRFA is the part that changes, a lower bound"
 SLOPE_STEP, STEEPEST = 0.1, 2.0
+COMMON_FROM = 0.5  # share of what all recordings share in a block, from which its residual is the machine's
+WITNESS_FROM = 0.9
 RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
 
 
@@ -367,6 +369,33 @@ def _sloped(blocks: _Blocks, joint: _Joint) -> _Joint:
     return joint._replace(std=np.hypot(joint.std, dragged))
 
 
+def _misfit(blocks: _Blocks, joint: _Joint) -> Field:
+    """Standard deviations (recordings, 4) that a machine brings which does not quite repeat itself, beside chance.
+
+    What the fit of one recording would make of the residuals that the others have where its line lies: its influence
+    a_b on each parameter, applied to r_jb of those recordings j whose own line is far; squared, averaged over them,
+    less what chance explains.
+    """
+    line, by_f0, by_damping = _lines(blocks.centre, joint.parameters)
+    expected = _expected(blocks, joint.parameters)
+    relative = np.stack([line, by_f0, by_damping, expected - line], axis=1) / expected[:, None]
+    information = np.einsum("npb,nqb,nb->npq", relative, relative, blocks.weight, optimize=True) + LOOSE * np.eye(4)
+    influence = np.linalg.solve(information, relative * blocks.weight[:, None])
+    common = relative[:, 3]
+    felt = influence * common[:, None]  # what a relative change of the machine in block b does to each parameter
+    counts = (common > COMMON_FROM) & (blocks.weight > 0.0)
+    share = np.where(counts, common, 1.0)
+    change = np.where(counts, (blocks.density / expected - 1.0) / share, 0.0)
+    by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight, 1.0) * share**2), 0.0)
+    heard = np.einsum("npb,jb->npj", felt, change, optimize=True) ** 2
+    heard -= np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
+    whole = np.einsum("npb,jb->npj", felt**2, counts.astype(float), optimize=True)
+    # a recording counts as a witness where it is the machine's alone over nearly all that matters
+    witness = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
+    variance = np.sum(heard * witness, axis=2) / np.maximum(np.sum(witness, axis=2), 1)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
 def _judged(
     blocks: _Blocks, joint: _Joint, coarse: _Blocks, templates: _Templates, band_hz: tuple[float, float]
 ) -> tuple[Resonance, ...]:
@@ -381,10 +410,10 @@ def _judged(
     without = np.sum(blocks.weight * (np.log(alone) + blocks.density / alone), axis=1)
     evidence = 2.0 * (without - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1))
 
+    std = np.hypot(joint.std, _misfit(blocks, joint))
     off = blocks.density / expected - 1.0
     counted = blocks.weight > 0.0
     chance = np.sum(counted, axis=1)
-    excess = np.maximum(np.sum(blocks.weight * off**2, axis=1) / chance, 1.0)
     misfit = np.sqrt(
         np.maximum(np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / chance, 0.0)
     )
@@ -397,7 +426,7 @@ def _judged(
     found = []
     for i in range(own.shape[0]):
         level, f0, zeta, gain = np.exp(own[i])
-        level_std, f0_std, zeta_std = joint.std[i, :3] * [level, f0, zeta] * np.sqrt(excess[i])
+        level_std, f0_std, zeta_std = std[i, :3] * [level, f0, zeta]
         width = 2.0 * zeta * f0
         away = np.abs(templates.f0 - f0) > 3.0 * width
         rival = templates.f0[away][np.argmin(cost[i, away])] if np.any(away) else np.nan
