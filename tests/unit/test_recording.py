@@ -222,3 +222,16 @@ def test_every_measured_file_is_read_or_refused_in_words():
     assert channels["2003.10.22.12.06.24"] == 8
     assert channels["HT-2n-6-4_2_001.csv"] == 20
     assert len(channels) == 66
+
+
+def test_arrays_of_several_axes_and_fields(tmp_path):
+    both = np.stack([VALUES, -VALUES])
+    np.save(tmp_path / "rows.npy", both)
+    np.save(tmp_path / "columns.npy", np.asfortranarray(both.T))
+    np.save(tmp_path / "fields.npy", np.rec.fromarrays(both, names="a,b"))
+    np.savez(tmp_path / "both.npz", acc=both, columns=np.asfortranarray(both.T), fs=RATE)
+    second = {"rows.npy": "2", "columns.npy": "2", "fields.npy": "b", "both.npz": "acc[2]"}
+    for name, channel in second.items():
+        rate = None if name == "both.npz" else RATE
+        assert np.array_equal(read_recording(tmp_path / name, rate_hz=rate, channel=channel).values, -VALUES), name
+    assert np.array_equal(read_recording(tmp_path / "both.npz", channel="columns[1]").values, VALUES)

@@ -2,6 +2,7 @@
 
 import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -40,7 +41,7 @@ def read_npy(path: Path) -> Contents:
                 raise UnreadableFile(f"{path.name} is cut short; {REMEDY}")
             notes.append(f"cut short: {rows} of {shape[0]} samples are there")
             shape = (rows, *shape[1:])
-        array = np.memmap(path, dtype, "r", offset, shape, "F" if fortran else "C")
+        array = _Stored(path=path, dtype=dtype, offset=offset, shape=shape, fortran=fortran)
     except UnreadableFile:
         raise
     except (OSError, ValueError, TypeError, OverflowError, MemoryError, AttributeError, SyntaxError) as error:
@@ -48,11 +49,27 @@ def read_npy(path: Path) -> Contents:
     return Contents(format="npy", channels=only(_of_array(path, array, notes), path.name), notes=notes)
 
 
-def _of_array(path: Path, array: Any, notes: list[str]) -> Iterator[Channel]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stored:
+    """An array in a file, mapped for each slice anew: pages that stay mapped would count as memory."""
+
+    path: Path
+    dtype: np.dtype[Any]
+    offset: int
+    shape: tuple[int, ...]
+    fortran: bool
+    name: str | None = None  # of a field
+
+    def __getitem__(self, where: Any) -> Any:
+        mapped = np.memmap(self.path, self.dtype, "r", self.offset, self.shape, "F" if self.fortran else "C")
+        return np.array(mapped[where] if self.name is None else mapped[self.name][where])
+
+
+def _of_array(path: Path, array: _Stored, notes: list[str]) -> Iterator[Channel]:
     if array.dtype.names:
         for name in array.dtype.names:
-            if array.dtype[name].kind in "iuf" and array[name].ndim == 1:
-                yield from columns(name, array[name], notes)
+            if array.dtype[name].kind in "iuf" and len(array.shape) == 1 and not array.dtype[name].shape:
+                yield from columns(name, replace(array, name=name), notes)
     elif array.dtype.kind in "iuf":
         yield from columns(path.stem, array, notes)
 
