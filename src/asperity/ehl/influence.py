@@ -130,25 +130,27 @@ def _rectangles(cells: tuple[int, int], spacing: tuple[float, float], depth: flo
     angle_z = angle_x + angle_y  # -2π ∂z φ
     log_x, log_y = np.arcsinh(x / np.sqrt(in_yz)), np.arcsinh(y / np.sqrt(in_xz))  # 2π ∂y φ, 2π ∂x φ
     across_x, across_y = z * xy / (r * in_xz), z * xy / (r * in_yz)  # -2π z ∂xx φ, -2π z ∂yy φ
-    corners = np.stack(
-        [
-            # pressure
-            -angle_x - 2.0 * nu * angle_y + across_x,  # ∂xx χ - z ∂xx φ + 2ν ∂yy χ
-            -angle_y - 2.0 * nu * angle_x + across_y,  # ∂yy χ - z ∂yy φ + 2ν ∂xx χ
-            -angle_z - across_x - across_y,  # ∂z φ - z ∂zz φ
-            -(1.0 - 2.0 * nu) * np.log(sunk) - z / r,  # (1 - 2ν) ∂xy χ - z ∂xy φ
-            zz * x / (r * in_yz),  # -z ∂yz φ
-            zz * y / (r * in_xz),  # -z ∂xz φ
-            # traction along x
-            2.0 * log_y + z * y * (xx - r * z) / (r * sunk * in_xz) + 2.0 * nu * y / sunk,  # 2∂x φ + z∂xxx χ - 2ν∂xyy ψ
-            -z * y / (r * sunk) + 2.0 * nu * (log_y - y / sunk),  # z ∂xyy χ - 2ν ∂xxx ψ
-            zz * y / (r * in_xz),  # -z ∂xz φ
-            log_x - x * (2.0 * nu + z / r) / sunk,  # ∂y φ + 2ν ∂xxy ψ + z ∂xxy χ
-            -z / r,  # -z ∂xy φ
-            -angle_z + across_x,  # ∂z φ - z ∂xx φ
-        ]
+    corners = (
+        # pressure
+        -angle_x - 2.0 * nu * angle_y + across_x,  # ∂xx χ - z ∂xx φ + 2ν ∂yy χ
+        -angle_y - 2.0 * nu * angle_x + across_y,  # ∂yy χ - z ∂yy φ + 2ν ∂xx χ
+        -angle_z - across_x - across_y,  # ∂z φ - z ∂zz φ
+        -(1.0 - 2.0 * nu) * np.log(sunk) - z / r,  # (1 - 2ν) ∂xy χ - z ∂xy φ
+        zz * x / (r * in_yz),  # -z ∂yz φ
+        zz * y / (r * in_xz),  # -z ∂xz φ
+        # traction along x
+        2.0 * log_y + z * y * (xx - r * z) / (r * sunk * in_xz) + 2.0 * nu * y / sunk,  # 2∂x φ + z∂xxx χ - 2ν∂xyy ψ
+        -z * y / (r * sunk) + 2.0 * nu * (log_y - y / sunk),  # z ∂xyy χ - 2ν ∂xxx ψ
+        zz * y / (r * in_xz),  # -z ∂xz φ
+        log_x - x * (2.0 * nu + z / r) / sunk,  # ∂y φ + 2ν ∂xxy ψ + z ∂xxy χ
+        -z / r,  # -z ∂xy φ
+        -angle_z + across_x,  # ∂z φ - z ∂xx φ
     )
-    differences = np.diff(np.diff(corners, axis=-1), axis=-2) / (2.0 * np.pi)
+    differences = np.empty((12, cells[0] + 1, cells[1] + 1))
+    for corner, out in zip(corners, differences, strict=True):
+        along = np.diff(corner, axis=1)
+        np.subtract(along[1:], along[:-1], out=out)
+    differences /= 2.0 * np.pi
     return differences.reshape(2, 6, cells[0] + 1, cells[1] + 1)
 
 

@@ -175,8 +175,8 @@ def _half_width(conditions: ContactConditions) -> float:
 
 
 def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
-    """The surface, the core's depth, and 14 depths from half a cell to 2.5 half-widths in equal ratios [m]."""
-    half_width, first = _half_width(conditions), 0.5 * min(grid.spacing)
+    """The surface, the core's depth, and 14 in equal ratios from half a cell along x to 2.5 half-widths [m]."""
+    half_width, first = _half_width(conditions), 0.5 * grid.spacing[0]
     below = np.geomspace(first, max(DEEPEST * half_width, 10.0 * first), DEPTHS - 2)
     return np.unique(np.concatenate([[0.0, CORE * half_width], below]))
 
@@ -216,7 +216,8 @@ def stress_below(
     if core_depth not in levels:
         look(core_depth)
     core, _, shear_peak = (
-        _largest(levels, measure, below, look) for measure, below in ((0, core_depth), (0, 0.0), (1, 0.0))
+        _largest(levels, measure, below, grid.spacing[0], look)
+        for measure, below in ((0, core_depth), (0, 0.0), (1, 0.0))
     )
     peak = max((level[0] for level in levels.values()), key=lambda one: one.value)  # of all depths looked at by now
     return SubsurfaceStress(
@@ -259,13 +260,16 @@ def _peak(stress: Field, depth: float, grid: Grid) -> Peak:
     return Peak(float(stress[i, j]), depth, float(grid.x[i]), float(grid.y[j]))
 
 
-def _largest(levels: _Levels, measure: int, below: float, look: Callable[[float], object]) -> Peak:
-    """The largest of a measure from a depth on, sought between depths by parabolas through the highest of them."""
+def _largest(levels: _Levels, measure: int, below: float, cell: float, look: Callable[[float], object]) -> Peak:
+    """The largest of a measure from a depth on, sought between depths by parabolas through the highest of them.
+
+    Within a depth of less than a cell along x nothing is sought: there the cells decide.
+    """
     for _ in range(REFINEMENTS):
         depths = sorted(depth for depth in levels if depth >= below)
         values = [levels[depth][measure].value for depth in depths]
         top = int(np.argmax(values))
-        if not 0 < top < len(depths) - 1:
+        if not 0 < top < len(depths) - 1 or depths[top + 1] - depths[top - 1] < cell:
             break
         around = slice(top - 1, top + 2)
         shift = depths[top]  # depths grow in equal ratios, which a logarithm takes out; the surface needs a shift
