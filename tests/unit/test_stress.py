@@ -3,7 +3,7 @@ import pytest
 
 from asperity import BadInput, ContactConditions, ElasticPair, flat_surface, solve_contact, subsurface_stress
 from asperity.ehl.influence import ODD_IN_X, ODD_IN_Y, Tractions, _rectangles
-from asperity.ehl.stress import StressTensor, default_depths, stress_below
+from asperity.ehl.stress import StressTensor, default_depths, hertz_stress, stress_below
 from asperity.grid import Grid
 
 NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")
@@ -141,6 +141,27 @@ def test_maps_and_section_are_of_the_same_stresses():
     assert stress.largest.max() <= stress.peak.value
     k = list(stress.depths).index(stress.depth_of_largest[4, 7])
     assert stress.von_mises[4, 7, k] == stress.largest[4, 7]
+
+
+@pytest.mark.parametrize(
+    ("geometry", "radius", "length", "value", "depth"),
+    [
+        ("line", 0.01, 0.01, 0.558, 0.704),
+        ("point", 0.01, None, 0.620, 0.481),
+        ("elliptic", (0.01, 0.5), None, 0.57, 0.7),
+    ],
+)
+def test_stress_below_hertz_contacts_of_all_geometries(geometry, radius, length, value, depth):
+    """Johnson, section 4.2 and table 4.1: a slim ellipse (axis ratio 0.08) is nearly a line, depth in short axes."""
+    pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
+    bodies = ContactConditions(
+        pair=pair, geometry=geometry, radius=radius, load=100.0, length=length, surface_speeds=(1.0, 1.0)
+    )
+    a = min(bodies.hertz.half_widths) if geometry == "elliptic" else bodies.hertz.half_widths[0]
+    stress = hertz_stress(bodies, np.concatenate([[0.0], np.geomspace(0.01, 2.5, 15)]) * a)
+    tight = 0.004 if geometry != "elliptic" else 0.03
+    assert stress.peak.value == pytest.approx(value * bodies.hertz.p_max, rel=tight)
+    assert stress.peak.depth == pytest.approx(depth * a, rel=5.0 * tight)
 
 
 def test_default_depths_go_from_the_surface_to_below_the_contact():
