@@ -50,6 +50,8 @@ def test_the_film_is_as_viscous_as_its_temperature_leaves_it(pair):
     assert contact_state(warm).reynolds_residual < 1e-4
     assert warm.convergence.converged
     assert len(warm.convergence.history) > len(cold.convergence.history)  # all rounds are told
+    assert warm.convergence.iteration_error is not None
+    assert warm.convergence.discretisation_error == cold.convergence.discretisation_error
 
 
 def test_warm_oil_shears_more_easily_and_parts_the_bodies_less(pair):
