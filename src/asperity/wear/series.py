@@ -32,6 +32,7 @@ USUAL_DAMPING, DAMPING_SPREAD = 0.02, 1.0  # prior of ln ζ: centre, and a facto
 LEVELS = np.geomspace(0.03, 3e3, 21)  # of the search: a line's height over the base below it
 LARGEST_MISFIT = 0.3  # rms, beyond chance, of what the model leaves of a spectrum
 STARTS = (0.1, 0.3, 0.5)  # quantiles over the recordings, as first guesses of what is common to them
+HEAVIEST_DAMPING = 0.1  # of a contact: 0.01 dry to 0.1 in boundary lubrication, the paper's section 2.1
 LEAST_DAMPING, MOST_DAMPING = 1e-3, 0.3
 LONGEST_STEP = np.array([1.0, 0.03, 0.5, 1.0])  # of ln A, ln f, ln ζ, ln g
 MOST_STEPS = 60
@@ -447,6 +448,11 @@ def _judged(
         elif width > (high - low) / 2.0:
             objection = (
                 f"the line at {f0:.0f} Hz is wider than half the band ({width:.0f} Hz): a slope, not a resonance"
+            )
+        elif zeta > HEAVIEST_DAMPING:
+            objection = (
+                f"the line at {f0:.0f} Hz is wider than a contact's damping makes one ({width:.0f} Hz, damping ratio "
+                f"{zeta:.2g}; {HEAVIEST_DAMPING:g} is the most): a slope, or part of the machine"
             )
         elif lead < RIVAL:
             objection = f"a line at {rival:.0f} Hz would do as well as the one at {f0:.0f} Hz"
