@@ -1,5 +1,6 @@
 """`asperity check`, `track` and `watch`: measured recordings, from files to a verdict."""
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,6 +39,7 @@ Table = Annotated[
 Shaft = Annotated[
     list[float] | None, typer.Option(metavar="HZ", help="Shaft speed whose harmonics to remove; found if not given.")
 ]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes that read at once, else all.")]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 
 
@@ -181,7 +183,7 @@ def track(
     out: Annotated[
         list[Path] | None, typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat.")
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes that read at once, else all.")] = None,
+    workers: Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -235,6 +237,7 @@ def watch(
     settle: Annotated[
         float, typer.Option(metavar="SECONDS", min=0.0, help="How long a file must have stayed as it is.")
     ] = 2.0,
+    workers: Workers = None,
     rate: Rate = None,
     unit: Unit = None,
     channel: Channel = None,
@@ -248,6 +251,7 @@ def watch(
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
+    from asperity.tracking.listen import cores
     from asperity.tracking.watch import watch_folder
 
     results = out if out is not None else folder / "asperity-watch"
@@ -255,8 +259,8 @@ def watch(
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     make_folder(results)
     alarmed = False
-    try:
-        for update in watch_folder(
+    with _shown_files(quiet=quiet, waiting="watching ...") as told:
+        updates = watch_folder(
             folder,
             results,
             case=_case(case_file),
@@ -271,14 +275,19 @@ def watch(
             once=once,
             every_s=every,
             settle_s=settle,
-        ):
-            alarmed = update.track is not None and update.track.alarmed
-            if update.track is not None:
-                _write(update.track, [results / "track.csv", results / "track.nc"], results / "report.html")
-            _tell(update.new, update.track, results, as_json=as_json, quiet=quiet)
-    except KeyboardInterrupt:
-        if once:
-            raise
+            workers=workers or cores(),
+            progress=told,
+        )
+        try:
+            for update in updates:
+                alarmed = update.track is not None and update.track.alarmed
+                if update.track is not None:
+                    _write(update.track, [results / "track.csv", results / "track.nc"], results / "report.html")
+                _tell(update.new, update.track, results, as_json=as_json, quiet=quiet)
+        except KeyboardInterrupt:
+            if once:
+                raise
+            print(f"stopped; what was heard is in {results}, and the next watch goes on from there", file=sys.stderr)
     if alarmed:
         raise typer.Exit(ALARM)
 
@@ -343,7 +352,7 @@ def _case(path: Path | None) -> "Case | None":
 
 
 @contextmanager
-def _shown_files(*, quiet: bool) -> "Iterator[Callable[[Heard], None] | None]":
+def _shown_files(*, quiet: bool, waiting: str = "reading recordings ...") -> "Iterator[Callable[[Heard], None] | None]":
     """Count files on a terminal as they are read."""
     from rich.console import Console
 
@@ -352,7 +361,7 @@ def _shown_files(*, quiet: bool) -> "Iterator[Callable[[Heard], None] | None]":
         yield None
         return
     count = 0
-    with console.status("reading recordings ...") as status:
+    with console.status(waiting) as status:
 
         def told(heard: "Heard") -> None:
             nonlocal count

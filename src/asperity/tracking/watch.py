@@ -4,7 +4,7 @@ What was heard is kept in files of its own, so that a watch can stop at any mome
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -15,7 +15,7 @@ from asperity.case import Case
 from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput, UnreadableFile
 from asperity.tracking.files import read_table, recordings_in
-from asperity.tracking.listen import Asked, Heard, common_spacing, keep, kept, listen
+from asperity.tracking.listen import Asked, Heard, common_spacing, keep, kept, listen_to_all
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import Track, judge
 
@@ -48,6 +48,8 @@ def watch_folder(
     once: bool = False,
     every_s: float = 5.0,
     settle_s: float = 2.0,
+    workers: int = 1,
+    progress: Callable[[Heard], None] | None = None,
 ) -> Iterator[Update]:
     """Yield an update at the start and whenever recordings have arrived; for ever, unless `once`.
 
@@ -74,7 +76,7 @@ def watch_folder(
     while True:
         present = _present(folder)
         arrived = [path for path in present if memory.recall(path) is None and _settled(path, settle_s)]
-        new = [memory.listen(path) for path in arrived]
+        new = memory.listen(arrived, workers, progress)
         heard = [one for path in present if (one := memory.recall(path)) is not None]
         if new or first:
             track = None
@@ -88,7 +90,7 @@ def watch_folder(
                     )
             elif heard:
                 track = judge(heard, target, shaft_hz=shaft_hz, method=method, detector=detector)
-            yield Update(new=tuple(new), track=track)
+            yield Update(new=new, track=track)
         if once:
             return
         first = False
@@ -131,18 +133,24 @@ class _Memory:
                 (self.folder / key).unlink()  # cut short by a crash: listen again
         return self._at_hand.get(key)
 
-    def listen(self, path: Path) -> Heard:
-        """Listen to a file, and keep what it gave."""
-        key = _key(path)
+    def listen(
+        self, paths: Sequence[Path], workers: int, progress: Callable[[Heard], None] | None
+    ) -> tuple[Heard, ...]:
+        """Listen to files, and keep what each gave as soon as it is there."""
+        if not paths:
+            return ()
         if self.spacing_hz is None:
-            self.spacing_hz = common_spacing([path], self.asked, self.target)
+            self.spacing_hz = common_spacing(paths, self.asked, self.target)
             with whole_file(self.settings) as part:
                 part.write_text(json.dumps(self._wanted() | {"spacing_hz": self.spacing_hz}, indent=2), "utf-8")
-        heard = listen(path, self.asked, self.target, self.spacing_hz)
-        with whole_file(self.folder / key) as part:
-            keep(heard, part)
-        self._at_hand[key] = heard
-        return heard
+        keys = [_key(path) for path in paths]  # before reading: what changes meanwhile is read again
+        for number, heard in listen_to_all(
+            paths, self.asked, self.target, self.spacing_hz, workers=workers, progress=progress
+        ):
+            with whole_file(self.folder / keys[number]) as part:
+                keep(heard, part)
+            self._at_hand[keys[number]] = heard
+        return tuple(self._at_hand[key] for key in keys)
 
 
 def _present(folder: Path) -> list[Path]:
