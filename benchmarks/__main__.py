@@ -7,7 +7,7 @@ import sys
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks import friction, recordings, robustness, roughness_levels, stress, surfaces, vibration
+from benchmarks import friction, indicators, recordings, robustness, roughness_levels, stress, surfaces, vibration
 from benchmarks.first_call import first_call
 
 
@@ -51,6 +51,9 @@ def main() -> None:
             print(line, flush=True)
         print()
         for line in stress.lines(fast=wanted.fast):
+            print(line, flush=True)
+        print()
+        for line in indicators.lines(fast=wanted.fast):
             print(line, flush=True)
     print()
     for line in recordings.lines(fast=wanted.fast):  # on all processors, as its users have it

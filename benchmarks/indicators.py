@@ -1,0 +1,233 @@
+"""Indicators measured on the simulated rig: failures and errors over SNR, intervals, stages of wear.
+
+`python -m benchmarks.indicators` runs this part alone; `--fast` a tenth of it.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.rig import SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS, Disturbance, Rig, simulate_rig
+from asperity.signals import Spectrum
+from asperity.wear import CleanSpectrum, Resonance, contact_resonance, remove_lines, series_resonances, split_stages
+
+SNRS = (20.0, 10.0, 6.0, 3.0, 0.0)
+SERIES = 60
+DURATION = 300.0
+SEGMENT = 80_000
+FAR = 100.0  # Hz: a failure
+NINETY = 1.6449
+TRIALS = 400
+ALONE = 12
+CRF_STD = 15.0
+KNEE, RANGE = 1.8, (1.68, 1.92)
+
+Reading = Callable[["Heard"], Sequence[Resonance]]
+
+
+class Heard(NamedTuple):
+    """A rig, its spectra, and those without tones."""
+
+    rig: Rig
+    spectra: list[Spectrum]
+    clean: list[CleanSpectrum]
+
+
+def lines(*, fast: bool = False) -> Iterator[str]:
+    """Markdown, a line at a time; `fast` takes a tenth of the series and trials."""
+    share = 10 if fast else 1
+    yield f"## Indicators: 12 samples x 5 repeats of {DURATION:g} s at 20 kHz, {SERIES // share} series a row\n"
+    yield from table_lines(SERIES // share)
+    yield f"\n## Indicators: each spectrum by itself, {ALONE // share or 1} series a row\n"
+    yield from table_lines(ALONE // share or 1, (20.0, 6.0, 0.0), BY_ITSELF)
+    yield f"\n## Indicators: short recordings of 10 s, {ALONE // share or 1} series a row\n"
+    yield from table_lines(ALONE // share or 1, (10.0, 0.0), METHODS, duration_s=10.0)
+    yield (
+        "\n## Indicators: a machine that repeats itself badly (modes' levels 0.3 dB, frequencies 0.05 %), "
+        f"{ALONE // share or 1} series a row\n"
+    )
+    yield from table_lines(ALONE // share or 1, (6.0, 0.0), METHODS, mode_gain_db=0.3, mode_drift=5e-4)
+    yield f"\n## Stages: {TRIALS // share} trials a row, CRF standard deviation {CRF_STD:g} Hz\n"
+    yield from stage_lines(TRIALS // share)
+
+
+def drawn(snr_db: float, seed: int, *, duration_s: float = DURATION, **choices: float) -> Rig:
+    disturbance = Disturbance(
+        snr_db=snr_db,
+        modes=int(np.random.default_rng(seed).integers(2, 7)),
+        **choices,  # type: ignore[arg-type]
+    )
+    return simulate_rig(duration_s=duration_s, disturbance=disturbance, seed=seed)
+
+
+def heard(rig: Rig) -> Heard:
+    one = rig.recordings[0]
+    length = min(SEGMENT, round(one.duration_s * one.rate_hz))
+    spectra = [one.spectrum(length) for one in rig.recordings]
+    clean = [remove_lines(one, shaft_hz=rig.shaft_hz, band_hz=rig.band_hz) for one in spectra]
+    return Heard(rig, spectra, clean)
+
+
+def papers(heard: Heard) -> Sequence[Resonance]:
+    """Five-point cubic smoothing three times, highest point of the band."""
+    return [contact_resonance(one, band_hz=heard.rig.band_hz, method="peak") for one in heard.spectra]
+
+
+def alone(heard: Heard) -> Sequence[Resonance]:
+    """One oscillator line over a floor, each recording by itself, tones taken out."""
+    return [contact_resonance(one.spectrum, band_hz=heard.rig.band_hz) for one in heard.clean]
+
+
+def modes(heard: Heard) -> Sequence[Resonance]:
+    """As many lines as each spectrum needs, the strongest; tones taken out."""
+    return [contact_resonance(one.spectrum, band_hz=heard.rig.band_hz, method="modes") for one in heard.clean]
+
+
+def joint(heard: Heard) -> Sequence[Resonance]:
+    """What stays told from what moves, tones taken out."""
+    return series_resonances(
+        [one.spectrum for one in heard.clean], band_hz=heard.rig.band_hz, kept=[one.kept for one in heard.clean]
+    )
+
+
+class Tally:
+    """Errors of one method over many series."""
+
+    def __init__(self) -> None:
+        self.crf: list[float] = []
+        self.crfa: list[float] = []
+        self.crf_std: list[float] = []
+        self.covered: list[tuple[bool, bool]] = []
+        self.lost = self.wrong = self.all = 0
+        self.seconds = 0.0
+
+    def add(self, rig: Rig, found: Sequence[Resonance]) -> None:
+        for true, one in zip(rig.recordings, found, strict=True):
+            self.all += 1
+            if not one.found:
+                self.lost += 1
+                continue
+            error = one.crf_hz - true.crf_hz
+            if abs(error) > FAR:
+                self.wrong += 1
+                continue
+            relative = one.crfa / true.crfa - 1.0
+            self.crf.append(error)
+            self.crfa.append(relative)
+            if np.isfinite(one.crf_std):
+                self.crf_std.append(one.crf_std)
+                self.covered.append(
+                    (abs(error) < NINETY * one.crf_std, abs(one.crfa - true.crfa) < NINETY * one.crfa_std)
+                )
+
+    def row(self) -> str:
+        def percent(count: int) -> str:
+            return f"{100 * count / self.all:.1f} %"
+
+        if self.covered:
+            coverage = " and ".join(f"{100 * part:.0f} %" for part in np.mean(self.covered, axis=0))
+            stated = f"{np.median(self.crf_std):.2f}"
+        else:
+            coverage, stated = "none stated", "none"
+        rms = np.sqrt(np.mean(np.square(self.crf))) if self.crf else np.nan
+        crfa = 100 * np.sqrt(np.mean(np.square(self.crfa))) if self.crfa else np.nan
+        return (
+            f"{percent(self.wrong + self.lost)} | {percent(self.wrong)} | {percent(self.lost)} | {rms:.2f} | "
+            f"{stated} | {crfa:.1f} % | {100 * np.median(self.crfa) if self.crfa else np.nan:+.1f} % | {coverage} | "
+            f"{self.seconds:.1f}"
+        )
+
+
+METHODS: dict[str, Reading] = {"paper's highest point": papers, "joint": joint}
+BY_ITSELF: dict[str, Reading] = {"one line": alone, "modes": modes}
+
+
+def table_lines(
+    series: int, snrs: Sequence[float] = SNRS, methods: Mapping[str, Reading] = METHODS, **choices: float
+) -> Iterator[str]:
+    yield (
+        "| SNR [dB] | method | failures | > 100 Hz off | not found | CRF rms error [Hz] | stated [Hz] | "
+        "CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s a series |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|---|---|"
+    for snr_db in snrs:
+        tallies = {name: Tally() for name in methods}
+        for number in range(series):
+            series_heard = heard(drawn(snr_db, 1000 + number, **choices))
+            for name, method in methods.items():
+                began = perf_counter()
+                found = method(series_heard)
+                tallies[name].seconds += (perf_counter() - began) / series
+                tallies[name].add(series_heard.rig, found)
+        for name, tally in tallies.items():
+            yield f"| {snr_db:g} | {name} | {tally.row()} |"
+
+
+def stage_lines(trials: int) -> Iterator[str]:
+    yield (
+        "| truth | Sq | said: severe | running-in | no distinct stage | no change | break in 1.68 to 1.92 um | "
+        "90 % interval covers | sd of the break [um] |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|"
+    truths: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "knee at 1.8 um": TRENDS["knee"],
+        "saturating, length 0.5 um": saturating(0.5),
+        "saturating, length 0.8 um": TRENDS["smooth"],
+        "saturating, length 2 um": saturating(2.0),
+        "CLR saturating, CRF its sixth root": lambda sq: (
+            3879.0 * (0.95 - 0.77 * np.exp(-(sq * 1e6 - 0.54) / 0.9)).clip(0.02) ** (1 / 6)
+        ),
+        "Hill curve": lambda sq: 2500.0 + 1500.0 * sq**2 / (sq**2 + 0.8e-6**2),
+        "straight line": lambda sq: 2921.93 + 300.0 * (sq * 1e6 - 0.54),
+        "constant": TRENDS["constant"],
+    }
+    for name, truth in truths.items():
+        for errors in (0.0, 0.5, 1.0):
+            known = f"off by {errors:g} of the printed ±" if errors else "exact"
+            yield f"| {name} | {known} | {stage_row(truth, errors, trials)} |"
+
+
+def saturating(length_um: float) -> Callable[[np.ndarray], np.ndarray]:
+    def truth(sq: np.ndarray) -> np.ndarray:
+        grown = (1.0 - np.exp(-(sq * 1e6 - 0.54) / length_um)) / (1.0 - np.exp(-2.95 / length_um))
+        return np.asarray(2921.93 + (3811.88 - 2921.93) * grown)
+
+    return truth
+
+
+def saturating_share(sq: np.ndarray) -> np.ndarray:
+    share = 0.95 - 0.77 * np.exp(-(sq * 1e6 - 0.54) / 0.9)
+    return np.asarray(3879.0 * share.clip(0.02) ** (1.0 / 6.0))
+
+
+def stage_row(truth: Callable[[np.ndarray], np.ndarray], errors: float, trials: int) -> str:
+    rng = np.random.default_rng(7)
+    kinds: dict[str, int] = {}
+    splits, covered = [], 0
+    for _ in range(trials):
+        true_sq = np.array(SAMPLES_SQ_UM) + errors * np.array(SAMPLES_STD_UM) * rng.standard_normal(12)
+        crf = truth(np.repeat(true_sq, 5) * 1e-6) + CRF_STD * rng.standard_normal(60)
+        x_std = np.repeat(SAMPLES_STD_UM, 5) * errors if errors else None
+        found = split_stages(np.repeat(SAMPLES_SQ_UM, 5), crf, crf_std_hz=CRF_STD, x_std=x_std)
+        kinds[found.kind] = kinds.get(found.kind, 0) + 1
+        if found.found:
+            splits.append(found.split)
+            covered += found.interval[0] <= KNEE <= found.interval[1]
+    order = ("severe", "running-in", "no distinct stage", "no change")
+    said = " | ".join(f"{100 * kinds.get(kind, 0) / trials:.1f} %" for kind in order)
+    if truth is not TRENDS["knee"]:
+        return f"{said} | - | - | -"
+    inside = sum(RANGE[0] <= split <= RANGE[1] for split in splits)
+    return (
+        f"{said} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % | {np.std(splits):.3f}"
+    )
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(prog="python -m benchmarks.indicators", description=__doc__)
+    arguments.add_argument("--fast", action="store_true", help="a tenth of the series and trials")
+    for line in lines(fast=arguments.parse_args().fast):
+        print(line, flush=True)
