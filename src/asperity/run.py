@@ -94,14 +94,19 @@ class Run:
         rubbing, heat, stress = self.friction, self.heat, self.stress
         resonance = None if self.vibration is None else self.vibration.resonance
         heard = resonance is not None and resonance.found
+        error = convergence.error
         return {
             "car": state.car,
+            "car_error": None if error is None else error.car,
             "car_domain": state.car_domain,
             "clr": state.clr,
+            "clr_error": None if error is None else error.clr,
             "capped_oil_load_ratio": state.capped_oil_load_ratio,
             "sq_m": state.sq,
             "h_min_m": state.h_min,
+            "h_min_error_m": None if error is None else error.h_min,
             "h_central_m": state.h_central,
+            "h_central_error_m": None if error is None else error.h_central,
             "h_mean_m": state.h_mean,
             "p_max_pa": state.p_max,
             "lambda_ratio": state.lambda_ratio,

@@ -122,6 +122,13 @@ def print_json(values: dict[str, Any]) -> None:
     print(json.dumps(values, indent=2, allow_nan=False))
 
 
+def with_error(scale: float, value: float, error: float | None, decimals: int) -> str:
+    """A value times `scale`, with its error where one is known and shows."""
+    shown = f"{scale * value:.{decimals}f}"
+    known = error is not None and round(scale * error, decimals) > 0.0
+    return f"{shown} ± {scale * (error or 0.0):.{decimals}f}" if known else shown
+
+
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     """Names and values in two columns."""
     width = max(len(name) for name, _ in rows)

@@ -14,6 +14,7 @@ from asperity.cli.common import (
     require_output,
     save_report,
     solve_shown,
+    with_error,
     write_text,
 )
 from asperity.errors import AsperityError
@@ -128,17 +129,22 @@ def report(
 def _print_run(run: "Run") -> None:
     state, convergence = run.state, run.solution.convergence
     peak, core = run.stress.peak, run.stress.core
+
+    def off(name: str) -> float | None:
+        return None if convergence.error is None else float(getattr(convergence.error, name))
+
     lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
     rows = [
-        ("CLR, load on asperities", f"{100 * state.clr:.2f} %"),
+        ("CLR, load on asperities", f"{with_error(100, state.clr, off('clr'), 2)} %"),
         ("load on oil at the pressure cap, not in CLR", f"{100 * state.capped_oil_load_ratio:.2f} %"),
-        ("CAR, contact in the Hertz zone", f"{100 * state.car:.2f} %"),
+        ("CAR, contact in the Hertz zone", f"{with_error(100, state.car, off('car'), 2)} %"),
         ("CAR of the domain, over the Hertz area", f"{100 * state.car_domain:.2f} %"),
         ("asperities count as touching below", f"{1e9 * run.solution.options.contact_film:g} nm"),
         ("Sq, composite roughness", f"{1e6 * state.sq:.3f} um"),
         (
             "film: least, central, mean",
-            f"{1e6 * state.h_min:.3f}, {1e6 * state.h_central:.3f}, {1e6 * state.h_mean:.3f} um",
+            f"{with_error(1e6, state.h_min, off('h_min'), 3)}, "
+            f"{with_error(1e6, state.h_central, off('h_central'), 3)}, {1e6 * state.h_mean:.3f} um",
         ),
         ("lambda, smooth-contact film over Sq", lambda_ratio),
         ("largest pressure", f"{1e-9 * state.p_max:.3f} GPa"),

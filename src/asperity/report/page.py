@@ -177,6 +177,7 @@ class Quantity:
     scale: float = 1.0
     form: str | Callable[[float], str] = ".3f"
     deviation: str | None = None
+    error: str | None = None
 
     def show(self, scalars: Mapping[str, Any]) -> str:
         """The value in display units, without its unit."""
@@ -188,7 +189,11 @@ class Quantity:
         value = value * self.scale
         if self.deviation is not None:
             return " ".join(with_deviation(value, scalars[self.deviation])).rstrip()
-        return self.form(value) if callable(self.form) else format(value, self.form)
+        shown = self.form(value) if callable(self.form) else format(value, self.form)
+        if self.error is None or scalars[self.error] is None:
+            return shown
+        assert isinstance(self.form, str)  # what has an error bar has decimals
+        return f"{shown} ± {format(scalars[self.error] * self.scale, self.form)}"
 
     def row(self, scalars: Sequence[Mapping[str, Any]]) -> _Row:
         """The line of the table for several runs."""
@@ -196,7 +201,15 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity("clr", "Load share of asperities, CLR", "%", "load on contact cells over the whole load", 100.0, ".1f"),
+    Quantity(
+        "clr",
+        "Load share of asperities, CLR",
+        "%",
+        "load on contact cells over the whole load",
+        100.0,
+        ".1f",
+        error="clr_error",
+    ),
     Quantity(
         "capped_oil_load_ratio",
         "Load on oil at the pressure cap",
@@ -212,6 +225,7 @@ QUANTITIES = (
         "contact cells over all cells there",
         100.0,
         ".1f",
+        error="car_error",
     ),
     Quantity(
         "car_domain",
@@ -222,8 +236,10 @@ QUANTITIES = (
         ".1f",
     ),
     Quantity("sq_m", "Composite roughness, Sq", "µm", "root-mean-square height before deformation", 1e6),
-    Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap anywhere", 1e6),
-    Quantity("h_central_m", "Central film", "µm", "mean gap in a tenth of the Hertz zone", 1e6),
+    Quantity("h_min_m", "Smallest film, h min", "µm", "smallest gap anywhere", 1e6, error="h_min_error_m"),
+    Quantity(
+        "h_central_m", "Central film", "µm", "mean gap in a tenth of the Hertz zone", 1e6, error="h_central_error_m"
+    ),
     Quantity("h_mean_m", "Mean film", "µm", "mean gap in the Hertz zone", 1e6),
     Quantity("lambda_ratio", "Film ratio, Λ", "", "least film of the smooth contact (usual fit) over Sq", 1.0, ".2f"),
     Quantity("p_max_pa", "Largest pressure", "GPa", "oil and asperities together", 1e-9),
