@@ -173,7 +173,7 @@ def false_finds() -> Iterator[str]:
     """How often a contact resonance is found on bearings that have none."""
     yield "| recordings | method | found | of |"
     yield "|---|---|---|---|"
-    alone = {"none given": None, "likelihood": "likelihood", "peak": "peak"}
+    alone = {"none given": None, "modes": "modes", "likelihood": "likelihood", "peak": "peak"}
     running = []
     for path in [*sorted((MEASURED / "mfpt").iterdir()), *sorted((MEASURED / "ims").iterdir())]:
         given = {"rate_hz": 20e3} if path.parent.name == "ims" else {"unit": "g"}

@@ -34,7 +34,7 @@ ALERT, DANGER = 0.5, 0.9  # probability of severe wear
 IN_A_ROW = 3
 QUIET_SHARE = 0.05  # rms over the series' median, below which the machine was off
 SAME_LINES = 0.25  # of a line, by which the highest lines of two spectra may differ and still be laid on one another
-ALONE = "likelihood"  # method where there are too few recordings for the joint separation
+ALONE = "modes"  # method where there are too few recordings for the joint separation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
