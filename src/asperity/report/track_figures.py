@@ -26,7 +26,7 @@ def x_label(track: "Track") -> str:
     units = {"um": "µm", "h": "h", "s": "s", "min": "min", "d": "d", "mm": "mm", "nm": "nm", "m": "m", "km": "km"}
     if separator and unit in units:
         return f"{'Sq' if name == 'sq' else name.replace('_', ' ')} [{units[unit]}]"
-    return {"recording": "recording, in the order of their names"}.get(track.x_name, track.x_name)
+    return {"recording": "number"}.get(track.x_name, track.x_name)
 
 
 @styled()
@@ -203,7 +203,7 @@ def spectrum_with_fit(track: "Track", one: "Tracked") -> Figure:
     curve = one.resonance.curve(shown)
     within = (shown >= low) & (shown <= high) & (curve > 0.0)
     if np.isfinite(curve[within]).any():
-        axes.semilogy(shown[within], curve[within], color=BLUE, label="fit")
+        axes.semilogy(shown[within], curve[within], color=BLUE, label="fit" if one.resonance.found else "fit, no line")
     title = "no resonance found"
     if one.resonance.found:
         axes.axvline(one.resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label="CRF")

@@ -3,6 +3,7 @@
 Self-contained, in the style of `asperity.report.page`. Nothing is read or fitted here.
 """
 
+import re
 from collections import Counter
 from importlib.metadata import version
 from pathlib import Path
@@ -55,7 +56,7 @@ def render_track_page(track: "Track") -> str:
         version=version("asperity"),
         total=f"{total} {'recording' if total == 1 else 'recordings'}",
         level=track.alarm.level,
-        verdict=in_print(track.verdict()),
+        verdict=re.sub(r"\bum\b", "µm", in_print(track.verdict())),
         alarm=in_print(track.alarm.verdict),
         tiles=_tiles(track),
         pictures=_pictures(track),
@@ -201,23 +202,25 @@ def _remarks(track: "Track") -> list[tuple[str, str]]:
     return [(in_print(sentence[:1].upper() + sentence[1:]), holders(names)) for sentence, names in said.items()]
 
 
-def _facts(track: "Track") -> list[tuple[str, str]]:
-    """Each fact with its source; where recordings differ, the commonest and how many there are."""
+def _facts(track: "Track") -> list[tuple[str, str, str]]:
+    """Name, value and source of each fact; where recordings differ, the commonest and how many there are."""
     rows = []
     for name in ("rate", "unit", "channel", "scale", "format"):
         seen = Counter(one.heard.facts[name] for one in track.recordings if name in one.heard.facts)
         if seen:
-            (value, count), *others = seen.most_common()
-            more = f"; {len(others)} other values in {seen.total() - count} recordings" if others else ""
-            rows.append((name.capitalize(), value + more))
+            ((value, source), count), *others = seen.most_common()
+            more = f"; others in {seen.total() - count} recordings" if others else ""
+            rows.append((name.capitalize(), f"{value} Hz{more}" if name == "rate" else value + more, source))
     lengths = [one.heard.quality.duration_s for one in track.recordings if one.heard.quality is not None]
     if lengths:
         same = f"{min(lengths):.4g} s"
-        rows.append(("Length", same if min(lengths) == max(lengths) else f"{same} to {max(lengths):.4g} s"))
+        length = same if min(lengths) == max(lengths) else f"{same} to {max(lengths):.4g} s"
+        rows.append(("Length", length, "its samples"))
     started = sorted(one.heard.started for one in track.recordings if one.heard.started)
     if started:
         first, last = started[0].replace("T", " "), started[-1].replace("T", " ")
-        rows.append(("Started", first if first == last else f"{first} to {last}"))
+        source = next(one.heard.facts["started"][1] for one in track.recordings if one.heard.started)
+        rows.append(("Started", first if first == last else f"{first} to {last}", source))
     return rows
 
 

@@ -44,7 +44,7 @@ class Asked:
 class Heard:
     """What listening to one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
-    `facts` are texts by name, each with its source, `started` in ISO form or empty.
+    `facts` are texts by name, each with its source; `started` is in ISO form or empty.
     """
 
     file: str
@@ -52,7 +52,7 @@ class Heard:
     quality: Quality | None
     rate_hz: float
     unit: str
-    facts: dict[str, str]
+    facts: dict[str, tuple[str, str]]
     started: str
     reason: str
 
@@ -80,7 +80,7 @@ def listen(path: Path, asked: Asked, target: Target, spacing_hz: float) -> Heard
         nothing,
         rate_hz=opened.rate_hz,
         unit=opened.unit,
-        facts={name: f"{fact.value} ({fact.source})" for name, fact in opened.facts.items()},
+        facts={name: (_text(fact.value), fact.source) for name, fact in opened.facts.items()},
         started=opened.started.isoformat() if opened.started else "",
     )
     gauge = Gauge()
@@ -99,6 +99,10 @@ def listen(path: Path, asked: Asked, target: Target, spacing_hz: float) -> Heard
         spectrum, failed = None, str(refusal)
     quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
     return replace(known, spectrum=spectrum, quality=quality, reason="; ".join(quality.faults) or failed)
+
+
+def _text(value: object) -> str:
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def segment(rate_hz: float, spacing_hz: float) -> int:
@@ -195,6 +199,7 @@ def kept(path: Path) -> Heard:
             density, told = content["density"], json.loads(str(content["told"]))
         quality = told.pop("quality")
         spectrum = told.pop("spectrum")
+        told["facts"] = {name: (value, source) for name, (value, source) in told["facts"].items()}
         if spectrum is not None:
             lines = np.arange(density.size) * (told["rate_hz"] / spectrum["segment"])
             spectrum = Spectrum(frequency_hz=lines, density=density, **spectrum)
