@@ -69,12 +69,12 @@ def friction(
         stress[solution.in_contact] = boundary_friction * solution.pressure[solution.in_contact]
     borne = float(solution.pressure.sum())
     touching = float(stress[solution.in_contact].sum()) / borne
-    total = float(stress.sum()) / borne
-    force = total * conditions.load
+    parted = float(stress[~solution.in_contact].sum()) / borne
+    force = (touching + parted) * conditions.load
     return Friction(
-        coefficient=total,
+        coefficient=touching + parted,
         asperity_part=touching,
-        oil_part=total - touching,
+        oil_part=parted,
         shear=-np.sign(sliding) * stress,
         shear_force=-float(np.sign(sliding)) * force,
         power=force * abs(sliding),
