@@ -150,6 +150,9 @@ def test_several_blocks_are_channels_of_their_own(tmp_path):
     (tmp_path / "a.csv").write_text("".join(block.format(k + 1, text) for k, text in enumerate(rows)))
     names = [one.channel.name for one in open_channels(tmp_path / "a.csv")]
     assert names == ["1/Fx", "1/acc", "2/Fx", "2/acc"]
+    assert read_recording(tmp_path / "a.csv", channel="1/acc").facts["channel"].value == "1/acc"
+    with pytest.raises(BadInput, match="has 2 channels 'acc'; give 1/acc, 2/acc"):
+        read_recording(tmp_path / "a.csv", channel="acc")
     force, shaken = (read_recording(tmp_path / "a.csv", channel=name) for name in ("2/Fx", "2/acc"))
     assert (force.unit, force.values[0]) == ("gram-force", 300.5)
     assert (shaken.unit, shaken.rate_hz) == ("m/s^2", 50.0)

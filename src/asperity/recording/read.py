@@ -209,12 +209,20 @@ def _channel(path: Path, contents: Contents, asked: str | None) -> Channel:
     for fits in (asked, asked.strip()):
         if fits in names:
             return channels[names.index(fits)]
-    ends = [one for one in channels if one.name.split("/")[-1].split(".")[-1].lower() == asked.strip().lower()]
-    if len(ends) == 1:
-        return ends[0]
+    plain = asked.strip().lower()
+    meant = [one for one in channels if plain in _short_names(one.name)]
+    if len(meant) == 1:
+        return meant[0]
+    if meant:
+        raise BadInput(f"{path.name} has {len(meant)} channels {asked!r}; give {_listed([one.name for one in meant])}")
     if asked.strip().isdigit() and 0 < int(asked) <= len(channels):
         return channels[int(asked) - 1]
     raise BadInput(f"{path.name} has no channel {asked!r}; it has {_listed(names)}")
+
+
+def _short_names(name: str) -> set[str]:
+    """What else a channel may be called: COF for 1/COF, gs for bearing.gs, 8.0 for 8.0 X (100g)."""
+    return {part.lower() for part in (name.split("/")[-1], name.split("/")[-1].split(".")[-1], name.split(" ")[0])}
 
 
 def _listed(names: list[str]) -> str:

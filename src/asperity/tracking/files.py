@@ -49,25 +49,24 @@ class Table:
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
     """The files named, and those in the folders named, by name with numbers in their order.
 
-    Left out of a folder: hidden files, sidecars, tables with a column `file`, results.
+    Left out of a folder: folders in it, hidden files, sidecars, tables with a column `file`, results.
 
     Raises
     ------
     BadInput
-        for a path that does not exist, or nothing left.
+        for a path that does not exist, or a folder with nothing left.
     """
     found: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
-            found += sorted(
-                (one for one in path.iterdir() if may_be_recording(one)), key=lambda one: _natural(one.name)
-            )
+            inside = [one for one in path.iterdir() if may_be_recording(one)]
+            if not inside:
+                raise BadInput(f"{path} holds no recordings; name files, or the folder they lie in")
+            found += sorted(inside, key=lambda one: _natural(one.name))
         elif path.exists():
             found.append(path)
         else:
             raise BadInput(f"{path} does not exist; check its name")
-    if not found:
-        raise BadInput(f"{', '.join(map(str, paths))} holds no recordings; name files or a folder with files")
     return list(dict.fromkeys(found))
 
 

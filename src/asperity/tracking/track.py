@@ -295,7 +295,8 @@ def track_recordings(
         heard[number] = one
     done = [one for one in heard if one is not None]
     if all(one.spectrum is None and one.quality is None for one in done):
-        raise BadInput("; ".join(dict.fromkeys(one.reason for one in done[:3])))
+        others = f" (and so on for {len(done) - 1} more files)" if len(done) > 1 else ""
+        raise BadInput(f"{done[0].reason}{others}")
     x_name, named = places
     return judge(done, target, named, x_name, shaft_hz=shaft_hz, method=method, detector=detector)
 
