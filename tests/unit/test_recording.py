@@ -9,6 +9,8 @@ import pytest
 from asperity.errors import BadInput, UnreadableFile
 from asperity.recording import open_channels, open_recording, read_recording
 from asperity.recording.units import acceleration_scale, name_and_unit
+from asperity.signals import power_spectrum
+from asperity.wear.indicators import contact_resonance
 from recordings_made import RATE, SHARED, uff_set, vibration, write_all, write_uff
 
 G = 9.80665
@@ -238,3 +240,21 @@ def test_arrays_of_several_axes_and_fields(tmp_path):
         rate = None if name == "both.npz" else RATE
         assert np.array_equal(read_recording(tmp_path / name, rate_hz=rate, channel=channel).values, -VALUES), name
     assert np.array_equal(read_recording(tmp_path / "both.npz", channel="columns[1]").values, VALUES)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' data are not on this machine")
+def test_six_copies_of_a_measured_second_have_the_same_indicators():
+    found = {}
+    for path in sorted((SHARED / "vibration" / "mfpt-formats").iterdir()):
+        recording = read_recording(path, unit="g" if path.suffix == ".wav" else None)
+        spectrum = power_spectrum(recording, segment=8192)
+        found[path.suffix] = [
+            contact_resonance(spectrum, band_hz=(4e3, 8e3), method=method) for method in ("likelihood", "peak")
+        ]
+    assert len(found) == 6
+    first, highest = found[".h5"]
+    assert first.found
+    for suffix, (likeliest, peak) in found.items():
+        assert likeliest.crf_hz == pytest.approx(first.crf_hz, rel=1e-6), suffix
+        assert likeliest.crfa == pytest.approx(first.crfa, rel=1e-5), suffix
+        assert (peak.crf_hz, peak.crfa) == pytest.approx((highest.crf_hz, highest.crfa), rel=1e-6), suffix
