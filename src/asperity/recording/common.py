@@ -137,16 +137,14 @@ def columns(
     shape = tuple(int(n) for n in array.shape if n != 1) or (int(np.prod(array.shape)),)
     if len(shape) > 2 or 0 in shape:
         return
+    along = int(np.argmax(array.shape))
     if len(shape) == 1:
-        flat = array if len(array.shape) == 1 else array.reshape(-1) if isinstance(array, np.ndarray) else None
-        if flat is None:  # an HDF5 data set of shape (1, n) or (n, 1)
-            along = int(np.argmax(array.shape))
-            read = lambda i, j: array[tuple(slice(i, j) if k == along else 0 for k in range(len(array.shape)))]  # noqa: E731
-        else:
-            read = lambda i, j: flat[i:j]  # noqa: E731
+
+        def read(i: int, j: int) -> Any:
+            return array[tuple(slice(i, j) if axis == along else 0 for axis in range(len(array.shape)))]
+
         yield Channel(name=name, blocks=sliced(read, shape[0], notes, name), samples=shape[0], **facts)
         return
-    along = int(np.argmax(array.shape))
     count = min(shape)
     if count > MOST_CHANNELS or len(array.shape) != 2:
         raise UnreadableFile(f"{name} is an array of {shape[0]} x {shape[1]}: no recording; give one row a channel")

@@ -16,7 +16,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
-from asperity.recording.common import MOST_CHANNELS, REMEDY, facts_in, only, when
+from asperity.recording.common import MOST_CHANNELS, facts_in, only, when
 from asperity.recording.model import Channel, Contents
 from asperity.recording.timing import Clock, from_stamps, is_time
 from asperity.recording.units import known_unit, name_and_unit
@@ -91,12 +91,8 @@ def read(path: Path) -> Contents:
     for number, table in enumerate(tables, 1):
         prefix = f"{number}/" if len(tables) > 1 else ""
         channels += _channels(path, table, prefix, notes, open_bytes if large else None)
-    columns, blocks = len(channels), f", {len(tables)} blocks" if len(tables) > 1 else ""
-    return Contents(format=f"text{blocks}", channels=only(channels, path.name), notes=notes) if columns else _no(path)
-
-
-def _no(path: Path) -> Contents:
-    raise UnreadableFile(f"{path.name} holds no column but one of times; {REMEDY}")
+    blocks = f", {len(tables)} blocks" if len(tables) > 1 else ""
+    return Contents(format=f"text{blocks}", channels=only(channels, path.name), notes=notes)
 
 
 def _opener(path: Path) -> Callable[[], BinaryIO]:
@@ -371,7 +367,7 @@ def _channels(
     assert rows is not None
     clock_at = 0 if table.stamped else next((k for k, name in enumerate(table.names) if is_time(name)), None)
     clock: dict[str, Any] = {}
-    spread: Callable[[Field], Field] = lambda values: values  # noqa: E731
+    spread: Callable[[Field], Field] = _as_they_are
     if clock_at is not None:
         name, unit = table.names[clock_at], table.units[clock_at]
         times = from_stamps(table.stamps) if table.stamped and table.stamps else rows[:, clock_at]
@@ -427,6 +423,10 @@ def _streamed(
     return blocks
 
 
+def _as_they_are(values: Field) -> Field:
+    return values
+
+
 def _onto_grid(times: Field, prefix: str, notes: list[str]) -> Callable[[Field], Field]:
     """Puts rows where their times say, leaving gaps where samples are missing."""
     known = np.flatnonzero(np.isfinite(times))
@@ -435,7 +435,7 @@ def _onto_grid(times: Field, prefix: str, notes: list[str]) -> Callable[[Field],
     gaps = int(np.count_nonzero(steps > _GAP * step))
     if np.any(steps <= 0.0):
         notes.append(f"{prefix}its times go back or stand still; rows were taken in the order of the file")
-        return lambda values: values
+        return _as_they_are
     elapsed = (times[known] - times[known[0]]) / step
     place = np.round(elapsed)
     stray = float(np.max(np.abs(elapsed - place)))
@@ -455,4 +455,4 @@ def _onto_grid(times: Field, prefix: str, notes: list[str]) -> Callable[[Field],
     elif stray > 0.25 and float(np.max(np.abs(steps - step))) > 0.1 * step:
         least, most = steps.min() / step, steps.max() / step
         notes.append(f"{prefix}its times are uneven: steps from {least:.2f} to {most:.2f} of the median")
-    return lambda values: values
+    return _as_they_are
