@@ -70,8 +70,8 @@ def test_the_surface_carries_what_was_put_on_it(repeats):
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0), (False, repeats))
     pressure, shear = generator.random(grid.cells), generator.normal(size=grid.cells)
     surface = stress_below(pressure, shear, grid, np.array([0.0, 0.1]), poisson_ratio=0.25).at(0.0)
-    np.testing.assert_allclose(surface.zz, -pressure, atol=2e-5)
-    np.testing.assert_allclose(surface.xz, -shear, atol=2e-5)
+    np.testing.assert_allclose(surface.zz, -pressure, atol=5e-5)
+    np.testing.assert_allclose(surface.xz, -shear, atol=5e-5)
     np.testing.assert_allclose(surface.yz, 0.0, atol=2e-4)
 
 
