@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.signal import welch
+from scipy.signal import get_window, welch
 
 from asperity.errors import BadInput
 from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
@@ -135,3 +135,16 @@ def test_pieces_with_a_gap_are_left_out_of_a_spectrum():
     assert spectrum.averages == pytest.approx(9.0)
     with pytest.raises(BadInput, match="without a gap"):
         averaged_spectrum([np.full(500, np.nan)], 1.0, "m", segment=100)
+
+
+def test_averages_count_what_the_pieces_beside_a_gap_share():
+    """1 / (n sum w_t^2), the weight of every sample added up piece by piece."""
+    values = np.random.default_rng(5).standard_normal(1000)
+    values[310:330] = np.nan
+    spectrum = averaged_spectrum([values], 1.0, "m", segment=100)
+    starts = [start for start in range(0, 901, 50) if np.isfinite(values[start : start + 100]).all()]
+    weight = np.zeros(1000)
+    taper = get_window("hann", 100)
+    for start in starts:
+        weight[start : start + 100] += taper**2 / np.sum(taper**2) / len(starts)
+    assert spectrum.averages == pytest.approx(1.0 / (100 * np.sum(weight**2)), rel=1e-12)
