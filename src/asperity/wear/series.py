@@ -26,6 +26,7 @@ from asperity.wear.indicators import (
 )
 
 FEWEST_RECORDINGS = 6
+MOST_TOGETHER = 100  # recordings of a longer series that settle what all of them share
 MOST_BLOCKS, COARSE_BLOCKS = 600, 160
 DAMPINGS = np.geomspace(0.006, 0.08, 6)  # of the search
 USUAL_DAMPING, DAMPING_SPREAD = 0.02, 1.0  # prior of ln ζ: centre, and a factor e either way as standard deviation
@@ -221,20 +222,39 @@ def _settled_base(blocks: _Blocks, own: Field, base: Field) -> Field:
     return np.asarray(np.exp(log_base))
 
 
-def _first_base(blocks: _Blocks, quantile: float) -> tuple[Field, Field]:
-    """A quantile over the recordings, their levels evened out; and those levels."""
+def _first_base(blocks: _Blocks, quantile: float) -> Field:
+    """A quantile over the recordings, their levels evened out."""
     middle = np.exp(np.mean(np.log(np.maximum(blocks.density, 1e-300)), axis=0))
     gain = np.median(blocks.density / middle, axis=1)
-    return np.quantile(blocks.density / gain[:, None], quantile, axis=0), gain
+    return np.asarray(np.quantile(blocks.density / gain[:, None], quantile, axis=0))
 
 
 def _separated(blocks: _Blocks, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
-    """From several first guesses of what is common, the separation of the greatest likelihood."""
+    """What all recordings share from all of them, or of a long series from some, evenly chosen; then every line."""
     coarse = _coarser(blocks)
     templates = _templates(coarse.centre)
+    recordings = blocks.density.shape[0]
+    chosen = list(range(recordings))
+    if recordings > MOST_TOGETHER:
+        chosen = [round(place) for place in np.linspace(0.0, recordings - 1.0, MOST_TOGETHER)]
+    joint = _together(_rows(blocks, chosen), _rows(coarse, chosen), templates)
+    if recordings > len(chosen):
+        shared = joint.parameters
+        own = _tracks(coarse, np.exp(np.interp(coarse.centre, blocks.centre, shared.base)), templates)
+        own[chosen] = shared.own
+        joint = _each(blocks, shared._replace(own=own))
+    return _judged(blocks, joint, coarse, templates, band_hz, chosen)
+
+
+def _rows(blocks: _Blocks, chosen: list[int]) -> _Blocks:
+    return _Blocks(blocks.centre, blocks.density[chosen], blocks.weight[chosen])
+
+
+def _together(blocks: _Blocks, coarse: _Blocks, templates: _Templates) -> _Joint:
+    """From several first guesses of what is common, the separation of the greatest likelihood."""
     best: _Joint | None = None
     for quantile in STARTS:
-        base, _ = _first_base(coarse, quantile)
+        base = _first_base(coarse, quantile)
         for _ in range(8):
             own = _tracks(coarse, base, templates)
             base = _settled_base(coarse, own, base)
@@ -251,8 +271,7 @@ def _separated(blocks: _Blocks, band_hz: tuple[float, float]) -> tuple[Resonance
         best = joint
     base = np.exp(np.interp(blocks.centre, coarse.centre, best.parameters.base))
     base = _settled_base(blocks, best.parameters.own, base)
-    fine = _sloped(blocks, _scored(blocks, _Parameters(best.parameters.own, np.log(base))))
-    return _judged(blocks, fine, coarse, templates, band_hz)
+    return _sloped(blocks, _scored(blocks, _Parameters(best.parameters.own, np.log(base))))
 
 
 class _Point(NamedTuple):
@@ -270,13 +289,18 @@ def _expected(blocks: _Blocks, at: _Parameters) -> Field:
     return np.asarray(_lines(blocks.centre, at)[0] + np.exp(at.own[:, 3, None] + at.base))
 
 
-def _cost(blocks: _Blocks, at: _Parameters) -> float:
+def _costs(blocks: _Blocks, at: _Parameters) -> Field:
+    """-ln likelihood of each recording, its prior included."""
     expected = _expected(blocks, at)
-    return float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + _prior(at.own))
+    return np.asarray(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1) + _prior(at.own))
 
 
-def _prior(own: Field) -> float:
-    return float(0.5 * np.sum(((own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD) ** 2))
+def _cost(blocks: _Blocks, at: _Parameters) -> float:
+    return float(np.sum(_costs(blocks, at)))
+
+
+def _prior(own: Field) -> Field:
+    return np.asarray(0.5 * ((own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD) ** 2)
 
 
 def _point(blocks: _Blocks, at: _Parameters) -> _Point:
@@ -292,7 +316,7 @@ def _point(blocks: _Blocks, at: _Parameters) -> _Point:
     own_information[:, 2, 2] += DAMPING_SPREAD**-2
     base_part = relative[:, 3]
     return _Point(
-        cost=float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + _prior(at.own)),
+        cost=float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own))),
         own_score=own_score,
         own_information=own_information + LOOSE * np.eye(4),
         base_score=np.sum(base_part * off, axis=0),
@@ -319,11 +343,15 @@ def _reduced(point: _Point, damping: float) -> tuple[Field, Field]:
     return reduced, base_information
 
 
+def _bounds(blocks: _Blocks) -> tuple[Field, Field]:
+    """Least and greatest ln A, ln f, ln ζ, ln g."""
+    low, high = np.log(0.97 * blocks.centre[0]), np.log(1.03 * blocks.centre[-1])
+    return np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0]), np.array([60.0, high, np.log(MOST_DAMPING), 60.0])
+
+
 def _scored(blocks: _Blocks, start: _Parameters) -> _Joint:
     """Damped Fisher scoring of everything at once; the base, whose blocks do not couple, is eliminated first."""
-    low, high = np.log(0.97 * blocks.centre[0]), np.log(1.03 * blocks.centre[-1])
-    lower = np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0])
-    upper = np.array([60.0, high, np.log(MOST_DAMPING), 60.0])
+    lower, upper = _bounds(blocks)
     at = start._replace(own=np.clip(start.own, lower, upper))
     point = _point(blocks, at)
     damping = 1e-3
@@ -351,6 +379,29 @@ def _scored(blocks: _Blocks, start: _Parameters) -> _Joint:
     return _Joint(at, point.cost, std)
 
 
+def _each(blocks: _Blocks, start: _Parameters) -> _Joint:
+    """Damped Fisher scoring of every recording's own parameters beside a base that is known."""
+    lower, upper = _bounds(blocks)
+    at = start._replace(own=np.clip(start.own, lower, upper))
+    point, costs = _point(blocks, at), _costs(blocks, at)
+    damping = np.full(costs.size, 1e-3)
+    for _ in range(MOST_STEPS):
+        diagonal = np.einsum("npp->np", point.own_information)
+        damped = point.own_information + (damping[:, None] * diagonal)[:, :, None] * np.eye(4)
+        step = np.linalg.solve(damped, point.own_score[..., None])[..., 0]
+        if np.max(np.sum(step * point.own_score, axis=1)) < 2.0 * SETTLED or np.min(damping) > 1e6:
+            break
+        tried = np.clip(at.own + np.clip(step, -LONGEST_STEP, LONGEST_STEP), lower, upper)
+        trial_costs = _costs(blocks, at._replace(own=tried))
+        better = trial_costs < costs
+        at = at._replace(own=np.where(better[:, None], tried, at.own))
+        costs = np.where(better, trial_costs, costs)
+        damping = np.where(better, np.maximum(damping / 5.0, 1e-7), damping * 4.0)
+        point = _point(blocks, at)
+    std = np.sqrt(np.einsum("npp->np", np.linalg.inv(point.own_information)))
+    return _Joint(at, float(np.sum(costs)), std)
+
+
 def _sloped(blocks: _Blocks, joint: _Joint) -> _Joint:
     """The separation with the likeliest slope t, by parabolas through three of them; its error counts in all others."""
     for _ in range(3):
@@ -370,12 +421,12 @@ def _sloped(blocks: _Blocks, joint: _Joint) -> _Joint:
     return joint._replace(std=np.hypot(joint.std, dragged))
 
 
-def _misfit(blocks: _Blocks, joint: _Joint) -> Field:
+def _misfit(blocks: _Blocks, joint: _Joint, witnesses: list[int]) -> Field:
     """Standard deviations (recordings, 4) that a machine brings which does not quite repeat itself, beside chance.
 
     What the fit of one recording would make of the residuals that the others have where its line lies: its influence
     a_b on each parameter, applied to r_jb of those recordings j whose own line is far; squared, averaged over them,
-    less what chance explains.
+    less what chance explains. `witnesses` are the indices j.
     """
     line, by_f0, by_damping = _lines(blocks.centre, joint.parameters)
     expected = _expected(blocks, joint.parameters)
@@ -384,10 +435,10 @@ def _misfit(blocks: _Blocks, joint: _Joint) -> Field:
     influence = np.linalg.solve(information, relative * blocks.weight[:, None])
     common = relative[:, 3]
     felt = influence * common[:, None]  # what a relative change of the machine in block b does to each parameter
-    counts = (common > COMMON_FROM) & (blocks.weight > 0.0)
-    share = np.where(counts, common, 1.0)
-    change = np.where(counts, (blocks.density / expected - 1.0) / share, 0.0)
-    by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight, 1.0) * share**2), 0.0)
+    counts = ((common > COMMON_FROM) & (blocks.weight > 0.0))[witnesses]
+    share = np.where(counts, common[witnesses], 1.0)
+    change = np.where(counts, (blocks.density / expected - 1.0)[witnesses] / share, 0.0)
+    by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[witnesses], 1.0) * share**2), 0.0)
     heard = np.einsum("npb,jb->npj", felt, change, optimize=True) ** 2
     heard -= np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
     whole = np.einsum("npb,jb->npj", felt**2, counts.astype(float), optimize=True)
@@ -398,7 +449,12 @@ def _misfit(blocks: _Blocks, joint: _Joint) -> Field:
 
 
 def _judged(
-    blocks: _Blocks, joint: _Joint, coarse: _Blocks, templates: _Templates, band_hz: tuple[float, float]
+    blocks: _Blocks,
+    joint: _Joint,
+    coarse: _Blocks,
+    templates: _Templates,
+    band_hz: tuple[float, float],
+    witnesses: list[int],
 ) -> tuple[Resonance, ...]:
     """Which of the lines are there, each with its reason."""
     low, high = band_hz
@@ -411,7 +467,7 @@ def _judged(
     without = np.sum(blocks.weight * (np.log(alone) + blocks.density / alone), axis=1)
     evidence = 2.0 * (without - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1))
 
-    std = np.hypot(joint.std, _misfit(blocks, joint))
+    std = np.hypot(joint.std, _misfit(blocks, joint, witnesses))
     off = blocks.density / expected - 1.0
     counted = blocks.weight > 0.0
     chance = np.sum(counted, axis=1)
