@@ -7,7 +7,18 @@ import sys
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks import friction, indicators, recordings, robustness, roughness_levels, stress, surfaces, vibration
+from benchmarks import (
+    films,
+    friction,
+    indicators,
+    recordings,
+    robustness,
+    roughness_levels,
+    speed,
+    stress,
+    surfaces,
+    vibration,
+)
 from benchmarks.first_call import first_call
 
 
@@ -38,6 +49,12 @@ def main() -> None:
     )
     print()
     with threadpool_limits(1):
+        for line in speed.lines(fast=wanted.fast):
+            print(line, flush=True)
+        print()
+        for line in films.lines(fast=wanted.fast):
+            print(line, flush=True)
+        print()
         for line in robustness.lines(fast=wanted.fast):
             print(line, flush=True)
         print()

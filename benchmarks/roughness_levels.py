@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from asperity.case import load_case
+from asperity.case import Case, load_case
 from asperity.ehl.deflection import deflection
 from asperity.ehl.solution import ContactSolution, Options
 from asperity.ehl.solve import solve_contact
@@ -41,11 +41,16 @@ class Outcome:
     clr_error: float | None = None
 
 
-def solve(sq_um: float, seed: int, tolerance: float, cells: int) -> ContactSolution:
-    """One cold solve."""
-    case = load_case(CASE).with_overrides(
+def paper_case(sq_um: float, seed: int, cells: int) -> Case:
+    """The paper's contact with one of the surfaces."""
+    return load_case(CASE).with_overrides(
         {"surface.sq": f"{sq_um} um", "surface.seed": seed, "grid.cells": [cells, cells]}
     )
+
+
+def solve(sq_um: float, seed: int, tolerance: float, cells: int) -> ContactSolution:
+    """One cold solve."""
+    case = paper_case(sq_um, seed, cells)
     deflection.cache_clear()
     return solve_contact(
         case.conditions, case.lubricant, case.surface(), options=Options(tolerance=tolerance), strict=False

@@ -2,27 +2,39 @@
 
 import numpy as np
 
+SECOND_ORDER = (0.0, 0.5)
 
-def faces(pressure, content, mobility, ambient, inlet_content, dx, dy):
+
+def mean(own, following, logarithmic):
+    """Of two mobilities."""
+    return (own - following) / np.log(own / following) if logarithmic else (own + following) / 2.0
+
+
+def faces(pressure, content, mobility, ambient, inlet_content, dx, dy, wedge=SECOND_ORDER, logarithmic=False):
     """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell; complex welcome.
 
-    `ambient` is the mobility that the first and the last cells would have at the ambient pressure of the outer faces.
+    `ambient` is the mobility that the first and the last cells would have at the ambient pressure of the outer faces,
+    `wedge` the weights of the next and of the upstream cell.
     """
     nx = pressure.shape[0]
     couette = np.empty((nx + 1, pressure.shape[1]), dtype=pressure.dtype)
     couette[0] = inlet_content
     couette[1] = content[0]
-    couette[2:] = 1.5 * content[1:] - 0.5 * content[:-1]
+    ahead, behind = content[2:] - content[1:-1], content[1:-1] - content[:-2]
+    couette[2:-1] = content[1:-1] + wedge[0] * ahead + wedge[1] * behind
+    couette[-1] = 1.5 * content[-1] - 0.5 * content[-2]
     poiseuille = np.empty_like(couette)
     poiseuille[0] = -(mobility[0] + ambient[0]) / 2.0 * pressure[0] / (dx / 2.0)
-    poiseuille[1:-1] = -(mobility[1:] + mobility[:-1]) / 2.0 * np.diff(pressure, axis=0) / dx
+    poiseuille[1:-1] = -mean(mobility[:-1], mobility[1:], logarithmic) * np.diff(pressure, axis=0) / dx
     poiseuille[-1] = (mobility[-1] + ambient[1]) / 2.0 * pressure[-1] / (dx / 2.0)
-    north = -(mobility + np.roll(mobility, -1, 1)) / 2.0 * (np.roll(pressure, -1, 1) - pressure) / dy
+    following = np.roll(mobility, -1, 1)
+    north = -mean(mobility, following, logarithmic) * (np.roll(pressure, -1, 1) - pressure) / dy
     return couette + poiseuille, north
 
 
-def net_outflow(pressure, content, mobility, ambient, inlet_content, dx, dy):
-    along, north = faces(pressure, content, mobility, ambient, inlet_content, dx, dy)
+def net_outflow(*arguments, **scheme):
+    along, north = faces(*arguments, **scheme)
+    dx, dy = arguments[-2:]
     return np.diff(along, axis=0) / dx + (north - np.roll(north, 1, 1)) / dy
 
 

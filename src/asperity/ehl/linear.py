@@ -12,7 +12,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.ehl.problem import Balance
 from asperity.kernels import relax, reynolds
-from asperity.kernels.reynolds import LUBRICATED, Film, Stencil
+from asperity.kernels.reynolds import LUBRICATED, Faces, Film, Stencil
 
 MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors
 LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
@@ -33,7 +33,8 @@ class Linear:
         self.pressure = balance.pressure.astype(dtype)
         scale = balance.rows.fluid_scale.astype(dtype)
         self.rows = balance.rows._replace(fluid_scale=scale)
-        self.film = None if balance.film is None else _film(balance.film, dtype)
+        self.film = None if balance.film is None else Film(*(part.astype(dtype) for part in balance.film))
+        self.faces = None if balance.faces is None else _faces(balance.faces, dtype)
         self.stencil = self._stencil()
         self.even, self.odd = (self._lines(parity) for parity in (0, 1))
         if self.film is not None:
@@ -48,12 +49,12 @@ class Linear:
         problem = self.balance.problem
         d_gap = problem.deflection(d_pressure)
         d_gap += self.dtype(d_approach)
-        if self.film is None:
+        if self.film is None or self.faces is None:
             touching = self.rows.state == reynolds.TOUCHING
             return np.where(touching, d_gap * self.dtype(self.rows.contact_scale), d_pressure)
         out = np.empty(self.cells, self.dtype)
         reynolds.jacobian_product(
-            self.rows, self.film, self.pressure, d_pressure, d_gap, problem.spacing, self.storing, out
+            self.rows, self.film, self.faces, self.pressure, d_pressure, d_gap, problem.spacing, self.storing, out
         )
         return out
 
@@ -77,8 +78,9 @@ class Linear:
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
         nothing = np.zeros(self.cells, self.dtype)
         film = self.film or Film(*[nothing] * 8)
+        faces = self.faces or Faces(nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0])
         problem = self.balance.problem
-        reynolds.local_stencil(self.rows, film, problem.deflection.near, problem.spacing, self.storing, stencil)
+        reynolds.local_stencil(self.rows, film, faces, problem.deflection.near, problem.spacing, self.storing, stencil)
         return stencil
 
     def _lines(self, parity: int) -> relax.Lines:
@@ -99,14 +101,10 @@ def _block(cells: int) -> int:
     return max(smallest, -(-cells // MOST_COARSE_CELLS))
 
 
-def _film(film: Film, dtype: Any) -> Film:
-    """In another precision; mobilities that would become denormal are none."""
-    least = LEAST * float(film.mobility.max())
-    flowing = film.mobility > least
-    return Film(*(
-        (np.where(flowing, part, 0.0) if name.startswith("mobility") else part).astype(dtype)
-        for name, part in film._asdict().items()
-    ))  # fmt: skip
+def _faces(faces: Faces, dtype: Any) -> Faces:
+    """In another precision; what would become denormal in it is none."""
+    least = LEAST * float(max(faces.east.max(), faces.north.max()))
+    return Faces(*(np.where(part > least, part, 0.0).astype(dtype) for part in faces))
 
 
 class _Pattern(NamedTuple):

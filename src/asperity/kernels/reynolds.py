@@ -1,9 +1,10 @@
 """The finite-volume Reynolds equation on arrays: net outflow of each cell, its derivative, its local stencil.
 
-x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and periodic. The wedge is
-taken upwind to second order, face value m + (m - m_upstream)/2; Poiseuille faces carry the mean of two node mobilities,
-those at the ends the mean of their cell's and what that would be at zero pressure.
-Knows no units, no oil and no tolerance.
+x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and periodic. The wedge
+leans upstream, face value m + a (m_next - m) + b (m - m_upstream): second order with (a, b) = (0, 1/2), third with
+(3/8, 1/8). Poiseuille faces carry the arithmetic mean of two node mobilities or their logarithmic one, which is exact
+for a viscosity that grows exponentially under a given flow; those at the ends carry the mean of their cell's and what
+that would be at zero pressure. Knows no units, no oil and no tolerance.
 """
 
 from typing import NamedTuple
@@ -17,7 +18,7 @@ RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # what decides a cell
 
 
 class Film(NamedTuple):
-    """Oil content m = rho H and Poiseuille mobility eps of every cell, each with its slopes in H and P.
+    """Oil content m = rho H with its slopes in H and P, Poiseuille mobility eps with those of its logarithm.
 
     `ambient` is the mobility that the first and the last cells along x would have at ambient pressure, shape (2, ny).
     """
@@ -26,8 +27,8 @@ class Film(NamedTuple):
     content_by_gap: Field
     content_by_pressure: Field
     mobility: Field
-    mobility_by_gap: Field
-    mobility_by_pressure: Field
+    log_mobility_by_gap: Field
+    log_mobility_by_pressure: Field
     ambient: Field
     ambient_by_gap: Field
 
@@ -35,9 +36,25 @@ class Film(NamedTuple):
         """The same film, its gap fixed in some cells."""
         return self._replace(
             content_by_gap=np.where(held, 0.0, self.content_by_gap),
-            mobility_by_gap=np.where(held, 0.0, self.mobility_by_gap),
+            log_mobility_by_gap=np.where(held, 0.0, self.log_mobility_by_gap),
             ambient_by_gap=np.where(held[[0, -1]], 0.0, self.ambient_by_gap),
         )
+
+
+class Faces(NamedTuple):
+    """Mobility of the faces east and north of each cell, and its slopes in the logarithms of both nodes' mobilities.
+
+    The last face to the east is the outlet; `inlet` holds the first one to the west, shape (ny,); `wedge` is (a, b).
+    """
+
+    east: Field
+    east_by_own: Field
+    east_by_next: Field
+    north: Field
+    north_by_own: Field
+    north_by_next: Field
+    inlet: Field
+    wedge: Field
 
 
 class Rows(NamedTuple):
@@ -59,29 +76,65 @@ class Stencil(NamedTuple):
 
 
 @njit(cache=True)
-def net_outflow(pressure: Field, film: Film, inlet_content: Field, dx: float, dy: float, out: Field) -> None:
-    """Couette plus Poiseuille outflow minus inflow of each cell, per cell area."""
-    nx, ny = pressure.shape
-    content, mobility = film.content, film.mobility
-    upstream = np.empty(ny)
+def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, float, float]:
+    """Logarithmic mean of two positive numbers, and its slopes in their logarithms."""
+    if abs(log_ratio) < 1e-2:
+        mean = 0.5 * (own + following) * (1.0 - log_ratio * log_ratio / 12.0)
+        return mean, own * (0.5 - log_ratio / 6.0), following * (0.5 + log_ratio / 6.0)
+    mean = (own - following) / log_ratio
+    return mean, (own - mean) / log_ratio, (mean - following) / log_ratio
+
+
+@njit(cache=True)
+def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, faces: Faces) -> None:
+    """Fill `faces` in; `log_mobility` is the natural logarithm of the film's mobility.
+
+    Arithmetic means unless `logarithmic`.
+    """
+    nx, ny = log_mobility.shape
+    eps = film.mobility
     for j in range(ny):
-        upstream[j] = inlet_content[j] - (mobility[0, j] + film.ambient[0, j]) * pressure[0, j] / dx
+        faces.inlet[j] = 0.5 * (eps[0, j] + film.ambient[0, j])
     for i in range(nx):
         for j in range(ny):
             if i < nx - 1:
-                flux = -0.5 * (mobility[i, j] + mobility[i + 1, j]) * (pressure[i + 1, j] - pressure[i, j]) / dx
+                ratio = log_mobility[i, j] - log_mobility[i + 1, j] if logarithmic else 0.0
+                mean, own, following = _log_mean(eps[i, j], eps[i + 1, j], ratio)
             else:
-                flux = (mobility[i, j] + film.ambient[1, j]) * pressure[i, j] / dx
-            flux += content[i, j]
-            if i > 0:
-                flux += 0.5 * (content[i, j] - content[i - 1, j])
+                mean, own, following = 0.5 * (eps[i, j] + film.ambient[1, j]), 0.5 * eps[i, j], 0.0
+            faces.east[i, j], faces.east_by_own[i, j], faces.east_by_next[i, j] = mean, own, following
+            jn = j + 1 if j < ny - 1 else 0
+            ratio = log_mobility[i, j] - log_mobility[i, jn] if logarithmic else 0.0
+            mean, own, following = _log_mean(eps[i, j], eps[i, jn], ratio)
+            faces.north[i, j], faces.north_by_own[i, j], faces.north_by_next[i, j] = mean, own, following
+
+
+@njit(cache=True)
+def net_outflow(
+    pressure: Field, content: Field, faces: Faces, inlet_content: Field, dx: float, dy: float, out: Field
+) -> None:
+    """Couette plus Poiseuille outflow minus inflow of each cell, per cell area."""
+    nx, ny = pressure.shape
+    a, b = faces.wedge
+    upstream = np.empty(ny)
+    for j in range(ny):
+        upstream[j] = inlet_content[j] - faces.inlet[j] * pressure[0, j] * 2.0 / dx
+    for i in range(nx):
+        for j in range(ny):
+            flux = content[i, j]
+            if i < nx - 1:
+                flux -= faces.east[i, j] * (pressure[i + 1, j] - pressure[i, j]) / dx
+                if i > 0:
+                    flux += a * (content[i + 1, j] - content[i, j]) + b * (content[i, j] - content[i - 1, j])
+            else:
+                flux += faces.east[i, j] * pressure[i, j] * 2.0 / dx + 0.5 * (content[i, j] - content[i - 1, j])
             out[i, j] = (flux - upstream[j]) / dx
             upstream[j] = flux
         for j in range(ny):
             jn = j + 1 if j < ny - 1 else 0
             js = j - 1 if j > 0 else ny - 1
-            north = 0.5 * (mobility[i, j] + mobility[i, jn]) * (pressure[i, j] - pressure[i, jn])
-            south = 0.5 * (mobility[i, js] + mobility[i, j]) * (pressure[i, js] - pressure[i, j])
+            north = faces.north[i, j] * (pressure[i, j] - pressure[i, jn])
+            south = faces.north[i, js] * (pressure[i, js] - pressure[i, j])
             out[i, j] += (north - south) / (dy * dy)
 
 
@@ -89,6 +142,7 @@ def net_outflow(pressure: Field, film: Film, inlet_content: Field, dx: float, dy
 def jacobian_product(
     rows: Rows,
     film: Film,
+    faces: Faces,
     pressure: Field,
     d_pressure: Field,
     d_gap: Field,
@@ -104,56 +158,56 @@ def jacobian_product(
     nx, ny = pressure.shape
     real = pressure.dtype.type
     dx, dy = spacing
-    half, over_dx, over_dy2 = real(0.5), real(1.0 / dx), real(0.5 / (dy * dy))
-    kept = real(storing)
+    half, over_dx, over_dy2, kept = real(0.5), real(1.0 / dx), real(1.0 / (dy * dy)), real(storing)
     touching = real(rows.contact_scale)
     state, scale = rows.state, rows.fluid_scale
-    eps, eps_h, eps_p = film.mobility, film.mobility_by_gap, film.mobility_by_pressure
+    log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
-    d_eps, d_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
-    upstream, before = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
+    d_log, d_log_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
+    before, here, after = np.zeros(ny, pressure.dtype), np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
+    upstream = np.empty(ny, pressure.dtype)
     for j in range(ny):
-        d_eps[j] = eps_h[0, j] * d_gap[0, j] + eps_p[0, j] * d_pressure[0, j]
-        before[j] = m_h[0, j] * d_gap[0, j] + m_p[0, j] * d_pressure[0, j]
-        d_face = d_eps[j] + film.ambient_by_gap[0, j] * d_gap[0, j]
-        face = eps[0, j] + film.ambient[0, j]
-        upstream[j] = m_h[0, j] * d_gap[0, j] - (face * d_pressure[0, j] + d_face * pressure[0, j]) * over_dx
+        d_log[j] = log_h[0, j] * d_gap[0, j] + log_p[0, j] * d_pressure[0, j]
+        here[j] = m_h[0, j] * d_gap[0, j] + m_p[0, j] * d_pressure[0, j]
+        d_face = half * (film.mobility[0, j] * d_log[j] + film.ambient_by_gap[0, j] * d_gap[0, j])
+        crossing = faces.inlet[j] * d_pressure[0, j] + d_face * pressure[0, j]
+        upstream[j] = m_h[0, j] * d_gap[0, j] - real(2.0) * over_dx * crossing
     for i in range(nx):
-        second = half if i > 0 else real(0.0)
         if i < nx - 1:
+            upwind, downwind = (faces.wedge[1], faces.wedge[0]) if i > 0 else (real(0.0), real(0.0))
             for j in range(ny):
-                d_east[j] = eps_h[i + 1, j] * d_gap[i + 1, j] + eps_p[i + 1, j] * d_pressure[i + 1, j]
+                d_log_east[j] = log_h[i + 1, j] * d_gap[i + 1, j] + log_p[i + 1, j] * d_pressure[i + 1, j]
+                after[j] = m_h[i + 1, j] * d_gap[i + 1, j] + m_p[i + 1, j] * d_pressure[i + 1, j]
             for j in range(ny):
-                here = m_h[i, j] * d_gap[i, j] + m_p[i, j] * d_pressure[i, j]
-                flux = here + second * (here - before[j])
-                flux -= (half * over_dx) * (
-                    (eps[i, j] + eps[i + 1, j]) * (d_pressure[i + 1, j] - d_pressure[i, j])
-                    + (d_eps[j] + d_east[j]) * (pressure[i + 1, j] - pressure[i, j])
+                flux = here[j] + downwind * (after[j] - here[j]) + upwind * (here[j] - before[j])
+                d_face = faces.east_by_own[i, j] * d_log[j] + faces.east_by_next[i, j] * d_log_east[j]
+                flux -= over_dx * (
+                    faces.east[i, j] * (d_pressure[i + 1, j] - d_pressure[i, j])
+                    + d_face * (pressure[i + 1, j] - pressure[i, j])
                 )
-                out[i, j] = (flux - upstream[j]) * over_dx + kept * here
+                out[i, j] = (flux - upstream[j]) * over_dx + kept * here[j]
                 upstream[j] = flux
-                before[j] = here
         else:
             for j in range(ny):
-                here = m_h[i, j] * d_gap[i, j] + m_p[i, j] * d_pressure[i, j]
-                flux = here + second * (here - before[j])
-                d_face = d_eps[j] + film.ambient_by_gap[1, j] * d_gap[i, j]
-                flux += ((eps[i, j] + film.ambient[1, j]) * d_pressure[i, j] + d_face * pressure[i, j]) * over_dx
-                out[i, j] = (flux - upstream[j]) * over_dx + kept * here
-        # y faces: what crosses from the south of each line is what leaves the line before
-        for j in range(ny - 1):
-            jn = j + 1
-            north = (eps[i, j] + eps[i, jn]) * (d_pressure[i, j] - d_pressure[i, jn]) + (d_eps[j] + d_eps[jn]) * (
-                pressure[i, j] - pressure[i, jn]
+                flux = here[j] + half * (here[j] - before[j])
+                d_face = faces.east_by_own[i, j] * d_log[j] + half * film.ambient_by_gap[1, j] * d_gap[i, j]
+                flux += real(2.0) * over_dx * (faces.east[i, j] * d_pressure[i, j] + d_face * pressure[i, j])
+                out[i, j] = (flux - upstream[j]) * over_dx + kept * here[j]
+        # y faces: what leaves a line through its north face enters the next
+        last = ny - 1
+        for j in range(last):
+            d_face = faces.north_by_own[i, j] * d_log[j] + faces.north_by_next[i, j] * d_log[j + 1]
+            north = faces.north[i, j] * (d_pressure[i, j] - d_pressure[i, j + 1]) + d_face * (
+                pressure[i, j] - pressure[i, j + 1]
             )
             out[i, j] += over_dy2 * north
-            out[i, jn] -= over_dy2 * north
-        last = ny - 1
-        crossing = (eps[i, last] + eps[i, 0]) * (d_pressure[i, last] - d_pressure[i, 0]) + (d_eps[last] + d_eps[0]) * (
+            out[i, j + 1] -= over_dy2 * north
+        d_face = faces.north_by_own[i, last] * d_log[last] + faces.north_by_next[i, last] * d_log[0]
+        north = faces.north[i, last] * (d_pressure[i, last] - d_pressure[i, 0]) + d_face * (
             pressure[i, last] - pressure[i, 0]
         )
-        out[i, last] += over_dy2 * crossing
-        out[i, 0] -= over_dy2 * crossing
+        out[i, last] += over_dy2 * north
+        out[i, 0] -= over_dy2 * north
         for j in range(ny):
             if state[i, j] == LUBRICATED:
                 out[i, j] *= scale[i, j]
@@ -161,30 +215,32 @@ def jacobian_product(
                 out[i, j] = d_gap[i, j] * touching
             else:
                 out[i, j] = d_pressure[i, j]
-            d_eps[j] = d_east[j]
+            before[j], here[j], d_log[j] = here[j], after[j], d_log_east[j]
 
 
 @njit(cache=True)
-def fluid_diagonal(film: Film, near: Field, dx: float, dy: float, out: Field) -> None:
-    """Derivative of each cell's net outflow by its own pressure, kept positive; `near` holds the compliance along x."""
+def fluid_diagonal(film: Film, faces: Faces, near: Field, dx: float, dy: float, out: Field) -> None:
+    """Derivative of each cell's net outflow by its own pressure, kept positive; `near` holds the compliance along x.
+
+    The wedge is taken as first order: a scale, and the start of a preconditioner, need no more.
+    """
     nx, ny = out.shape
-    eps, m_h, m_p = film.mobility, film.content_by_gap, film.content_by_pressure
+    m_h, m_p = film.content_by_gap, film.content_by_pressure
     for i in range(nx):
         for j in range(ny):
-            jn = j + 1 if j < ny - 1 else 0
             js = j - 1 if j > 0 else ny - 1
-            own = eps[i, j]
-            east = 0.5 * (own + eps[i + 1, j]) if i < nx - 1 else own + film.ambient[1, j]
-            west = 0.5 * (own + eps[i - 1, j]) if i > 0 else own + film.ambient[0, j]
+            east = faces.east[i, j] if i < nx - 1 else 2.0 * faces.east[i, j]
+            west = faces.east[i - 1, j] if i > 0 else 2.0 * faces.inlet[j]
             above = m_h[i - 1, j] if i > 0 else m_h[i, j]
             wedge = m_h[i, j] * near[0] - above * near[1] + m_p[i, j]
             wedge = max(wedge, near[0] - near[1])
-            out[i, j] = (east + west) / (dx * dx) + (own + 0.5 * (eps[i, jn] + eps[i, js])) / (dy * dy) + wedge / dx
+            across = faces.north[i, j] + faces.north[i, js]
+            out[i, j] = (east + west) / (dx * dx) + across / (dy * dy) + wedge / dx
 
 
 @njit(cache=True)
 def local_stencil(
-    rows: Rows, film: Film, near: Field, spacing: tuple[float, float], storing: float, out: Stencil
+    rows: Rows, film: Film, faces: Faces, near: Field, spacing: tuple[float, float], storing: float, out: Stencil
 ) -> None:
     """Fill the five-point approximation of the scaled Jacobian, in the precision of `out`.
 
@@ -192,35 +248,33 @@ def local_stencil(
     """
     nx, ny = out.centre.shape
     real = out.centre.dtype.type
-    half, none, one, kept = real(0.5), real(0.0), real(1.0), real(storing)
+    none, one, two, kept = real(0.0), real(1.0), real(2.0), real(storing)
     dx, dy = spacing
     over_dx, over_dx2, over_dy2 = real(1.0 / dx), real(1.0 / (dx * dx)), real(1.0 / (dy * dy))
     near0, near1, near2 = real(near[0]), real(near[1]), real(near[2])
     touching_own = real((near[0] - near[3]) * rows.contact_scale)
     touching_next = real((near[1] - near[3]) * rows.contact_scale)
-    eps, m_h, m_p = film.mobility, film.content_by_gap, film.content_by_pressure
-    faces = np.empty(ny + 1, out.centre.dtype)  # of the y faces, each between its southern and northern cell
+    m_h, m_p = film.content_by_gap, film.content_by_pressure
+    across = np.empty(ny + 1, out.centre.dtype)  # of the y faces, each between its southern and northern cell
     for i in range(nx):
-        west_of, east_of = max(i - 1, 0), min(i + 1, nx - 1)
-        at_inlet, at_outlet = i == 0, i == nx - 1
-        for j in range(1, ny):
-            faces[j] = half * over_dy2 * (eps[i, j - 1] + eps[i, j])
-        faces[0] = half * over_dy2 * (eps[i, ny - 1] + eps[i, 0])
-        faces[ny] = faces[0]
+        west_of, at_inlet, at_outlet = max(i - 1, 0), i == 0, i == nx - 1
+        for j in range(ny):
+            across[j + 1] = over_dy2 * faces.north[i, j]
+        across[0] = across[ny]
         for j in range(ny):
             wet, touching = rows.state[i, j] == LUBRICATED, rows.state[i, j] == TOUCHING
-            own, here, above = eps[i, j], m_h[i, j], m_h[west_of, j]
+            here, above = m_h[i, j], m_h[west_of, j]
             above_p = none if at_inlet else m_p[west_of, j]
             scale = rows.fluid_scale[i, j]
-            east = over_dx2 * (own + film.ambient[1, j] if at_outlet else half * (own + eps[east_of, j]))
-            west = over_dx2 * (own + film.ambient[0, j] if at_inlet else half * (own + eps[west_of, j]))
+            east = over_dx2 * (two * faces.east[i, j] if at_outlet else faces.east[i, j])
+            west = over_dx2 * (two * faces.inlet[j] if at_inlet else faces.east[west_of, j])
             wedge = here * near0 - above * near1 + m_p[i, j]
             own_kept, next_kept = kept * (here * near0 + m_p[i, j]), kept * here * near1
-            centre = (east + west + faces[j] + faces[j + 1] + wedge * over_dx + own_kept) * scale
+            centre = (east + west + across[j] + across[j + 1] + wedge * over_dx + own_kept) * scale
             upstream = (-west + (here * near1 - above * near0 - above_p) * over_dx + next_kept) * scale
             downstream = (-east + (here * near1 - above * near2) * over_dx + next_kept) * scale
             out.centre[i, j] = centre if wet else (touching_own if touching else one)
             out.west[i, j] = upstream if wet else (touching_next if touching else none)
             out.east[i, j] = downstream if wet else (touching_next if touching else none)
-            out.north[i, j] = -faces[j + 1] * scale if wet else none
-            out.south[i, j] = -faces[j] * scale if wet else none
+            out.north[i, j] = -across[j + 1] * scale if wet else none
+            out.south[i, j] = -across[j] * scale if wet else none

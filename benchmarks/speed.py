@@ -1,0 +1,204 @@
+"""What a solve costs: on finer grids, smooth, dry, beside other codes, and on two processors at once."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+
+from asperity.conditions import ContactConditions
+from asperity.ehl.deflection import deflection
+from asperity.ehl.solution import ContactSolution, Options
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.state import contact_state
+from asperity.grid import Grid
+from asperity.lubricant import Lubricant
+from asperity.surface import Surface, flat_surface
+from benchmarks.films import BARUS, REFERENCE, ball
+from benchmarks.roughness_levels import SEEDS, SQ_UM, paper_case
+
+TRIES = 3
+
+
+def cold(conditions: ContactConditions, oil: Lubricant | None, surface: Surface, tolerance: float) -> ContactSolution:
+    """From the Hertz pressure, the elastic kernel built anew."""
+    deflection.cache_clear()
+    return solve_contact(conditions, oil, surface, options=Options(tolerance=tolerance), strict=False)
+
+
+def best_of(work: Callable[[], object], tries: int = TRIES) -> float:
+    """Least time of several [s]; once before, unmeasured, for the compiled kernels."""
+    work()
+    times = []
+    for _ in range(tries):
+        began = perf_counter()
+        work()
+        times.append(perf_counter() - began)
+    return min(times)
+
+
+def _grids(*, fast: bool) -> Iterator[str]:
+    yield "| cells | median of solves [s] | over 256 x 256 | peak memory [GiB] |"
+    yield "|---|---|---|---|"
+    levels = [(sq, seed) for sq in SQ_UM for seed in SEEDS] if not fast else [(1.0, 0), (3.0, 1)]
+    base = None
+    for cells in (256, 512, 1024):
+        chosen = levels if cells == 256 else levels[:: 5 if cells == 512 else 15]
+        times = []
+        for sq, seed in chosen:
+            case = paper_case(sq, seed, cells)
+            solution = cold(case.conditions, case.lubricant, case.surface(), 1e-4)
+            times.append(solution.convergence.seconds)
+        base = base or median(times)
+        found = f"{median(times):.2f} | {median(times) / base:.1f} | {peak_gib(cells):.2f}"
+        yield f"| {cells} x {cells} ({len(times)} solves) | {found} |"
+
+
+def peak_gib(cells: int) -> float:
+    """Of a process that solves the paper's contact once."""
+    code = (
+        "import resource; from benchmarks.speed import cold; from benchmarks.roughness_levels import paper_case; "
+        f"case = paper_case(1.0, 0, {cells}); cold(case.conditions, case.lubricant, case.surface(), 1e-4); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return int(said.stdout) / 1024.0**2
+
+
+def _smooth() -> Iterator[str]:
+    case = paper_case(1.0, 0, 256)
+    seconds = best_of(lambda: cold(case.conditions, case.lubricant, flat_surface(case.grid), 1e-4))
+    yield f"Smooth line contact, 256 x 256 cells, solved on one line: {seconds:.3f} s."
+    for (load_number, oil_number, name), (central, least) in list(REFERENCE.items())[:2]:
+        conditions, unit = ball(load_number, oil_number)
+        a = conditions.hertz.half_widths[0]
+        grid = Grid((257, 257), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
+        solution = cold(conditions, BARUS, flat_surface(grid), 1e-4)
+        seconds = best_of(lambda c=conditions, g=grid: cold(c, BARUS, flat_surface(g), 1e-4))  # type: ignore[misc]
+        middle = float(np.interp(0.0, grid.x, solution.gap[:, 128])) / unit
+        off = [
+            100.0 * (film / wanted - 1.0) for film, wanted in ((middle, central), (solution.gap.min() / unit, least))
+        ]
+        yield (
+            f"Smooth ball, M {load_number}, L {oil_number}, {name}, 257 x 257: {seconds:.2f} s; "
+            f"central film {off[0]:+.2f} %, least film {off[1]:+.2f} % off the reference."
+        )
+
+
+def _dry() -> Iterator[str]:
+    case = paper_case(1.0, 0, 256)
+    elastic = ContactConditions(
+        pair=case.conditions.pair,
+        geometry="line",
+        radius=case.conditions.radius_along_rolling,
+        length=case.conditions.length,
+        load=case.conditions.load,
+        surface_speeds=case.conditions.surface_speeds,
+    )
+    surface = case.surface()
+    ours = best_of(lambda: cold(elastic, None, surface, 1e-8))
+    kept = best_of(lambda: solve_contact(elastic, None, surface, options=Options(tolerance=1e-8)))
+    yield f"Dry rough line contact, 256 x 256, to 1e-8: {ours:.3f} s ({kept:.3f} s with the elastic kernel at hand)."
+    for name, twin in (("tamaas", _tamaas_seconds), ("ContactMechanics", _contact_mechanics_seconds)):
+        try:
+            seconds = twin(surface, elastic)
+        except ImportError:
+            yield f"{name} is not installed here."
+            continue
+        yield f"{name}, same heights, periodic both ways, to 1e-8: {seconds:.3f} s, {seconds / ours:.1f} times ours."
+    yield (
+        "SlipPy 0.5.2, the one open code for the rough point contact, asks for NumPy below 1.21 and so for Python 3.9 "
+        "or older: it cannot be installed beside asperity."
+    )
+
+
+def _tamaas_seconds(surface: Surface, conditions: ContactConditions) -> float:
+    import tamaas as tm
+
+    grid = surface.grid
+    model = tm.Model(tm.model_type.basic_2d, list(grid.extent), list(grid.cells))
+    model.E, model.nu = conditions.pair.reduced_modulus, 0.0
+    form = -(grid.x[:, None] ** 2) / (2.0 * conditions.radius_along_rolling) * np.ones(grid.cells)
+    pressure = conditions.line_load / grid.extent[0]
+
+    def solve() -> None:
+        solver = tm.PolonskyKeerRey(model, surface.heights + form, 1e-8)
+        solver.solve(pressure)
+
+    tm.set_log_level(tm.LogLevel.error)
+    return best_of(solve)
+
+
+def _contact_mechanics_seconds(surface: Surface, conditions: ContactConditions) -> float:
+    from ContactMechanics import PeriodicFFTElasticHalfSpace
+    from ContactMechanics.Factory import make_system
+    from SurfaceTopography import Topography
+
+    grid = surface.grid
+    form = -(grid.x[:, None] ** 2) / (2.0 * conditions.radius_along_rolling) * np.ones(grid.cells)
+    topography = Topography(surface.heights + form, grid.extent, periodic=True)
+    substrate = PeriodicFFTElasticHalfSpace(grid.cells, conditions.pair.reduced_modulus, grid.extent)
+    load = conditions.line_load * grid.extent[1]
+
+    def solve() -> None:
+        system = make_system(substrate=substrate, surface=topography)
+        result = system.minimize_proxy(external_force=load, pentol=1e-8 * load / np.prod(grid.cells))
+        if not result.success:
+            raise RuntimeError("ContactMechanics did not converge")
+
+    return best_of(solve)
+
+
+def _one_solve(seed: int) -> float:
+    case = paper_case(1.0, seed, 256)
+    surface = case.surface()
+    cold(case.conditions, case.lubricant, surface, 1e-4)
+    began = perf_counter()
+    for _ in range(4):
+        cold(case.conditions, case.lubricant, surface, 1e-4)
+    return perf_counter() - began
+
+
+def _two_processors() -> Iterator[str]:
+    if (os.cpu_count() or 1) < 2:
+        yield "One processor only: nothing to compare."
+        return
+    alone = sum(_one_solve(seed) for seed in (0, 1))
+    with ProcessPoolExecutor(2) as pool:
+        together = max(pool.map(_one_solve, (0, 1)))
+    yield f"Two solves on two processors: {alone / together:.2f} times as fast as one after the other."
+
+
+def _error_bars(*, fast: bool) -> Iterator[str]:
+    """How often the stated error holds the difference to a grid twice as fine."""
+    held, cases, factors = {"car": 0, "clr": 0, "h_central": 0}, 0, []
+    for sq in SQ_UM[:: 4 if fast else 1]:
+        for seed in (0, 1) if fast else SEEDS:
+            coarse, fine = (paper_case(sq, seed, cells) for cells in (256, 512))
+            here, finer = (cold(one.conditions, one.lubricant, one.surface(), 1e-4) for one in (coarse, fine))
+            error, state, truth = here.convergence.error, contact_state(here), contact_state(finer)
+            assert error is not None
+            cases += 1
+            for name in held:
+                off = abs(getattr(state, name) - getattr(truth, name))
+                held[name] += off <= getattr(error, name)
+                factors.append(getattr(error, name) / off)
+    counts = ", ".join(f"{name} in {count}" for name, count in held.items())
+    yield (
+        f"Of {cases} contacts at 256 x 256 the stated error holds the difference to 512 x 512 for {counts}; "
+        f"it is {median(factors):.1f} times that difference (median)."
+    )
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    """The figures as Markdown."""
+    yield "## What a solve costs"
+    yield ""
+    yield from _grids(fast=fast)
+    yield ""
+    for part in (_smooth(), _dry(), _two_processors(), _error_bars(fast=fast)):
+        yield from part
