@@ -189,7 +189,7 @@ def test_a_purely_elastic_contact_is_solved_too(sq):
 def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
     surface = rough(COARSE, SQ)
     hurried = Options(max_iterations=3)
-    with pytest.raises(NotConverged, match="not solved: out of iterations, at last .* after 6 steps") as caught:
+    with pytest.raises(NotConverged, match=r"not solved: out of iterations, at last .* after 6 steps") as caught:
         solve_contact(contact(hardness=CAP), barus(), surface, options=hurried)
     unfinished = caught.value.solution
     assert unfinished.convergence.status is Status.OUT_OF_ITERATIONS
