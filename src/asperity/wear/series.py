@@ -43,8 +43,8 @@ STANDING = 0.1  # standard deviation of a line's places over its width, below wh
 MOVES = "moves against what all recordings share"
 STANDS = "keeps its place and changes its height; CRFA is the part that changes, a lower bound"
 SLOPE_STEP, STEEPEST = 0.1, 2.0
-COMMON_FROM = 0.5  # share of what all recordings share in a block, from which its residual is the machine's
-WITNESS_FROM = 0.9
+COMMON_FROM = 0.1  # share of what all recordings share in a block, from which its residual is the machine's
+WITNESS_FROM = 0.8  # of a parameter's influence, that a witness has to cover
 RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
 
 
@@ -440,11 +440,11 @@ def _misfit(blocks: _Blocks, joint: _Joint, witnesses: list[int]) -> Field:
     change = np.where(counts, (blocks.density / expected - 1.0)[witnesses] / share, 0.0)
     by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[witnesses], 1.0) * share**2), 0.0)
     heard = np.einsum("npb,jb->npj", felt, change, optimize=True) ** 2
-    heard -= np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
+    expected_of_chance = np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
     whole = np.einsum("npb,jb->npj", felt**2, counts.astype(float), optimize=True)
-    # a recording counts as a witness where it is the machine's alone over nearly all that matters
-    witness = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
-    variance = np.sum(heard * witness, axis=2) / np.maximum(np.sum(witness, axis=2), 1)
+    # a witness has to be heard over nearly all that matters; the less chance blurs it, the more it counts
+    witness = (whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]) / np.maximum(expected_of_chance, 1e-300) ** 2
+    variance = np.sum((heard - expected_of_chance) * witness, axis=2) / np.maximum(np.sum(witness, axis=2), 1e-300)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
