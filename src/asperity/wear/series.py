@@ -45,6 +45,7 @@ STANDS = "keeps its place and changes its height; CRFA is the part that changes,
 SLOPE_STEP, STEEPEST = 0.1, 2.0
 COMMON_FROM = 0.1  # share of what all recordings share in a block, from which its residual is the machine's
 WITNESS_FROM = 0.8  # of a parameter's influence, that a witness has to cover
+TINY = 1e-100
 RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
 
 
@@ -443,8 +444,9 @@ def _misfit(blocks: _Blocks, joint: _Joint, witnesses: list[int]) -> Field:
     expected_of_chance = np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
     whole = np.einsum("npb,jb->npj", felt**2, counts.astype(float), optimize=True)
     # a witness has to be heard over nearly all that matters; the less chance blurs it, the more it counts
-    witness = (whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]) / np.maximum(expected_of_chance, 1e-300) ** 2
-    variance = np.sum((heard - expected_of_chance) * witness, axis=2) / np.maximum(np.sum(witness, axis=2), 1e-300)
+    heard_enough = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
+    witness = heard_enough / np.maximum(expected_of_chance, TINY) ** 2
+    variance = np.sum((heard - expected_of_chance) * witness, axis=2) / np.maximum(np.sum(witness, axis=2), TINY)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
