@@ -332,7 +332,7 @@ def judge(
         )
     groups = -(-len(used) // MOST_TOGETHER) if chosen == "joint" else 1
     if groups > 1:
-        notes.append(f"{len(used)} recordings were separated in {groups} groups, each of every {groups}th of them.")
+        notes.append(f"{len(used)} recordings were separated in {groups} groups, each spread over the whole series.")
     resonances = _resonances(cleaned, target, chosen, groups)
     if method is None and chosen == ALONE:
         resonances = tuple(_whose(resonance) for resonance in resonances)
