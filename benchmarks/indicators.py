@@ -169,10 +169,10 @@ def table_lines(
 
 def stage_lines(trials: int) -> Iterator[str]:
     yield (
-        "| truth | Sq | said: severe | running-in | no distinct stage | no change | break in 1.68 to 1.92 um | "
-        "90 % interval covers | sd of the break [um] |"
+        "| truth | Sq | tests a sample | said: severe | running-in | no distinct stage | no change | "
+        "break in 1.68 to 1.92 um | 90 % interval covers | sd of the break [um] |"
     )
-    yield "|---|---|---|---|---|---|---|---|---|"
+    yield "|---|---|---|---|---|---|---|---|---|---|"
     truths: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "knee at 1.8 um": TRENDS["knee"],
         "saturating, length 0.5 um": saturating(0.5),
@@ -186,9 +186,9 @@ def stage_lines(trials: int) -> Iterator[str]:
         "constant": TRENDS["constant"],
     }
     for name, truth in truths.items():
-        for errors in (0.0, 0.5, 1.0):
+        for errors, tests in ((0.0, 1), (0.0, 5), (0.5, 5), (1.0, 5)):
             known = f"off by {errors:g} of the printed ±" if errors else "exact"
-            yield f"| {name} | {known} | {stage_row(truth, errors, trials)} |"
+            yield f"| {name} | {known} | {tests} | {stage_row(truth, errors, tests, trials)} |"
 
 
 def saturating(length_um: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -204,15 +204,15 @@ def saturating_share(sq: np.ndarray) -> np.ndarray:
     return np.asarray(3879.0 * share.clip(0.02) ** (1.0 / 6.0))
 
 
-def stage_row(truth: Callable[[np.ndarray], np.ndarray], errors: float, trials: int) -> str:
+def stage_row(truth: Callable[[np.ndarray], np.ndarray], errors: float, tests: int, trials: int) -> str:
     rng = np.random.default_rng(7)
     kinds: dict[str, int] = {}
     splits, covered = [], 0
     for _ in range(trials):
         true_sq = np.array(SAMPLES_SQ_UM) + errors * np.array(SAMPLES_STD_UM) * rng.standard_normal(12)
-        crf = truth(np.repeat(true_sq, 5) * 1e-6) + CRF_STD * rng.standard_normal(60)
-        x_std = np.repeat(SAMPLES_STD_UM, 5) * errors if errors else None
-        found = split_stages(np.repeat(SAMPLES_SQ_UM, 5), crf, crf_std_hz=CRF_STD, x_std=x_std)
+        crf = truth(np.repeat(true_sq, tests) * 1e-6) + CRF_STD * rng.standard_normal(12 * tests)
+        x_std = np.repeat(SAMPLES_STD_UM, tests) * errors if errors else None
+        found = split_stages(np.repeat(SAMPLES_SQ_UM, tests), crf, crf_std_hz=CRF_STD, x_std=x_std)
         kinds[found.kind] = kinds.get(found.kind, 0) + 1
         if found.found:
             splits.append(found.split)

@@ -13,9 +13,9 @@ from asperity.errors import BadInput
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
-KEYS = [  # design.md, section 4, the load on capped oil, parts of friction, shear, standard deviations of the last two
-    *("car", "car_domain", "clr", "capped_oil_load_ratio", "sq_m"),
-    *("h_min_m", "h_central_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
+KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of friction, shear, the last two's deviations
+    *("car", "car_error", "car_domain", "clr", "clr_error", "capped_oil_load_ratio", "sq_m"),
+    *("h_min_m", "h_min_error_m", "h_central_m", "h_central_error_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
     *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
     *("flash_temperature_max_k", "film_temperature_max_k"),
     *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),

@@ -70,6 +70,15 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     assert pandas.read_parquet("t.parquet")["file"].tolist() == [row["file"] for row in said["recordings"]]
 
 
+def test_a_long_series_is_separated_in_groups(asp, rig, monkeypatch):
+    folder, truth = rig
+    monkeypatch.setattr("asperity.tracking.track.MOST_TOGETHER", 12)
+    said = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
+    for row in said["recordings"]:
+        assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
+    assert any("24 recordings were separated in 2 groups" in note for note in said["notes"])
+
+
 def test_track_says_what_it_assumed_and_what_it_left_out(asp, rig):
     folder, _ = rig
     shutil.copytree(folder, "copy")

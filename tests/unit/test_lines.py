@@ -54,8 +54,9 @@ def test_noise_alone_loses_nothing():
         assert lost <= 1  # 0.1 expected
 
 
-def test_a_resonance_is_no_tone():
-    spring = ContactOscillator(mass=0.1, stiffness=0.1 * (2 * np.pi * 2000.0) ** 2, damping_ratio=0.003)
+@pytest.mark.parametrize("damping_ratio", [0.0005, 0.003])  # 8 and 48 spectral lines wide
+def test_a_resonance_is_no_tone(damping_ratio):
+    spring = ContactOscillator(mass=0.1, stiffness=0.1 * (2 * np.pi * 2000.0) ** 2, damping_ratio=damping_ratio)
     ridden = acceleration(spring, Signal(np.cumsum(np.cumsum(noise())) * 1e-9, RATE, "m")).values
     ridden = ridden / np.std(ridden)
     seen = spectrum(ridden + 0.01 * noise(1) + tones(SHAFT, range(60, 76), 0.05))

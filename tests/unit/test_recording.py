@@ -258,3 +258,15 @@ def test_six_copies_of_a_measured_second_have_the_same_indicators():
         assert likeliest.crf_hz == pytest.approx(first.crf_hz, rel=1e-6), suffix
         assert likeliest.crfa == pytest.approx(first.crfa, rel=1e-5), suffix
         assert (peak.crf_hz, peak.crfa) == pytest.approx((highest.crf_hz, highest.crfa), rel=1e-6), suffix
+
+
+def test_time_stamps_give_rate_and_start(tmp_path, monkeypatch):
+    rows = "".join(f"2024-01-31T12:00:{i / 20:06.3f},{i % 5}.5\n" for i in range(400))
+    (tmp_path / "a.csv").write_text("timestamp,acc (g)\n" + rows)
+    recording = read_recording(tmp_path / "a.csv")
+    assert (recording.rate_hz, recording.values.size) == (20.0, 400)
+    assert recording.facts["started"].value == datetime(2024, 1, 31, 12)
+    monkeypatch.setattr("asperity.recording.text._LARGE", 100)
+    large = read_recording(tmp_path / "a.csv")
+    assert np.array_equal(large.values, recording.values)
+    assert large.rate_hz == 20.0

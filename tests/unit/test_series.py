@@ -6,7 +6,7 @@ import pytest
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear.indicators import line_shape
-from asperity.wear.series import _Blocks, _cost, _Parameters, _point, series_resonances
+from asperity.wear.series import _Blocks, _cost, _Line, _objection, _Parameters, _point, series_resonances
 
 BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 6000.0, 1.0)
@@ -159,3 +159,22 @@ def test_of_a_long_series_some_settle_what_all_share():
     assert all(one.found for one in found)
     pulls = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(found, truth, strict=True)])
     assert np.mean(np.abs(pulls) < 1.645) == pytest.approx(0.9, abs=0.07)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, None),
+        ({"evidence": 9.0}, "nothing moves"),
+        ({"misfit": 0.5}, "off by 50 %"),
+        ({"f0": 1805.0}, "edge of the band"),
+        ({"damping": 0.15}, "wider than a contact's damping"),
+        ({"damping": 0.2}, "half the band"),
+        ({"lead": 5.0}, "a line at 2300 Hz would do as well"),
+        ({"f0_std": 130.0}, "cannot be told"),
+    ],
+)
+def test_every_line_that_is_not_the_contacts_is_refused_with_its_reason(changes, words):
+    line = _Line(f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0)
+    said = _objection(line._replace(**changes), BAND)
+    assert said is None if words is None else words in said

@@ -129,6 +129,8 @@ def test_too_few_places_are_called_so():
         ({"x": np.full(12, np.nan)}, "finite"),
         ({"crf_std_hz": -1.0}, "CRF deviation"),
         ({"x_std": -1.0}, "x deviation"),
+        ({"x_std": np.ones(3)}, "one number or 12"),
+        ({"x": [], "crf_hz": []}, "got none"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(changes, named):

@@ -322,8 +322,9 @@ def _line_by_line(chunk: bytes, table: _Table, at: int, column: int | None) -> t
             if table.stamped and values and values[0] is None:
                 stamp = when(fields[0].strip().strip('"'))
                 if stamp is not None:
-                    values[0] = float(len(table.stamps))
-                    table.stamps.append(stamp)
+                    values[0] = 0.0
+                    if column is None:  # a large file's are too many to keep
+                        table.stamps.append(stamp)
             good = [value for value in values if value is not None]
             if len(values) == table.columns and good:
                 if waiting is not None:

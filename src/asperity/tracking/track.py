@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 ALERT, DANGER = 0.5, 0.9  # probability of severe wear
 IN_A_ROW = 3
 QUIET_SHARE = 0.05  # rms over the series' median, below which the machine was off
+MOST_TOGETHER = 400  # recordings separated at once: memory grows with their square, time with their cube
 SAME_LINES = 0.25  # of a line, by which the highest lines of two spectra may differ and still be laid on one another
 ALONE = "modes"  # method where there are too few recordings for the joint separation
 
@@ -329,14 +330,10 @@ def judge(
             f"The joint separation, which tells the contact from the machine by what moves, needs {FEWEST_RECORDINGS} "
             f"recordings and has {len(used)}; --method {chosen} takes for the contact's what stands out of each."
         )
-    resonances: tuple[Resonance, ...] = ()
-    if used:
-        resonances = series_resonances(
-            [one.spectrum for one in cleaned],
-            band_hz=target.band_hz,
-            method=chosen,
-            kept=[one.kept for one in cleaned],
-        )
+    groups = -(-len(used) // MOST_TOGETHER) if chosen == "joint" else 1
+    if groups > 1:
+        notes.append(f"{len(used)} recordings were separated in {groups} groups, each spread over the whole series.")
+    resonances = _resonances(cleaned, target, chosen, groups)
     if method is None and chosen == ALONE:
         resonances = tuple(_whose(resonance) for resonance in resonances)
     by_number = dict(zip(used, zip(cleaned, resonances, strict=True), strict=True))
@@ -509,6 +506,20 @@ def _on_one_grid(series: list[Heard]) -> tuple[list[Heard], list[str]]:
 def _spectrum(one: Heard) -> Any:
     assert one.spectrum is not None
     return one.spectrum
+
+
+def _resonances(cleaned: list[CleanSpectrum], target: Target, method: str, groups: int) -> tuple[Resonance, ...]:
+    """One a spectrum; each group takes every so-manieth spectrum, so that all see the whole series."""
+    found: list[Resonance | None] = [None] * len(cleaned)
+    for first in range(min(groups, len(cleaned))):
+        mine = cleaned[first::groups]
+        found[first::groups] = series_resonances(
+            [one.spectrum for one in mine],
+            band_hz=target.band_hz,
+            method=method,
+            kept=[one.kept for one in mine],
+        )
+    return tuple(one for one in found if one is not None)
 
 
 def _whose(resonance: Resonance) -> Resonance:

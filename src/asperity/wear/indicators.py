@@ -19,7 +19,7 @@ STRONG_EVIDENCE = 10.0  # BIC difference, "very strong": Kass and Raftery, J. Am
 PAPER_PASSES = 3  # "five-point triple smoothing"
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-5, 0.7  # above 0.7 an oscillator has no peak
 MOST_MODES = 8
-MODE_BLOCKS = 1024
+MODE_BLOCKS = 600
 AMBIGUOUS = 0.5  # a second line with more than this share of the strongest's power could be the contact's as well
 START_DAMPINGS = (0.002, 0.007, 0.02, 0.06)
 MOST_BLOCKS = 512  # for the search of a start only
@@ -349,17 +349,19 @@ def _fit_modes(band: _Band, band_hz: tuple[float, float], leakage: Field) -> "_F
 
 
 def _lines_model(frequency: Field, floors: Field, leakage: Field) -> Model:
-    """Expected density and slopes of any number of lines over the floor."""
-    one = _line_model(frequency, floors, leakage)
-    none = np.zeros(2)
+    """Expected density and slopes of any number of lines, as the window shows them, over the floor."""
+    reach = leakage.size // 2
+    spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
+    wide = frequency[0] + spacing * np.arange(-reach, frequency.size + reach)
 
     def model(theta: Field) -> tuple[Field, Field]:
-        total, columns = floors @ theta[-2:], []
-        for first in range(0, theta.size - 2, 3):
-            line, slopes = one(np.concatenate([theta[first : first + 3], none]))
-            total = total + line
-            columns.append(slopes[:, :3])
-        return total, np.column_stack([*columns, floors])
+        level, f0, zeta = np.exp(theta[:-2].reshape(-1, 3, 1)).transpose(1, 0, 2)
+        parts = level[:, None] * np.stack(line_and_slopes(wide, f0, zeta), axis=1)  # (lines, 3, frequencies)
+        if reach:
+            shown = [np.convolve(part, leakage, "valid") for part in parts.reshape(-1, wide.size)]
+            parts = np.reshape(shown, (*parts.shape[:2], frequency.size))
+        expected = parts[:, 0].sum(axis=0) + floors @ theta[-2:]
+        return expected, np.concatenate([parts.reshape(-1, frequency.size), floors.T]).T
 
     return model
 
@@ -433,11 +435,11 @@ def _fit_line(frequency: Field, floors: Field, data: _Data, spectrum: Spectrum, 
     centres = frequency[: count * size].reshape(count, size).mean(axis=1)
     block_floors = floors[: count * size].reshape(count, size, 2).mean(axis=1)
     coarse = [
-        _scoring(_line_model(centres, block_floors, np.ones(1)), start, bounds, blocks)
+        _scoring(_lines_model(centres, block_floors, np.ones(1)), start, bounds, blocks)
         for start in _starts(centres, blocks.density)
     ]
     best = min(coarse, key=lambda fit: fit.cost)
-    return _scoring(_line_model(frequency, floors, _leakage(spectrum)), best.parameters, bounds, data)
+    return _scoring(_lines_model(frequency, floors, _leakage(spectrum)), best.parameters, bounds, data)
 
 
 def _starts(frequency: Field, density: Field) -> list[Field]:
@@ -466,22 +468,6 @@ def _leakage(spectrum: Spectrum) -> Field:
     reach = int(np.flatnonzero(near[half:] > 1e-4)[-1])
     near = near[half - reach : half + reach + 1]
     return np.asarray(near / near.sum())
-
-
-def _line_model(frequency: Field, floors: Field, leakage: Field) -> Model:
-    """Expected density and slopes: the line as the window shows it, plus the floor."""
-    reach = leakage.size // 2
-    spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
-    wide = frequency[0] + spacing * np.arange(-reach, frequency.size + reach)
-
-    def model(theta: Field) -> tuple[Field, Field]:
-        level, f0, zeta = np.exp(theta[:3])
-        line, by_f0, by_damping = (
-            level * (np.convolve(part, leakage, "valid") if reach else part) for part in line_and_slopes(wide, f0, zeta)
-        )
-        return line + floors @ theta[3:], np.column_stack([line, by_f0, by_damping, floors])
-
-    return model
 
 
 def _scoring(model: Model, start: Field, bounds: _Bounds, data: _Data) -> _Fit:

@@ -43,8 +43,9 @@ STANDING = 0.1  # standard deviation of a line's places over its width, below wh
 MOVES = "moves against what all recordings share"
 STANDS = "keeps its place and changes its height; CRFA is the part that changes, a lower bound"
 SLOPE_STEP, STEEPEST = 0.1, 2.0
-COMMON_FROM = 0.5  # share of what all recordings share in a block, from which its residual is the machine's
-WITNESS_FROM = 0.9
+COMMON_FROM = 0.1  # share of what all recordings share in a block, from which its residual is the machine's
+WITNESS_FROM = 0.8  # of a parameter's influence, that a witness has to cover
+TINY = 1e-100
 RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
 
 
@@ -440,11 +441,12 @@ def _misfit(blocks: _Blocks, joint: _Joint, witnesses: list[int]) -> Field:
     change = np.where(counts, (blocks.density / expected - 1.0)[witnesses] / share, 0.0)
     by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[witnesses], 1.0) * share**2), 0.0)
     heard = np.einsum("npb,jb->npj", felt, change, optimize=True) ** 2
-    heard -= np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
+    expected_of_chance = np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
     whole = np.einsum("npb,jb->npj", felt**2, counts.astype(float), optimize=True)
-    # a recording counts as a witness where it is the machine's alone over nearly all that matters
-    witness = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
-    variance = np.sum(heard * witness, axis=2) / np.maximum(np.sum(witness, axis=2), 1)
+    # a witness has to be heard over nearly all that matters; the less chance blurs it, the more it counts
+    heard_enough = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
+    witness = heard_enough / np.maximum(expected_of_chance, TINY) ** 2
+    variance = np.sum((heard - expected_of_chance) * witness, axis=2) / np.maximum(np.sum(witness, axis=2), TINY)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
@@ -457,7 +459,6 @@ def _judged(
     witnesses: list[int],
 ) -> tuple[Resonance, ...]:
     """Which of the lines are there, each with its reason."""
-    low, high = band_hz
     own, base, _ = joint.parameters
     expected = _expected(blocks, joint.parameters)
     with_line = np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1)
@@ -476,63 +477,89 @@ def _judged(
     )
     cost, _ = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, base)), templates)
 
-    places = own[evidence > STRONG_EVIDENCE, 1]
-    widths = 2.0 * np.exp(own[evidence > STRONG_EVIDENCE, 2])
+    significant = evidence > STRONG_EVIDENCE
+    places, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
     # a line that keeps its place can lend any part of its height to what all recordings share
     stands = places.size > 0 and float(np.std(places)) < STANDING * float(np.median(widths))
     found = []
     for i in range(own.shape[0]):
-        level, f0, zeta, gain = np.exp(own[i])
-        level_std, f0_std, zeta_std = std[i, :3] * [level, f0, zeta]
-        width = 2.0 * zeta * f0
-        away = np.abs(templates.f0 - f0) > 3.0 * width
-        rival = templates.f0[away][np.argmin(cost[i, away])] if np.any(away) else np.nan
-        lead = float(np.min(cost[i, away]) - np.min(cost[i, ~away])) if np.any(away) and np.any(~away) else np.inf
-        objection = None
-        if evidence[i] < STRONG_EVIDENCE:
-            objection = (
-                f"nothing moves or changes height against what all recordings share between {low:.0f} and "
-                f"{high:.0f} Hz (BIC {evidence[i]:+.1f})"
-            )
-        elif misfit[i] > LARGEST_MISFIT:
-            objection = (
-                f"the spectrum is not what all recordings share and one line beside it (off by {100 * misfit[i]:.0f} % "
-                "beyond chance)"
-            )
-        elif not low + 3.0 * f0_std < f0 < high - 3.0 * f0_std:
-            objection = f"what stands out peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
-        elif width > (high - low) / 2.0:
-            objection = (
-                f"the line at {f0:.0f} Hz is wider than half the band ({width:.0f} Hz): a slope, not a resonance"
-            )
-        elif zeta > HEAVIEST_DAMPING:
-            objection = (
-                f"the line at {f0:.0f} Hz is wider than a contact's damping makes one ({width:.0f} Hz, damping ratio "
-                f"{zeta:.2g}; {HEAVIEST_DAMPING:g} is the most): a slope, or part of the machine"
-            )
-        elif lead < RIVAL:
-            objection = f"a line at {rival:.0f} Hz would do as well as the one at {f0:.0f} Hz"
-        elif f0_std > width:
-            objection = f"the line at {f0:.0f} Hz cannot be told from what all recordings share (± {f0_std:.0f} Hz)"
-        common = (blocks.centre, gain * bare)
+        level, f0, zeta, gain = (float(value) for value in np.exp(own[i]))
+        level_std, f0_std, zeta_std = (float(value) for value in std[i, :3] * [level, f0, zeta])
+        line = _Line(f0, f0_std, zeta, float(evidence[i]), float(misfit[i]), *_rival(f0, zeta, cost[i], templates))
+        objection = _objection(line, band_hz)
         if objection is not None:
-            silent = no_resonance(objection, band_hz, "joint", evidence=float(evidence[i]))
+            silent = no_resonance(objection, band_hz, "joint", evidence=line.evidence)
             found.append(replace(silent, background=(blocks.centre, alone[i])))
             continue
         found.append(
             Resonance(
-                crf_hz=float(f0),
-                crfa=float(level),
-                crf_std=float(f0_std),
-                crfa_std=np.nan if stands else float(level_std),
+                crf_hz=f0,
+                crfa=level,
+                crf_std=f0_std,
+                crfa_std=np.nan if stands else level_std,
                 found=True,
-                reason=f"a line {width:.0f} Hz wide {STANDS if stands else MOVES} (BIC {evidence[i]:+.0f})",
+                reason=f"a line {line.width:.0f} Hz wide {STANDS if stands else MOVES} (BIC {line.evidence:+.0f})",
                 band_hz=band_hz,
                 method="joint",
-                damping_ratio=float(zeta),
-                damping_ratio_std=float(zeta_std),
-                evidence=float(evidence[i]),
-                background=common,
+                damping_ratio=zeta,
+                damping_ratio_std=zeta_std,
+                evidence=line.evidence,
+                background=(blocks.centre, gain * bare),
             )
         )
     return tuple(found)
+
+
+class _Line(NamedTuple):
+    """A recording's line as it is judged; `lead` in ln likelihood over a line at `rival`, the best place elsewhere."""
+
+    f0: float
+    f0_std: float
+    damping: float
+    evidence: float
+    misfit: float
+    rival: float
+    lead: float
+
+    @property
+    def width(self) -> float:
+        return 2.0 * self.damping * self.f0
+
+
+def _rival(f0: float, damping: float, cost: Field, templates: _Templates) -> tuple[float, float]:
+    """The best place more than three widths away, and by how much the line's own is better."""
+    away = np.abs(templates.f0 - f0) > 6.0 * damping * f0
+    if np.all(away) or not np.any(away):
+        return np.nan, np.inf
+    return float(templates.f0[away][np.argmin(cost[away])]), float(np.min(cost[away]) - np.min(cost[~away]))
+
+
+def _objection(line: _Line, band_hz: tuple[float, float]) -> str | None:
+    """Why a line is not the contact's, or cannot be told to be."""
+    low, high = band_hz
+    if line.evidence < STRONG_EVIDENCE:
+        return (
+            f"nothing moves or changes height against what all recordings share between {low:.0f} and {high:.0f} Hz "
+            f"(BIC {line.evidence:+.1f})"
+        )
+    if line.misfit > LARGEST_MISFIT:
+        return (
+            f"the spectrum is not what all recordings share and one line beside it (off by {100 * line.misfit:.0f} % "
+            "beyond chance)"
+        )
+    if not low + 3.0 * line.f0_std < line.f0 < high - 3.0 * line.f0_std:
+        return f"what stands out peaks at or beyond the edge of the band {low:.0f} to {high:.0f} Hz"
+    if line.width > (high - low) / 2.0:
+        return (
+            f"the line at {line.f0:.0f} Hz is wider than half the band ({line.width:.0f} Hz): a slope, not a resonance"
+        )
+    if line.damping > HEAVIEST_DAMPING:
+        return (
+            f"the line at {line.f0:.0f} Hz is wider than a contact's damping makes one ({line.width:.0f} Hz, damping "
+            f"ratio {line.damping:.2g}; {HEAVIEST_DAMPING:g} is the most): a slope, or part of the machine"
+        )
+    if line.lead < RIVAL:
+        return f"a line at {line.rival:.0f} Hz would do as well as the one at {line.f0:.0f} Hz"
+    if line.f0_std > line.width:
+        return f"the line at {line.f0:.0f} Hz cannot be told from what all recordings share (± {line.f0_std:.0f} Hz)"
+    return None

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
@@ -56,12 +57,12 @@ class Stages:
 
 
 def split_stages(
-    x: Field,
-    crf_hz: Field,
-    crfa: Field | None = None,
+    x: ArrayLike,
+    crf_hz: ArrayLike,
+    crfa: ArrayLike | None = None,
     *,
-    crf_std_hz: Field | float | None = None,
-    x_std: Field | float | None = None,
+    crf_std_hz: ArrayLike | None = None,
+    x_std: ArrayLike | None = None,
     detector: str = "bayesian",
     unit: str = "",
 ) -> Stages:
@@ -99,8 +100,11 @@ def split_stages(
     return STAGE_DETECTORS[detector](x, crf_hz, second, crf_std, x_error, unit)
 
 
-def _deviations(name: str, value: Field | float | None, recordings: int) -> Field:
-    deviations = np.zeros(recordings) if value is None else np.broadcast_to(np.asarray(value, dtype=float), recordings)
+def _deviations(name: str, value: ArrayLike | None, recordings: int) -> Field:
+    given = np.asarray(0.0 if value is None else value, dtype=float)
+    if given.shape not in ((), (recordings,)):
+        raise BadInput(f"{name} must be one number or {recordings}, one a recording, got shape {given.shape}")
+    deviations = np.broadcast_to(given, recordings)
     if np.any(deviations[np.isfinite(deviations)] < 0.0):
         raise BadInput(f"{name} must be 0 or more, got {np.nanmin(deviations):g}; give standard deviations")
     return np.where(np.isfinite(deviations), deviations, 0.0)
