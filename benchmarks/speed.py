@@ -120,12 +120,12 @@ def _tamaas_seconds(surface: Surface, conditions: ContactConditions) -> float:
     import tamaas as tm
 
     grid = surface.grid
-    model = tm.Model(tm.model_type.basic_2d, list(grid.extent), list(grid.cells))
-    model.E, model.nu = conditions.pair.reduced_modulus, 0.0
     form = -(grid.x[:, None] ** 2) / (2.0 * conditions.radius_along_rolling) * np.ones(grid.cells)
     pressure = conditions.line_load / grid.extent[0]
 
-    def solve() -> None:
+    def solve() -> None:  # a model each, or it starts from what it found before
+        model = tm.Model(tm.model_type.basic_2d, list(grid.extent), list(grid.cells))
+        model.E, model.nu = conditions.pair.reduced_modulus, 0.0
         solver = tm.PolonskyKeerRey(model, surface.heights + form, 1e-8)
         solver.solve(pressure)
 

@@ -1,5 +1,7 @@
 """The paper's contact, built by hand: what most of the tests press together."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
@@ -8,6 +10,19 @@ from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.surface import gaussian_surface
 
 RADIUS, ETA0 = 5.4e-3, 0.096
+
+
+@dataclass(frozen=True)
+class FirstPrinted:
+    """Dowson and Higginson (1966) before rounding."""
+
+    rho0: float = 880.0
+
+    def __call__(self, p):
+        return self.rho0 * (5.9e8 + 1.34 * p) / (5.9e8 + p)
+
+    def slope(self, p):
+        return self.rho0 * 0.34 * 5.9e8 / (5.9e8 + p) ** 2
 
 
 def contact(*, speed=1.91, **changes):

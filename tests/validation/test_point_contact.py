@@ -12,8 +12,9 @@ from asperity.ehl.solution import Options
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import contact_state
 from asperity.grid import Grid
-from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
+from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
 from asperity.surface import flat_surface
+from reference_solvers.paper import FirstPrinted
 
 PAIR = ElasticPair((200e9, 200e9), (0.3, 0.3))
 RADIUS, ETA0, ALPHA = 12.5e-3, 0.04, 22e-9
@@ -39,7 +40,7 @@ def films(conditions: ContactConditions, oil: Lubricant, cells: int) -> tuple[fl
 
 
 BARUS = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=Newtonian())
-ROELANDS = Lubricant(viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian())
+ROELANDS = Lubricant(viscosity=Roelands(ETA0, ALPHA), density=FirstPrinted(870.0), rheology=Newtonian())
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ rounded coefficients of the package, 0.6 and 1.7 1/GPa, central films are 0.5 % 
 """
 
 import csv
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -20,26 +19,13 @@ from asperity.ehl.state import contact_state
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import flat_surface
 from reference_solvers.line import Oil, line_contact
-from reference_solvers.paper import ETA0, RADIUS, contact, grid
+from reference_solvers.paper import ETA0, RADIUS, FirstPrinted, contact, grid
 
 TABLE = Path(__file__).parents[1] / "reference" / "smooth_line_contact.csv"
 ROWS = list(csv.DictReader(TABLE.read_text().splitlines()))
 HERTZ = contact().hertz
 A, P_H = HERTZ.half_widths[0], HERTZ.p_max
 GAP = A**2 / RADIUS
-
-
-@dataclass(frozen=True)
-class FirstPrinted:
-    """Dowson and Higginson (1966) before rounding."""
-
-    rho0: float = 880.0
-
-    def __call__(self, p):
-        return self.rho0 * (5.9e8 + 1.34 * p) / (5.9e8 + p)
-
-    def slope(self, p):
-        return self.rho0 * 0.34 * 5.9e8 / (5.9e8 + p) ** 2
 
 
 def name(row):

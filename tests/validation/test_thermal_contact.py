@@ -70,7 +70,7 @@ def test_without_feedback_heat_is_only_a_result():
     assert rolling.viscosity_factor is None
 
 
-def test_a_runaway_law_is_tamed_or_refused():
+def test_a_runaway_law_is_tamed(monkeypatch):
     """Newtonian oil at full Barus viscosity makes thousands of kelvins isothermally; its own heat thins it."""
     cold = solve_contact(contact(), barus(), SMOOTH)
     unlimited = replace(cold, lubricant=oil(NewtonianShear()))
@@ -79,8 +79,10 @@ def test_a_runaway_law_is_tamed_or_refused():
     assert 10.0 < fed_back[1].film_max_k < 300.0
     assert fed_back[0].coefficient < 0.5 * isothermal[0].coefficient
     touchy = replace(WARM, warmth=ExponentialWarmth(50.0))
+    assert 0.0 < friction_and_heat(unlimited, thermal=touchy)[1].film_max_k < fed_back[1].film_max_k
+    monkeypatch.setattr("asperity.ehl.thermal.MOST_ROUNDS", 2)
     with pytest.raises(AsperityError, match="did not settle"):
-        friction_and_heat(unlimited, thermal=touchy)
+        friction_and_heat(unlimited, thermal=WARM)
 
 
 def test_an_unfinished_contact_is_told():

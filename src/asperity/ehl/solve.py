@@ -118,19 +118,21 @@ class _Search:
         self.history: list[Iteration] = []
         self.figures: list[Figures] = []  # a grid each, since the last climb began
         self.iteration_error: Figures | None = None
+        self.smooth = False
         self.lost = False
 
     @property
     def discretisation_error(self) -> Figures | None:
-        """From the last grids: their difference is three times what a second-order solution is off by.
+        """From the last grids, Roache's grid convergence index: their difference for a smooth, second-order solution.
 
-        A rough one has no such order, so no less than the whole difference is taken, and no less than a quarter of
-        that between the grids before, lest two grids agree by chance.
+        That is three times its error. A rough one has no such order and gets twice the difference, but no less than a
+        quarter of that between the grids before, lest two grids agree by chance. Source: P. J. Roache, J. Fluids Eng.
+        116 (1994) 405.
         """
         if len(self.figures) < 2:
             return None
         *before, coarse, fine = self.figures
-        error = fine.off(coarse)
+        error = fine.off(coarse).times(1.0 if self.smooth else 2.0)
         return error.at_least(coarse.off(before[-1]).times(0.25)) if before else error
 
     def settled(self, tolerance: float) -> bool:
@@ -140,7 +142,7 @@ class _Search:
 
     def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
         """Solve on grid after grid, from the last, coarsest one to the first."""
-        options, self.figures = self.options, []
+        options, self.figures, self.smooth = self.options, [], levels[0].smooth
         for problem in reversed(levels):
             coarsest, finest = problem is levels[-1], problem is levels[0]
             tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)

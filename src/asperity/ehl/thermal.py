@@ -57,7 +57,10 @@ def friction_and_heat(
         left = float(np.max(np.abs(change)))
         if left < SETTLED * max(heat.film_max_k, LEAST_RISE):
             return rubbing, heat
-        rise = mixer(rise, change)
+        # a cell's own warming thins its oil and cools it: the step of Newton's method that sees this and nothing else
+        warm = thermal.ambient + rise
+        thinning = np.log(warm_factor(solution, thermal, warm) / warm_factor(solution, thermal, warm + 1.0))
+        rise = mixer(rise, change / (1.0 + thinning * np.maximum(heat.film, 0.0)))
     raise AsperityError(
         f"friction and temperature did not settle: {left:.2g} K apart after {MOST_ROUNDS} rounds; "
         "take the feedback of heat out, or a friction law with a limit"

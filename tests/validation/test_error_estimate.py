@@ -1,0 +1,91 @@
+"""What a solution says of its own error, against solutions on much finer grids; and how a failed attempt is mended."""
+
+import numpy as np
+import pytest
+
+import asperity.ehl.solve as solving
+from asperity.ehl.iterate import newton
+from asperity.ehl.solution import ATTEMPTS, Options
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.state import contact_state
+from asperity.surface import flat_surface
+from reference_solvers.paper import barus, contact, grid, rough
+
+CONDITIONS, OIL = contact(hardness=2e9), barus()
+
+
+def solved(surface, **given):
+    return solve_contact(CONDITIONS, OIL, surface, **given)
+
+
+@pytest.mark.parametrize("cells", [96, 192])
+def test_smooth_films_are_off_by_no_more_than_stated(cells):
+    here, true = (solved(flat_surface(grid((n, 8))), options=Options(tolerance=1e-7)) for n in (cells, 3072))
+    error, state, truth = here.convergence.error, contact_state(here), contact_state(true)
+    for name in ("h_central", "h_min"):
+        off = abs(getattr(state, name) - getattr(truth, name))
+        assert off < getattr(error, name) < 40.0 * off
+    assert error.clr == error.car == 0.0
+
+
+@pytest.mark.parametrize("sq", [1e-6, 2e-6])
+def test_load_shares_are_off_by_about_what_is_stated(sq):
+    """One surface on two grids; the median over four surfaces, because a bound from two grids is no certainty."""
+    ratios = []
+    for seed in range(4):
+        coarse, fine = (solved(rough(grid((n, n)), sq, seed=seed, correlation_length=40e-6)) for n in (96, 192))
+        off = abs(contact_state(coarse).clr - contact_state(fine).clr)
+        assert coarse.convergence.error.clr > 0.0
+        ratios.append(off / coarse.convergence.error.clr)
+    assert np.median(ratios) < 0.8
+    assert np.median(ratios) > 0.05
+
+
+def test_a_single_grid_has_no_estimate_and_a_warm_start_hands_its_own_on():
+    small = solved(rough(grid((64, 48)), 1e-6, correlation_length=40e-6))
+    assert small.convergence.discretisation_error is None
+    assert small.convergence.error is None
+    first = solved(rough(grid((96, 96)), 1e-6, correlation_length=40e-6))
+    again = solved(rough(grid((96, 96)), 1.05e-6, correlation_length=40e-6), start=first)
+    assert again.convergence.discretisation_error == first.convergence.discretisation_error
+    assert again.convergence.iteration_error.clr < 1e-3
+
+
+def test_any_number_of_cells_will_do():
+    even, odd = (
+        contact_state(solved(rough(grid(cells), 1e-6, correlation_length=40e-6))) for cells in ((96, 96), (97, 95))
+    )
+    assert odd.clr == pytest.approx(even.clr, abs=0.05)
+
+
+def test_what_fails_at_first_is_tried_with_the_bodies_held(monkeypatch):
+    surface = rough(grid((64, 48)), 1e-6, correlation_length=40e-6)
+    usual = solved(surface)
+    assert usual.convergence.attempt == ATTEMPTS[0]
+
+    def lame(problem, pressure, approach, *, held=False):
+        for step in newton(problem, pressure, approach, held=held):
+            yield step
+            while not held:  # never takes a step
+                yield step
+
+    monkeypatch.setattr(solving, "newton", lame)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solving._Search, "run", counted(solving._Search.run))
+        mended = solved(surface)
+    assert mended.convergence.attempt == ATTEMPTS[1]
+    assert ATTEMPTS[1] in mended.convergence.explain()
+    assert contact_state(mended).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
+
+
+def counted(run):
+    """`run`, bounded: steps that go nowhere do not count themselves."""
+
+    def bounded(self, problem, steps, tolerance, most, *, of_load=True):
+        def numbered():
+            for number, step in enumerate(steps):
+                yield type(step)(number, step.balance, step.approach, step.change if np.isfinite(step.change) else 1.0)
+
+        return run(self, problem, numbered(), tolerance, most, of_load=of_load)
+
+    return bounded
