@@ -12,6 +12,7 @@ import tamaas
 from asperity.ehl.solution import Options
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import contact_state
+from asperity.grid import Grid
 from asperity.surface import Surface, flat_surface
 from reference_solvers.paper import RADIUS, contact, grid, rough
 
@@ -101,3 +102,25 @@ def test_a_wave_pressed_flat_adds_its_own_pressure():
     np.testing.assert_allclose(
         middle.mean(axis=1), P_H * np.sqrt(1.0 - (ON.x[np.abs(ON.x) < 0.3 * A] / A) ** 2), rtol=0.01
     )
+
+
+@pytest.mark.parametrize("full", [0.8, 1.5, 3.0])
+def test_short_waves_are_westergaards(full):
+    """Waves along y much shorter than the contact is wide feel its mean pressure as if it went on for ever.
+
+    `full` is the pressure p* = π E* Δ/λ that presses them flat, over Hertz's. Contact on the share (2/π) asin √s of a
+    wave and the mean gap Δ (1 - s + s ln s) at s = p/p*: Westergaard (1939), Johnson (1985) eqs 13.8-13.10.
+    """
+    conditions, cells = contact(), 128
+    a, p_max = conditions.hertz.half_widths[0], conditions.hertz.p_max
+    length, p_flat = 0.2 * a, full * p_max
+    amplitude = p_flat * length / (np.pi * conditions.pair.reduced_modulus)
+    on = Grid((cells, cells), (-1.5 * a, 0.0), (1.5 * a, length))
+    wave = amplitude * np.cos(2.0 * np.pi * on.y / length)
+    solution = solve_contact(conditions, None, Surface(np.tile(wave, (cells, 1)), on), options=Options(tolerance=1e-8))
+    for line in (64, 80, 96):  # x/a = 0.01, 0.39, 0.76
+        share = min(float(solution.pressure[line].mean()) / p_flat, 1.0)
+        touching = 2.0 / np.pi * np.arcsin(np.sqrt(share))
+        mean_gap = amplitude * (1.0 - share + share * np.log(share))
+        assert solution.in_contact[line].mean() == pytest.approx(touching, abs=1.5 / cells)
+        assert solution.gap[line].mean() == pytest.approx(mean_gap, rel=0.01, abs=2e-3 * amplitude)

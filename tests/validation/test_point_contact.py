@@ -57,8 +57,8 @@ def test_films_of_a_ball_on_a_flat(m, l, oil, h_central, h_min):  # noqa: E741
     conditions, unit = moes_contact(m, l)
     (coarse_c, coarse_m), (fine_c, fine_m) = (films(conditions, oil, cells) for cells in (96, 192))
     extrapolated_c, extrapolated_m = fine_c + (fine_c - coarse_c) / 3.0, fine_m + (fine_m - coarse_m) / 3.0
-    assert extrapolated_c / unit == pytest.approx(h_central, rel=0.01)
-    assert extrapolated_m / unit == pytest.approx(h_min, rel=0.01)
+    assert extrapolated_c / unit == pytest.approx(h_central, rel=0.005)
+    assert extrapolated_m / unit == pytest.approx(h_min, rel=0.005)
     assert abs(fine_c / unit - h_central) < abs(coarse_c / unit - h_central) / 2.0
 
 
