@@ -31,15 +31,59 @@ class Mutation:
 
 MUTATIONS = (
     Mutation("wedge: 2 % too much oil dragged in", "ehl/scales.py", "12.0 * ", "12.24 * ", SMOOTH),
-    Mutation("Poiseuille flow: h cubed becomes h squared", "ehl/problem.py", "content * height**2", "content * height", SMOOTH),
-    Mutation("density: held at its ambient value", "ehl/problem.py", "content = density * height", "content = height", SMOOTH),
-    Mutation("viscosity: 2 % too steep", "ehl/problem.py", "viscosity = oil.viscosity(pascals)", "viscosity = oil.viscosity(1.02 * pascals)", SMOOTH),
-    Mutation("deformation: 1 % too stiff", "ehl/deflection.py", "waves *= self.spectrum", "waves *= 0.99 * self.spectrum", HERTZ),
-    Mutation("cap: 5 % too high", "ehl/solve.py", "conditions.hardness / scales.pressure", "1.05 * conditions.hardness / scales.pressure", DRY),
-    Mutation("load balance: 0.1 % too little carried", "ehl/problem.py", "/ self.problem.load - 1.0", "/ self.problem.load - 0.999", MIXED),
-    Mutation("contact: asperities may overlap by 2 nm", "ehl/problem.py", "touching = (gap - self.contact_gap)", "touching = (gap - 0.6 * self.contact_gap)", MIXED),
-    Mutation("Jacobian: mobility's slope in the gap left out", "kernels/reynolds.py", "d_log[j] = log_h[0, j] * d_gap[0, j] + ", "d_log[j] = ", KERNELS),
-)  # fmt: skip
+    Mutation(
+        "Poiseuille flow: h cubed becomes h squared",
+        "ehl/problem.py",
+        "content * height**2",
+        "content * height",
+        SMOOTH,
+    ),
+    Mutation(
+        "density: held at its ambient value", "ehl/problem.py", "content = density * height", "content = height", SMOOTH
+    ),
+    Mutation(
+        "viscosity: 2 % too steep",
+        "ehl/problem.py",
+        "viscosity = oil.viscosity(pascals)",
+        "viscosity = oil.viscosity(1.02 * pascals)",
+        SMOOTH,
+    ),
+    Mutation(
+        "deformation: 1 % too stiff",
+        "ehl/deflection.py",
+        "waves *= self.spectrum",
+        "waves *= 0.99 * self.spectrum",
+        HERTZ,
+    ),
+    Mutation(
+        "cap: 5 % too high",
+        "ehl/solve.py",
+        "conditions.hardness / scales.pressure",
+        "1.05 * conditions.hardness / scales.pressure",
+        DRY,
+    ),
+    Mutation(
+        "load balance: 0.1 % too little carried",
+        "ehl/problem.py",
+        "/ self.problem.load - 1.0",
+        "/ self.problem.load - 0.999",
+        MIXED,
+    ),
+    Mutation(
+        "contact: asperities may overlap by 2 nm",
+        "ehl/problem.py",
+        "touching = (gap - self.contact_gap)",
+        "touching = (gap - 0.6 * self.contact_gap)",
+        MIXED,
+    ),
+    Mutation(
+        "Jacobian: mobility's slope in the gap left out",
+        "kernels/reynolds.py",
+        "d_log[j] = log_h[0, j] * d_gap[0, j] + ",
+        "d_log[j] = ",
+        KERNELS,
+    ),
+)
 
 
 def caught(mutation: Mutation) -> str | None:
