@@ -19,6 +19,7 @@ from asperity.surface import flat_surface
 
 PAIR = ElasticPair((200e9, 200e9), (0.3, 0.3))
 RADIUS, ETA0, ALPHA = 12.5e-3, 0.04, 22e-9
+NO_FLOOR = 1e-13  # [m]: low speeds make films of less than the usual contact film
 ROELANDS = Lubricant(viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian())
 BARUS = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=Newtonian())
 REFERENCE = {  # M, L, oil: central and least film, Richardson from 257 and 513 points, X -4.5..1.5, Y -3..3
@@ -65,7 +66,9 @@ def ball_films(
     found = []
     for n in (cells // 2, cells):
         grid = Grid((n, n), (-reach * a, -wide * b), (reach / 3.0 * a, wide * b), periodic=(False, False))
-        solution = solve_contact(conditions, oil, flat_surface(grid), options=Options(tolerance=1e-5))
+        solution = solve_contact(
+            conditions, oil, flat_surface(grid), options=Options(tolerance=1e-5, contact_film=NO_FLOOR)
+        )
         middle = solution.gap[:, n // 2 - 1 : n // 2 + 1].mean(axis=1)
         found.append((np.interp(0.0, grid.x, middle) / unit, solution.gap.min() / unit, solution.convergence.seconds))
     (coarse_c, coarse_m, _), (fine_c, fine_m, seconds) = found
@@ -117,7 +120,9 @@ def line_films(load_number: float, oil_number: float, law: str, cells: int) -> t
     a = conditions.hertz.half_widths[0]
     reach = 10.0 if load_number <= 10.0 else 4.5 if load_number <= 20.0 else 2.5  # thin films need a short inlet only
     grid = Grid((cells, 8), (-reach * a, -a), (max(1.4, 0.3 * reach) * a, a))
-    solution = solve_contact(conditions, oil, flat_surface(grid), options=Options(tolerance=1e-7))
+    solution = solve_contact(
+        conditions, oil, flat_surface(grid), options=Options(tolerance=1e-7, contact_film=NO_FLOOR)
+    )
     return float(np.interp(0.0, grid.x, solution.gap[:, 0]) / unit), float(solution.gap.min() / unit)
 
 

@@ -185,8 +185,9 @@ def _error_bars(*, fast: bool) -> Iterator[str]:
             cases += 1
             for name in held:
                 off = abs(getattr(state, name) - getattr(truth, name))
-                held[name] += off <= getattr(error, name)
-                factors.append(getattr(error, name) / off)
+                held[name] += bool(off <= getattr(error, name))
+                if off > 0.0:
+                    factors.append(getattr(error, name) / off)
     counts = ", ".join(f"{name} in {count}" for name, count in held.items())
     yield (
         f"Of {cases} contacts at 256 x 256 the stated error holds the difference to 512 x 512 for {counts}; "

@@ -1,4 +1,4 @@
-"""Rough, dry contact against tamaas, with and without a cap of the pressure, and a wave that is pressed flat.
+"""Rough, dry contact against tamaas, with and without a cap of the pressure, and waves against Westergaard.
 
 tamaas repeats along x as well. Its domain is eight times as wide, and the parabola is flattened by what the images of
 the line load, a spacing L apart, bend it back: -(1/pi) ln|2 sin(pi X/L)| = -(1/pi) ln|X| + const + pi X^2/(6 L^2), so
@@ -13,7 +13,7 @@ from asperity.ehl.solution import Options
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import contact_state
 from asperity.grid import Grid
-from asperity.surface import Surface, flat_surface
+from asperity.surface import Surface, flat_surface, gaussian_surface
 from reference_solvers.paper import RADIUS, contact, grid, rough
 
 A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
@@ -124,3 +124,28 @@ def test_short_waves_are_westergaards(full):
         mean_gap = amplitude * (1.0 - share + share * np.log(share))
         assert solution.in_contact[line].mean() == pytest.approx(touching, abs=1.5 / cells)
         assert solution.gap[line].mean() == pytest.approx(mean_gap, rel=0.01, abs=2e-3 * amplitude)
+
+
+@pytest.mark.parametrize(("sq", "seed"), [(0.1e-6, 1), (0.3e-6, 2)])
+def test_a_rough_ball_is_tamaas_without_images(sq, seed):
+    """Neither repeats anywhere: the same cells, the same Love kernel, another solver (Polonsky and Keer)."""
+    ball = contact(geometry="point", radius=10e-3, length=None, load=20.0)
+    a, cells = ball.hertz.half_widths[0], 96
+    corners = (-1.6 * a, -1.6 * a), (1.6 * a, 1.6 * a)
+    rng = np.random.default_rng(seed)
+    heights = gaussian_surface(Grid((cells, cells), *corners), sq=sq, correlation_length=0.4 * a, rng=rng).heights
+    on = Grid((cells, cells), *corners, periodic=(False, False))
+    solution = solve_contact(ball, None, Surface(heights, on), options=Options(tolerance=1e-8))
+
+    tamaas.set_log_level(tamaas.LogLevel.error)
+    side, modulus = on.extent[0] / a, ball.pair.reduced_modulus
+    model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [side, side], [cells, cells])
+    model.E, model.nu = 1.0, 0.0  # stresses in units of E*
+    tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
+    bowl = -(on.x[:, None] ** 2 + on.y**2) / (2.0 * ball.radius)
+    twin = tamaas.PolonskyKeerRey(model, (bowl + heights) / a, 1e-12)
+    twin.setIntegralOperator("dcfft")
+    twin.solve(ball.load / on.extent[0] ** 2 / modulus)
+    expected = model.traction * modulus
+    np.testing.assert_array_equal(solution.in_contact, expected > 0.0)
+    assert np.linalg.norm(solution.pressure - expected) < 1e-6 * np.linalg.norm(expected)
