@@ -25,7 +25,6 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainValidator,
-    PositiveFloat,
     PositiveInt,
     Strict,
     ValidationError,
@@ -271,7 +270,7 @@ class MaterialSection(Section):
     youngs_modulus: Annotated[tuple[Pressure, Pressure], _Twice]
     poisson_ratio: Annotated[tuple[Number, Number], _Twice]
     hardness: Annotated[Pressure | None, _Optional] = None
-    boundary_friction: Annotated[PositiveFloat, Strict(), Field(le=2.0)] = BOUNDARY_FRICTION
+    boundary_friction: Annotated[float, Strict(), Field(ge=0.0, le=2.0)] = BOUNDARY_FRICTION
 
 
 class GaussianSection(Section):

@@ -13,7 +13,7 @@ from asperity.case import Case
 from asperity.conditions import ContactConditions
 from asperity.ehl.solution import ContactSolution, Iteration
 from asperity.ehl.state import contact_state
-from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
+from asperity.ehl.thermal import HOT, friction_and_heat, solve_thermal_contact
 from asperity.errors import BadInput, require_positive
 from asperity.surface import Surface
 
@@ -24,7 +24,6 @@ SPEEDS = 13
 SLIP_RANGE = (1e-3, 0.5)
 SLIPS = 14
 MOST_SLIP = 1000.0
-HOT = 30.0  # rise of the film [K] that no oil stays as viscous through
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

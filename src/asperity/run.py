@@ -29,7 +29,7 @@ from asperity.ehl.solution import ContactSolution, Iteration
 from asperity.ehl.state import ContactState, contact_state
 from asperity.ehl.storage import load_solution, save_dataset
 from asperity.ehl.stress import SubsurfaceStress, subsurface_stress
-from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
+from asperity.ehl.thermal import HOT, friction_and_heat, solve_thermal_contact
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.surface import Surface
 
@@ -77,6 +77,18 @@ class Run:
     def heat(self) -> FlashTemperature | None:
         """Temperatures that friction causes; None where there is no friction."""
         return None if isinstance(self._rubbing, str) else self._rubbing[1]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """`notes`, and what a reader of friction and heat has to know."""
+        heat = self.heat
+        if heat is None or self.case.thermal.feedback or heat.film_max_k < HOT or self.solution.lubricant is None:
+            return self.notes
+        hot = (
+            f"The film warms up by up to {heat.film_max_k:.4g} K, and its oil is taken as viscous as when cold: "
+            "friction and temperatures are too high; set thermal.feedback=true to let it thin."
+        )
+        return (*self.notes, hot)
 
     @property
     def friction_failure(self) -> str | None:

@@ -94,6 +94,21 @@ def test_track_says_what_it_assumed_and_what_it_left_out(asp, rig):
     assert Path("t.csv").is_file()
 
 
+def test_a_copy_is_named_and_too_few_places_have_no_stage(asp, rig, tmp_path):
+    folder, _ = rig
+    few = tmp_path / "few"
+    few.mkdir()
+    for file in sorted(folder.glob("*.h5"))[:3]:
+        shutil.copy(file, few)
+    shutil.copy(file, few / "copy.h5")
+    code, out, _ = asp("track", str(few), "--method", "peak", "--rate", "20 kHz", "--json")
+    said = json.loads(out)
+    assert code == 0
+    assert any("copy.h5" in note and "hold the same samples" in note for note in said["notes"])
+    assert said["stages"]["probability"] == [None] * 4
+    assert "± nan" not in asp("track", str(few), "--method", "peak")[1]
+
+
 def test_constant_wear_is_no_alarm(asp, tmp_path):
     write_rig(tmp_path / "still", "constant", repeats=1)
     code, out, _ = asp("track", "still", "--table", "still/table.csv", "--case", "case.toml", "--json")
@@ -161,6 +176,7 @@ def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
     shutil.copyfile(folder / "sample-01-test-1.h5", "in/a.h5")
     said = json.loads(asp("watch", "in", "--once", "--settle", "60", "--json")[1])
     assert said["new"] == []
+    assert said["waiting"] == 1
 
 
 @pytest.mark.parametrize(

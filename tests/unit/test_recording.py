@@ -170,6 +170,15 @@ def test_dialects(tmp_path, line):
         assert read_recording(tmp_path / "a.dat", rate_hz=1.0, channel=channel).values.tolist() == [value] * 20
 
 
+@pytest.mark.parametrize("label", ["acc [g]", "acc (g)", "# acc [g]"])
+def test_the_label_of_an_only_column_may_hold_a_blank(tmp_path, label):
+    file = tmp_path / "one.csv"
+    file.write_text(label + "\n" + "".join(f"{np.sin(k / 9.0):.5f}\n" for k in range(4000)))
+    recording = read_recording(file, rate_hz=20e3)
+    assert recording.facts["unit"].value == "g"
+    assert recording.facts["unit"].source == "file"
+
+
 @pytest.mark.parametrize(
     ("unit", "metres"),
     [("m/s²", 1.0), ("m/s**2", 1.0), ("m s-2", 1.0), ("[g]", G), ("mg", G / 1000), ("in/s^2", 0.0254), ("kg", None),

@@ -31,6 +31,15 @@ def test_scalars_state_friction_heat_and_stress(run):
     assert found["von_mises_max_pa"] / 2.0 <= found["shear_stress_max_pa"] <= found["von_mises_max_pa"] / np.sqrt(3.0)
 
 
+def test_a_film_too_hot_for_its_viscosity_is_remarked_on(run, monkeypatch):
+    monkeypatch.setattr(asperity.run, "HOT", 1e3)
+    assert run.remarks == run.notes
+    monkeypatch.setattr(asperity.run, "HOT", 0.9 * run.heat.film_max_k)
+    *notes, hot = run.remarks
+    assert tuple(notes) == run.notes
+    assert f"{run.heat.film_max_k:.4g} K" in hot
+
+
 def test_the_traction_of_friction_is_part_of_the_stress(run):
     surface = run.stress.at(0.0)
     np.testing.assert_allclose(surface.xz, -run.friction.shear, atol=1e-3 * run.state.p_max)

@@ -117,7 +117,7 @@ def test_many_recordings_are_averaged_and_lose_nothing():
 def test_too_few_places_are_called_so():
     found = split_stages(np.repeat(SQ[:6], 5), knee(np.repeat(SQ[:6], 5)))
     assert found.kind == "too few"
-    assert found.probability == pytest.approx(np.zeros(30))
+    assert np.isnan(found.probability).all()  # no verdict is not a verdict of normal wear
     assert "got 6" in found.verdict
 
 

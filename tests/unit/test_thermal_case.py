@@ -54,7 +54,7 @@ def test_what_is_said_arrives_in_si_and_comes_back():
         ("thermal.feedbck", True, "did you mean feedback"),
         ("thermal.conductivity", "46 W", "a thermal conductivity"),
         ("lubricant.friction", "ree-eyring", "lubricant.friction.tau0 is missing"),
-        ("material.boundary_friction", -0.1, "material.boundary_friction must be greater than 0"),
+        ("material.boundary_friction", -0.1, "material.boundary_friction must be greater than or equal to 0"),
     ],
 )
 def test_a_mistake_is_one_sentence(key, value, says):

@@ -133,13 +133,14 @@ def _print_run(run: "Run") -> None:
     def off(name: str) -> float | None:
         return None if convergence.error is None else float(getattr(convergence.error, name))
 
+    touching_below = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     lambda_ratio = "-" if state.lambda_ratio is None else f"{state.lambda_ratio:.3f}"
     rows = [
         ("CLR, load on asperities", f"{with_error(100, state.clr, off('clr'), 2)} %"),
         ("load on oil at the pressure cap, not in CLR", f"{100 * state.capped_oil_load_ratio:.2f} %"),
         ("CAR, contact in the Hertz zone", f"{with_error(100, state.car, off('car'), 2)} %"),
         ("CAR of the domain, over the Hertz area", f"{100 * state.car_domain:.2f} %"),
-        ("asperities count as touching below", f"{1e9 * run.solution.options.contact_film:g} nm"),
+        ("asperities count as touching below", f"{1e9 * touching_below:g} nm"),
         ("Sq, composite roughness", f"{1e6 * state.sq:.3f} um"),
         (
             "film: least, central, mean",
@@ -165,7 +166,7 @@ def _print_run(run: "Run") -> None:
     ]
     print()
     print_rows(rows)
-    for note in run.notes:
+    for note in run.remarks:
         print(f"  note: {note}")
 
 

@@ -17,11 +17,15 @@ if TYPE_CHECKING:
     from asperity.recording import OpenRecording, Quality
     from asperity.tracking import Track
     from asperity.tracking.listen import Heard
+    from asperity.wear.indicators import Resonance
 
 ALARM = 3
 IN_FULL = 4  # recordings that `check` shows with every fact
 
-Rate = Annotated[float | None, typer.Option(metavar="HZ", help="Sampling rate, for files that do not state it.")]
+Rate = Annotated[
+    float | None,
+    typer.Option(metavar="HZ", parser=lambda text: _hertz(text), help="Sampling rate, for files that do not state it."),
+]
 Unit = Annotated[str | None, typer.Option(help="Unit of the values, such as g, for files that do not state it.")]
 Channel = Annotated[str | None, typer.Option(help="Name or number of the channel, where files have several.")]
 Scale = Annotated[
@@ -159,6 +163,7 @@ def _check_rows(one: "OpenRecording", quality: "Quality") -> list[tuple[str, str
         ("format", str(facts["format"].value)),
         ("rate", f"{one.rate_hz:g} Hz, stated by {facts['rate'].source}"),
         ("unit", f"{facts['unit'].value}, stated by {facts['unit'].source}"),
+        *([("scale", f"{facts['scale'].value:g}, stated by {facts['scale'].source}")] if "scale" in facts else []),
         ("length", f"{quality.duration_s:.4g} s, {quality.samples} samples"),
         ("rms, peak, offset", f"{quality.rms:.4g}, {quality.peak:.4g}, {quality.offset:.4g}; unit: {one.unit}"),
     ]
@@ -283,7 +288,7 @@ def watch(
                 alarmed = update.track is not None and update.track.alarmed
                 if update.track is not None:
                     _write(update.track, [results / "track.csv", results / "track.nc"], results / "report.html")
-                _tell(update.new, update.track, results, as_json=as_json, quiet=quiet)
+                _tell(update.new, update.track, update.waiting, results, as_json=as_json, quiet=quiet)
         except KeyboardInterrupt:
             if once:
                 raise
@@ -292,14 +297,18 @@ def watch(
         raise typer.Exit(ALARM)
 
 
-def _tell(new: "Sequence[Heard]", tracked: "Track | None", results: Path, *, as_json: bool, quiet: bool) -> None:
+def _tell(
+    new: "Sequence[Heard]", tracked: "Track | None", waiting: int, results: Path, *, as_json: bool, quiet: bool
+) -> None:
     """One update of a watch: a JSON object a line, or a verdict with what is new."""
     import json
 
     verdict = "Nothing to judge yet: no recording has arrived." if tracked is None else tracked.verdict()
+    if waiting:
+        verdict += f" {waiting} more may still be written and wait for the next look."
     if as_json:
         told: dict[str, Any] = {"verdict": verdict} if tracked is None else tracked.scalars()
-        told |= {"new": [one.file for one in new], "results": str(results)}
+        told |= {"new": [one.file for one in new], "waiting": waiting, "results": str(results)}
         print(json.dumps(told, allow_nan=False), flush=True)
         return
     print(verdict, flush=True)
@@ -327,7 +336,7 @@ def _print_track(tracked: "Track") -> None:
     for one in tracked.recordings:
         probability = "" if one.severe != one.severe else f"{one.severe:.2f}"
         amplitude = f"{one.resonance.crfa:.3g}" if one.resonance.found else ""
-        shown = f"{one.resonance.crf_hz:.1f} ± {one.resonance.crf_std:.1f}" if one.resonance.found else "not found"
+        shown = _with_deviation(one.resonance) if one.resonance.found else "not found"
         reason = "" if one.resonance.found else f"  {one.resonance.reason}"
         print(f"  {Path(one.file).name:{name}}  {one.x:10.4g}  {shown:>16}  {amplitude:>9}  {probability:>6}{reason}")
     print()
@@ -342,7 +351,23 @@ def _found(one: Any) -> str:
     resonance = one.resonance
     if not resonance.found:
         return f"no contact resonance: {resonance.reason}"
-    return f"CRF {resonance.crf_hz:.1f} ± {resonance.crf_std:.1f} Hz, severe with probability {one.severe:.2f}"
+    stage = "" if one.severe != one.severe else f", severe with probability {one.severe:.2f}"
+    return f"CRF {_with_deviation(resonance)} Hz{stage}"
+
+
+def _with_deviation(resonance: "Resonance") -> str:
+    deviation = "" if resonance.crf_std != resonance.crf_std else f" ± {resonance.crf_std:.1f}"
+    return f"{resonance.crf_hz:.1f}{deviation}"
+
+
+def _hertz(text: str) -> float:
+    """A frequency as a bare number of hertz, or with its unit."""
+    from asperity.case import read_amount
+
+    try:
+        return float(text)
+    except ValueError:
+        return read_amount("a frequency", "Hz", text)
 
 
 def _case(path: Path | None) -> "Case | None":

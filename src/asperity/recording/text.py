@@ -211,7 +211,9 @@ def _labels(header: list[str], count: int, dialect: _Dialect) -> tuple[list[str]
     """Names and units of the columns, from the last one or two header lines with as many fields."""
     fitting = []
     for line in [line for line in header if line.strip()][-3:]:
-        fields = [one.strip().strip('"') for one in _fields(line.lstrip("#%/ "), dialect)]
+        bare = line.lstrip("#%/ ")
+        alone = count == 1 and not re.search("[:=]", bare)  # a blank in the label of an only column separates nothing
+        fields = [one.strip().strip('"') for one in ([bare] if alone else _fields(bare, dialect))]
         if len(fields) + (line.rstrip().endswith(dialect.separator or "\0")) in (count, count + 1):
             fitting.append((fields + [""] * count)[:count])
     if not fitting:

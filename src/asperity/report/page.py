@@ -330,7 +330,7 @@ class _RunView:
         self.ending = in_print(run.solution.convergence.explain()).capitalize()
         self.tiles = [_tile(quantity, scalars) for quantity in QUANTITIES if quantity.key in TILES]
         self.pictures = _run_pictures(run, scalars)
-        self.notes = [in_print(note[:1].upper() + note[1:]) for note in (*run.notes, *_silence(run))]
+        self.notes = [in_print(note[:1].upper() + note[1:]) for note in (*run.remarks, *_silence(run))]
         self.case_text = run.case.text
 
 

@@ -118,7 +118,7 @@ def _pictures(track: "Track") -> dict[str, list[Picture]]:
         shown["trend"].append(
             picture(
                 figures.trend(track),
-                "CRF of each recording with its 90 % interval; blue normal, red severe. "
+                "CRF of each recording with its 90 % interval; blue normal, orange severe. "
                 + ("The shaded strip is where the break lies with 90 %. " if split else "")
                 + "Below: the probability of the severe stage.",
                 f"Trend of the contact resonance over {figures.x_label(track)}: {track.verdict()}",

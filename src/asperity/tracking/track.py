@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -414,6 +415,7 @@ def _staged(
     if not comparable and facts:
         units = ", ".join(sorted({one.heard.unit for one in tracked if one.clean is not None}))
         notes.append(f"CRFA is not comparable with other series: its unit is {units}, not m/s^2. CRF is.")
+    notes.extend(_copies(tracked))
     return Track(
         recordings=tuple(tracked),
         x_name=x_name,
@@ -425,6 +427,21 @@ def _staged(
         problems=consistency(facts),
         notes=tuple(notes),
     )
+
+
+def _copies(tracked: Sequence[Tracked]) -> list[str]:
+    """A sentence for each recording whose spectrum is another's: one of them is a copy."""
+    sampled = []
+    for one in tracked:
+        if one.heard.spectrum is not None:
+            density = one.heard.spectrum.density
+            sampled.append((density[:: max(1, density.size // 16)][1:], Path(one.file).name))
+    sampled.sort(key=lambda pair: float(pair[0].sum()))
+    return [
+        f"{name} and {other} hold the same samples; leave one of them out."
+        for (one, name), (two, other) in pairwise(sampled)
+        if one.shape == two.shape and np.allclose(one, two, rtol=1e-4, atol=0.0)
+    ]
 
 
 def _placed(

@@ -25,10 +25,14 @@ SETTINGS = "watch.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Update:
-    """What is new: files just listened to, and the series with them; None as long as there is none."""
+    """What is new: files just listened to, and the series with them; None as long as there is none.
+
+    `waiting` files have changed so lately that they may still be written.
+    """
 
     new: tuple[Heard, ...]
     track: Track | None
+    waiting: int = 0
 
 
 def watch_folder(
@@ -75,7 +79,8 @@ def watch_folder(
     first = True
     while True:
         present = _present(folder)
-        arrived = [path for path in present if memory.recall(path) is None and _settled(path, settle_s)]
+        unheard = [path for path in present if memory.recall(path) is None]
+        arrived = [path for path in unheard if _settled(path, settle_s)]
         new = memory.listen(arrived, workers, progress)
         heard = [one for path in present if (one := memory.recall(path)) is not None]
         if new or first:
@@ -90,7 +95,7 @@ def watch_folder(
                     )
             elif heard:
                 track = judge(heard, target, shaft_hz=shaft_hz, method=method, detector=detector)
-            yield Update(new=new, track=track)
+            yield Update(new=new, track=track, waiting=len(unheard) - len(arrived))
         if once:
             return
         first = False

@@ -31,8 +31,9 @@ class Stages:
         it falls and then does so at another pace. "no distinct stage", it changes, but a smooth curve explains it as
         well. "no change". "too few" places to tell
     split, interval : the break, in units of x, and its 90 % interval; nan unless a stage was found
-    probability : shape (recordings,), of being in the severe stage; 0 where the break belongs to running-in. Weighs
-        the broken stick against the smooth curves, so that it stays below 1 where no stage is distinct
+    probability : shape (recordings,), of being in the severe stage; 0 where the break belongs to running-in, nan
+        where there are too few places to tell. Weighs the broken stick against the smooth curves, so that it stays
+        below 1 where no stage is distinct
     labels : "normal", "severe" (probability 0.5 or more), "running-in", "steady" or "none", one a recording
     evidence : BIC of each model less that of the best; 0 is the best, 6 more is strong evidence against
     slopes : of CRF before and after the break [Hz per unit of x]
@@ -154,7 +155,7 @@ def _bayesian(x: Field, crf: Field, crfa: Field | None, crf_std: Field, x_std: F
     count = places.x.size
     if count < FEWEST_PLACES:
         verdict = f"Too few to tell: a stage needs CRFs at {FEWEST_PLACES} different places, got {count}."
-        return _without_stage("too few", verdict, x.size, {}, np.zeros(x.size), np.nan)
+        return _without_stage("too few", verdict, x.size, {}, np.full(x.size, np.nan), np.nan)
     candidates = _candidates(places)
     scatters = _scatters(places)
     fits = {candidate.name: _fit(candidate, places, scatters) for candidate in candidates}
