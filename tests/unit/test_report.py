@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 
 from asperity.case import load_case
 from asperity.coupling import contact_vibration
-from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Status
+from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Status
 from asperity.ehl.state import ContactState
 from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
@@ -247,6 +247,18 @@ def test_several_runs_are_drawn_against_roughness(single, several):
         assert drawn(several, title) == 1
     assert drawn(several, "Film thickness") == 3
     assert "20.0 % to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
+
+
+def test_figures_carry_their_error_where_it_shows():
+    run = run_like()
+    errors = Figures(car=0.0123, clr=0.0456, h_min=1e-12, h_central=7.1e-9)
+    convergence = replace(run.solution.convergence, iteration_error=errors.times(0.0), discretisation_error=errors)
+    run = replace(run, solution=replace(run.solution, convergence=convergence))
+    rows = {row[0].split(",")[0]: row[1] for row in Page(page.render_page([run])).rows if len(row) > 1}
+    assert next(value for name, value in rows.items() if name.startswith("Load share of asperities")) == "54.2 ± 4.6"
+    assert next(value for name, value in rows.items() if name.startswith("Contact area share")) == "37.1 ± 1.2"
+    assert next(value for name, value in rows.items() if name.startswith("Central film")) == "0.512 ± 0.007"
+    assert next(value for name, value in rows.items() if name.startswith("Smallest film")) == "0.005"
 
 
 def test_runs_of_one_roughness_are_not_drawn_against_it():

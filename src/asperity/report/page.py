@@ -193,7 +193,8 @@ class Quantity:
         if self.error is None or scalars[self.error] is None:
             return shown
         assert isinstance(self.form, str)  # what has an error bar has decimals
-        return f"{shown} ± {format(scalars[self.error] * self.scale, self.form)}"
+        error = format(scalars[self.error] * self.scale, self.form)
+        return f"{shown} ± {error}" if float(error) > 0.0 else shown
 
     def row(self, scalars: Sequence[Mapping[str, Any]]) -> _Row:
         """The line of the table for several runs."""
