@@ -42,7 +42,7 @@ def solution():
             steps,
             3e-7,
             0.1 + 0.2,
-            ATTEMPTS[1],
+            ATTEMPTS[2],
             Figures(car=0.1 / 3.0, clr=0.1 / 7.0, h_min=1e-9 / 3.0, h_central=1e-9 / 7.0),
         ),
         attributes={"case": 'model = "unified"\n# größer\n', "notes": "[]"},

@@ -49,7 +49,7 @@ class Problem:
     P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the speed number. For the oil's laws
     `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]; `viscosity_factor` is what warmth
     leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by
-    lines of cells at ambient pressure.
+    lines of cells at ambient pressure. `accurate` takes the third-order wedge and logarithmic mean mobilities.
     """
 
     form: Form
@@ -64,6 +64,7 @@ class Problem:
     p_scale: float
     lubricant: Lubricant | None
     viscosity_factor: Field | None = None
+    accurate: bool = False
 
     @property
     def cells(self) -> tuple[int, int]:
@@ -96,11 +97,6 @@ class Problem:
         """Whether nothing varies along y, so that one line of cells tells all."""
         fields = [self.roughness] if self.viscosity_factor is None else [self.roughness, self.viscosity_factor]
         return self.form.periodic and all(bool(np.all(field == field[:, :1])) for field in fields)
-
-    @cached_property
-    def smooth(self) -> bool:
-        """Whether the bodies have no roughness."""
-        return not np.any(self.roughness)
 
     def coarsened(self, cells: tuple[int, int]) -> "Problem":
         """The same contact on a grid of fewer cells; fields are averaged over each cell."""
@@ -173,7 +169,7 @@ class Problem:
             ambient,
             3.0 * ambient / height[[0, -1]],
         )
-        wedge = THIRD_ORDER if self.smooth else SECOND_ORDER
+        wedge = THIRD_ORDER if self.accurate else SECOND_ORDER
         east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty((6, *self.cells))
         faces = Faces(
             east,
@@ -185,8 +181,8 @@ class Problem:
             inlet=np.empty(self.cells[1]),
             wedge=np.array(wedge),
         )
-        log_mobility = np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.smooth else mobility
-        reynolds.face_mobilities(film, log_mobility, self.smooth, faces)
+        log_mobility = np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
+        reynolds.face_mobilities(film, log_mobility, self.accurate, faces)
         dx, dy = self.spacing
         ahead = gap[0] + ((self.x[0] - dx) ** 2 - self.x[0] ** 2) / 2.0  # the gap one cell before the inlet
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)

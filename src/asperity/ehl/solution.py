@@ -44,7 +44,11 @@ class Options:
 
 
 # what is tried, one after the other, until one converges
-ATTEMPTS = ("coarse to fine", "with the bodies held while their distance was searched")
+ATTEMPTS = (
+    "coarse to fine",
+    "with the second-order wedge of rough bodies",  # smooth bodies only: they have a better one at first
+    "with the bodies held while their distance was searched",
+)
 
 
 class Status(StrEnum):

@@ -73,7 +73,11 @@ def solve_contact(
         levels = [finest]
         guess = _warm_start(start, finest.cells, scales)
     for attempt in ATTEMPTS:
-        step = search.climb(levels, *guess, held=attempt != ATTEMPTS[0])
+        if attempt == ATTEMPTS[1]:
+            if not finest.accurate:
+                continue
+            levels = [replace(level, accurate=False) for level in levels]
+        step = search.climb(levels, *guess, held=attempt == ATTEMPTS[2])
         if search.settled(options.tolerance):
             break
 
@@ -142,7 +146,7 @@ class _Search:
 
     def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
         """Solve on grid after grid, from the last, coarsest one to the first."""
-        options, self.figures, self.smooth = self.options, [], levels[0].smooth
+        options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
         for problem in reversed(levels):
             coarsest, finest = problem is levels[-1], problem is levels[0]
             tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
@@ -236,8 +240,10 @@ def contact_problem(
     surface: Surface,
     options: Options,
     viscosity_factor: Field | None = None,
+    *,
+    attempt: str = ATTEMPTS[0],
 ) -> Problem:
-    """The dimensionless problem on the surface's own grid."""
+    """The dimensionless problem on the surface's own grid, as the attempt poses it."""
     scales = Scales.of(conditions, lubricant)
     grid, line = surface.grid, conditions.geometry == "line"
     (dx, dy), (left, front) = grid.spacing, grid.lower
@@ -261,6 +267,7 @@ def contact_problem(
         p_scale=scales.pressure,
         lubricant=lubricant,
         viscosity_factor=viscosity_factor,
+        accurate=attempt == ATTEMPTS[0] and not np.any(surface.heights),
     )
 
 

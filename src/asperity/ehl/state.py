@@ -50,7 +50,14 @@ def contact_state(solution: ContactSolution) -> ContactState:
     scales = Scales.of(solution.conditions, solution.lubricant)
     grid, touching = solution.grid, solution.in_contact
     sq, oil = solution.surface.sq, solution.lubricant
-    problem = contact_problem(solution.conditions, oil, solution.surface, solution.options, solution.viscosity_factor)
+    problem = contact_problem(
+        solution.conditions,
+        oil,
+        solution.surface,
+        solution.options,
+        solution.viscosity_factor,
+        attempt=solution.convergence.attempt,
+    )
     balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
     zone, centre = problem.zone(), problem.zone(CENTRE)
     capped = balance.rows.state == CAPPED
