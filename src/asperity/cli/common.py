@@ -107,7 +107,8 @@ def shown_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration]
         with console.status(f"{label}: setting up ...") if console.is_terminal else nullcontext() as status:
 
             def report_step(step: "Iteration") -> None:
-                announcement.cancel()
+                if step.number > 0:  # the start is known before all is compiled
+                    announcement.cancel()
                 if status is not None:
                     nx, ny = step.cells
                     status.update(f"{label}: {nx} x {ny} cells, step {step.number}, residual {step.residual:.1e}")
