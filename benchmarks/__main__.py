@@ -49,30 +49,10 @@ def main() -> None:
     )
     print()
     with threadpool_limits(1):
-        for line in speed.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in films.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in robustness.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in vibration.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in surfaces.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in friction.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in stress.lines(fast=wanted.fast):
-            print(line, flush=True)
-        print()
-        for line in indicators.lines(fast=wanted.fast):
-            print(line, flush=True)
-    print()
+        for part in (speed, films, robustness, vibration, surfaces, friction, stress, indicators):
+            for line in part.lines(fast=wanted.fast):
+                print(line, flush=True)
+            print()
     for line in recordings.lines(fast=wanted.fast):  # on all processors, as its users have it
         print(line, flush=True)
 
