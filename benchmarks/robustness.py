@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
+from asperity.ehl.scales import Scales
+from asperity.ehl.solution import ContactSolution, Options
+from asperity.ehl.solve import contact_problem, solve_contact
 from asperity.ehl.state import contact_state
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
@@ -49,7 +50,7 @@ class Outcome:
     steps: int
     seconds: float
     clr: float
-    least_gap_nm: float
+    overlap_nm: float  # deepest, of the bodies as they deform, where no cap flattens them
     clr_error: float | None = None
 
     def row(self) -> dict[str, object]:
@@ -105,6 +106,20 @@ def prepared(contact: Contact, cells: int) -> tuple[ContactConditions, Surface]:
     return conditions, gaussian_surface(grid, sq=sq, correlation_length=length, rng=rng)
 
 
+def overlap(solution: ContactSolution) -> float:
+    """How far the bent bodies reach below the contact film, worked out from the pressure alone [m].
+
+    The solution's own gap is no less than the contact film by construction, so it could not tell. Cells at the cap are
+    flattened plastically and do not count.
+    """
+    scales = Scales.of(solution.conditions, solution.lubricant)
+    problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
+    pressure = solution.pressure / scales.pressure
+    gap = problem.evaluate(pressure, solution.rigid_approach / scales.gap).gap
+    elastic = pressure < (1.0 - 1e-6) * problem.p_cap
+    return float(np.max(problem.contact_gap - gap[elastic], initial=0.0)) * scales.gap
+
+
 def outcomes(
     *, count: int = 600, cells: int = 128, checked: int = 30, told: Callable[[Outcome], None] = lambda _: None
 ) -> Iterator[Outcome]:
@@ -123,7 +138,7 @@ def outcomes(
             solution.convergence.iterations,
             solution.convergence.seconds,
             state.clr,
-            1e9 * float(solution.gap.min()),
+            1e9 * overlap(solution),
             error,
         )
         told(outcome)
@@ -146,7 +161,7 @@ def lines(*, fast: bool, artefact: Path = Path("build/robustness.csv")) -> Itera
         f"{len(solved)} of {len(results)} solved, the rest refused loudly; "
         f"median {np.median([one.seconds for one in solved]):.2f} s and "
         f"{np.median([one.steps for one in solved]):.0f} steps. "
-        f"Least gap anywhere {min(one.least_gap_nm for one in results):.3f} nm. "
+        f"Bodies overlap nowhere by more than {max(one.overlap_nm for one in solved):.3f} nm. "
         f"{len(errors)} solved again 100 times tighter: {sum(np.isnan(errors))} of those did not converge, "
         f"the load share of the others is off by {np.nanmax(errors):.1e} at most. All of it: {artefact}."
     )
