@@ -48,9 +48,10 @@ def demo(
     save_report(runs, report_file)
     first, last = runs[0], runs[-1]
     less, more = (f"{100 * run.state.clr:.0f} %" for run in (first, last))
+    at_last = last.resonance_in_words().removeprefix("contact resonance ")
     verdict = (
         f"From Sq {DEMO_SQ[0]} to {DEMO_SQ[-1]} the asperities' share of the load goes from {less} to {more}: "
-        f"{first.resonance_in_words()} at first, {last.resonance_in_words()} at last."
+        f"{first.resonance_in_words()} at first, {at_last} at last."
     )
     unfinished = [sq for sq, run in zip(DEMO_SQ, runs, strict=True) if not run.solution.convergence.converged]
     if unfinished:

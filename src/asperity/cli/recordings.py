@@ -22,9 +22,20 @@ if TYPE_CHECKING:
 ALARM = 3
 IN_FULL = 4  # recordings that `check` shows with every fact
 
+
+def _hertz(text: str) -> float:
+    """A frequency as a bare number of hertz, or with its unit."""
+    from asperity.case import read_amount
+
+    try:
+        return float(text)
+    except ValueError:
+        return read_amount("a frequency", "Hz", text)
+
+
 Rate = Annotated[
     float | None,
-    typer.Option(metavar="HZ", parser=lambda text: _hertz(text), help="Sampling rate, for files that do not state it."),
+    typer.Option(metavar="HZ", parser=_hertz, help="Sampling rate, for files that do not state it."),
 ]
 Unit = Annotated[str | None, typer.Option(help="Unit of the values, such as g, for files that do not state it.")]
 Channel = Annotated[str | None, typer.Option(help="Name or number of the channel, where files have several.")]
@@ -358,16 +369,6 @@ def _found(one: Any) -> str:
 def _with_deviation(resonance: "Resonance") -> str:
     deviation = "" if resonance.crf_std != resonance.crf_std else f" ± {resonance.crf_std:.1f}"
     return f"{resonance.crf_hz:.1f}{deviation}"
-
-
-def _hertz(text: str) -> float:
-    """A frequency as a bare number of hertz, or with its unit."""
-    from asperity.case import read_amount
-
-    try:
-        return float(text)
-    except ValueError:
-        return read_amount("a frequency", "Hz", text)
 
 
 def _case(path: Path | None) -> "Case | None":
