@@ -18,6 +18,7 @@ from asperity.ehl.solution import ContactSolution, Options
 from asperity.ehl.solve import contact_problem, solve_contact
 from asperity.ehl.state import contact_state
 from asperity.grid import Grid
+from asperity.kernels.reynolds import CAPPED
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.surface import Surface, gaussian_surface, self_affine_surface
 
@@ -109,15 +110,14 @@ def prepared(contact: Contact, cells: int) -> tuple[ContactConditions, Surface]:
 def overlap(solution: ContactSolution) -> float:
     """How far the bent bodies reach below the contact film, worked out from the pressure alone [m].
 
-    The solution's own gap is no less than the contact film by construction, so it could not tell. Cells at the cap are
-    flattened plastically and do not count.
+    The solution's own gap is no less than the contact film by construction, so it could not tell. Cells that the cap
+    decides are flattened plastically and do not count.
     """
     scales = Scales.of(solution.conditions, solution.lubricant)
     problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
-    pressure = solution.pressure / scales.pressure
-    gap = problem.evaluate(pressure, solution.rigid_approach / scales.gap).gap
-    elastic = pressure < (1.0 - 1e-6) * problem.p_cap
-    return float(np.max(problem.contact_gap - gap[elastic], initial=0.0)) * scales.gap
+    balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
+    elastic = balance.rows.state != CAPPED
+    return float(np.max(problem.contact_gap - balance.gap[elastic], initial=0.0)) * scales.gap
 
 
 def outcomes(
