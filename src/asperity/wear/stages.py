@@ -336,14 +336,6 @@ def _line_slopes(_: Field, at: _Places) -> Field:
     return np.stack([np.zeros_like(at.x), np.ones_like(at.x)], axis=-1)[None]
 
 
-def _constant(_: Field, at: _Places) -> Field:
-    return np.ones((1, at.x.size, 1))
-
-
-def _constant_slopes(_: Field, at: _Places) -> Field:
-    return np.zeros((1, at.x.size, 1))
-
-
 def _fit(candidate: _Candidate, places: _Places, scatters: Field) -> _Fitted:
     """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
     columns = candidate.columns(candidate.bends, places)[:, None]  # (bends, 1, places, linear)
