@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields, replace
 from decimal import Decimal
 from difflib import get_close_matches
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, lru_cache, partial
 from pathlib import Path
 from tokenize import TokenError
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar, cast, get_args
@@ -131,6 +131,11 @@ def _units() -> "pint.UnitRegistry[Decimal]":
     return UnitRegistry(non_int_type=Decimal)  # decimal: 5.4 mm is the float nearest to 0.0054, not a product of floats
 
 
+@lru_cache(4096)  # a case states forty quantities, and a study states most of them a thousand times over
+def _in(unit: str, number: str, unit_text: str) -> float:
+    return float(_units().Quantity(Decimal(number), unit_text).to(unit).magnitude)
+
+
 def _amount(unit: str, value: object) -> Amount:
     """A quantity with its unit, in `unit`."""
     import pint
@@ -150,7 +155,7 @@ def _amount(unit: str, value: object) -> Amount:
     if unit == "Hz" and "Hz" not in unit_text:  # rpm and rad/s would slip through as inverse times, a factor 2 pi off
         raise BadInput(f"{expected}, got {_shown(value)}, which is not in hertz")
     try:
-        si = float(_units().Quantity(Decimal(number), unit_text).to(unit).magnitude)
+        si = _in(unit, number, unit_text)
     except pint.UndefinedUnitError:
         raise BadInput(f"{expected}, got {_shown(value)}, whose unit is not known; capitals matter") from None
     except pint.DimensionalityError:
@@ -160,6 +165,51 @@ def _amount(unit: str, value: object) -> Amount:
     if not 0.0 < si < math.inf:
         raise BadInput(f"must be positive and finite, got {_shown(value)}; correct its sign or value")
     return Amount(si, f"{number} {unit_text}")
+
+
+def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
+    """A number and its unit as written, or the number in `unit`; a bare number has the unit "".
+
+    Raises
+    ------
+    BadInput
+        for what is neither, or cannot be had in `unit`.
+    """
+    import pint
+
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        number, own = Decimal(str(value)), ""
+    else:
+        written = _WRITTEN.fullmatch(value) if isinstance(value, str) else None
+        if written is None:
+            raise BadInput(f'must be a number, or a quantity such as "0.5 um", got {_shown(value)}')
+        number, own = Decimal(written[1]), " ".join(written[2].split())
+    if unit is None or own == unit:
+        return number, own
+    try:
+        if own and unit:
+            return cast(Decimal, _units().Quantity(number, own).to(unit).magnitude), unit
+    except (pint.PintError, ValueError, TypeError, AssertionError, ArithmeticError, SyntaxError, TokenError):
+        pass
+    raise BadInput(f"must be in {unit or 'no unit'} as the range's beginning is, got {_shown(value)}")
+
+
+def in_si(value: object) -> Any:
+    """A value of a case file as a number in SI; two equal ones as one; names as they stand."""
+    if isinstance(value, list | tuple):
+        entries = [in_si(entry) for entry in value]
+        return entries[0] if len(entries) == 2 and entries[0] == entries[1] else entries
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    written = _WRITTEN.fullmatch(value) if isinstance(value, str) else None
+    if written is None or not written[2].strip():
+        return value
+    return _to_si(written[1], " ".join(written[2].split()))
+
+
+@lru_cache(4096)
+def _to_si(number: str, unit_text: str) -> float:
+    return float(_units().Quantity(Decimal(number), unit_text).to_base_units().magnitude)
 
 
 def _restated(value: float, unit: str) -> Amount:
@@ -392,19 +442,34 @@ class SolverSection(Section):
     contact_film: Length = _restated(Options().contact_film, "m")
 
 
-class SweepSection(Section):
-    """A range of one quantity in [study]."""
+def _seeds(value: object) -> int | tuple[int, ...]:
+    """How many seeds, or the seeds themselves."""
+    if type(value) is int and value >= 1:
+        return value
+    if isinstance(value, list | tuple) and value and all(type(seed) is int and seed >= 0 for seed in value):
+        return tuple(value)
+    raise BadInput(f"must be 1 or more, or a list of seeds such as [1, 2, 3], got {_shown(value)}")
 
-    start: Length = Field(alias="from")
-    to: Length
-    step: Length
+
+class RangeSection(Section):
+    """A range in [study]: `step` from one value to the next, or `count` of them; over samples, neither."""
+
+    start: Any = Field(alias="from")
+    to: Any
+    step: Any = None
+    count: Count | None = None
+    scale: Literal["linear", "log"] = "linear"
 
 
 class StudySection(Section):
-    """[study]: what a sweep varies; read and kept, not yet run."""
+    """[study]: what a sweep varies. Every other key names a quantity of the case."""
 
-    sq: SweepSection
-    seeds: Count = 1
+    kind: Literal["solve", "vibrate"] = "solve"
+    axes: dict[str, tuple[Any, ...] | RangeSection]  # as written: key -> values
+    samples: Count | None = None  # a Latin hypercube of so many points in place of the product
+    sample_seed: Seed = 0
+    seeds: Annotated[int | tuple[int, ...], PlainValidator(_seeds)] = 1  # how many surfaces a point, or which
+    seeding: Literal["independent", "common"] = "independent"
 
 
 class _Located(BadInput):
@@ -483,6 +548,40 @@ def _lubricant_section(value: object) -> LubricantSection | None:
     return None if value == "none" else _validated(LubricantSection, value)
 
 
+_STUDY_KEYS = tuple(name for name in StudySection.model_fields if name != "axes")
+
+
+def _study_section(value: object) -> StudySection | None:
+    """The plan of a study; quantities stand beside its own keys, as tables (contact.load) or by their bare names."""
+    if value is None or value == "none":
+        return None
+    if not isinstance(value, Mapping):
+        raise BadInput(f"must be a table, got {_shown(value)}")
+    own = {key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in _STUDY_KEYS}
+    axes = dict(_axes({key: v for key, v in value.items() if key not in _STUDY_KEYS}))
+    return _validated(StudySection, {**own, "axes": axes})
+
+
+def _axes(table: Mapping[str, object], parents: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
+    for key, value in table.items():
+        keys = (*parents, key)
+        if isinstance(value, Mapping) and not {"from", "to", "step", "count"} & set(value):
+            yield from _axes(value, keys)
+        elif isinstance(value, Mapping):
+            try:
+                yield ".".join(keys), _validated(RangeSection, value)
+            except _Located as mistake:
+                raise _Located(keys + mistake.keys, mistake.message) from None
+        elif isinstance(value, list) and value:
+            yield ".".join(keys), tuple(value)
+        else:
+            raise _Located(
+                keys,
+                f'must be a list of values or a range such as {{ from = "0.5 um", to = "4 um", step = "0.1 um" }}, '
+                f"got {_shown(value)}",
+            )
+
+
 class ThermalSection(Section):
     """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
 
@@ -543,7 +642,7 @@ class CaseFile(Section):
     solver: SolverSection = SolverSection()
     thermal: ThermalSection = Field(default_factory=ThermalSection)
     vibration: Annotated[Any, PlainValidator(_vibration_section)] = None
-    study: Annotated[StudySection | None, _Optional] = None
+    study: Annotated[StudySection | None, PlainValidator(_study_section)] = None
 
 
 def _validated(model: type[S], table: object) -> S:
@@ -953,6 +1052,8 @@ def _law(laws: Mapping[str, type[L]], section: Section) -> L:
 def _plain(section: Section) -> dict[str, Any]:
     """Tables of plain values, quantities as they were written; what is left out stays out."""
     values = {entry.alias or name: getattr(section, name) for name, entry in type(section).model_fields.items()}
+    if isinstance(section, StudySection):
+        values |= values.pop("axes")
     return {key: _plain_value(value) for key, value in values.items() if value is not None}
 
 

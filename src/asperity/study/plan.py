@@ -1,0 +1,349 @@
+"""Which cases a study consists of: points from lists, ranges, products or a Latin hypercube; seeds; ids.
+
+A case's id is the hash of everything that decides its result, so that the same case is the same file anywhere.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from difflib import get_close_matches
+from functools import cached_property
+from itertools import product
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from asperity.case import Case, RangeSection, Section, in_si, split_amount
+from asperity.errors import BadInput, UnreadableFile
+
+Kind = Literal["solve", "vibrate"]
+Seeding = Literal["independent", "common"]
+SEEDS = ("surface.seed", "vibration.seed")
+MOST_CASES = 10_000_000
+DIGITS = 9  # of a sampled value
+
+
+class StudyCase(NamedTuple):
+    """One case of a study: its place in the plan, what it replaces in the study's case, its id."""
+
+    number: int
+    point: int
+    realisation: int
+    overrides: dict[str, Any]
+    id: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study computes.
+
+    Parameters
+    ----------
+    case : what all cases share, without [study]
+    axes : the swept keys, such as "surface.sq"
+    points : replaced values by key, as a case file writes them
+    realisations : surfaces (and vibration records) a point
+    kind : "solve", a contact each; "vibrate", the vibration model alone
+    seeding : "independent", every case has seeds of its own; "common", the k-th realisation has the same at every
+        point, which lets differences between points show with fewer of them
+    seeds : the surfaces' seeds in place of ones drawn for the study
+    """
+
+    case: Case
+    axes: tuple[str, ...]
+    points: tuple[Mapping[str, Any], ...]
+    realisations: int = 1
+    kind: Kind = "solve"
+    seeding: Seeding = "independent"
+    seeds: tuple[int, ...] | None = None
+
+    @cached_property
+    def cases(self) -> tuple[StudyCase, ...]:
+        """Every case, in order: all realisations of a point, then the next point."""
+        return tuple(self._cases())
+
+    @cached_property
+    def _fixed(self) -> dict[str, Any]:
+        return {"kind": self.kind, "surface file": self.surface_digest, **_flat(self.case.contents)}
+
+    @cached_property
+    def surface_digest(self) -> str | None:
+        """Hash of the measured surface's file, of the stored roughness, or None: a case file does not hold them."""
+        section = self.case.contents.surface
+        if self.case.stored is not None:
+            return hashlib.sha256(self.case.stored.heights.tobytes()).hexdigest()
+        files = [getattr(part, "file", None) for part in (section, getattr(section, "second", None))]
+        digest = hashlib.sha256()
+        for file in (self.case.folder / name for name in files if name is not None):
+            try:
+                digest.update(file.read_bytes())
+            except OSError as error:
+                raise UnreadableFile(f"{file} cannot be read: {error.strerror}; check surface.file") from None
+        return digest.hexdigest() if any(files) else None
+
+    @cached_property
+    def design(self) -> str:
+        """Hash of all that the cases share."""
+        return _hash(self._fixed)
+
+    def _cases(self) -> Iterator[StudyCase]:
+        seeded = [key for key in SEEDS if _has_seed(self.case, key)]
+        base = int(self._fixed.get("surface.seed") or 0)
+        number = 0
+        for place, point in enumerate(self.points):
+            plain = {key: in_si(value) for key, value in point.items()}
+            words = [] if self.seeding == "common" else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
+            for realisation in range(self.realisations):
+                if self.seeds is None:
+                    drawn = np.random.SeedSequence([base, realisation, *words]).generate_state(2)
+                else:
+                    own = self.seeds[realisation]
+                    drawn = np.array([own, np.random.SeedSequence([own, *words]).generate_state(1)[0]])
+                chosen = {
+                    key: int(seed) for key, seed in zip(SEEDS, drawn, strict=True) if key in seeded and key not in point
+                }
+                identity = {**self._fixed, **plain, **chosen}
+                yield StudyCase(number, place, realisation, {**point, **chosen}, _hash(identity)[:16])
+                number += 1
+
+
+def plan_study(case: Case) -> Plan:
+    """The plan that a case's [study] states.
+
+    Raises
+    ------
+    BadInput
+        for a case without [study]; a swept key or value that the case file would be refused for; too many cases.
+    """
+    section = case.contents.study
+    if section is None:
+        raise BadInput(
+            f'{case.source}: study is missing; add [study] with what is varied, such as '
+            'sq = { from = "0.5 um", to = "4 um", step = "0.5 um" }'
+        )
+    if not section.axes and section.seeds == 1:
+        raise BadInput(f"{case.source}: study varies nothing; add a swept quantity or seeds")
+    keys = {_full_key(case, name): (name, values) for name, values in section.axes.items()}
+    if len(keys) < len(section.axes):
+        raise BadInput(f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}")
+    count = math.prod(
+        len(values) if isinstance(values, tuple) else _range_size(case, name, values) for name, values in keys.values()
+    )
+    seeds = section.seeds
+    realisations = seeds if isinstance(seeds, int) else len(seeds)
+    if (section.samples or count) * realisations > MOST_CASES:
+        raise BadInput(
+            f"{case.source}: study has {(section.samples or count) * realisations} cases, more than {MOST_CASES}; "
+            "widen its steps, or take samples"
+        )
+    points: list[dict[str, Any]]
+    if section.samples is None:
+        swept = {
+            key: values if isinstance(values, tuple) else tuple(_range(case, name, values))
+            for key, (name, values) in keys.items()
+        }
+        points = [dict(zip(swept, combined, strict=True)) for combined in product(*swept.values())]
+    else:
+        points = _sampled(case, keys, section.samples, section.sample_seed)
+    return plan_points(
+        case,
+        points,
+        axes=tuple(keys),
+        seeds=seeds,
+        kind=section.kind,
+        seeding=section.seeding,
+    )
+
+
+def plan_points(
+    case: Case,
+    points: Sequence[Mapping[str, Any]],
+    *,
+    axes: Sequence[str] | None = None,
+    seeds: int | Sequence[int] = 1,
+    kind: Kind = "solve",
+    seeding: Seeding = "independent",
+) -> Plan:
+    """A plan of points of one's own.
+
+    Parameters
+    ----------
+    case : what all cases share; its [study] is left aside
+    points : values by dotted key, as a case file writes them: {"surface.sq": "0.5 um", "contact.load": "200 N"}
+    axes : the swept keys; by default all that the points name
+    seeds : realisations a point, or the surfaces' seeds
+    kind, seeding : see `Plan`
+
+    Raises
+    ------
+    BadInput
+        for a value that the case file would be refused for.
+    """
+    if not points:
+        raise BadInput("a study needs at least one point, got none")
+    base = replace(case, contents=case.contents.model_copy(update={"study": None}))
+    if axes is None:
+        axes = tuple(dict.fromkeys(key for point in points for key in point))
+    _require_values(base, axes, points)
+    given = None if isinstance(seeds, int) else tuple(seeds)
+    realisations = seeds if isinstance(seeds, int) else len(seeds)
+    if realisations < 1:
+        raise BadInput(f"seeds must be 1 or more, got {realisations}")
+    return Plan(base, tuple(axes), tuple(points), realisations, kind, seeding, given)
+
+
+def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[str, Any]]) -> None:
+    """Refuse now what would fail in every case that has it. Of many values of a quantity, the extremes are asked."""
+    for key in axes:
+        values = {json.dumps(in_si(point[key])): point[key] for point in points if key in point}
+        chosen = list(values.values())
+        numbers = [in_si(value) for value in chosen]
+        if len(chosen) > 100 and all(isinstance(number, float | int) for number in numbers):
+            order = sorted(range(len(chosen)), key=numbers.__getitem__)
+            chosen = [chosen[order[0]], chosen[order[-1]]]
+        for value in chosen:
+            case.with_overrides({key: value})
+
+
+def _full_key(case: Case, name: str) -> str:
+    """The dotted key that a name in [study] means: itself, or the one key of the case that ends so."""
+    keys = [key for key in _keys(case.contents) if not key.startswith("study")]
+    if name in keys:
+        return name
+    meant = [key for key in keys if key.rpartition(".")[2] == name]
+    if len(meant) == 1:
+        return meant[0]
+    if meant:
+        raise BadInput(f"{case.source}: study.{name} could mean {' or '.join(meant)}; write one of them")
+    near = get_close_matches(name, [*keys, *(key.rpartition(".")[2] for key in keys)], n=1)
+    remedy = f"did you mean {near[0]}?" if near else "name one such as surface.sq or contact.load"
+    raise BadInput(f"{case.source}: study.{name} is not a key of the case; {remedy}")
+
+
+def _keys(section: Section, parents: tuple[str, ...] = ()) -> Iterator[str]:
+    for name, entry in type(section).model_fields.items():
+        keys = (*parents, entry.alias or name)
+        value = getattr(section, name)
+        if isinstance(value, Section):
+            yield from _keys(value, keys)
+        else:
+            yield ".".join(keys)
+
+
+# Ranges --------------------------------------------------------------------------------------------------------------
+
+
+class _Span(NamedTuple):
+    """A range read: its ends in the unit of `from`."""
+
+    low: Decimal
+    high: Decimal
+    unit: str
+
+    def text(self, number: Decimal) -> str | float | int:
+        """A value of the range as a case file writes it."""
+        if self.unit:
+            return f"{number:f} {self.unit}"
+        return int(number) if number == int(number) and self.low == int(self.low) else float(number)
+
+
+def _span(case: Case, name: str, section: RangeSection) -> _Span:
+    try:
+        low, unit = split_amount(section.start)
+        high = split_amount(section.to, unit)[0]
+    except BadInput as error:
+        raise BadInput(f"{case.source}: study.{name} {error}") from None
+    if high < low:
+        raise BadInput(f"{case.source}: study.{name} must go upwards, got from {section.start} to {section.to}")
+    if section.scale == "log" and low <= 0:
+        raise BadInput(f"{case.source}: study.{name} must be positive on a log scale, got from {section.start}")
+    return _Span(low, high, unit)
+
+
+def _step(case: Case, name: str, section: RangeSection, span: _Span) -> Decimal:
+    if (section.step is None) == (section.count is None):
+        raise BadInput(f"{case.source}: study.{name} needs either step or count; or give study.samples")
+    if section.count is not None:
+        return Decimal(0)
+    if section.scale == "log":
+        raise BadInput(f"{case.source}: study.{name} has a step, which a log scale has not; give count")
+    try:
+        step = split_amount(section.step, span.unit)[0]
+    except BadInput as error:
+        raise BadInput(f"{case.source}: study.{name}.step {error}") from None
+    if step <= 0:
+        raise BadInput(f"{case.source}: study.{name}.step must be positive, got {section.step}")
+    return step
+
+
+def _range_size(case: Case, name: str, section: RangeSection) -> int:
+    if case.contents.study is not None and case.contents.study.samples is not None:
+        return 1
+    span = _span(case, name, section)
+    step = _step(case, name, section, span)
+    return section.count or int((span.high - span.low) / step) + 1
+
+
+def _range(case: Case, name: str, section: RangeSection) -> Iterator[str | float | int]:
+    span = _span(case, name, section)
+    step = _step(case, name, section, span)
+    if section.count is None:
+        yield from (span.text(span.low + i * step) for i in range(_range_size(case, name, section)))
+        return
+    shares = [i / max(section.count - 1, 1) for i in range(section.count)]
+    yield from (span.text(_between(span, share, section.scale)) for share in shares)
+
+
+def _between(span: _Span, share: float, scale: str) -> Decimal:
+    """The value at a share of the way; the ends are met exactly."""
+    if share in (0.0, 1.0):
+        return span.high if share else span.low
+    low, high = float(span.low), float(span.high)
+    value = low * (high / low) ** share if scale == "log" else low + share * (high - low)
+    return Decimal(f"{value:.{DIGITS}g}")
+
+
+def _sampled(
+    case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int
+) -> list[dict[str, Any]]:
+    """Points of a Latin hypercube: over ranges evenly, over lists entry by entry."""
+    from scipy.stats import qmc
+
+    shares = qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
+    points: list[dict[str, Any]] = [{} for _ in range(samples)]
+    for column, (key, (name, values)) in enumerate(keys.items()):
+        for point, share in zip(points, shares[:, column], strict=True):
+            if isinstance(values, tuple):
+                point[key] = values[int(share * len(values))]
+            else:
+                span = _span(case, name, values)
+                point[key] = span.text(_between(span, float(share), values.scale))
+    return points
+
+
+# Identity ------------------------------------------------------------------------------------------------------------
+
+
+def _has_seed(case: Case, key: str) -> bool:
+    section, name = key.split(".")
+    table = getattr(case.contents, section)
+    return table is not None and name in type(table).model_fields
+
+
+def _flat(section: Section, parents: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Every value of the case in SI by its dotted key."""
+    flat: dict[str, Any] = {}
+    for name, entry in type(section).model_fields.items():
+        keys, value = (*parents, entry.alias or name), getattr(section, name)
+        if isinstance(value, Section):
+            flat |= _flat(value, keys)
+        else:
+            flat[".".join(keys)] = in_si(value)
+    return flat
+
+
+def _hash(values: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
