@@ -121,7 +121,7 @@ def plan_study(case: Case) -> Plan:
     section = case.contents.study
     if section is None:
         raise BadInput(
-            f'{case.source}: study is missing; add [study] with what is varied, such as '
+            f"{case.source}: study is missing; add [study] with what is varied, such as "
             'sq = { from = "0.5 um", to = "4 um", step = "0.5 um" }'
         )
     if not section.axes and section.seeds == 1:
@@ -306,9 +306,7 @@ def _between(span: _Span, share: float, scale: str) -> Decimal:
     return Decimal(f"{value:.{DIGITS}g}")
 
 
-def _sampled(
-    case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int
-) -> list[dict[str, Any]]:
+def _sampled(case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int) -> list[dict[str, Any]]:
     """Points of a Latin hypercube: over ranges evenly, over lists entry by entry."""
     from scipy.stats import qmc
 

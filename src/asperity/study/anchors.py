@@ -1,0 +1,270 @@
+"""What is known from elsewhere about a wear curve, the paper's printed numbers above all, and how a curve meets it."""
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field as Entry
+from pydantic import ValidationError
+
+from asperity.case import Length, Section
+from asperity.errors import BadInput, UnreadableFile
+from asperity.rig import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS
+from asperity.study.curve import WearCurve
+
+if TYPE_CHECKING:
+    import pandas
+
+Sense = Literal["about", "at least", "at most"]
+SPLIT = "split"
+_TEXT = "section 3.1 of Xu et al., Lubricants 2025, 13, 78"
+_RIG = "section 4.2 of Xu et al., Lubricants 2025, 13, 78"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Anchor:
+    """A number that a wear curve should meet.
+
+    Parameters
+    ----------
+    name : what a table calls it
+    quantity : a column of the study, or "split", the break between stages [um of Sq]
+    value, tolerance : in the column's unit; `tolerance` is what a deviation is measured by
+    sq : roughness it holds at [m]; None for "split"
+    since : where given, the anchor is the change of the quantity from there to `sq` [m]
+    sense : whether the curve should be about `value`, at least or at most that
+    source : where it is printed
+    fitted : whether a calibration aims at it
+    """
+
+    name: str
+    quantity: str
+    value: float
+    tolerance: float
+    sq: float | None = None
+    since: float | None = None
+    sense: Sense = "about"
+    source: str = ""
+    fitted: bool = True
+
+    def of(self, curve: WearCurve) -> tuple[float, float, float]:
+        """What the curve has in its place, and the interval over seeds; nan where the curve does not reach."""
+        if self.quantity == SPLIT:
+            stages = curve.stages.get("sound")
+            return (np.nan,) * 3 if stages is None or not stages.found else (stages.split, *stages.interval)
+        assert self.sq is not None
+        here = curve.at(self.sq, self.quantity)
+        if self.since is None:
+            return here
+        there = curve.at(self.since, self.quantity)
+        off = float(np.hypot(here[2] - here[0], there[2] - there[0]))
+        change = here[0] - there[0]
+        return change, change - off, change + off
+
+    def miss(self, ours: float) -> float:
+        """How far off `ours` is, in the quantity's unit; 0 where the anchor only bounds it and is kept."""
+        off = ours - self.value
+        if self.sense == "at least":
+            return min(off, 0.0)
+        return max(off, 0.0) if self.sense == "at most" else off
+
+
+def _car(quantity: str, name: str, fitted: bool) -> tuple[Anchor, ...]:
+    common = {"quantity": quantity, "fitted": fitted, "source": _TEXT}
+    return (
+        Anchor(name=f"{name} at 0.5 um", sq=0.5e-6, value=0.0557, tolerance=0.03, **common),  # type: ignore[arg-type]
+        Anchor(name=f"{name} at 2.5 um", sq=2.5e-6, value=0.5922, tolerance=0.03, **common),  # type: ignore[arg-type]
+        Anchor(  # "gradually increases and reaches a saturation state"
+            name=f"{name}, change from 2.5 to 4 um",
+            since=2.5e-6,
+            sq=4e-6,
+            value=0.0,
+            tolerance=0.05,
+            **common,  # type: ignore[arg-type]
+        ),
+    )
+
+
+PAPER_ANCHORS: tuple[Anchor, ...] = (
+    *_car("car_domain", "CAR of the domain", True),
+    *_car("car", "CAR of the Hertz zone", False),
+    Anchor(
+        name="CLR, rise from 2.5 to 4 um",
+        quantity="clr",
+        since=2.5e-6,
+        sq=4e-6,
+        value=0.03,
+        tolerance=0.02,
+        sense="at least",
+        source=_TEXT,
+    ),
+    Anchor(
+        name="CLR steady, change from 3.5 to 4 um",
+        quantity="clr",
+        since=3.5e-6,
+        sq=4e-6,
+        value=0.0,
+        tolerance=0.03,
+        source=_TEXT,
+    ),
+    Anchor(  # from CRF ~ (CLR F)^(1/6) and the full-load CRF
+        name="CLR at 0.54 um behind the rig's CRF",
+        quantity="clr",
+        sq=0.54e-6,
+        value=0.19,
+        tolerance=0.05,
+        source=_RIG,
+        fitted=False,
+    ),
+    Anchor(
+        name="CLR at 3.49 um behind the rig's CRF",
+        quantity="clr",
+        sq=3.49e-6,
+        value=0.935,
+        tolerance=0.04,
+        source=_RIG,
+        fitted=False,
+    ),
+    Anchor(
+        name="CRF at 0.54 um, rig",
+        quantity="crf_sound_hz",
+        sq=0.54e-6,
+        value=CRF_ENDS_HZ[0],
+        tolerance=60.0,
+        source=_RIG,
+    ),
+    Anchor(
+        name="CRF at 3.49 um, rig",
+        quantity="crf_sound_hz",
+        sq=3.49e-6,
+        value=CRF_ENDS_HZ[1],
+        tolerance=30.0,
+        source=_RIG,
+    ),
+    Anchor(
+        name="split, simulated",
+        quantity=SPLIT,
+        value=2.5,
+        tolerance=0.3,
+        source=_TEXT,
+        fitted=False,
+    ),
+    Anchor(
+        name="split, rig",
+        quantity=SPLIT,
+        value=1.8,
+        tolerance=0.12,
+        source=_RIG,
+        fitted=False,
+    ),
+)
+
+
+def compare(curve: WearCurve, anchors: Sequence[Anchor] = PAPER_ANCHORS) -> "pandas.DataFrame":
+    """A row an anchor: what is printed, what the curve has, its 90 % interval over seeds, the miss, and whether met.
+
+    `met` is True where the miss is within the tolerance, and `possible` where some value of the interval would be.
+    Both are False where the curve has no value (a Sq that was not computed, stages that are not there).
+    """
+    import pandas
+
+    rows = []
+    for anchor in anchors:
+        ours, low, high = anchor.of(curve)
+        ends = [abs(anchor.miss(end)) for end in (low, high) if np.isfinite(end)]
+        crossed = bool(np.isfinite(low) and low <= anchor.value <= high)
+        miss = anchor.miss(ours) if np.isfinite(ours) else np.nan
+        met = bool(np.isfinite(miss) and abs(miss) <= anchor.tolerance)
+        rows.append(
+            {
+                "anchor": anchor.name,
+                "quantity": anchor.quantity,
+                "sq_um": np.nan if anchor.sq is None else 1e6 * anchor.sq,
+                "sense": anchor.sense,
+                "printed": anchor.value,
+                "tolerance": anchor.tolerance,
+                "ours": ours,
+                "low": low,
+                "high": high,
+                "miss": miss,
+                "met": met,
+                "possible": met or crossed or any(end <= anchor.tolerance for end in ends),
+                "source": anchor.source,
+            }
+        )
+    return pandas.DataFrame(rows)
+
+
+def rig_prediction(curve: WearCurve, quantity: str = "crf_sound_hz") -> "pandas.DataFrame":
+    """Our CRF at the rig's twelve Sq values with the spread over seeds, beside what is printed: the two ends."""
+    import pandas
+
+    rows = []
+    for number, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
+        ours, low, high = curve.at(1e-6 * sq, quantity)
+        printed = {0: CRF_ENDS_HZ[0], len(SAMPLES_SQ_UM) - 1: CRF_ENDS_HZ[1]}.get(number, np.nan)
+        rows.append({"sq_um": sq, "sq_std_um": std, "crf_hz": ours, "low": low, "high": high, "printed_hz": printed})
+    return pandas.DataFrame(rows)
+
+
+def rig_deviation(curve: WearCurve, quantity: str = "crf_sound_hz") -> dict[str, float]:
+    """Root mean square of our CRF less the rig's [Hz]; nan where the curve does not reach over all of its Sq.
+
+    "ends": over the two values that are printed. "knee", "smooth": over all twelve Sq, between those ends along a bent
+    or a saturating line; its Fig 13 has no numbers, so that the shape between the ends is ours.
+    """
+    predicted = rig_prediction(curve, quantity)
+    ours, sq = predicted["crf_hz"].to_numpy(dtype=float), 1e-6 * np.array(SAMPLES_SQ_UM)
+    ends = ours[[0, -1]] - np.array(CRF_ENDS_HZ)
+    shapes = {name: ours - TRENDS[name](sq) for name in ("knee", "smooth")}
+    return {name: float(np.sqrt(np.mean(off**2))) for name, off in {"ends": ends, **shapes}.items()}
+
+
+class _AnchorSection(Section):
+    name: str
+    quantity: str
+    value: float
+    tolerance: Annotated[float, Entry(gt=0.0)]
+    sq: Length | None = None
+    since: Length | None = None
+    sense: Sense = "about"
+    source: str = ""
+    fitted: bool = True
+
+
+class _AnchorFile(Section):
+    anchor: Annotated[tuple[_AnchorSection, ...], Entry(min_length=1)]
+
+
+def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
+    """Read anchors of one's own: a TOML file of [[anchor]] tables with the fields of `Anchor`, Sq with its unit.
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is missing or no TOML.
+    BadInput
+        for a table that lacks something or has what an anchor has not.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UnreadableFile(f"{path} cannot be read as TOML: {error}") from None
+    try:
+        sections = _AnchorFile.model_validate(tables).anchor
+    except ValidationError as error:
+        mistake = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in mistake["loc"])
+        raise BadInput(f"{path}: {where}: {mistake['msg']}, got {mistake['input']!r}; see docs/study.md") from None
+    anchors = []
+    for section in sections:
+        if (section.sq is None) != (section.quantity == SPLIT):
+            raise BadInput(f"{path}: anchor {section.name!r} needs sq, a length; only a split has none")
+        values = {name: getattr(section, name) for name in type(section).model_fields}
+        lengths = {name: None if values[name] is None else float(values[name]) for name in ("sq", "since")}
+        anchors.append(Anchor(**{**values, **lengths}))
+    return tuple(anchors)

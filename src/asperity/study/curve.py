@@ -1,0 +1,196 @@
+"""The wear curve, the paper's Figs 7 and 8: roughness to load sharing to contact resonance to stage, over seeds."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.case import Case
+from asperity.errors import BadInput, require_positive
+from asperity.study.evaluate import BOTH_PRESETS, DONE
+from asperity.study.execute import Progress, StudyResult, run_study
+from asperity.study.plan import plan_points
+from asperity.wear import Stages, split_stages
+
+if TYPE_CHECKING:
+    import pandas
+
+SQ = "surface.sq"
+LEVEL = 0.90
+
+
+@dataclass(frozen=True)
+class WearCurve:
+    """Load sharing and contact resonance over roughness.
+
+    Parameters
+    ----------
+    sq : shape (levels,), roughness asked for [m], rising
+    table : a row a case, as in `StudyResult.table`; what failed is left out of every mean
+    """
+
+    sq: Field
+    table: "pandas.DataFrame"
+
+    @property
+    def left_out(self) -> int:
+        """Cases that failed or did not converge."""
+        return int((self.table["status"] != DONE).sum())
+
+    def values(self, quantity: str, level: int) -> Field:
+        """Every seed's value of a column at a level, shape (seeds,); where there is none, as of an unheard CRF, none.
+
+        Raises
+        ------
+        BadInput
+            for a column that the table has not.
+        """
+        if quantity not in self.table:
+            raise BadInput(f"the study has no column {quantity!r}; it has {', '.join(self.table.columns)}")
+        rows = self.table[(self.table["status"] == DONE) & (self.table[SQ] == self.sq[level])]
+        values = rows[quantity].to_numpy(dtype=float)
+        return np.asarray(values[np.isfinite(values)])
+
+    def mean(self, quantity: str) -> Field:
+        """Mean over seeds, shape (levels,); nan where no seed has a value."""
+        return np.array([values.mean() if values.size else np.nan for values in self._by_level(quantity)])
+
+    def std(self, quantity: str) -> Field:
+        """Standard deviation over seeds, of one surface against another, shape (levels,)."""
+        return np.array([values.std(ddof=1) if values.size > 1 else np.nan for values in self._by_level(quantity)])
+
+    def interval(self, quantity: str, level: float = LEVEL) -> Field:
+        """Student's interval of the mean over seeds, shape (levels, 2); nan with fewer than two seeds."""
+        from scipy.stats import t
+
+        counts = np.array([values.size for values in self._by_level(quantity)])
+        reach = (
+            t.ppf(0.5 + level / 2.0, np.maximum(counts - 1, 1)) * self.std(quantity) / np.sqrt(np.maximum(counts, 1))
+        )
+        return self.mean(quantity)[:, None] + np.outer(reach, (-1.0, 1.0))
+
+    def at(self, sq: float, quantity: str, level: float = LEVEL) -> tuple[float, float, float]:
+        """Mean at any roughness [m] and its interval, straight between levels; nan outside of them."""
+        mean, reach = self.mean(quantity), np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0
+        if not self.sq[0] * (1 - 1e-9) <= sq <= self.sq[-1] * (1 + 1e-9):
+            return np.nan, np.nan, np.nan
+        if self.sq.size == 1:
+            weights = np.ones(1)
+        else:
+            right = int(np.clip(np.searchsorted(self.sq, sq), 1, self.sq.size - 1))
+            share = float(np.clip((sq - self.sq[right - 1]) / (self.sq[right] - self.sq[right - 1]), 0.0, 1.0))
+            weights = np.zeros(self.sq.size)
+            weights[right - 1 : right + 1] = 1.0 - share, share
+        used = weights > 0.0
+        middle = float(weights[used] @ mean[used])
+        off = float(np.sqrt(np.sum((weights[used] * reach[used]) ** 2)))  # neighbouring levels have their own surfaces
+        return middle, middle - off, middle + off
+
+    @cached_property
+    def stages(self) -> dict[str, Stages]:
+        """Stages along Sq in micrometres, from the CRF and CRFA of each vibration preset; empty without vibration."""
+        found = {}
+        rows = self.table[self.table["status"] == DONE]
+        for preset in BOTH_PRESETS:
+            if f"crf_{preset}_hz" in rows:
+                std = rows[f"crf_std_{preset}_hz"].to_numpy(dtype=float)
+                found[preset] = split_stages(
+                    1e6 * rows[SQ].to_numpy(dtype=float),
+                    rows[f"crf_{preset}_hz"].to_numpy(dtype=float),
+                    rows[f"crfa_{preset}"].to_numpy(dtype=float),
+                    crf_std_hz=np.nan_to_num(std),
+                    unit="um",
+                )
+        return found
+
+    def summary(self) -> "pandas.DataFrame":
+        """Mean, standard deviation and interval of the paper's quantities, a row a level."""
+        import pandas
+
+        columns: dict[str, Field] = {"sq_um": 1e6 * self.sq}
+        for name in self.quantities:
+            low, high = self.interval(name).T
+            columns |= {name: self.mean(name), f"{name}_std": self.std(name), f"{name}_low": low, f"{name}_high": high}
+        return pandas.DataFrame(columns)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The columns that the paper's Figs 7 and 8 show."""
+        heard = [f"{name}_{preset}{unit}" for preset in BOTH_PRESETS for name, unit in (("crf", "_hz"), ("crfa", ""))]
+        wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *heard)
+        return tuple(name for name in wanted if name in self.table)
+
+    def verdict(self) -> str:
+        """One sentence: where load sharing and resonance go, and where wear turns severe."""
+        first, last = 1e6 * self.sq[0], 1e6 * self.sq[-1]
+        sentence = "Between Sq "
+        clr = 100.0 * self.mean("clr")
+        sentence += (
+            f"{first:.3g} and {last:.3g} um the asperities' share of the load goes from {clr[0]:.0f} to {clr[-1]:.0f} %"
+        )
+        if "crf_sound_hz" in self.table:
+            crf = self.mean("crf_sound_hz")
+            sentence += f", the contact resonance from {crf[0]:.0f} to {crf[-1]:.0f} Hz"
+            sentence += f". {self.stages['sound'].verdict}"
+        sentence = f"{sentence.rstrip('.')}."
+        return f"{self.left_out} CASES FAILED and are left out: {sentence}" if self.left_out else sentence
+
+    def _by_level(self, quantity: str) -> list[Field]:
+        return [self.values(quantity, level) for level in range(self.sq.size)]
+
+
+def wear_curve(
+    case: Case,
+    *,
+    sq_values: Sequence[float],
+    seeds: int | Sequence[int],
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> WearCurve:
+    """Solve a case at several roughnesses, several surfaces each, and listen to all of them.
+
+    Parameters
+    ----------
+    case : its surface is generated anew for each case, at the wanted Sq
+    sq_values : shape (levels,) [m]
+    seeds : surfaces a level, or their seeds
+    executor, workers, progress : see `run_study`
+
+    Raises
+    ------
+    BadInput
+        for a roughness that is not positive, or a case without an Sq to vary.
+    """
+    for sq in sq_values:
+        require_positive("Sq", sq, "m")
+    points = [{SQ: f"{1e6 * sq:.9g} um"} for sq in sorted(set(sq_values))]
+    plan = plan_points(case, points, seeds=seeds)
+    return curve_of(run_study(plan, executor=executor, workers=workers, progress=progress))
+
+
+def curve_of(result: StudyResult) -> WearCurve:
+    """The wear curve of a study that varies Sq and nothing else.
+
+    Raises
+    ------
+    BadInput
+        if the study varies something else, or holds no finished case.
+    """
+    if not is_wear_study(result):
+        raise BadInput(
+            f"a wear curve needs a study that varies {SQ} alone, got {', '.join(result.plan.axes) or 'none'}"
+        )
+    if not len(result.table) or not (result.table["status"] == DONE).any():
+        raise BadInput("a wear curve needs finished cases, got none; run the study first")
+    return WearCurve(np.sort(result.table[SQ].unique().astype(float)), result.table)
+
+
+def is_wear_study(result: StudyResult) -> bool:
+    """Whether a study's cases differ in Sq (and seeds) alone."""
+    swept = [key for key in result.plan.axes if key not in ("surface.seed", "vibration.seed")]
+    return swept == [SQ] and result.plan.kind == "solve"

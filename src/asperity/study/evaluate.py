@@ -1,0 +1,120 @@
+"""One case of a study to one row: solved, listened to with both vibration presets, every number by its name.
+
+Runs in worker processes: takes and gives only what can be sent, raises nothing that a case can cause.
+"""
+
+import logging
+import math
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from multiprocessing.connection import wait
+from typing import Any
+
+from asperity.arrays import Field
+from asperity.case import Case
+from asperity.coupling import contact_vibration
+from asperity.ehl.solution import ContactSolution
+from asperity.ehl.state import ContactState
+from asperity.errors import AsperityError
+from asperity.run import solve_case, vibrate_case, vibration_scalars
+from asperity.wear import Resonance
+
+DONE, NOT_CONVERGED, FAILED = "done", "not converged", "failed"
+FIELDS = ("pressure", "gap", "in_contact", "surface_height")
+BOTH_PRESETS = ("sound", "paper")
+
+Row = dict[str, Any]
+_alone = threading.Lock()  # the solver's work arrays are one set a process, and an executor may have threads
+
+
+def evaluate_batch(
+    case: Case, kind: str, batch: Sequence[Mapping[str, Any]], wanted: tuple[str, ...] = ()
+) -> list[tuple[Row, dict[str, Field]]]:
+    """Rows, and the fields wanted, of `case` with each of the batch's overrides.
+
+    One thread does the algebra: two would sum in another order, and a resumed study is to be the same to the last bit.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with _alone, threadpool_limits(1):
+        return [evaluate(case, kind, overrides, wanted) for overrides in batch]
+
+
+def evaluate(
+    case: Case, kind: str, overrides: Mapping[str, Any], wanted: tuple[str, ...] = ()
+) -> tuple[Row, dict[str, Field]]:
+    """The row of one case: `status`, `reason` and every scalar; a failure is a row too, and says why."""
+    try:
+        return EVALUATIONS[kind](case.with_overrides(overrides), wanted)
+    except AsperityError as refusal:
+        return {"status": FAILED, "reason": str(refusal)}, {}
+    except Exception as mistake:  # ours, and no reason to lose the others
+        logging.getLogger(__name__).exception("a case of a study failed: %s", overrides)
+        return {"status": FAILED, "reason": f"{type(mistake).__name__}: {mistake}"}, {}
+
+
+def _solved(case: Case, wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+    run = solve_case(case, strict=False)
+    convergence = run.solution.convergence
+    row: Row = {"status": DONE, "reason": ""}
+    if not convergence.converged:
+        row = {"status": NOT_CONVERGED, "reason": convergence.explain()}
+    row |= run.scalars()
+    if run.vibration is not None:
+        row["full_load_crf_hz"] = run.vibration.full_load_crf_hz
+        row |= _both_presets(case, run.state, run.solution)
+    maps: dict[str, Any] = {
+        "pressure": run.solution.pressure,
+        "gap": run.solution.gap,
+        "in_contact": run.solution.in_contact,
+        "surface_height": run.solution.surface.heights,
+    }
+    return row, {name: maps[name] for name in wanted}
+
+
+def _vibrated(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+    heard, state = vibrate_case(case)
+    return {"status": DONE, "reason": "", **vibration_scalars(heard, state, case)}, {}
+
+
+EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Field]]]] = {
+    "solve": _solved,
+    "vibrate": _vibrated,
+}
+
+
+def _both_presets(case: Case, state: ContactState, solution: ContactSolution) -> Row:
+    """CRF and CRFA of the one contact by the sound vibration preset and by the paper's."""
+    row: Row = {}
+    for preset in BOTH_PRESETS:
+        model = case.with_overrides({"vibration.preset": preset}).vibration
+        assert model is not None
+        row[f"reason_{preset}"] = ""
+        try:
+            found: Resonance | None = contact_vibration(state, case.conditions, model, solution=solution).resonance
+        except AsperityError as refusal:
+            row[f"reason_{preset}"], found = str(refusal), None
+        heard = found if found is not None and found.found else None
+        for name, unit in (("crf", "_hz"), ("crfa", ""), ("crf_std", "_hz"), ("crfa_std", "")):
+            value = math.nan if heard is None else float(getattr(heard, f"{name}{unit}"))
+            row[f"{name}_{preset}{unit}"] = value if math.isfinite(value) else None
+    return row
+
+
+# In worker processes -------------------------------------------------------------------------------------------------
+
+
+def set_up_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it: a parent that is killed cannot tell its workers to stop."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)

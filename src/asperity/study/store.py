@@ -1,0 +1,317 @@
+"""What a study leaves on disk, and how it comes back: manifest first, then a part a finished batch, each written whole.
+
+A part is a small parquet table under a temporary name, flushed and renamed, so that a crash at any moment leaves only
+whole ones; what the manifest promises and no part holds is still to be computed.
+"""
+
+import hashlib
+import json
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from platform import python_version
+from typing import TYPE_CHECKING, Any
+
+from asperity.arrays import Field
+from asperity.case import in_si, load_case, relative_to
+from asperity.ehl.storage import require_writable, whole_file
+from asperity.errors import AsperityError, BadInput, UnreadableFile
+from asperity.study.evaluate import DONE, Row
+from asperity.study.plan import SEEDS, Plan, plan_points
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
+
+FORMAT = 1  # counts up when a reader of the format before could not read the folder
+MANIFEST, PARTS, TABLE, MAPS = "manifest.json", "parts", "table.parquet", "fields.zarr"
+LEFT_BEHIND_S = 3600.0  # age of a temporary file that no shard elsewhere can still be writing
+_LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
+
+
+@dataclass(frozen=True)
+class Store:
+    """A study's folder. Made by `open_store`, which holds its lock."""
+
+    folder: Path
+    plan: Plan
+    shard: tuple[int, int]
+
+    def finished(self) -> dict[str, tuple[str, int]]:
+        """Status and attempt of every case that some part holds."""
+        import pyarrow.parquet
+
+        found: dict[str, tuple[str, int]] = {}
+        for path in self._parts():
+            with _naming(path):
+                part = pyarrow.parquet.read_table(path, columns=["case_id", "status", "attempt"]).to_pydict()
+            for case_id, status, attempt in zip(*(part[name] for name in part), strict=True):
+                if attempt >= found.get(case_id, ("", 0))[1]:
+                    found[case_id] = status, attempt
+        return found
+
+    def keep(self, rows: Sequence[Row], maps: Mapping[str, Mapping[str, Field]]) -> None:
+        """Write a finished batch: its fields first, then its rows.
+
+        Raises
+        ------
+        AsperityError
+            if the system refuses to write; nothing half written is left behind.
+        """
+        for case_id, fields in maps.items():
+            if fields:
+                self._keep_maps(case_id, fields)
+        names = hashlib.sha256("".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()).hexdigest()
+        self._write(self.folder / PARTS / f"{names[:20]}.parquet", table_of(rows))
+
+    def _keep_maps(self, case_id: str, fields: Mapping[str, Field]) -> None:
+        zarr = require_zarr()
+        try:
+            group = zarr.open_group(self.folder / MAPS, mode="a").require_group(case_id)
+            for name, values in fields.items():
+                group.create_array(name, data=values, chunks=values.shape, overwrite=True)
+        except OSError as error:
+            raise AsperityError(_refused(self.folder / MAPS, error)) from error
+
+    def merge(self) -> Path:
+        """Write what is finished as one table, in the order of the plan, and return its path."""
+        import pyarrow
+
+        path = self.folder / TABLE
+        table = pyarrow.Table.from_pandas(self.table(), preserve_index=False)
+        about = {"asperity": version("asperity"), "case": self.plan.case.text}
+        self._write(path, table.replace_schema_metadata({**table.schema.metadata, **about}))
+        return path
+
+    def table(self) -> "pandas.DataFrame":
+        """What is finished, a row a case in the order of the plan."""
+        import pyarrow.parquet
+
+        parts = []
+        for path in self._parts():
+            with _naming(path):
+                parts.append(pyarrow.parquet.read_table(path))
+        return in_order(parts, self.plan)
+
+    def take_from(self, other: Path) -> int:
+        """Copy the parts of another folder of the same study (a shard computed elsewhere), and return how many."""
+        manifest = read_manifest(other)
+        _require_same(manifest, self.plan, other)
+        taken = 0
+        for path in sorted((other / PARTS).glob("*.parquet")):
+            target = self.folder / PARTS / path.name
+            if not target.exists():
+                with whole_file(target) as part:
+                    part.write_bytes(path.read_bytes())
+                taken += 1
+        return taken
+
+    def _parts(self) -> list[Path]:
+        return sorted((self.folder / PARTS).glob("*.parquet"))
+
+    def _write(self, path: Path, table: "pyarrow.Table") -> None:
+        import pyarrow.parquet
+
+        with whole_file(path) as part:
+            pyarrow.parquet.write_table(table, part)
+
+
+@contextmanager
+def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Store]:
+    """A study's folder, made or found, with its manifest written, held against a second process that computes there.
+
+    Raises
+    ------
+    BadInput
+        for a folder that cannot be written to, that holds another study, or that another process is working in.
+    AsperityError
+        if the system refuses to write, as on a full disk.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"cannot write into {folder}: it is a file; name a folder")
+    manifest = folder / MANIFEST
+    if manifest.exists():
+        _require_same(read_manifest(folder), plan, folder)
+    elif folder.exists() and any((folder / PARTS).glob("*.parquet")):
+        raise BadInput(f"{folder} holds parts of a study without its manifest; choose another folder")
+    try:
+        (folder / PARTS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(f"cannot make the folder {folder / PARTS}: {error.strerror}; choose another") from None
+    require_writable(manifest)
+    with ExitStack() as held:
+        _hold(folder, shard, held)
+        for left in (folder / PARTS).glob(".*.part"):
+            if shard == (1, 1) or time.time() - left.stat().st_mtime > LEFT_BEHIND_S:
+                left.unlink(missing_ok=True)
+        with whole_file(manifest) as part:
+            part.write_text(json.dumps(_manifest(plan, folder), indent=1), "utf-8")
+        yield Store(folder, plan, shard)
+
+
+def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
+    """Lock the folder: a whole study against everybody, a shard against itself and a whole study."""
+    import filelock
+
+    whole, own = folder / ".whole.lock", folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
+    try:
+        if shard == (1, 1):
+            for lock in (whole, *folder.glob(".shard-*.lock")):
+                held.enter_context(filelock.FileLock(lock, timeout=0))
+        else:
+            with filelock.FileLock(whole, timeout=1):
+                held.enter_context(filelock.FileLock(own, timeout=0))
+    except filelock.Timeout:
+        raise BadInput(f"another process computes this study in {folder}; wait for it, or stop it") from None
+    except OSError as error:
+        raise BadInput(f"cannot write into {folder}: {error.strerror}; choose another") from None
+
+
+def read_plan(folder: Path) -> Plan:
+    """The plan of a study's folder.
+
+    Raises
+    ------
+    UnreadableFile
+        if the folder holds no study, or its manifest is damaged.
+    """
+    manifest = read_manifest(folder)
+    try:
+        home = (folder / manifest["case_folder"]).resolve()
+        case = load_case(manifest["case"], folder=home, name=manifest["source"])
+        return plan_points(
+            case,
+            manifest["points"],
+            axes=manifest["axes"],
+            seeds=manifest["seeds"] or manifest["realisations"],
+            kind=manifest["kind"],
+            seeding=manifest["seeding"],
+        )
+    except KeyError:
+        raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """What a study's folder says about itself; UnreadableFile where it says nothing that can be read."""
+    path = folder / MANIFEST
+    try:
+        manifest = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise UnreadableFile(f"{folder} holds no study: it has no {MANIFEST}; check its name") from None
+    except (OSError, ValueError):
+        raise UnreadableFile(f"{path} is damaged; compute the study into another folder") from None
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise UnreadableFile(f"{path} is not a study's manifest that this asperity can read; choose another folder")
+    return manifest
+
+
+def _manifest(plan: Plan, folder: Path) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "design": plan.design,
+        "versions": {
+            **{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")},
+            "python": python_version(),
+        },
+        "source": plan.case.source,
+        "case": plan.case.text,
+        "case_folder": relative_to(plan.case.folder.resolve(), folder.resolve()),
+        "surface_digest": plan.surface_digest,
+        "kind": plan.kind,
+        "seeding": plan.seeding,
+        "seeds": plan.seeds,
+        "realisations": plan.realisations,
+        "axes": plan.axes,
+        "cases": len(plan.cases),
+        "points": plan.points,
+    }
+
+
+def _require_same(manifest: Mapping[str, Any], plan: Plan, folder: Path) -> None:
+    """Levels and seeds may be added to a study; what all its cases share may not change under it."""
+    theirs, ours = manifest.get("versions", {}).get("asperity"), version("asperity")
+    if theirs != ours:
+        raise BadInput(f"{folder} was computed by asperity {theirs}, this is {ours}; choose another folder")
+    if manifest.get("design") != plan.design:
+        raise BadInput(
+            f"{folder} holds a study of another case than {plan.case.source}; "
+            "choose another folder, or the case as it was"
+        )
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    import pyarrow
+
+    try:
+        yield
+    except (OSError, pyarrow.ArrowException) as error:
+        raise UnreadableFile(f"{path} is damaged ({error}); delete it, and its cases are computed again") from None
+
+
+def _refused(path: Path, error: OSError) -> str:
+    return f"{path} could not be written: {error.strerror or error}; finished cases are kept"
+
+
+def require_zarr() -> Any:
+    """The zarr library; BadInput where it is not installed."""
+    try:
+        import zarr
+    except ModuleNotFoundError:
+        raise BadInput("keeping fields needs zarr; pip install 'asperity[study]'") from None
+    return zarr
+
+
+# Tables --------------------------------------------------------------------------------------------------------------
+
+
+def table_of(rows: Iterable[Row]) -> "pyarrow.Table":
+    """Rows as a table; a row may lack what another has."""
+    import pyarrow
+
+    rows = list(rows)
+    names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
+    return pyarrow.Table.from_pydict({name: [row.get(name) for row in rows] for name in names})
+
+
+def in_order(parts: Sequence["pyarrow.Table"], plan: Plan) -> "pandas.DataFrame":
+    """Finished rows behind the plan's own columns, by case number; of a case computed twice, the last attempt."""
+    import pandas
+    import pyarrow
+
+    planned = pandas.DataFrame(
+        {
+            "case_id": [case.id for case in plan.cases],
+            "number": [case.number for case in plan.cases],
+            "point": [case.point for case in plan.cases],
+            "realisation": [case.realisation for case in plan.cases],
+        }
+    )
+    for key in (*plan.axes, *(seed for seed in SEEDS if seed not in plan.axes)):
+        values = [in_si(case.overrides.get(key)) for case in plan.cases]
+        if any(value is not None for value in values):
+            planned[key] = [json.dumps(value) if isinstance(value, list) else value for value in values]
+    for seed in SEEDS:
+        if seed in planned:
+            planned[seed] = planned[seed].astype("int64")
+    if parts:
+        fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
+        table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
+        for place, column in enumerate(table.schema):
+            if pyarrow.types.is_null(column.type):  # a number that no case has
+                table = table.set_column(place, column.name, table.column(place).cast("float64"))
+        finished = table.to_pandas()
+        finished = finished.sort_values("attempt").drop_duplicates("case_id", keep="last").drop(columns="attempt")
+    else:
+        finished = pandas.DataFrame({"case_id": [], "status": [], "reason": []}, dtype=str)
+    merged = planned.merge(finished, on="case_id", how="inner").sort_values("number", ignore_index=True)
+    rest = [name for name in merged.columns if name not in _LEADING]
+    return merged[[*_LEADING, *rest]]
+
+
+def failed(table: "pandas.DataFrame") -> "pandas.DataFrame":
+    """The rows that must not be used."""
+    return table[table["status"] != DONE]
