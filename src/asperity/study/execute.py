@@ -28,7 +28,18 @@ from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker
 from asperity.study.plan import Plan, StudyCase
-from asperity.study.store import Store, failed, in_order, open_store, read_plan, require_zarr, table_of
+from asperity.study.store import (
+    MANIFEST,
+    TABLE,
+    Store,
+    failed,
+    in_order,
+    open_read,
+    open_store,
+    read_plan,
+    require_zarr,
+    table_of,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -158,9 +169,8 @@ def load_study(folder: str | Path) -> StudyResult:
     """
     folder = Path(folder)
     plan = read_plan(folder)
-    store = Store(folder, plan, (1, 1))
-    path = folder / "table.parquet"
-    return StudyResult(plan, store.table(), folder, path if path.exists() else None)
+    path = folder / TABLE
+    return StudyResult(plan, open_read(folder, plan).table(), folder, path if path.exists() else None)
 
 
 def cores() -> int:
@@ -365,3 +375,42 @@ def _workers_of(executor: Executor) -> int:
     if client is not None:
         return max(1, int(sum(client.nthreads().values())))
     return int(getattr(executor, "_max_workers", None) or cores())
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a study will cost, from a few of its cases computed and thrown away."""
+
+    cases: int  # of this shard
+    kept: int
+    case_s: float  # one worker, mean of those tried
+    tried: int
+    workers: int
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock time that is left."""
+        return (self.cases - self.kept) * self.case_s / self.workers
+
+
+def estimate(
+    plan: Plan, *, out: Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
+) -> Estimate:
+    """Time three cases of a study, from its beginning, middle and end; nothing is kept.
+
+    Raises
+    ------
+    BadInput
+        for a folder that holds another study.
+    """
+    kept = 0
+    if out is not None and (out / MANIFEST).exists():
+        known = open_read(out, plan).finished()
+        kept = sum(case.id in known for case in plan.cases if case.number % shard[1] == shard[0] - 1)
+    share = [case for case in plan.cases if case.number % shard[1] == shard[0] - 1]
+    if not share:
+        return Estimate(0, 0, 0.0, 0, workers or cores())
+    chosen = [share[round(part * (len(share) - 1))] for part in (0.0, 0.5, 1.0)]
+    evaluate_batch(plan.case, plan.kind, [chosen[1].overrides])  # loads and compiles
+    _, seconds = _timed(plan.case, plan.kind, [case.overrides for case in chosen])
+    return Estimate(len(share), kept, seconds / len(chosen), len(chosen), workers or cores())

@@ -98,8 +98,7 @@ class Store:
 
     def take_from(self, other: Path) -> int:
         """Copy the parts of another folder of the same study (a shard computed elsewhere), and return how many."""
-        manifest = read_manifest(other)
-        _require_same(manifest, self.plan, other)
+        open_read(other, self.plan)
         taken = 0
         for path in sorted((other / PARTS).glob("*.parquet")):
             target = self.folder / PARTS / path.name
@@ -150,6 +149,12 @@ def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Sto
         with whole_file(manifest) as part:
             part.write_text(json.dumps(_manifest(plan, folder), indent=1), "utf-8")
         yield Store(folder, plan, shard)
+
+
+def open_read(folder: Path, plan: Plan) -> Store:
+    """A study's folder to read from; BadInput where it holds another study than `plan`."""
+    _require_same(read_manifest(folder), plan, folder)
+    return Store(folder, plan, (1, 1))
 
 
 def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
