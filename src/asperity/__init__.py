@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from asperity.conditions import ContactConditions, ElasticPair
     from asperity.coupling import Vibration, VibrationModel, contact_vibration
     from asperity.curves import FrictionCurve, stribeck_curve, traction_curve
+    from asperity.ehl.cavitation import FilmSolution, solve_film
     from asperity.ehl.flash import FlashTemperature, flash_temperature
     from asperity.ehl.friction import Friction, friction
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
@@ -75,6 +76,7 @@ _NAMES = {
     "conditions": ("ContactConditions", "ElasticPair"),
     "coupling": ("Vibration", "VibrationModel", "contact_vibration"),
     "curves": ("FrictionCurve", "stribeck_curve", "traction_curve"),
+    "ehl.cavitation": ("FilmSolution", "solve_film"),
     "ehl.flash": ("FlashTemperature", "flash_temperature"),
     "ehl.friction": ("Friction", "friction"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
@@ -154,6 +156,7 @@ __all__ = [
     "ElasticPair",
     "EyringShear",
     "Facts",
+    "FilmSolution",
     "FilteredNoise",
     "FlashTemperature",
     "Friction",
@@ -229,6 +232,7 @@ __all__ = [
     "smooth",
     "solve_case",
     "solve_contact",
+    "solve_film",
     "solve_thermal_contact",
     "split_stages",
     "stribeck_curve",

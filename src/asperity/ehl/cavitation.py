@@ -1,0 +1,334 @@
+"""Oil between rigid walls that conserves mass where it ruptures: Jakobsson, Floberg and Olsson's cavitation.
+
+One signed unknown a cell: s >= 0 is a pressure in a full film, s < 0 the missing share of a ruptured one (film content
+1 + s, no pressure), so that one of the two always holds. The gap is given: what bends it stands in `conserving`.
+Source: H. G. Elrod, J. Lubr. Tech. 103 (1981) 350, for one universal unknown in both regions.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from asperity.arrays import Field, Mask
+from asperity.errors import BadInput, NotConverged, require_positive
+from asperity.lubricant import Barus, DensityLaw, Incompressible, ViscosityLaw
+
+MOST_STEPS = 200
+LONGEST_STEP = 1.0  # change of a viscosity's logarithm in one cell and one Newton step
+PATIENCE = 4  # steps without progress before they are halved ...
+SHORTEST_SHARE = 0.1  # ... down to this
+TOLERANCE = 1e-11  # of the flow: what a cell may lose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmSolution:
+    """An oil film between rigid walls.
+
+    `pressure` [Pa] above the cavitation pressure, `content` (share of the gap that is oil, 0 to 1) and `gap` [m] have
+    shape (nx,) or (nx, ny); `flux` [m^2/s], oil through the faces along x at ambient density and per width, has one
+    more along x; `spacing` [m] and `steps` of Newton's method.
+    """
+
+    pressure: Field
+    content: Field
+    flux: Field
+    gap: Field
+    spacing: tuple[float, float]
+    steps: int
+    residual: float  # most that a cell loses, over the largest mean flow through a section
+
+    @property
+    def cavitated(self) -> Mask:
+        """Cells that are not full of oil."""
+        return np.asarray(self.content < 1.0)
+
+    @property
+    def load(self) -> float:
+        """What the pressure carries: [N/m] for a line of cells, [N] for a field."""
+        area = self.spacing[0] * (self.spacing[1] if self.pressure.ndim == 2 else 1.0)
+        return float(self.pressure.sum() * area)
+
+    @property
+    def fronts(self) -> tuple[Field, Field]:
+        """Where the film of a line of cells ruptures and where it forms again, distances [m] from its start.
+
+        Where it forms again the last cell that is not full holds more oil than streams through the cavity. None more
+        leaves the next cell without pressure, and all there is room for leaves its own at the onset of one: the front
+        lies between their centres.
+        """
+        if self.pressure.ndim != 1:
+            raise BadInput("fronts are those of a line of cells, got a field; ask for one of its lines")
+        full = ~self.cavitated
+        dx = self.spacing[0]
+        ruptures = np.flatnonzero(full[:-1] & ~full[1:]) + 1
+        forms = np.flatnonzero(~full[:-1] & full[1:])  # the last cell that is not full holds the front
+        before = np.maximum(forms - 1, 0)
+        streaming = np.minimum(self.content[before] * self.gap[before] / self.gap[forms], self.content[forms])
+        filled = (self.content[forms] - streaming) / (1.0 - streaming)
+        return ruptures * dx, (forms + 1.5 - filled) * dx
+
+
+def solve_film(
+    gap: Field,
+    *,
+    spacing: float | tuple[float, float],
+    entrainment_speed: float,
+    viscosity: float | ViscosityLaw,
+    density: DensityLaw | None = None,
+    ends: tuple[float, float] = (0.0, 0.0),
+    sides: tuple[float, float] | None = None,
+    inflow_content: float = 1.0,
+    tolerance: float = TOLERANCE,
+    strict: bool = True,
+) -> FilmSolution:
+    """Pressure and content of the oil in a given gap, no oil lost.
+
+    Parameters
+    ----------
+    gap : distance of the walls [m] in each cell, shape (nx,) or (nx, ny), x along rolling; a step belongs on a face
+    spacing : size of a cell [m], (dx, dy) for a field
+    entrainment_speed : mean speed of both walls [m/s], towards larger x
+    viscosity : a law, or one number [Pa s]
+    density : a law; None for oil of one density
+    ends : pressures at inlet and outlet [Pa], above the cavitation pressure
+    sides : pressures along the two sides of a field [Pa]; None where it repeats across
+    inflow_content : share of the gap at the inlet that arrives filled with oil
+    tolerance : bound on what any cell loses, as a share of the flow
+    strict : raise when the tolerance is not met; otherwise return the unfinished film
+
+    Raises
+    ------
+    BadInput
+        for a gap, pressure, speed or content that cannot be.
+    NotConverged
+        when strict and the tolerance was not met; carries the unfinished film.
+    """
+    gaps = np.asarray(gap, dtype=float)
+    line = gaps.ndim == 1
+    dx, dy = (spacing, 1.0) if isinstance(spacing, (int, float)) else spacing
+    law = Barus(float(viscosity), 1e-30) if isinstance(viscosity, (int, float)) else viscosity
+    channel = Channel(
+        gap=gaps[:, None] if line else gaps,
+        spacing=(float(dx), float(dy)),
+        speed=require_positive("entrainment speed", entrainment_speed, "m/s"),
+        viscosity=law,
+        density=density or Incompressible(1.0),
+        ends=ends,
+        sides=sides,
+        inflow_content=inflow_content,
+    )
+    _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
+    signed = np.zeros(channel.gap.shape)
+    best, idle, share, steps = np.inf, 0, 1.0, 0
+    while True:
+        flows = channel.flows(signed)
+        residual = float(np.max(np.abs(flows.outflow)) / flows.through)
+        if residual < tolerance or steps == MOST_STEPS or not np.isfinite(residual):
+            break
+        idle += 1
+        if residual < 0.9 * best:
+            best, idle, share = residual, 0, min(1.0, 1.5 * share)
+        elif idle == PATIENCE:  # cells that flip to and fro settle in shorter steps
+            best, idle, share = residual, 0, max(0.5 * share, SHORTEST_SHARE)
+        signed = signed + share * channel.limited(signed, -_solved(flows))
+        steps += 1
+    pressure, content = channel.split(signed)
+    shown = np.s_[:, 0] if line else np.s_[:]
+    film = FilmSolution(
+        pressure=pressure[shown],
+        content=content[shown],
+        flux=flows.along[shown],
+        gap=gaps,
+        spacing=channel.spacing,
+        steps=steps,
+        residual=residual,
+    )
+    if strict and not residual < tolerance:
+        raise NotConverged(film, f"film not solved: a cell loses {residual:.1e} of the flow after {steps} steps")
+    return film
+
+
+Index: TypeAlias = npt.NDArray[np.intp]
+
+
+class Flows(NamedTuple):
+    """Flows [m^2/s] through the faces along x, what each cell loses, and its derivatives by the signed unknown."""
+
+    along: Field
+    outflow: Field
+    through: float
+    rows: Index
+    columns: Index
+    slopes: Field
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """A rigid gap, its oil and what holds at its borders."""
+
+    gap: Field
+    spacing: tuple[float, float]
+    speed: float
+    viscosity: ViscosityLaw
+    density: DensityLaw
+    ends: tuple[float, float]
+    sides: tuple[float, float] | None
+    inflow_content: float
+
+    @property
+    def pressure_scale(self) -> float:
+        """What drives as much oil across a cell as the walls do [Pa]."""
+        typical = float(np.exp(np.mean(np.log(self.gap))))
+        return 12.0 * self.viscosity.eta0 * self.speed * self.spacing[0] / typical**2
+
+    def split(self, signed: Field) -> tuple[Field, Field]:
+        """Pressure [Pa] and content of a signed unknown."""
+        return np.maximum(signed, 0.0) * self.pressure_scale, 1.0 + np.minimum(signed, 0.0)
+
+    def limited(self, signed: Field, change: Field) -> Field:
+        """A change no longer than the oil's laws are straight."""
+        steep = self.viscosity.log_slope(np.maximum(signed, 0.0) * self.pressure_scale) * self.pressure_scale
+        longest = LONGEST_STEP / np.maximum(steep, 1e-12)
+        return np.clip(change, -longest - np.abs(signed), longest + 1.0)
+
+    def flows(self, signed: Field) -> Flows:
+        """All flows and their derivatives.
+
+        A face joins two half cells of one gap each, which is exact where the gap steps. Its pressure is found from
+        equal flow on both sides, and where that were negative the film ruptures at the face.
+        """
+        dx, u, scale = self.spacing[0], self.speed, self.pressure_scale
+        pressure, content = self.split(signed)
+        full = signed >= 0.0
+        d_pressure, d_content = np.where(full, scale, 0.0), np.where(full, 0.0, 1.0)
+        rho0 = self.density.rho0
+        density = self.density(pressure) / rho0
+        d_density = self.density.slope(pressure) / rho0 * d_pressure
+        oil, d_oil = density * self.gap, d_density * self.gap  # of a full gap
+        conductance = density * self.gap**3 / (12.0 * self.viscosity(pressure))
+        d_conductance = conductance * (d_density / density - self.viscosity.log_slope(pressure) * d_pressure)
+
+        half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
+        left, right = np.s_[:-1], np.s_[1:]
+        both = half[left] + half[right]
+        share = half[right] / both  # weight of the left cell's oil in the face's
+        face_oil = share * oil[left] + (1.0 - share) * oil[right]
+        joint = share * half[left]
+        step = (oil[right] - oil[left]) / both
+        drop = pressure[left] - pressure[right]
+        flow = u * content[left] * face_oil + joint * drop
+        by_left = (
+            u * d_content[left] * face_oil
+            + u * content[left] * (share * d_oil[left] + share * step * d_half[left])
+            + share**2 * d_half[left] * drop
+            + joint * d_pressure[left]
+        )
+        by_right = (
+            u * content[left] * ((1.0 - share) * d_oil[right] - (1.0 - share) * step * d_half[right])
+            + (1.0 - share) ** 2 * d_half[right] * drop
+            - joint * d_pressure[right]
+        )
+        to_rupture = u * content[left] * oil[left] + half[left] * pressure[left]
+        ruptures = to_rupture < flow
+        d_to_rupture = (
+            u * d_content[left] * oil[left]
+            + u * content[left] * d_oil[left]
+            + d_half[left] * pressure[left]
+            + half[left] * d_pressure[left]
+        )
+        flow = np.where(ruptures, to_rupture, flow)
+        by_left = np.where(ruptures, d_to_rupture, by_left)
+        by_right = np.where(ruptures, 0.0, by_right)
+
+        inlet, outlet = self.ends
+        entering = u * self.inflow_content * self.density(np.array(inlet)) / rho0 * self.gap[0]
+        entering = entering + half[0] * (inlet - pressure[0])
+        d_entering = d_half[0] * (inlet - pressure[0]) - half[0] * d_pressure[0]
+        leaving = u * content[-1] * oil[-1] + half[-1] * (pressure[-1] - outlet)
+        d_leaving = (
+            u * (d_content[-1] * oil[-1] + content[-1] * d_oil[-1])
+            + d_half[-1] * (pressure[-1] - outlet)
+            + half[-1] * d_pressure[-1]
+        )
+        along = np.concatenate([entering[None], flow, leaving[None]])
+        outflow = np.diff(along, axis=0)
+        own = np.concatenate([by_left, d_leaving[None]])
+        own[0] -= d_entering
+        own[1:] -= by_right
+        index: Index = np.arange(self.gap.size, dtype=np.intp).reshape(self.gap.shape)
+        entries = [(index, index, own), (index[:-1], index[1:], by_right), (index[1:], index[:-1], -by_left)]
+        outflow += self._across(pressure, conductance, d_conductance, d_pressure, index, entries)
+        rows, columns = (np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1))
+        slopes = np.concatenate([entry[2].ravel() for entry in entries])
+        through = float(np.max(np.abs(along.mean(axis=1))))
+        return Flows(along, outflow, through, rows, columns, slopes)
+
+    def _across(
+        self,
+        pressure: Field,
+        conductance: Field,
+        d_conductance: Field,
+        d_pressure: Field,
+        index: Index,
+        entries: list[tuple[Index, Index, Field]],
+    ) -> Field:
+        """What each cell loses across, with its derivatives added to `entries`; rows are scaled as those along x."""
+        dx, dy = self.spacing
+        ratio = dx / dy
+        half, d_half = 2.0 * ratio * conductance / dy, 2.0 * ratio * d_conductance / dy
+        outflow = np.zeros_like(pressure)
+        a, b = half, np.roll(half, -1, 1)
+        joint = a * b / (a + b)
+        drop = pressure - np.roll(pressure, -1, 1)
+        flow = joint * drop  # through the northern face
+        by_own = (b / (a + b)) ** 2 * d_half * drop + joint * d_pressure
+        by_next = (a / (a + b)) ** 2 * np.roll(d_half, -1, 1) * drop - joint * np.roll(d_pressure, -1, 1)
+        if self.sides is not None:
+            for part in (flow, by_own, by_next):
+                part[:, -1] = 0.0
+            for column, outside in ((0, self.sides[0]), (-1, self.sides[1])):
+                outflow[:, column] += half[:, column] * (pressure[:, column] - outside)
+                slope = d_half[:, column] * (pressure[:, column] - outside) + half[:, column] * d_pressure[:, column]
+                entries.append((index[:, column], index[:, column], slope))
+        north = np.roll(index, -1, 1)
+        entries += [(index, index, by_own), (index, north, by_next), (north, index, -by_own), (north, north, -by_next)]
+        return outflow + flow - np.roll(flow, 1, 1)
+
+
+def _solved(flows: Flows) -> Field:
+    """Change of the signed unknown whose linear answer is the cells' loss."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    size = flows.outflow.size
+    matrix = csc_array((flows.slopes, (flows.rows, flows.columns)), shape=(size, size))
+    try:
+        change = splu(matrix).solve(flows.outflow.ravel())
+    except RuntimeError:  # singular: pressures at which the oil is a solid
+        return np.full_like(flows.outflow, np.nan)
+    return np.asarray(change).reshape(flows.outflow.shape)
+
+
+def _check(channel: Channel, *, line: bool, field_spacing: bool) -> None:
+    gap = channel.gap
+    if gap.ndim != 2 or len(gap) < 2:
+        raise BadInput(f"gap must have shape (nx,) or (nx, ny) with two cells or more along x, got {gap.shape}")
+    if line == field_spacing:
+        wanted = "one size of cell" if line else "(dx, dy)"
+        raise BadInput(f"spacing must be {wanted} for a gap of shape {gap.shape[: 1 if line else 2]}")
+    if not np.all((gap > 0.0) & (gap < np.inf)):
+        raise BadInput(f"gap must be positive and finite everywhere, got {np.min(gap):g} m; part the walls")
+    for name, size in zip(("dx", "dy"), channel.spacing, strict=True):
+        require_positive(f"spacing {name}", size, "m")
+    for name, pressure in (("ends", channel.ends), ("sides", channel.sides or (0.0, 0.0))):
+        if not all(0.0 <= value < np.inf for value in pressure):
+            raise BadInput(f"{name} must be pressures above that of cavitation, got {pressure} Pa; count them from it")
+    if not 0.0 < channel.inflow_content <= 1.0:
+        raise BadInput(f"inflow content must lie between 0 and 1, got {channel.inflow_content:g}; 1 is a full gap")
+    if channel.inflow_content < 1.0 and channel.ends[0] > 0.0:
+        raise BadInput(
+            f"oil that enters at {channel.ends[0]:g} Pa fills the gap, got inflow content "
+            f"{channel.inflow_content:g}; use 1"
+        )
