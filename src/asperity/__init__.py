@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     )
     from asperity.recording import Recording, check_recording, open_recording, read_recording
     from asperity.report import write_report
+    from asperity.report.study_page import write_study_report
     from asperity.report.track_page import write_track_report
     from asperity.rig import Disturbance, Rig, RigRecording, simulate_rig
     from asperity.run import Run, load_run, solve_case
@@ -106,6 +107,7 @@ _NAMES = {
     ),
     "recording": ("Recording", "check_recording", "open_recording", "read_recording"),
     "report": ("write_report",),
+    "report.study_page": ("write_study_report",),
     "report.track_page": ("write_track_report",),
     "rig": ("Disturbance", "Rig", "RigRecording", "simulate_rig"),
     "run": ("Run", "load_run", "solve_case"),
@@ -242,6 +244,7 @@ __all__ = [
     "track_recordings",
     "traction_curve",
     "write_report",
+    "write_study_report",
     "write_track_report",
 ]
 

@@ -118,6 +118,19 @@ def shown_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration]
         announcement.cancel()
 
 
+@contextmanager
+def busy(text: str, *, quiet: bool) -> "Iterator[Callable[[str], None]]":
+    """Show on a terminal what is being done; takes what is said of it."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield lambda _: None
+        return
+    with console.status(f"{text} ...") as status:
+        yield lambda doing: status.update(f"{text}: {doing} ...")
+
+
 def print_json(values: dict[str, Any]) -> None:
     """The one JSON object of `--json`; nan or infinity in it is a mistake of ours."""
     print(json.dumps(values, indent=2, allow_nan=False))

@@ -7,6 +7,7 @@ import typer
 
 from asperity.cli.app import AsJson, Quiet, app
 from asperity.cli.common import (
+    busy,
     chosen_case,
     make_folder,
     print_json,
@@ -17,7 +18,7 @@ from asperity.cli.common import (
     with_error,
     write_text,
 )
-from asperity.errors import AsperityError
+from asperity.errors import AsperityError, BadInput
 
 if TYPE_CHECKING:
     from asperity.run import Run
@@ -106,12 +107,33 @@ def solve(
 
 @app.command()
 def report(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Runs kept by asperity solve --out.")],
-    out: Annotated[Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run.")] = None,
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN...|STUDY", help="Runs kept by asperity solve --out, or a study's folder."),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run, or in the study.")
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Of a study: write its figures as PDF and PNG and its tables as csv too."),
+    ] = None,
+    anchors: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Of a study: numbers that it should meet, not the paper's.")
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one self-contained HTML page of one run or several."""
+    """Make one self-contained HTML page of one run, of several, or of a study."""
+    studies = [path for path in runs if path.is_dir()]
+    if studies:
+        if len(runs) > 1:
+            raise BadInput(f"a study's page holds nothing else, got {len(runs)} paths; name {studies[0]} alone")
+        _report_study(studies[0], out, figures, anchors, as_json=as_json, quiet=quiet)
+        return
+    if figures is not None or anchors is not None:
+        option = "--figures" if figures is not None else "--anchors"
+        raise BadInput(f"{option} is for a study's folder, got {runs[0]}; name the folder")
     out = out or (runs[0].with_suffix(".html") if len(runs) == 1 else Path("report.html"))
     require_output(out, ".html")
     from asperity.run import load_run
@@ -125,6 +147,31 @@ def report(
         print(run.verdict())
     if not quiet:
         print(f"\nReport: {out}")
+
+
+def _report_study(
+    folder: Path, out: Path | None, figures: Path | None, anchors: Path | None, *, as_json: bool, quiet: bool
+) -> None:
+    out = out or folder / "report.html"
+    require_output(out, ".html")
+    from asperity.cli.study import study_scalars
+    from asperity.report.study_page import write_study_report
+    from asperity.study.anchors import load_anchors
+    from asperity.study.execute import load_study
+
+    wanted = None if anchors is None else load_anchors(anchors)
+    result = load_study(folder)
+    with busy("the study's page", quiet=quiet) as tell:
+        write_study_report(result, out, figures=figures, anchors=wanted, progress=tell)
+    scalars = study_scalars(result)
+    if as_json:
+        print_json({**scalars, "report": str(out), "figures": None if figures is None else str(figures)})
+        return
+    print(scalars["verdict"])
+    if not quiet:
+        print(f"\nReport: {out}")
+        if figures is not None:
+            print(f"Figures and tables: {figures}")
 
 
 def _print_run(run: "Run") -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import chosen_case, print_json, print_rows, require_output
+from asperity.cli.common import busy, chosen_case, print_json, print_rows, require_output
 from asperity.errors import AsperityError, BadInput
 
 if TYPE_CHECKING:
@@ -189,18 +189,9 @@ def _make_page(result: "StudyResult", report: Path | None, figures: Path | None,
 
     assert result.folder is not None
     page = report or result.folder / "report.html"
-    with _busy("drawing the report", quiet=quiet):
-        write_study_report(result, page, figures=figures)
+    with busy("drawing the report", quiet=quiet) as tell:
+        write_study_report(result, page, figures=figures, progress=tell)
     return {"report": str(page), **({} if figures is None else {"figures": str(figures)})}
-
-
-@contextmanager
-def _busy(text: str, *, quiet: bool) -> Iterator[None]:
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    with console.status(f"{text} ...") if console.is_terminal and not quiet else nullcontext():
-        yield
 
 
 def _print_study(result: "StudyResult", made: dict[str, str]) -> None:

@@ -37,6 +37,7 @@ GIGA = 1e-9  # Pa -> GPa
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#6b7280"
 # The paper's Fig 6 has oil in red and asperities in yellow. These differ in lightness too, for grey printers.
 CONTACT_COLOUR, OIL_COLOUR, CAVITY_COLOUR, CAVITY_STRIPE = "#f7dc4a", "#c8452f", "#33415c", "#8b9cb8"
+GAP_COLOUR = "#e5e7eb"  # of a dry contact
 
 STYLE: Any = {
     "svg.hashsalt": "asperity",  # the same run gives the same bytes
@@ -140,18 +141,13 @@ def contact_map(solution: ContactSolution) -> Figure:
     shares = zone_shares(solution)
     dry = solution.lubricant is None
 
-    colours = np.empty((*solution.grid.cells, 3))
-    colours[:] = to_rgb("#e5e7eb" if dry else OIL_COLOUR)
-    colours[solution.cavitated] = to_rgb(CAVITY_COLOUR)
-    colours[solution.cavitated & _stripes(solution.grid.cells)] = to_rgb(CAVITY_STRIPE)
-    colours[solution.in_contact] = to_rgb(CONTACT_COLOUR)
-    show_map(axes, colours, solution)
+    show_map(axes, contact_colours(solution), solution)
     mark_hertz_zone(axes, solution, "black")
 
     axes.set_title(f"Asperity contact on {shares.contact:.1%} of the Hertz zone".replace("%", " %"))
     keys: list[Patch | Line2D] = [Patch(color=CONTACT_COLOUR, label=f"asperity contact {100 * shares.contact:.1f} %")]
     if dry:
-        keys.append(Patch(facecolor="#e5e7eb", label=f"open gap {100 * shares.film:.1f} %"))
+        keys.append(Patch(facecolor=GAP_COLOUR, label=f"open gap {100 * shares.film:.1f} %"))
     else:
         keys.append(Patch(color=OIL_COLOUR, label=f"oil film {100 * shares.film:.1f} %"))
         keys.append(
@@ -165,6 +161,16 @@ def contact_map(solution: ContactSolution) -> Figure:
     keys.append(Line2D([], [], color="black", linestyle=(0, (4, 3)), linewidth=1.0, label="Hertz zone"))
     figure.legend(handles=keys, loc="lower center", ncols=2, borderaxespad=0.2)
     return figure
+
+
+def contact_colours(solution: ContactSolution) -> Field:
+    """Red, green and blue of every cell, shape (nx, ny, 3): asperity contact, oil, ruptured oil; an open gap if dry."""
+    colours = np.empty((*solution.grid.cells, 3))
+    colours[:] = to_rgb(GAP_COLOUR if solution.lubricant is None else OIL_COLOUR)
+    colours[solution.cavitated] = to_rgb(CAVITY_COLOUR)
+    colours[solution.cavitated & _stripes(solution.grid.cells)] = to_rgb(CAVITY_STRIPE)
+    colours[solution.in_contact] = to_rgb(CONTACT_COLOUR)
+    return colours
 
 
 def _stripes(cells: tuple[int, int]) -> Mask:
