@@ -75,7 +75,7 @@ def test_what_fails_at_first_is_tried_with_the_bodies_held(monkeypatch):
 
     monkeypatch.setattr(solving, "newton", lame)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solving._Search, "run", counted(solving._Search.run))
+        patch.setattr(solving.Search, "run", counted(solving.Search.run))
         mended = solved(surface)
     assert mended.convergence.attempt == ATTEMPTS[2]
     assert ATTEMPTS[2] in mended.convergence.explain()

@@ -10,12 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.ehl.problem import Balance
+from asperity.ehl.problem import Balance, Past
 from asperity.kernels import relax, reynolds
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film, Stencil
 
 MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors
 LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
+
+
+class Kept(NamedTuple):
+    """What lubricated cells store, as it stands in their scaled equations: by a change of gap and of pressure."""
+
+    by_gap: Field
+    by_pressure: Field
 
 
 class Linear:
@@ -27,7 +34,7 @@ class Linear:
     """
 
     def __init__(self, balance: Balance, *, storing: float = 0.0, dtype: Any = np.float32) -> None:
-        self.balance, self.storing, self.dtype = balance, storing, dtype
+        self.balance, self.dtype = balance, dtype
         self.cells = balance.problem.cells
         self.unknown = balance.unknown
         self.pressure = balance.pressure.astype(dtype)
@@ -35,6 +42,9 @@ class Linear:
         self.rows = balance.rows._replace(fluid_scale=scale)
         self.film = None if balance.film is None else Film(*(part.astype(dtype) for part in balance.film))
         self.faces = None if balance.faces is None else _faces(balance.faces, dtype)
+        self.storing, self.kept = storing, self._kept(balance.problem.past, storing)
+        if self.film is not None and balance.problem.past is not None and balance.problem.past.followed:
+            self.film = self.film.followed
         self.stencil = self._stencil()
         self.even, self.odd = (self._lines(parity) for parity in (0, 1))
         if self.film is not None:
@@ -56,6 +66,9 @@ class Linear:
         reynolds.jacobian_product(
             self.rows, self.film, self.faces, self.pressure, d_pressure, d_gap, problem.spacing, self.storing, out
         )
+        if self.kept is not None:
+            out += self.kept.by_gap * d_gap
+            out += self.kept.by_pressure * d_pressure
         return out
 
     def __call__(self, residual: Field) -> Field:
@@ -74,13 +87,31 @@ class Linear:
         relax.add_lines(even, odd, change)
         return change
 
+    def _kept(self, past: Past | None, storing: float) -> Kept | None:
+        """What the kernels leave to be added; they store for followed oil nothing.
+
+        What the first two rows then draw in by the wedge is left out: so far from the contact the pressure gradient's
+        flow is all that a change of pressure changes.
+        """
+        if past is None or self.film is None:
+            return None
+        rate = self.dtype(past.rate + (storing if past.followed else 0.0))
+        scaled = np.where(self.rows.state == LUBRICATED, self.rows.fluid_scale * rate, self.dtype(0.0))
+        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+
     def _stencil(self) -> Stencil:
         stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
         nothing = np.zeros(self.cells, self.dtype)
         film = self.film or Film(*[nothing] * 8)
         faces = self.faces or Faces(nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0])
         problem = self.balance.problem
-        reynolds.local_stencil(self.rows, film, faces, problem.deflection.near, problem.spacing, self.storing, stencil)
+        near = problem.deflection.near
+        reynolds.local_stencil(self.rows, film, faces, near, problem.spacing, self.storing, stencil)
+        if self.kept is not None:
+            own, neighbour = (self.dtype(near[k] - near[3]) for k in (0, 1))
+            stencil.centre[:] += self.kept.by_gap * own + self.kept.by_pressure
+            stencil.west[:] += self.kept.by_gap * neighbour
+            stencil.east[:] += self.kept.by_gap * neighbour
         return stencil
 
     def _lines(self, parity: int) -> relax.Lines:

@@ -41,6 +41,19 @@ class Form:
         return np.asarray((x**2 / 2.0)[:, None] + self.flatness * (y**2 / 2.0))
 
 
+@dataclass(frozen=True, slots=True)
+class Past:
+    """What a step in time adds to the oil's balance: `rate` times its content now, and `source` from before, (nx, ny).
+
+    `followed` oil is balanced along its way, so that `source` holds the wedge too (not in the first two rows of cells,
+    which it has no way to).
+    """
+
+    rate: float
+    source: Field
+    followed: bool
+
+
 @dataclass(frozen=True, kw_only=True)
 class Problem:
     """A contact on one grid, in the solver's units.
@@ -49,7 +62,8 @@ class Problem:
     P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the speed number. For the oil's laws
     `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]; `viscosity_factor` is what warmth
     leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by
-    lines of cells at ambient pressure. `accurate` takes the third-order wedge and logarithmic mean mobilities.
+    lines of cells at ambient pressure. `accurate` takes the third-order wedge and logarithmic mean mobilities. `past`
+    is None where nothing moves but the oil.
     """
 
     form: Form
@@ -65,6 +79,7 @@ class Problem:
     lubricant: Lubricant | None
     viscosity_factor: Field | None = None
     accurate: bool = False
+    past: Past | None = None
 
     @property
     def cells(self) -> tuple[int, int]:
@@ -189,9 +204,38 @@ class Problem:
         entering = 0.5 * (
             np.maximum(ahead, self.contact_gap) + height[0]
         )  # unit density: the inlet is at ambient pressure
-        reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
-        reynolds.fluid_diagonal(film, faces, self.deflection.near, dx, dy, diagonal)
+        near = self.deflection.near
+        if self.past is None:
+            reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
+            reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
+        else:
+            self._move(self.past, pressure, film, faces, entering, outflow, diagonal)
         return film, faces, outflow, 1.0 / diagonal
+
+    def _move(
+        self,
+        past: Past,
+        pressure: Field,
+        film: Film,
+        faces: Faces,
+        entering: Field,
+        outflow: Field,
+        diagonal: Field,
+    ) -> None:
+        """Fill in the net outflow and its diagonal of a contact in which more moves than the oil."""
+        (dx, dy), near, content = self.spacing, self.deflection.near, film.content
+        if past.followed:
+            nothing = np.zeros_like(content)
+            reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
+            reynolds.fluid_diagonal(film.followed, faces, near, dx, dy, diagonal)
+            outflow[0] += (content[0] - entering) / dx
+            outflow[1] += 1.5 * (content[1] - content[0]) / dx
+        else:
+            reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
+            reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
+        outflow += past.rate * content + past.source
+        # less what far cells would answer too, as in a cell that touches: stored oil is as stiff as that
+        diagonal += past.rate * (film.content_by_gap * (near[0] - near[3]) + film.content_by_pressure)
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,7 @@ def solve_contact(
         _check_factor(viscosity_factor, surface)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = _on_one_line(whole) if whole.uniform else whole
-    search = _Search(options, scales.gap, progress)
+    search = Search(options, scales.gap, progress)
     if start is None:
         levels = _levels(finest)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
@@ -81,40 +81,22 @@ def solve_contact(
         if search.settled(options.tolerance):
             break
 
-    converged = search.settled(options.tolerance)
-    stopped = Status.STALLED if search.lost else Status.OUT_OF_ITERATIONS
-    discretisation = search.discretisation_error
-    if start is not None:
-        discretisation = start.convergence.discretisation_error
-    balance = step.balance
-    lines = whole.cells[1] // finest.cells[1]
-    pressure, gap = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.gap, lines, axis=1)
-    solution = ContactSolution(
-        conditions=conditions,
-        lubricant=lubricant,
-        surface=surface,
-        options=options,
-        pressure=pressure * scales.pressure,
-        gap=np.maximum(gap, 0.0 if lubricant is None else finest.contact_gap) * scales.gap,
-        in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
-        rigid_approach=step.approach * scales.gap,
-        convergence=Convergence(
-            status=Status.CONVERGED if converged else stopped,
-            history=tuple(search.history),
-            tolerance=options.tolerance,
-            seconds=time.perf_counter() - began,
-            attempt=attempt,
-            iteration_error=search.iteration_error,
-            discretisation_error=discretisation,
-        ),
+    solution = search.solution(
+        step,
+        surface,
+        conditions,
+        lubricant,
+        seconds=time.perf_counter() - began,
+        attempt=attempt,
+        discretisation=search.discretisation_error if start is None else start.convergence.discretisation_error,
         viscosity_factor=viscosity_factor,
     )
-    if strict and not converged:
+    if strict and not solution.convergence.converged:
         raise NotConverged(solution, f"contact not solved: {solution.convergence.explain()}")
     return solution
 
 
-class _Search:
+class Search:
     """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
 
     def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
@@ -212,6 +194,44 @@ class _Search:
             (near, too_much), (apart, too_little) = bracket[True], bracket[False]
             share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
             approach = near + share * (apart - near)
+
+    def solution(
+        self,
+        step: Step,
+        surface: Surface,
+        conditions: ContactConditions,
+        lubricant: Lubricant | None,
+        *,
+        seconds: float,
+        attempt: str = ATTEMPTS[0],
+        discretisation: Figures | None = None,
+        viscosity_factor: Field | None = None,
+    ) -> ContactSolution:
+        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all."""
+        scales, balance = Scales.of(conditions, lubricant), step.balance
+        stopped = Status.STALLED if self.lost else Status.OUT_OF_ITERATIONS
+        lines = surface.grid.cells[1] // balance.problem.cells[1]
+        pressure, gap = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.gap, lines, axis=1)
+        return ContactSolution(
+            conditions=conditions,
+            lubricant=lubricant,
+            surface=surface,
+            options=self.options,
+            pressure=pressure * scales.pressure,
+            gap=np.maximum(gap, 0.0 if lubricant is None else balance.problem.contact_gap) * scales.gap,
+            in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
+            rigid_approach=step.approach * scales.gap,
+            convergence=Convergence(
+                status=Status.CONVERGED if self.settled(self.options.tolerance) else stopped,
+                history=tuple(self.history),
+                tolerance=self.options.tolerance,
+                seconds=seconds,
+                attempt=attempt,
+                iteration_error=self.iteration_error,
+                discretisation_error=discretisation,
+            ),
+            viscosity_factor=viscosity_factor,
+        )
 
     def _record(self, problem: Problem, step: Step) -> None:
         balance = step.balance

@@ -6,6 +6,7 @@ import numpy as np
 
 from asperity.arrays import Mask
 from asperity.conditions import ContactConditions
+from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.solve import CENTRE, contact_problem, smooth_film
@@ -48,17 +49,23 @@ class ContactState:
 def contact_state(solution: ContactSolution) -> ContactState:
     """Read the scalars off a solution; the residuals are evaluated anew from its fields."""
     scales = Scales.of(solution.conditions, solution.lubricant)
-    grid, touching = solution.grid, solution.in_contact
-    sq, oil = solution.surface.sq, solution.lubricant
     problem = contact_problem(
         solution.conditions,
-        oil,
+        solution.lubricant,
         solution.surface,
         solution.options,
         solution.viscosity_factor,
         attempt=solution.convergence.attempt,
     )
-    balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
+    return state_of(
+        solution, problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
+    )
+
+
+def state_of(solution: ContactSolution, balance: Balance) -> ContactState:
+    """The scalars of a solution whose equations, those of a moving contact perhaps, are left with `balance`."""
+    grid, touching, problem = solution.grid, solution.in_contact, balance.problem
+    sq, oil = solution.surface.sq, solution.lubricant
     zone, centre = problem.zone(), problem.zone(CENTRE)
     capped = balance.rows.state == CAPPED
     dx, dy = problem.spacing

@@ -40,6 +40,12 @@ class Film(NamedTuple):
             ambient_by_gap=np.where(held[[0, -1]], 0.0, self.ambient_by_gap),
         )
 
+    @property
+    def followed(self) -> "Film":
+        """The same film without a wedge, for oil that is balanced along its way."""
+        nothing = np.zeros_like(self.content)
+        return self._replace(content_by_gap=nothing, content_by_pressure=nothing)
+
 
 class Faces(NamedTuple):
     """Mobility of the faces east and north of each cell, and its slopes in the logarithms of both nodes' mobilities.

@@ -1,0 +1,243 @@
+"""A contact in time: rough surfaces that run through it and the oil that they squeeze, step after step.
+
+Along the way of the oil, dx/dt = u, the wedge and the squeeze term of Reynolds' equation are one derivative,
+d(ρh)/dt + u d(ρh)/dx = D(ρh)/Dt. A step of one cell follows the oil from cell to cell, by the backward difference
+(3 m_i^n - 4 m_(i-1)^(n-1) + m_(i-2)^(n-2))/(2 Δt): second order, nothing is smeared, and where nothing moves it is the
+snapshot's own wedge. Steps of other lengths difference time and wedge apart. Steps are yielded; keeping them, and
+deciding when to stop, is left to others (`asperity.history`).
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any, Literal
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.conditions import ContactConditions
+from asperity.ehl.problem import Balance, Past, Problem
+from asperity.ehl.scales import Scales
+from asperity.ehl.solution import ATTEMPTS, ContactSolution, Options
+from asperity.ehl.solve import Progress, Search, contact_problem, solve_contact
+from asperity.ehl.state import ContactState, state_of
+from asperity.errors import BadInput, require_positive
+from asperity.kernels import reynolds
+from asperity.lubricant import Lubricant
+from asperity.surface import Surface
+from asperity.surface.moving import MovingSurfaces
+
+Start = Literal["steady", "stationary"]
+Memory = Mapping[str, "np.ndarray[Any, Any]"]
+
+LONGEST_STEP = 8.0  # cells that the oil may travel in one
+HELD = ATTEMPTS[2]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshot:
+    """A contact at one time of its history.
+
+    `number` of the step (0 is the start) and its `time` [s]; `solution` and `state` as of a contact that stands still,
+    with the squeeze term in the balance of oil; `flow_power` [W] what the pressure-driven flow of the oil turns to heat
+    (the rest is friction's), `elastic_energy` [J] half of the sum of pressure times deflection, of a line contact up to
+    a constant; both of the whole contact. `memory` is all that the next step needs to know.
+    """
+
+    number: int
+    time: float
+    solution: ContactSolution
+    state: ContactState
+    flow_power: float
+    elastic_energy: float
+    memory: Memory
+
+
+Steps = Callable[..., Iterator[Snapshot]]  # what a model of a moving contact is to whoever keeps its history
+
+
+def moving_contact(
+    conditions: ContactConditions,
+    lubricant: Lubricant,
+    surfaces: MovingSurfaces,
+    *,
+    start: Start = "steady",
+    resume: Memory | None = None,
+    time_step: float = 1.0,
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Snapshot]:
+    """Yield the contact at time 0 and then after each step, for as long as anybody asks.
+
+    Parameters
+    ----------
+    conditions, lubricant : the contact and its oil; the load is held at every step
+    surfaces : both bodies' roughness, and how fast it moves
+    start : "steady" from the snapshot, in which the oil has always flowed and the roughness stood still; "stationary"
+        from rest, bodies pressed together dry and every gap full of oil
+    resume : `memory` of an earlier snapshot, to go on from; that snapshot is not yielded again
+    time_step : over the time that the oil takes from cell to cell; 1 follows the oil along its way
+    options : tolerances of every step; `Options()` unless given
+    progress : called after every Newton step
+
+    A step that does not converge is yielded as it is, marked in `solution.convergence`, and the next goes on from it.
+
+    Raises
+    ------
+    BadInput
+        for a time step that is not positive or longer than 8 cells, a start that is none, and what `solve_contact`
+        refuses.
+    NotConverged
+        if there is no snapshot to start from.
+    """
+    require_positive("time step", time_step, "cells")
+    if time_step > LONGEST_STEP:
+        raise BadInput(f"time step must be at most {LONGEST_STEP:g} cells, got {time_step:g}; 1 follows the oil")
+    if start not in ("steady", "stationary"):
+        raise BadInput(f"start must be steady or stationary, got {start!r}")
+    contact = _Contact(conditions, lubricant, surfaces, options or Options(), time_step, progress)
+    if resume is None:
+        first = contact.start(standing=start == "steady")
+        yield first
+        resume = first.memory
+    for number in count(int(resume["number"]) + 1):
+        snapshot = contact.step(number, resume)
+        yield snapshot
+        resume = snapshot.memory
+
+
+def step_seconds(conditions: ContactConditions, surfaces: MovingSurfaces, time_step: float) -> float:
+    """Length of a step [s] of `time_step` times the time from cell to cell."""
+    return time_step * surfaces.grid.spacing[0] / conditions.entrainment_speed
+
+
+class _Contact:
+    """What stays the same from step to step, and how one is taken."""
+
+    def __init__(
+        self,
+        conditions: ContactConditions,
+        lubricant: Lubricant,
+        surfaces: MovingSurfaces,
+        options: Options,
+        time_step: float,
+        progress: Progress | None,
+    ) -> None:
+        self.conditions, self.lubricant, self.surfaces = conditions, lubricant, surfaces
+        self.options, self.progress = options, progress
+        self.scales = Scales.of(conditions, lubricant)
+        self.seconds = step_seconds(conditions, surfaces, time_step)
+        self.length = self.seconds * conditions.entrainment_speed / self.scales.length
+        self.one_line = surfaces.uniform and conditions.geometry == "line"
+        rough = any(surfaces.rough)
+        self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # on smooth bodies, the accurate wedge
+        self.followed = rough and time_step == 1.0
+
+    def start(self, *, standing: bool) -> Snapshot:
+        """Time 0, from a contact that has always been as it is, or from one at rest."""
+        surface = self.surfaces.at(0.0)
+        oil = self.lubricant if standing else None
+        solution = solve_contact(self.conditions, oil, surface, options=self.options, progress=self.progress)
+        solution = replace(solution, lubricant=self.lubricant)
+        approach = solution.rigid_approach / self.scales.gap
+        balance = self._problem(surface, None).evaluate(solution.pressure / self.scales.pressure, approach)
+        if not standing:  # what was touching dry has the contact film between
+            gap = np.maximum(solution.gap, self.options.contact_film)
+            solution = replace(solution, gap=gap)
+        return self._snapshot(0, solution, balance, approach, None, standing=standing)
+
+    def step(self, number: int, memory: Memory) -> Snapshot:
+        """The contact a step later."""
+        began = time.perf_counter()
+        surface = self.surfaces.at(number * self.seconds)
+        whole = self._problem(surface, self._past(memory))
+        problem = _on_one_line(whole) if self.one_line else whole
+        pressure, approach = memory["pressure"][:, : problem.cells[1]], float(memory["approach"])
+        search = Search(self.options, self.scales.gap, self.progress)
+        for held in (False, True):  # where Newton's steps lead nowhere, the bodies are held and their distance searched
+            step = search.climb([problem], pressure, approach, held=held)
+            if search.settled(self.options.tolerance):
+                break
+        solution = search.solution(
+            step,
+            surface,
+            self.conditions,
+            self.lubricant,
+            seconds=time.perf_counter() - began,
+            attempt=HELD if held else ATTEMPTS[0],
+        )
+        balance = step.balance
+        if self.one_line:
+            balance = whole.evaluate(np.repeat(balance.pressure, whole.cells[1], axis=1), step.approach)
+        return self._snapshot(number, solution, balance, step.approach, memory["content"], standing=True)
+
+    def _problem(self, surface: Surface, past: Past | None) -> Problem:
+        posed = contact_problem(self.conditions, self.lubricant, surface, self.options, attempt=self.attempt)
+        return replace(posed, past=past)
+
+    def _past(self, memory: Memory) -> Past:
+        content = memory["content"]
+        if "content_before" in memory:
+            before, rate, once, twice = memory["content_before"], 1.5, -2.0, 0.5
+        else:  # a start from rest has no time before it that flowed
+            before, rate, once, twice = content, 1.0, -1.0, 0.0
+        source = once * content + twice * before
+        if self.followed:
+            source[2:] = once * content[1:-1] + twice * before[:-2]
+        return Past(rate / self.length, source / self.length, self.followed)
+
+    def _snapshot(
+        self,
+        number: int,
+        solution: ContactSolution,
+        balance: Balance,
+        approach: float,
+        before: Field | None,
+        *,
+        standing: bool,
+    ) -> Snapshot:
+        assert balance.film is not None  # a moving contact has oil
+        memory = {
+            "number": np.array(number),
+            "pressure": balance.pressure,
+            "approach": np.array(approach),
+            "content": balance.film.content,
+        }
+        if standing:
+            memory["content_before"] = balance.film.content if before is None else before
+        flow, elastic = _powers(balance)
+        grid, conditions = solution.grid, self.conditions
+        area = self.scales.length**2 * (1.0 if conditions.length is None else conditions.length / grid.extent[1])
+        energy = self.scales.pressure * self.scales.gap * area
+        return Snapshot(
+            number=number,
+            time=number * self.seconds,
+            solution=solution,
+            state=state_of(solution, balance),
+            flow_power=flow * energy * conditions.entrainment_speed / self.scales.length,
+            elastic_energy=elastic * energy,
+            memory=memory,
+        )
+
+
+def _on_one_line(problem: Problem) -> Problem:
+    """What does not vary along y, on one line of cells that is as wide as all."""
+    past, (dx, dy) = problem.past, problem.spacing
+    return replace(
+        problem,
+        roughness=problem.roughness[:, :1],
+        spacing=(dx, problem.cells[1] * dy),
+        past=None if past is None else replace(past, source=past.source[:, :1]),
+    )
+
+
+def _powers(balance: Balance) -> tuple[float, float]:
+    """∫ ε |grad P|² and the elastic energy ½ ∫ P V, dimensionless."""
+    problem, pressure = balance.problem, balance.pressure
+    assert balance.faces is not None
+    (dx, dy), drained = problem.spacing, np.empty_like(pressure)
+    no_wedge = np.zeros_like(pressure)
+    reynolds.net_outflow(pressure, no_wedge, balance.faces, no_wedge[0], dx, dy, drained)
+    flow = float((pressure * drained).sum()) * dx * dy
+    return flow, 0.5 * float((pressure * problem.deflection(pressure)).sum()) * dx * dy
