@@ -598,8 +598,8 @@ class StudyReport:
             dict.fromkeys(sweep_figures.as_written(point[key]) for point in self.result.plan.points if key in point)
         )
         if len(values) <= 8:
-            return in_print(", ".join(values))
-        return in_print(f"{len(values)} values, {values[0]} to {values[-1]}")
+            return _printed(", ".join(values))
+        return _printed(f"{len(values)} values, {values[0]} to {values[-1]}")
 
 
 # In words and display units ------------------------------------------------------------------------------------------

@@ -1,0 +1,462 @@
+"""The page of a study and its figures: the numbers of the table, the printed ones beside them, failures loud."""
+
+import json
+import re
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pandas
+import pytest
+from matplotlib.colors import to_rgb
+from scipy.stats import t as student
+from test_report import Page
+
+import asperity
+from asperity.case import load_case
+from asperity.cli import main
+from asperity.errors import BadInput
+from asperity.report import study_figures, study_page, sweep_figures
+from asperity.report.figures import CONTACT_COLOUR
+from asperity.report.study_figures import ON_PAGE, ON_PAPER
+from asperity.report.study_page import StudyReport, papers_contact, write_study_report
+from asperity.study.anchors import PAPER_ANCHORS, Anchor
+from asperity.study.curve import curve_of
+from asperity.study.execute import StudyResult, load_study, run_study
+from asperity.study.plan import plan_points
+
+PAPERS = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
+SMALL = PAPERS.with_overrides({"grid.cells": "[48, 32]", "surface.correlation_length": "40 um"})
+LEVELS_UM = (0.75, 1.0, 2.0, 3.5)
+PRINTED_CAR = {0.5: 5.57, 2.5: 59.22}  # Sq [um] and CAR [%], section 3.1 of Xu et al., Lubricants 2025, 13, 78
+PRINTED_CRF = {0.54: 2921.93, 3.49: 3811.88}  # Sq [um] and CRF [Hz], its section 4.2
+RINGS_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)  # its section 4.1
+RINGS_STD_UM = (0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A small wear study, solved and kept."""
+    folder = tmp_path_factory.mktemp("study") / "wear"
+    points = [{"surface.sq": f"{sq} um"} for sq in LEVELS_UM]
+    with ThreadPoolExecutor(1) as executor:
+        run_study(plan_points(SMALL, points, seeds=3), out=folder, executor=executor)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wear(folder):
+    return load_study(folder)
+
+
+@pytest.fixture(scope="module")
+def report(wear):
+    return StudyReport(wear, None, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def page(written):
+    return Page(written[0].read_text("utf-8"))
+
+
+def made(points, *, case=PAPERS, seeds=1, **columns):
+    """A study whose table says what the test wants."""
+    plan = plan_points(case, points, seeds=seeds)
+    table = pandas.DataFrame(
+        {
+            "case_id": [one.id for one in plan.cases],
+            "number": [one.number for one in plan.cases],
+            "point": [one.point for one in plan.cases],
+            "realisation": [one.realisation for one in plan.cases],
+            "status": "done",
+            "reason": "",
+            **columns,
+        }
+    )
+    return StudyResult(plan, table)
+
+
+def with_knee(knee_um=2.5, *, seeds=5, scatter_hz=4.0):
+    """A wear study whose CRF rises at 400 Hz/um up to the knee and at 20 Hz/um after it."""
+    sq_um = np.repeat(np.arange(0.5, 4.01, 0.25), seeds)
+    random = np.random.default_rng(5)
+    crf = 2800.0 + 400.0 * np.minimum(sq_um, knee_um) + 20.0 * np.maximum(sq_um - knee_um, 0.0)
+    crf += random.normal(0.0, scatter_hz, crf.size)
+    heard = {
+        f"{name}_{preset}{unit}": values
+        for preset in ("sound", "paper")
+        for name, unit, values in (
+            ("crf", "_hz", crf), ("crf_std", "_hz", np.full(crf.size, 1.0)), ("crfa", "", 0.02 * sq_um),
+        )
+    }  # fmt: skip
+    shares = {"clr": 0.2 * sq_um, "car": 0.1 * sq_um, "car_domain": 0.15 * sq_um}
+    points = [{"surface.sq": f"{sq:g} um"} for sq in np.unique(sq_um)]
+    return made(points, seeds=seeds, **{"surface.sq": 1e-6 * sq_um}, **shares, **heard, full_load_crf_hz=3834.0)
+
+
+def without_maps(result):
+    """The report of a study that was never solved, and so has no contacts to map."""
+    report = StudyReport(result, None, lambda _: None)
+    report.__dict__["mapped"] = []
+    return report
+
+
+def plain(text):
+    """With spaces that may break."""
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def line(axes, label):
+    (found,) = [one for one in axes.get_lines() if one.get_label() == label]
+    return found
+
+
+def points_of(axes, label):
+    """x, y of the markers of an error bar."""
+    (found,) = [one for one in axes.containers if one.get_label() == label]
+    return found[0].get_xydata()
+
+
+# The page ------------------------------------------------------------------------------------------------------------
+
+
+def test_page_loads_nothing(page):
+    assert not {tag for tag, _ in page.tags} & {"script", "iframe", "object", "embed", "video", "audio"}
+    for tag, attributes in page.tags:
+        for name in ("src", "href", "srcset", "data"):
+            target = attributes.get(name, "data:")
+            linked = tag == "a" and target.startswith(("#", "https://doi.org/"))  # a link loads nothing by itself
+            assert linked or target.startswith("data:"), (tag, name, target[:80])
+    assert len(page.images()) == 5  # the paper's Figs 5, 6, 7, 8 and 13
+    assert all(len(image["alt"]) > 40 for image in page.images())
+    assert "url(" not in re.sub(r'src="data:[^"]*"', "", page.html)
+
+
+def test_levels_are_means_with_students_interval(page, wear):
+    clr = 100.0 * wear.table.loc[np.isclose(wear.table["surface.sq"], 2e-6), "clr"]
+    reach = student.ppf(0.95, 2) * clr.std() / np.sqrt(3)
+    (row,) = [row for row in page.rows if row[:2] == ["2", "3"]]
+    shown = [float(number.replace("−", "-")) for number in re.findall(r"−?[\d.]+", row[2])]
+    assert shown == pytest.approx([clr.mean(), clr.mean() - reach, clr.mean() + reach], abs=0.051)
+
+
+def test_anchors_stand_in_a_table(page, wear):
+    rows = {plain(row[0]).split(" section")[0]: row[1:] for row in page.rows if "Lubricants" in row[0]}
+    assert len(rows) == len(PAPER_ANCHORS)
+    wanted, ours, *_ = rows["CRF at 3.49 µm, rig"]
+    assert wanted.startswith("3812 ±")
+    crf = wear.table.groupby("surface.sq")["crf_sound_hz"].mean().to_numpy()
+    between = np.interp(3.49, LEVELS_UM, crf)
+    assert float(ours.removesuffix(" Hz")) == pytest.approx(between, abs=0.6)
+    assert rows["CAR of the domain at 0.5 µm"][1:] == ["–", "–", "–", "NO"]  # the study begins at 0.75 um
+
+
+def test_page_says_what_was_computed(page, wear):
+    facts = {name: plain(value) for name, value in (row for row in page.rows if len(row) == 2)}
+    assert facts["Cases"] == "12: 4 points of 3 surfaces each"
+    assert facts["surface.sq"] == "0.75 µm, 1.0 µm, 2.0 µm, 3.5 µm"
+    assert f"asperity {asperity.__version__}" in facts["Versions"]
+    assert wear.plan.case.text in page.text
+
+
+def test_failures_are_loud_and_left_out():
+    study = with_knee()
+    broken = study.table.copy()
+    broken.loc[3, ["status", "reason", "clr"]] = ["failed", "<b>no</b> surface", 9.0]
+    broken.loc[7, ["status", "reason", "clr"]] = ["not converged", "stalled", 9.0]
+    report = without_maps(replace(study, table=broken))
+    page = Page(report.page())
+    assert ("section", {"class": "verdict unfinished"}) in page.tags
+    assert "2 of 75 cases failed or did not converge" in page.text
+    (row,) = [row for row in page.rows if row[0] == "failed: <b>no</b> surface"]
+    assert [plain(cell) for cell in row[1:]] == ["1", "surface.sq 0.5 µm (1 of 5 surfaces)"]
+    axes = study_figures.shares(report.curve, (), ON_PAGE).axes[0]
+    assert line(axes, "CLR, share of the load").get_ydata()[0] == pytest.approx(10.0)  # 0.2 a micrometre, not 900 %
+    assert max(np.max(one.get_ydata()) for one in axes.get_lines()) < 100.0
+
+
+def test_all_failed_is_a_page_and_nothing_computed_is_refused():
+    study = with_knee()
+    none = replace(study, table=study.table.assign(status="failed", reason="no oil"))
+    page = Page(StudyReport(none, None, lambda _: None).page())
+    assert "75 OF 75 CASES FAILED" in page.text
+    assert not page.images()
+    with pytest.raises(BadInput, match=r"no computed case yet, of 75"):
+        StudyReport(replace(study, table=study.table[:0]), None, lambda _: None)
+
+
+def test_unfinished_study_says_so():
+    study = with_knee()
+    report = without_maps(replace(study, table=study.table[:60]))
+    assert report.notes == ["15 of 75 cases have not been computed yet: run the study again."]
+
+
+# The paper's figures -------------------------------------------------------------------------------------------------
+
+
+def test_shares_over_sq_with_the_printed_car(wear):
+    axes = study_figures.shares(curve_of(wear), PAPER_ANCHORS, ON_PAPER).axes[0]
+    for label, column in (
+        ("CLR, share of the load", "clr"),
+        ("CAR of the Hertz zone", "car"),
+        ("CAR of the domain", "car_domain"),
+    ):
+        means = wear.table.groupby("surface.sq")[column].mean()
+        drawn = line(axes, label).get_xydata()
+        assert drawn == pytest.approx(np.column_stack([LEVELS_UM, 100.0 * means]))
+    assert dict(points_of(axes, "CAR, printed")) | dict(axes.containers[1][0].get_xydata()) == pytest.approx(
+        PRINTED_CAR
+    )
+    assert axes.get_ylim()[1] >= 100.0
+    assert axes.get_ylabel().endswith("[%]")
+
+
+def test_stages_are_marked_where_crf_bends():
+    curve = curve_of(with_knee(2.5))
+    figure = study_figures.resonance(curve, PAPER_ANCHORS, ON_PAPER)
+    for axes in figure.axes:
+        (strip,) = [patch for patch in axes.patches if patch.get_label() == "split, 90 %"]
+        low, high = strip.get_x(), strip.get_x() + strip.get_width()
+        assert low <= 2.5 <= high
+        assert high - low < 0.3
+        splits = sorted(
+            float(one.get_xdata()[0]) for one in axes.get_lines() if "printed split" in str(one.get_label())
+        )
+        assert splits == [1.8, 2.5]  # simulated and between the rig's samples of 1.68 and 1.92 um
+    assert [text.get_text() for text in figure.axes[0].texts] == ["normal", "severe"]
+    assert dict(points_of(figure.axes[0], "CRF of the rig, printed")) == pytest.approx({0.54: 2921.93})
+
+
+def test_a_smooth_curve_has_no_stages(wear):
+    figure = study_figures.resonance(curve_of(wear), (), ON_PAGE)
+    assert not [patch for axes in figure.axes for patch in axes.patches]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["too few"]
+
+
+def test_rings_of_the_rig_stand_beside_the_prediction():
+    curve = curve_of(with_knee(2.5, scatter_hz=0.01))
+    axes = study_figures.rig(curve, ON_PAPER).axes[0]
+    ours = points_of(axes, "ours at a ring's Sq")
+    sq = np.array(RINGS_UM)
+    expected = 2800.0 + 400.0 * np.minimum(sq, 2.5) + 20.0 * np.maximum(sq - 2.5, 0.0)
+    assert ours == pytest.approx(np.column_stack([sq, expected]), rel=1e-4)
+    (container,) = [one for one in axes.containers if one.get_label() == "ours at a ring's Sq"]
+    sideways = container[2][0].get_segments()
+    assert [bar[1, 0] - bar[0, 0] for bar in sideways] == pytest.approx(2.0 * np.array(RINGS_STD_UM))
+    assert dict(points_of(axes, "rings, CRF printed")) == pytest.approx(PRINTED_CRF)
+
+
+def test_maps_show_the_contact_of_the_study(report, wear):
+    figure = study_figures.contact_maps(report.runs, ON_PAPER)
+    panels = [axes for axes in figure.axes if axes.images]
+    firsts = wear.table.groupby("surface.sq").first()
+    assert len(panels) == len(LEVELS_UM)
+    for axes, (sq, row), run in zip(panels, firsts.iterrows(), report.runs, strict=True):
+        title = axes.get_title("left")
+        assert f"Sq {1e6 * sq:.3g} µm" in title
+        shown = [float(share) for share in re.findall(r"([\d.]+) %", title)]
+        assert shown == pytest.approx([100 * row[name] for name in ("clr", "car", "car_domain")], abs=0.051)
+        image = np.asarray(axes.images[0].get_array())
+        yellow = np.all(np.isclose(image, to_rgb(CONTACT_COLOUR)), axis=2)
+        in_zone = np.abs(run.case.grid.x) <= run.case.conditions.hertz.half_widths[0]
+        assert yellow[:, in_zone].mean() == pytest.approx(row["car"])  # an image's rows are y
+    assert not report.notes
+
+
+def test_surfaces_share_one_scale(report):
+    figure = study_figures.surfaces(report.runs, ON_PAPER)
+    images = [axes.images[0] for axes in figure.axes if axes.images]
+    assert len({image.get_clim() for image in images}) == 1
+    spread = [float(np.std(image.get_array())) for image in images]
+    assert spread == pytest.approx(LEVELS_UM, rel=1e-6)  # um
+
+
+def test_a_map_that_differs_from_the_table_is_said(wear):
+    table = wear.table.copy()
+    table.loc[table["number"] == 3, "clr"] += 0.01
+    report = StudyReport(replace(wear, table=table), None, lambda _: None)
+    (note,) = report.notes
+    assert note.startswith("The contact mapped at Sq 1 µm, solved anew, has a CLR of")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "papers"),
+    [
+        ({}, True),
+        ({"material.hardness": "0.65 GPa", "contact.entrainment_speed": "2 m/s"}, True),
+        ({"contact.load": "200 N"}, False),
+        ({"contact.geometry": "point", "contact.length": "none"}, False),
+        ({"lubricant": "none"}, False),
+    ],
+)
+def test_printed_numbers_stand_beside_the_papers_contact_only(overrides, papers):
+    assert papers_contact(PAPERS.with_overrides(overrides)) is papers
+
+
+def test_anchors_of_ones_own_replace_the_papers(wear):
+    own = (Anchor(name="CLR of my rig", quantity="clr", value=0.7, tolerance=0.1, sq=2e-6),)
+    report = StudyReport(wear, own, lambda _: None)
+    assert [shown.name for shown in report.figures] == ["shares", "resonance", "contact-maps", "surfaces"]
+    axes = study_figures.shares(report.curve, own, ON_PAGE).axes[0]
+    assert points_of(axes, "CLR, given") == pytest.approx(np.array([[2.0, 70.0]]))
+    assert [row["name"] for row in report._anchor_rows()] == ["CLR of my rig"]
+
+
+# Any other study -----------------------------------------------------------------------------------------------------
+
+
+def over_two():
+    points = [
+        {"contact.load": f"{load} N", "surface.correlation_length": length}
+        for load in (200, 300)
+        for length in ("10 um", "0.02 mm", "80 um")
+    ]
+    clr = np.array([10, 20, 30, 40, 50, 60, 70, 80, 90, 15, 25, 35]) / 100.0
+    return made(points, seeds=2, clr=clr, crf_hz=3000.0 + 100.0 * clr)
+
+
+def test_means_over_two_quantities_as_a_map():
+    report = StudyReport(over_two(), None, lambda _: None)
+    assert [shown.name for shown in report.figures] == [
+        "against-contact-load", "against-surface-correlation-length",
+        "over-contact-load-and-surface-correlation-length",
+    ]  # fmt: skip
+    figure = report.figures[-1].draw(ON_PAPER)
+    image = figure.axes[0].images[0].get_array()
+    assert np.asarray(image) == pytest.approx(np.array([[15, 75], [35, 52.5], [55, 30]]))  # means of pairs, by hand
+    labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
+    assert labels == ["10", "20", "80"]  # um, one of them written in mm
+    assert figure.get_supylabel() == "correlation length [µm]"
+    assert figure.get_supxlabel() == "load [N]"
+
+
+def test_what_has_no_case_has_no_colour():
+    study = over_two()
+    study.table.loc[study.table["point"] == 4, "status"] = "failed"
+    figure = StudyReport(study, None, lambda _: None).figures[-1].draw(ON_PAGE)
+    image = np.ma.filled(figure.axes[0].images[0].get_array(), np.nan)
+    assert np.isnan(image[1, 1])
+    assert np.isnan(image).sum() == 1
+
+
+def test_means_against_one_quantity_have_students_interval():
+    report = StudyReport(over_two(), None, lambda _: None)
+    axes = report.figures[0].draw(ON_PAPER).axes[0]
+    at_200 = np.array([10, 20, 30, 40, 50, 60])
+    (bars,) = axes.containers
+    assert bars[0].get_xydata() == pytest.approx(np.array([[200, 35], [300, 52.5]]))
+    reach = student.ppf(0.95, 5) * at_200.std(ddof=1) / np.sqrt(6)
+    assert bars[2][0].get_segments()[0][:, 1] == pytest.approx([35 - reach, 35 + reach])
+
+
+def test_samples_are_averaged_in_groups():
+    sq = np.random.default_rng(1).uniform(0.5, 3.0, 40)
+    points = [{"surface.sq": f"{value:.4f} um", "lubricant.viscosity.alpha": "20 1/GPa"} for value in sq]
+    report = StudyReport(made(points, clr=sq / 4.0), None, lambda _: None)
+    (axis,) = report.axes  # alpha has one value: no axis
+    assert axis.binned
+    x, mean, low, high = sweep_figures.means(axis.values, 25.0 * axis.values, binned=True)
+    assert len(x) == 8
+    assert mean == pytest.approx(25.0 * x)
+    assert mean.mean() == pytest.approx(25.0 * axis.values.mean())  # groups of five
+    assert np.all((low < mean) & (mean < high))
+    assert len(Page(report.page()).images()) == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "logarithmic"),
+    [((10, 20, 40, 80), True), ((1, 2, 3, 4, 5), False), ((1, 10), False), ((0, 1, 9), False)],
+)
+def test_values_that_crowd_low_get_a_logarithmic_axis(values, logarithmic):
+    study = made([{"contact.slip": float(value)} for value in values], clr=np.arange(len(values)))
+    assert sweep_figures.axis_of(study.plan, study.table, "contact.slip").logarithmic is logarithmic
+
+
+def test_names_are_places_on_an_axis():
+    points = [{"surface.correlation_length": pair} for pair in (["10 um", "40 um"], ["20 um", "40 um"])]
+    study = made(points, clr=[0.1, 0.2])
+    axis = sweep_figures.axis_of(study.plan, study.table, "surface.correlation_length")
+    assert axis.names == ("10 um, 40 um", "20 um, 40 um")
+    assert axis.values.tolist() == [0.0, 1.0]
+
+
+# On disk and from the command line -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def written(wear, tmp_path_factory):
+    """The page, and the folder of figures beside it, written from Python."""
+    out = tmp_path_factory.mktemp("written")
+    write_study_report(wear, out / "page.html", figures=out / "paper" / "figures")
+    return out / "page.html", out / "paper" / "figures"
+
+
+def test_figures_and_tables_for_a_paper(written, wear):
+    _, out = written
+    names = {"shares": 84.0, "rig": 84.0, "resonance": 174.0, "contact-maps": 174.0, "surfaces": 174.0}
+    for name, width_mm in names.items():
+        pixels = matplotlib.image.imread(out / f"{name}.png").shape[1]
+        assert pixels / 300.0 * 25.4 == pytest.approx(width_mm, abs=0.2), name
+        document = (out / f"{name}.pdf").read_bytes()
+        assert document.startswith(b"%PDF")
+        assert b"/FontFile2" in document  # TrueType: text can be searched and edited
+        assert b"/Type3" not in document
+        assert f"**{name}**" in (out / "captions.md").read_text("utf-8")
+    cases = pandas.read_csv(out / "cases.csv")
+    assert cases["clr"].to_numpy() == pytest.approx(wear.table["clr"].to_numpy(), rel=1e-12)
+    levels = pandas.read_csv(out / "levels.csv")
+    assert levels["sq_um"].to_numpy() == pytest.approx(np.array(LEVELS_UM))
+    rig = pandas.read_csv(out / "rig-sound.csv")
+    assert rig["sq_um"].tolist() == list(RINGS_UM)
+    assert {file.suffix for file in out.iterdir()} == {".pdf", ".png", ".csv", ".md"}
+
+
+def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["report", str(folder), "--out", str(tmp_path / "p.html"), "--figures", str(tmp_path / "f"), "--json"])
+    assert not end.value.code
+    said = json.loads(capsys.readouterr().out)
+    assert said["report"] == str(tmp_path / "p.html")
+    assert said["figures"] == str(tmp_path / "f")
+    assert (said["cases"], said["failed"]) == (12, 0)
+    page, figures = written
+    assert (tmp_path / "p.html").read_bytes() == page.read_bytes()
+    assert {file.name for file in (tmp_path / "f").iterdir()} == {file.name for file in figures.iterdir()}
+    for file in figures.iterdir():
+        assert file.read_bytes() == (tmp_path / "f" / file.name).read_bytes(), file.name
+
+
+def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(wear, tmp_path, monkeypatch):
+    monkeypatch.setattr(study_page, "solve_case", lambda *_, **__: pytest.fail("solved first"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadInput, match="it is a file; name a folder"):
+        write_study_report(wear, tmp_path / "page.html", figures=tmp_path / "file")
+    with pytest.raises(BadInput, match="does not exist"):
+        write_study_report(wear, tmp_path / "nowhere" / "page.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["STUDY", "STUDY"], "a study's page holds nothing else"),
+        (["STUDY", "--anchors", "none.toml"], "none.toml cannot be read"),
+        (["run.nc", "--figures", "DIR"], "--figures is for a study's folder"),
+        (["EMPTY"], "holds no study"),
+        (["STUDY", "--out", "page.pdf"], "--out must be a file that ends in .html"),
+    ],
+)
+def test_command_refuses_in_one_sentence(arguments, sentence, folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "EMPTY").mkdir()
+    with pytest.raises(SystemExit) as end:
+        main(["report", *(str(folder) if word == "STUDY" else word for word in arguments)])
+    assert end.value.code == 2
+    said = capsys.readouterr()
+    assert not said.out
+    assert sentence in said.err
+    assert len(said.err.strip().splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["EMPTY"]
+    assert not (folder / "report.html").exists()
