@@ -34,6 +34,7 @@ from pydantic import (
 from asperity.conditions import ContactConditions, ElasticPair, Geometry
 from asperity.coupling import PRESETS, VibrationModel, preset_choices
 from asperity.ehl.friction import BOUNDARY_FRICTION
+from asperity.ehl.motion import LONGEST_STEP, Start
 from asperity.ehl.solution import Options
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
@@ -64,6 +65,7 @@ from asperity.surface import (
 )
 from asperity.surface.condition import Form, Outliers
 from asperity.surface.model import area_text, length_text
+from asperity.surface.moving import MovingSurfaces, track_grid
 
 if TYPE_CHECKING:
     import pint
@@ -472,6 +474,16 @@ class StudySection(Section):
     seeding: Literal["independent", "common"] = "independent"
 
 
+class MotionSection(Section):
+    """[motion]: how `asperity run` lets the roughness move."""
+
+    steps: Count = 200
+    time_step: Annotated[float, Strict(), Field(gt=0.0, le=LONGEST_STEP)] = 1.0  # cells that the oil travels in one
+    rough: Literal["first", "second", "both"] = "first"  # which body carries a generated surface; both: a half each
+    start: Start = "steady"
+    track: Count = 1  # lengths of the domain after which a surface repeats
+
+
 class _Located(BadInput):
     """What is wrong, and the keys that lead to it."""
 
@@ -643,6 +655,7 @@ class CaseFile(Section):
     thermal: ThermalSection = Field(default_factory=ThermalSection)
     vibration: Annotated[Any, PlainValidator(_vibration_section)] = None
     study: Annotated[StudySection | None, PlainValidator(_study_section)] = None
+    motion: Annotated[MotionSection | None, _Optional] = None
 
 
 def _validated(model: type[S], table: object) -> S:
@@ -823,10 +836,9 @@ class Case:
             return self._measured(section)
         if isinstance(section, FlatSection):
             return flat_surface(self.grid), ()
-        return self._generated(section, np.random.default_rng(getattr(section, "seed", 0)))
+        return self._generated(section, np.random.default_rng(getattr(section, "seed", 0)), self.grid)
 
-    def _generated(self, section: Section, rng: np.random.Generator) -> tuple[Surface, tuple[str, ...]]:
-        grid = self.grid
+    def _generated(self, section: Section, rng: np.random.Generator, grid: Grid) -> tuple[Surface, tuple[str, ...]]:
         if isinstance(section, SelfAffineSection):
             shortest, longest = (float(length) for length in section.cutoffs)
             sq, hurst = float(section.sq), section.hurst
@@ -878,7 +890,7 @@ class Case:
             f"the second face down; Sq {length_text(combined.sq)} together",
         )
 
-    def _prepared(self, section: FileSection) -> PreparedSurface:
+    def _prepared(self, section: FileSection, grid: Grid | None = None) -> PreparedSurface:
         def plain(length: float | None) -> float | None:
             return None if length is None else float(length)
 
@@ -888,7 +900,7 @@ class Case:
         )
         prepared = prepare_surface(
             measured,
-            self.grid,
+            grid or self.grid,
             sq=plain(section.sq),
             form=section.form,
             fit=section.fit,
@@ -907,6 +919,50 @@ class Case:
         with self.naming("surface"):
             first, second = self._prepared(section), self._prepared(section.second)
             return CompositeSurface(first.surface, second.surface, self.conditions.surface_speeds)
+
+    @property
+    def motion(self) -> MotionSection:
+        """How the roughness moves, where it is let."""
+        return self.contents.motion or MotionSection()
+
+    def moving_surfaces(self) -> MovingSurfaces:
+        """Both bodies' roughness on tracks that repeat along rolling, each at its own speed.
+
+        Roughness that is generated, or measured on one surface only, lies on the body that `motion.rough` names; "both"
+        bodies carry independent samples of Sq/√2 each, of which the first has the case's seed. Two measured surfaces
+        lie on one body each. A measured surface's ends are joined.
+
+        Raises
+        ------
+        BadInput
+            for one measured surface that shall be on both bodies, a track that it does not cover, or roughness kept in
+            a run, which is on neither track.
+        """
+        section, motion, speeds = self.contents.surface, self.motion, self.conditions.surface_speeds
+        track = track_grid(self.grid, motion.track)
+        with self.naming("surface"):
+            if self.stored is not None:
+                raise BadInput("is kept in a run, and what it had beside the contact is not; let the case file move")
+            if isinstance(section, MeasuredSection) and section.second is not None:
+                one, other = self._prepared(section, track).surface, self._prepared(section.second, track).surface
+                return MovingSurfaces(one, other, speeds, self.grid)
+            if isinstance(section, FileSection):
+                if motion.rough == "both":
+                    raise BadInput(
+                        f"{section.file} is one surface and motion.rough asks for two; name the other as second"
+                    )
+                made = self._prepared(section, track).surface
+            elif isinstance(section, FlatSection):
+                made = flat_surface(track)
+            elif motion.rough == "both":
+                seed = getattr(section, "seed", 0)
+                each = (np.random.default_rng(seed), np.random.default_rng([seed, 2]))
+                samples = (self._generated(section, rng, track)[0].heights for rng in each)
+                first, second = (Surface(heights / math.sqrt(2.0), track) for heights in samples)
+                return MovingSurfaces(first, second, speeds, self.grid)
+            else:
+                made = self._generated(section, np.random.default_rng(getattr(section, "seed", 0)), track)[0]
+            return MovingSurfaces.one_rough(made, speeds, self.grid, first=motion.rough == "first")
 
     def surface(self) -> Surface:
         """The composite roughness on the grid: generated, read and prepared, or as stored in the run.

@@ -7,14 +7,18 @@ the cells can show: nothing is smeared however long it runs.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.grid import Grid
 from asperity.surface.model import Surface, flat_surface
 from asperity.surface.prepare import CompositeSurface
+
+Spectrum: TypeAlias = npt.NDArray[np.complexfloating[Any, Any]]
 
 WHOLE = 1e-9  # of a cell: closer to a whole number of cells is one
 
@@ -54,12 +58,17 @@ class MovingSurfaces:
         return cls(composite.first, composite.second, composite.speeds, composite.first.grid)
 
     @classmethod
-    def one_rough(cls, surface: Surface, speeds: tuple[float, float], *, first: bool = True) -> "MovingSurfaces":
-        """All roughness on the first surface, or on the second, where it looks to the contact as it does here."""
-        flat = flat_surface(surface.grid)
+    def one_rough(
+        cls, surface: Surface, speeds: tuple[float, float], grid: Grid | None = None, *, first: bool = True
+    ) -> "MovingSurfaces":
+        """All roughness on the first surface, or on the second, and seen by the contact as it lies here.
+
+        The contact's grid is the surface's own, unless given.
+        """
+        flat, grid = flat_surface(surface.grid), grid or surface.grid
         if first:
-            return cls(surface, flat, speeds, surface.grid)
-        return cls(flat, Surface(surface.heights[:, ::-1], surface.grid), speeds, surface.grid)
+            return cls(surface, flat, speeds, grid)
+        return cls(flat, Surface(surface.heights[:, ::-1], surface.grid), speeds, grid)
 
     @property
     def rough(self) -> tuple[bool, bool]:
@@ -87,13 +96,13 @@ class MovingSurfaces:
         return moved(heights, cells, self._spectra[index])[: self.grid.cells[0]]
 
     @cached_property
-    def _spectra(self) -> tuple[Field, Field]:
+    def _spectra(self) -> tuple[Spectrum, Spectrum]:
         import scipy.fft as fft
 
         return fft.rfft(self.first.heights, axis=0), fft.rfft(self.second.heights, axis=0)
 
 
-def moved(heights: Field, cells: float, spectrum: Field) -> Field:
+def moved(heights: Field, cells: float, spectrum: Spectrum) -> Field:
     """Heights that repeat along the first axis, moved on by a number of `cells`; `spectrum` is their rfft along it."""
     whole = round(cells)
     if abs(cells - whole) < WHOLE:
