@@ -16,10 +16,8 @@ from typing import Any
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.coupling import contact_vibration
-from asperity.ehl.solution import ContactSolution
-from asperity.ehl.state import ContactState
 from asperity.errors import AsperityError
-from asperity.run import solve_case, vibrate_case, vibration_scalars
+from asperity.run import Run, solve_case, vibrate_case, vibration_scalars
 from asperity.wear import Resonance
 
 DONE, NOT_CONVERGED, FAILED = "done", "not converged", "failed"
@@ -65,7 +63,7 @@ def _solved(case: Case, wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]
     row |= run.scalars()
     if run.vibration is not None:
         row["full_load_crf_hz"] = run.vibration.full_load_crf_hz
-        row |= _both_presets(case, run.state, run.solution)
+        row |= _both_presets(case, run)
     maps: dict[str, Any] = {
         "pressure": run.solution.pressure,
         "gap": run.solution.gap,
@@ -86,17 +84,22 @@ EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Fi
 }
 
 
-def _both_presets(case: Case, state: ContactState, solution: ContactSolution) -> Row:
+def _both_presets(case: Case, run: Run) -> Row:
     """CRF and CRFA of the one contact by the sound vibration preset and by the paper's."""
     row: Row = {}
     for preset in BOTH_PRESETS:
         model = case.with_overrides({"vibration.preset": preset}).vibration
         assert model is not None
+        assert run.vibration is not None
         row[f"reason_{preset}"] = ""
-        try:
-            found: Resonance | None = contact_vibration(state, case.conditions, model, solution=solution).resonance
-        except AsperityError as refusal:
-            row[f"reason_{preset}"], found = str(refusal), None
+        found: Resonance | None = None
+        if model == case.vibration:
+            found = run.vibration.resonance
+        else:
+            try:
+                found = contact_vibration(run.state, case.conditions, model, solution=run.solution).resonance
+            except AsperityError as refusal:
+                row[f"reason_{preset}"] = str(refusal)
         heard = found if found is not None and found.found else None
         for name, unit in (("crf", "_hz"), ("crfa", ""), ("crf_std", "_hz"), ("crfa_std", "")):
             value = math.nan if heard is None else float(getattr(heard, f"{name}{unit}"))

@@ -312,7 +312,7 @@ def _sampled(case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, samp
 
     shares = qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
     points: list[dict[str, Any]] = [{} for _ in range(samples)]
-    for column, (key, (name, values)) in enumerate(keys.items()):
+    for column, (key, (name, values)) in enumerate(sorted(keys.items())):  # a restated case has another order
         for point, share in zip(points, shares[:, column], strict=True):
             if isinstance(values, tuple):
                 point[key] = values[int(share * len(values))]

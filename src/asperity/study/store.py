@@ -308,8 +308,11 @@ def in_order(parts: Sequence["pyarrow.Table"], plan: Plan) -> "pandas.DataFrame"
         for place, column in enumerate(table.schema):
             if pyarrow.types.is_null(column.type):  # a number that no case has
                 table = table.set_column(place, column.name, table.column(place).cast("float64"))
-        finished = table.to_pandas()
-        finished = finished.sort_values("attempt").drop_duplicates("case_id", keep="last").drop(columns="attempt")
+        runs = table.select(["case_id", "attempt"]).to_pandas()
+        last = runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
+        finished = table.take(sorted(last)).drop_columns("attempt").to_pandas()
+        if "converged" in finished:
+            finished["converged"] = finished["converged"].eq(True)  # what failed before it was solved did not converge
     else:
         finished = pandas.DataFrame({"case_id": [], "status": [], "reason": []}, dtype=str)
     merged = planned.merge(finished, on="case_id", how="inner").sort_values("number", ignore_index=True)

@@ -1,0 +1,101 @@
+"""Studies that are killed: `python -m benchmarks.crashes [MOMENTS]` kills a worker or the parent at random moments,
+goes on each time, and compares with the study that nothing interrupted, number by number."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import pandas
+import pyarrow.parquet
+
+CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
+SETTINGS = ["grid.cells=[64, 64]", 'study.sq={from="0.5 um", to="4 um", step="0.5 um"}', "study.seeds=3"]
+TIMES = "seconds"  # the one column that cannot be the same twice
+
+
+def command(out: Path) -> list[str]:
+    settings = [word for setting in SETTINGS for word in ("--set", setting)]
+    return [
+        sys.executable,
+        "-m",
+        "asperity",
+        "study",
+        str(CASE),
+        "--out",
+        str(out),
+        "--workers",
+        "2",
+        "--quiet",
+        *settings,
+    ]
+
+
+def children(pid: int) -> list[int]:
+    """Worker processes of a study: its children but for multiprocessing's resource tracker."""
+    found = subprocess.run(["pgrep", "-P", str(pid), "-f", "spawn_main"], capture_output=True, text=True, check=False)
+    return [int(line) for line in found.stdout.split()]
+
+
+def killed(out: Path, after: float, target: str) -> str:
+    """Start or resume the study and kill the target after so many seconds; what became of the process."""
+    running = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    time.sleep(after)
+    if running.poll() is None:
+        workers = children(running.pid)
+        victim = random.choice(workers) if target == "worker" and workers else running.pid
+        os.kill(victim, signal.SIGKILL)
+        if victim == running.pid:
+            running.wait()
+            time.sleep(2.0)
+            left = [pid for pid in workers if Path(f"/proc/{pid}").exists()]
+            return f"parent killed, {len(left)} workers left behind"
+        running.wait()
+        return f"worker killed, study ended with {running.returncode}"
+    return "had finished"
+
+
+def computed_twice(out: Path) -> int:
+    ids = Counter(
+        case_id
+        for part in (out / "parts").glob("*.parquet")
+        for case_id in pyarrow.parquet.read_table(part)["case_id"].to_pylist()
+    )
+    return sum(count > 1 for count in ids.values())
+
+
+def main(moments: int) -> None:
+    folder = Path(tempfile.mkdtemp(prefix="asperity-crashes-"))
+    try:
+        begun = time.perf_counter()
+        subprocess.run(command(folder / "whole"), check=True, stdout=subprocess.DEVNULL)
+        length = time.perf_counter() - begun
+        whole = pandas.read_parquet(folder / "whole" / "table.parquet").drop(columns=TIMES)
+        rng = random.Random(1)
+        same = twice = 0
+        print(f"{len(whole)} cases take {length:.0f} s; then killed at {moments} moments and resumed")
+        for number in range(moments):
+            out = folder / f"killed-{number}"
+            target = ("worker", "parent")[number % 2]
+            after = rng.uniform(0.3, 0.95 * length)
+            fate = killed(out, after, target)
+            subprocess.run(command(out), check=True, stdout=subprocess.DEVNULL)
+            again = pandas.read_parquet(out / "table.parquet").drop(columns=TIMES)
+            same += again.equals(whole)
+            twice += computed_twice(out)
+            left = len(list(out.rglob("*.part")))
+            print(f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left over: {left}")
+            shutil.rmtree(out)
+        print(f"{same} of {moments} the same to the last bit; {twice} cases computed twice")
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20)

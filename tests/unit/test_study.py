@@ -1,0 +1,256 @@
+"""A study on disk and in memory: nothing lost, nothing twice, the same however it is spread; small dry contacts."""
+
+import json
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import pandas
+import pytest
+
+import asperity.study.execute as execution
+from asperity.case import load_case
+from asperity.errors import AsperityError, BadInput, UnreadableFile
+from asperity.run import solve_case
+from asperity.study.execute import estimate, load_study, run_study
+from asperity.study.plan import plan_points, plan_study
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DRY = {
+    "lubricant": "none",
+    "grid.x": [-1.9, 1.9],
+    "grid.cells": [24, 24],
+    "surface.correlation_length": "30 um",
+    "vibration.duration": "0.1 s",
+}
+
+
+@pytest.fixture(scope="module")
+def case():
+    return load_case(EXAMPLES / "paper.toml").with_overrides({**DRY, "study": {"sq": ["1 um", "2 um"], "seeds": 3}})
+
+
+@pytest.fixture(scope="module")
+def plan(case):
+    return plan_study(case)
+
+
+@pytest.fixture(scope="module")
+def executor():
+    with ThreadPoolExecutor(2) as threads:
+        yield threads
+
+
+@pytest.fixture(scope="module")
+def unbroken(plan, executor):
+    return run_study(plan, executor=executor).table.drop(columns="seconds")
+
+
+class Dying:
+    """An executor whose process dies over some cases, every time."""
+
+    def __init__(self, deadly):
+        self.deadly, self.broken = deadly, False
+
+    def submit(self, function, *job):
+        if self.broken:
+            raise BrokenProcessPool("broken")
+        future = Future()
+        self.broken = any(overrides == deadly for overrides in job[2] for deadly in self.deadly)
+        if self.broken:
+            future.set_exception(BrokenProcessPool("killed"))
+        else:
+            future.set_result(function(*job))
+        return future
+
+    def shutdown(self, **_):
+        pass
+
+
+def same(result, unbroken):
+    pandas.testing.assert_frame_equal(result.table.drop(columns="seconds"), unbroken, check_exact=True)
+
+
+def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
+    chosen = plan.cases[4]
+    alone = solve_case(plan.case.with_overrides(chosen.overrides))
+    row = unbroken.iloc[4]
+    assert row["case_id"] == chosen.id
+    assert row["surface.sq"] == 2e-6
+    scalars = {name: value for name, value in alone.scalars().items() if name != "seconds" and value is not None}
+    assert {name: row[name] for name in scalars} == scalars
+    assert row["crf_sound_hz"] == pytest.approx(3000, rel=0.5)
+    assert row["crf_paper_hz"] == pytest.approx(row["crf_sound_hz"], rel=0.05)
+
+
+def test_a_study_on_disk_is_the_study_in_memory_and_goes_on_where_it_was(plan, unbroken, executor, tmp_path):
+    def stop(progress):
+        if progress.done >= 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(plan, out=tmp_path, executor=executor, progress=stop)
+    there = load_study(tmp_path)
+    assert 2 <= len(there.table) < 6
+    assert there.missing == 6 - len(there.table)
+    result = run_study(plan, out=tmp_path, executor=executor)
+    assert result.computed == there.missing
+    same(result, unbroken)
+    same(load_study(tmp_path), unbroken)
+    pandas.testing.assert_frame_equal(pandas.read_parquet(tmp_path / "table.parquet"), result.table)
+    assert run_study(plan, out=tmp_path, executor=executor).computed == 0
+
+
+def test_shards_make_up_the_whole_in_one_folder_or_merged(plan, unbroken, executor, tmp_path):
+    for k in (1, 2, 3):
+        alone = run_study(plan, out=tmp_path / f"{k}", executor=executor, shard=(k, 3))
+        assert len(alone.table) == 2
+        run_study(plan, out=tmp_path / "together", executor=executor, shard=(k, 3))
+    same(load_study(tmp_path / "together"), unbroken)
+    merged = run_study(
+        plan, out=tmp_path / "merged", executor=executor, merge_from=[tmp_path / f"{k}" for k in (1, 2, 3)]
+    )
+    assert merged.computed == 0
+    same(merged, unbroken)
+
+
+def test_what_a_crash_leaves_is_cleared_and_computed_again(plan, unbroken, executor, tmp_path):
+    run_study(plan, out=tmp_path, executor=executor)
+    part = next((tmp_path / "parts").glob("*.parquet"))
+    (tmp_path / "parts" / f".{part.name}.123.part").write_bytes(part.read_bytes()[:100])  # killed while writing
+    part.unlink()
+    result = run_study(plan, out=tmp_path, executor=executor)
+    assert result.computed > 0
+    same(result, unbroken)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_a_damaged_part_is_named(plan, executor, tmp_path):
+    run_study(plan, out=tmp_path, executor=executor)
+    part = next((tmp_path / "parts").glob("*.parquet"))
+    part.write_bytes(part.read_bytes()[:-50])
+    with pytest.raises(UnreadableFile, match=f"{part.name} is damaged.*delete it"):
+        run_study(plan, out=tmp_path, executor=executor)
+
+
+def test_a_case_that_kills_its_process_fails_alone(plan, unbroken, monkeypatch, tmp_path):
+    deadly = plan.cases[3].overrides
+    monkeypatch.setattr(execution, "_pool", lambda _: Dying([deadly]))
+    result = run_study(plan, out=tmp_path, workers=2)
+    assert list(result.failures["number"]) == [3]
+    assert "process that computed it died" in result.failures["reason"].iloc[0]
+    pandas.testing.assert_frame_equal(
+        result.table.drop(index=3).drop(columns="seconds"), unbroken.drop(index=3), check_dtype=False
+    )
+    monkeypatch.setattr(execution, "_pool", lambda _: Dying([]))
+    assert run_study(plan, out=tmp_path, workers=2).computed == 0
+    again = run_study(plan, out=tmp_path, workers=2, retry_failed=True)
+    assert again.computed == 1
+    same(again, unbroken)
+
+
+def test_a_case_that_is_refused_is_a_row_with_its_reason(case, executor):
+    plan = plan_points(case, [{"surface.sq": "1 um"}, {"surface.correlation_length": "3 um"}])
+    result = run_study(plan, executor=executor)
+    assert result.failed == 1
+    assert "correlation length along x must be at least 2 cells" in result.table["reason"][1]
+    assert result.table["clr"].isna().tolist() == [False, True]
+
+
+def test_more_levels_and_seeds_extend_a_study(case, plan, executor, tmp_path):
+    run_study(plan, out=tmp_path, executor=executor)
+    wider = plan_study(case.with_overrides({"study": {"sq": ["1 um", "2 um", "3 um"], "seeds": 4}}))
+    result = run_study(wider, out=tmp_path, executor=executor)
+    assert len(result.table) == 12
+    assert result.computed == 6
+
+
+def test_another_case_in_the_folder_is_refused(case, plan, executor, tmp_path):
+    run_study(plan, out=tmp_path, executor=executor)
+    other = plan_study(case.with_overrides({"contact.load": "400 N"}))
+    with pytest.raises(BadInput, match="holds a study of another case"):
+        run_study(other, out=tmp_path, executor=executor)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    manifest["versions"]["asperity"] = "0.0.1"
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(BadInput, match=r"was computed by asperity 0\.0\.1"):
+        run_study(plan, out=tmp_path, executor=executor)
+
+
+def test_two_processes_do_not_compute_in_one_folder(plan, executor, tmp_path):
+    def again(_):
+        with pytest.raises(BadInput, match="another process computes this study"):
+            run_study(plan, out=tmp_path, executor=executor)
+        with pytest.raises(BadInput, match="another process computes this study"):
+            run_study(plan, out=tmp_path, executor=executor, shard=(1, 2))
+
+    run_study(plan, out=tmp_path, executor=executor, progress=again)
+
+
+def test_a_full_disk_is_a_sentence_and_loses_nothing(plan, unbroken, executor, tmp_path, monkeypatch):
+    run_study(plan, out=tmp_path, executor=executor, shard=(1, 3))
+    before = load_study(tmp_path).table
+    kept = os.fsync
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(AsperityError, match="No space left on device; nothing was left behind"):
+        run_study(plan, out=tmp_path, executor=executor)
+    monkeypatch.setattr(os, "fsync", kept)
+    pandas.testing.assert_frame_equal(load_study(tmp_path).table, before)
+    same(run_study(plan, out=tmp_path, executor=executor), unbroken)
+
+
+def test_fields_are_kept_before_their_row_and_are_the_solutions(plan, executor, tmp_path):
+    import zarr
+
+    run_study(plan, out=tmp_path, executor=executor, fields=("pressure", "in_contact"))
+    chosen = plan.cases[2]
+    group = zarr.open_group(tmp_path / "fields.zarr", mode="r")
+    assert sorted(group.group_keys()) == sorted(case.id for case in plan.cases)
+    solution = solve_case(plan.case.with_overrides(chosen.overrides)).solution
+    assert (group[f"{chosen.id}/pressure"][:] == solution.pressure).all()
+    assert (group[f"{chosen.id}/in_contact"][:] == solution.in_contact).all()
+    assert group[f"{chosen.id}/pressure"].chunks == solution.pressure.shape
+
+
+def test_progress_counts_every_case_once(plan, executor):
+    told = []
+    run_study(plan, executor=executor, progress=told.append)
+    assert [told[0].done, told[-1].done] == [0, 6]
+    assert told[0].seconds_left is None
+    assert told[-1].seconds_left == 0.0
+    assert sorted(entry.done for entry in told) == [entry.done for entry in told]
+
+
+def test_a_dry_run_says_what_is_left_and_keeps_nothing(plan, executor, tmp_path):
+    run_study(plan, out=tmp_path / "there", executor=executor, shard=(1, 2))
+    cost = estimate(plan, out=tmp_path / "there", workers=2)
+    assert (cost.cases, cost.kept, cost.tried) == (6, 3, 3)
+    assert cost.seconds == pytest.approx(3 * cost.case_s / 2)
+    assert estimate(plan, out=tmp_path / "not there", workers=1).kept == 0
+    assert not (tmp_path / "not there").exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"shard": (0, 3)}, "shard must be k/N"),
+        ({"workers": 0}, "workers must be positive"),
+        ({"fields": ("gap", "colour")}, "fields must be among pressure, gap, in_contact, surface_height, got colour"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(plan, tmp_path, settings, sentence):
+    with pytest.raises(BadInput, match=sentence):
+        run_study(plan, out=tmp_path, **settings)
+
+
+def test_a_folder_that_is_no_study_is_said_so(tmp_path):
+    with pytest.raises(UnreadableFile, match="holds no study"):
+        load_study(tmp_path)
+    (tmp_path / "manifest.json").write_text("{}")
+    with pytest.raises(UnreadableFile, match="not a study's manifest"):
+        load_study(tmp_path)

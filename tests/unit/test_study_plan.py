@@ -1,0 +1,144 @@
+from pathlib import Path
+
+import pytest
+
+from asperity.case import load_case
+from asperity.errors import BadInput
+from asperity.study.plan import plan_points, plan_study
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return load_case(EXAMPLES / "paper.toml")
+
+
+def planned(case, **study):
+    return plan_study(case.with_overrides({"study": study}))
+
+
+def sq_range(**more):
+    return {"from": "0.5 um", "to": "4 um", **more}
+
+
+def test_the_papers_study_is_36_levels_of_5_surfaces(paper):
+    plan = plan_study(paper)
+    assert len(plan.points) == 36
+    assert len(plan.cases) == 180
+    assert plan.points[0] == {"surface.sq": "0.5 um"}
+    assert plan.points[-1] == {"surface.sq": "4.0 um"}
+    assert len({case.id for case in plan.cases}) == 180
+    assert len({case.overrides["surface.seed"] for case in plan.cases}) == 180
+
+
+def test_steps_are_decimal_so_that_a_level_is_the_number_a_user_would_write(paper):
+    case = planned(paper, sq=sq_range(step="0.1 um")).cases[7]  # 7 x 0.1 + 0.5 is 1.2000000000000002 in floats
+    by_hand = plan_points(paper, [{"surface.sq": "1.2 um"}]).cases[0]
+    assert case.overrides["surface.sq"] == "1.2 um"
+    assert case.id == by_hand.id
+
+
+def test_several_quantities_make_their_product_the_last_varying_fastest(paper):
+    plan = planned(paper, sq=["1 um", "2 um"], contact={"load": ["200 N", "500 N", "1 kN"]}, seeds=2)
+    assert plan.axes == ("surface.sq", "contact.load")
+    assert [tuple(point.values()) for point in plan.points] == [
+        (sq, load) for sq in ("1 um", "2 um") for load in ("200 N", "500 N", "1 kN")
+    ]
+    assert len(plan.cases) == 12
+
+
+def test_ranges_by_count_meet_their_ends_on_either_scale(paper):
+    by_log = planned(paper, sq=sq_range(count=4, scale="log")).points
+    assert [point["surface.sq"] for point in by_log] == ["0.5 um", "1 um", "2 um", "4 um"]
+    linear = planned(paper, slip={"from": 0, "to": 0.3, "count": 4}).points
+    assert [point["contact.slip"] for point in linear] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+
+
+def test_a_latin_hypercube_has_one_point_in_every_stripe_of_every_quantity(paper):
+    plan = planned(
+        paper, sq=sq_range(scale="log"), slip={"from": 0.0, "to": 0.5}, surface={"kind": ["gaussian"]}, samples=20
+    )
+    slips = sorted(point["contact.slip"] for point in plan.points)
+    assert [int(20 * slip / 0.5) for slip in slips] == list(range(20))
+    again = planned(
+        paper, sq=sq_range(scale="log"), slip={"from": 0.0, "to": 0.5}, surface={"kind": ["gaussian"]}, samples=20
+    )
+    assert again.points == plan.points
+
+
+def test_the_same_case_has_the_same_id_however_it_is_written(paper):
+    one = plan_points(paper, [{"surface.sq": "0.5 um"}]).cases[0]
+    other = plan_points(paper, [{"surface.sq": "500 nm"}]).cases[0]
+    assert one.id == other.id
+    assert one.overrides["surface.seed"] == other.overrides["surface.seed"]
+    assert plan_points(paper, [{"surface.sq": "0.51 um"}]).cases[0].id != one.id
+    harder = paper.with_overrides({"material.hardness": "3 GPa"})
+    assert plan_points(harder, [{"surface.sq": "0.5 um"}]).cases[0].id != one.id
+
+
+def test_adding_levels_or_seeds_keeps_the_cases_there_are(paper):
+    few = {case.id for case in planned(paper, sq=["1 um", "2 um"], seeds=2).cases}
+    more = {case.id for case in planned(paper, sq=["0.5 um", "1 um", "2 um"], seeds=3).cases}
+    assert few < more
+
+
+def test_common_seeds_are_those_of_the_realisation_not_of_the_point(paper):
+    plan = planned(paper, sq=["1 um", "2 um"], seeds=3, seeding="common")
+    seeds = [case.overrides["surface.seed"] for case in plan.cases]
+    assert seeds[:3] == seeds[3:]
+    assert len(set(seeds)) == 3
+
+
+def test_given_seeds_are_the_surfaces_seeds(paper):
+    plan = planned(paper, sq=["1 um", "2 um"], seeds=[7, 11])
+    assert [case.overrides["surface.seed"] for case in plan.cases] == [7, 11, 7, 11]
+
+
+def test_a_measured_surface_that_changes_makes_other_cases(paper, tmp_path):
+    heights = "1 2 3\n2 3 4\n5 6 7\n"
+    (tmp_path / "map.txt").write_text(heights)
+    case = load_case(paper.text, folder=tmp_path).with_overrides({"surface": {"file": "map.txt"}})
+    one = plan_points(case, [{"contact.load": "200 N"}]).cases[0].id
+    (tmp_path / "map.txt").write_text(heights.replace("7", "8"))
+    assert plan_points(case, [{"contact.load": "200 N"}]).cases[0].id != one
+
+
+REFUSED = [
+    ({"sqq": ["1 um"]}, "study.sqq is not a key of the case; did you mean sq?"),
+    ({"seed": [1, 2]}, "surface.seed or vibration.seed"),
+    ({"sq": sq_range()}, "study.sq needs either step or count"),
+    ({"sq": sq_range(step="0.1 um", count=3)}, "study.sq needs either step or count"),
+    ({"sq": sq_range(step="0 um")}, "study.sq.step must be positive"),
+    ({"sq": sq_range(step="0.1 N")}, 'must be in um as the range\'s beginning is, got "0.1 N"'),
+    ({"sq": {"from": "2 um", "to": "1 um", "step": "1 um"}}, "study.sq must go upwards"),
+    ({"sq": ["1 N"]}, "surface.sq must be a length"),
+    ({"sq": [1]}, "got the bare number 1"),
+    ({"sq": []}, "study.sq must be a list of values or a range"),
+    ({"sq": ["1 um"], "surface": {"sq": ["2 um"]}}, "sweeps one quantity twice"),
+    ({"kind": "solve"}, "study varies nothing"),
+    ({"sq": sq_range(step="0.1 pm"), "seeds": 5}, "widen its steps"),
+    ({"sq": sq_range(step="1 um"), "seeds": 0}, "study.seeds must be 1 or more"),
+    ({"slip": {"from": 0, "to": 1, "count": 3, "scale": "log"}}, "must be positive on a log scale"),
+]
+
+
+@pytest.mark.parametrize(("study", "sentence"), REFUSED)
+def test_a_study_that_cannot_be_meant_is_refused_in_one_sentence(paper, study, sentence):
+    with pytest.raises(BadInput) as refused:
+        planned(paper, **study)
+    assert sentence in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_case_without_a_study_says_how_to_add_one(paper):
+    with pytest.raises(BadInput, match=r"add \[study\] with what is varied"):
+        plan_study(paper.with_overrides({"study": "none"}))
+
+
+def test_the_text_of_a_case_restates_its_study(paper):
+    case = paper.with_overrides(
+        {"study": {"sq": sq_range(count=3), "contact": {"load": ["200 N"]}, "seeds": [1, 2], "samples": 4}}
+    )
+    assert load_case(case.text) == case
+    assert plan_study(load_case(case.text)).points == plan_study(case).points
