@@ -190,7 +190,7 @@ def shares(curve: "WearCurve", anchors: "Sequence[Anchor]", medium: Medium) -> F
     )
     printed = set(anchors) <= set(PAPER_ANCHORS)
     with medium.drawing():
-        figure = Figure(figsize=(medium.single, 0.86 * medium.single), layout="constrained")
+        figure = Figure(figsize=(medium.single, 0.9 * medium.single), layout="constrained")
         axes = figure.add_subplot()
         for column, label, stroke, colour in rows:
             _draw_mean(axes, curve, column, 100.0, stroke, colour, label)
@@ -240,7 +240,7 @@ def rig(curve: "WearCurve", medium: Medium) -> Figure:
     """The rig's twelve rings with what is printed of their CRF, beside what the study predicts: the paper's Fig 13."""
     first, *others = list(curve.stages)
     with medium.drawing():
-        figure = Figure(figsize=(medium.single, 0.92 * medium.single), layout="constrained")
+        figure = Figure(figsize=(medium.single, 0.9 * medium.single), layout="constrained")
         axes = figure.add_subplot()
         axes.axvspan(*RIG_SPLIT_UM, color="#dfe3e8", linewidth=0, zorder=0, label="printed split")
         _draw_mean(axes, curve, f"crf_{first}_hz", 1.0, "-", BLUE, f"ours, preset {first}", seeds=False)
@@ -343,21 +343,18 @@ def stage_names(stages: "Stages") -> tuple[str, str]:
 def _mark_stages(axes: Axes, curve: "WearCurve", preset: str, *, named: bool) -> None:
     """The split with its interval, and the names of the stages; where there is none, that."""
     stages = curve.stages[preset]
-    if not stages.found:
-        if named:
-            axes.annotate(
-                stages.kind, (0.98, 0.04), xycoords="axes fraction", ha="right", va="bottom", color=SPLIT_COLOUR,
-                style="italic",
-            )  # fmt: skip
-        return
-    axes.axvspan(*stages.interval, color=SPLIT_STRIP, linewidth=0, zorder=0, label="split, 90 %")
-    axes.axvline(stages.split, color=SPLIT_COLOUR, linewidth=1.0, zorder=0)
-    if named:
-        for name, side in zip(stage_names(stages), ("right", "left"), strict=True):
-            axes.annotate(
-                name, (stages.split, 0.03), (-5 if side == "right" else 5, 0), xycoords=("data", "axes fraction"),
-                textcoords="offset points", ha=side, va="bottom", color=SPLIT_COLOUR, style="italic",
-            )  # fmt: skip
+    low, high = curve.sq[[0, -1]] * MICRO
+    names = {stages.kind: 0.5 * (low + high)}
+    if stages.found:
+        axes.axvspan(*stages.interval, color=SPLIT_STRIP, linewidth=0, zorder=0, label="split, 90 %")
+        axes.axvline(stages.split, color=SPLIT_COLOUR, linewidth=1.0, zorder=0)
+        before, after = stage_names(stages)
+        names = {before: 0.5 * (low + stages.split), after: 0.5 * (stages.split + high)}
+    for name, middle in names.items() if named else ():
+        axes.annotate(
+            name, (middle, 0.04), xycoords=("data", "axes fraction"), ha="center", va="bottom", color=SPLIT_COLOUR,
+            style="italic", bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}, zorder=5,
+        )  # fmt: skip
 
 
 def _key_below(figure: Figure, *panels: Axes, ncols: int, seeds: bool = True) -> None:

@@ -235,13 +235,13 @@ class StudyReport:
                 for clr, run in zip(kept, self.runs, strict=True)
                 if abs(run.state.clr - clr) > SHOWS
             ]
-        for preset in PRESETS:
-            silent = int(self.used[f"crf_{preset}_hz"].isna().sum()) if f"crf_{preset}_hz" in self.used else 0
-            if silent:
-                said.append(
-                    f"No contact resonance was found in {silent} of {len(self.used)} cases with the vibration preset "
-                    f"{preset}: its means are over the others."
-                )
+        unheard = {name: self.used[f"crf_{name}_hz"].isna().sum() for name in PRESETS if f"crf_{name}_hz" in self.used}
+        if any(unheard.values()):
+            counts = ", ".join(f"{count} with the vibration preset {name}" for name, count in unheard.items())
+            said.append(
+                f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); means of CRF and CRFA "
+                "leave them out."
+            )
         return said
 
     @cached_property
