@@ -23,7 +23,7 @@ from asperity.ehl.solution import ATTEMPTS, ContactSolution, Options
 from asperity.ehl.solve import Progress, Search, contact_problem, solve_contact
 from asperity.ehl.state import ContactState, state_of
 from asperity.errors import BadInput, require_positive
-from asperity.kernels import reynolds
+from asperity.kernels.reynolds import LUBRICATED, RUPTURED
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 from asperity.surface.moving import MovingSurfaces
@@ -41,8 +41,9 @@ class Snapshot:
 
     `number` of the step (0 is the start) and its `time` [s]; `solution` and `state` as of a contact that stands still,
     with the squeeze term in the balance of oil; `flow_power` [W] what the pressure-driven flow of the oil turns to heat
-    (the rest is friction's), `elastic_energy` [J] half of the sum of pressure times deflection, of a line contact up to
-    a constant; both of the whole contact. `memory` is all that the next step needs to know.
+    where a film parts the bodies (the rest is friction's), `elastic_energy` [J] half of the sum of pressure times
+    deflection, of a line contact up to a constant; both of the whole contact. `memory` is all that the next step needs
+    to know.
     """
 
     number: int
@@ -233,11 +234,13 @@ def _on_one_line(problem: Problem) -> Problem:
 
 
 def _powers(balance: Balance) -> tuple[float, float]:
-    """∫ ε |grad P|² and the elastic energy ½ ∫ P V, dimensionless."""
-    problem, pressure = balance.problem, balance.pressure
-    assert balance.faces is not None
-    (dx, dy), drained = problem.spacing, np.empty_like(pressure)
-    no_wedge = np.zeros_like(pressure)
-    reynolds.net_outflow(pressure, no_wedge, balance.faces, no_wedge[0], dx, dy, drained)
-    flow = float((pressure * drained).sum()) * dx * dy
+    """∫ ε |grad P|² where a film parts the bodies on both sides of a face, and the elastic energy ½ ∫ P V."""
+    problem, pressure, faces = balance.problem, balance.pressure, balance.faces
+    assert faces is not None
+    dx, dy = problem.spacing
+    parted = (balance.rows.state == LUBRICATED) | (balance.rows.state == RUPTURED)
+    along = faces.east[:-1] * np.diff(pressure, axis=0) ** 2 * (parted[:-1] & parted[1:])
+    across = faces.north * (np.roll(pressure, -1, axis=1) - pressure) ** 2 * (parted & np.roll(parted, -1, axis=1))
+    ends = 2.0 * (faces.inlet * pressure[0] ** 2 * parted[0] + faces.east[-1] * pressure[-1] ** 2 * parted[-1])
+    flow = float((along.sum() + ends.sum()) / dx**2 + across.sum() / dy**2) * dx * dy
     return flow, 0.5 * float((pressure * problem.deflection(pressure)).sum()) * dx * dy
