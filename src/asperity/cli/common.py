@@ -53,12 +53,12 @@ def make_folder(path: Path) -> None:
         raise BadInput(f"cannot make the folder {path}: {error.strerror}; choose another") from None
 
 
-def require_output(path: Path, suffix: str) -> None:
+def require_output(path: Path, suffix: str, option: str = "--out") -> None:
     """BadInput unless `path` ends in `suffix` and can be written to: asked before the work, not after."""
     from asperity.ehl.storage import require_writable
 
     if path.suffix != suffix:
-        raise BadInput(f"--out must be a file that ends in {suffix}, got {path}")
+        raise BadInput(f"{option} must be a file that ends in {suffix}, got {path}")
     require_writable(path)
 
 

@@ -55,7 +55,7 @@ def study(
     if out is None and not dry_run:
         raise BadInput("study needs a folder to keep its cases in; give --out DIR")
     if report is not None:
-        require_output(report, ".html")
+        require_output(report, ".html", "--report")
     plan = plan_study(chosen_case(case, None, override or []))
     if dry_run:
         _print_estimate(plan, estimate(plan, out=out, workers=workers, shard=part), as_json=as_json)
@@ -206,7 +206,7 @@ def _print_study(result: "StudyResult", made: dict[str, str]) -> None:
     if result.failed > SHOWN_FAILURES:
         print(f"  ... and {result.failed - SHOWN_FAILURES} more; column reason of the table")
     rows = [("table", f"{result.path}")]
-    rows += [(name, path) for name, path in made.items()]
+    rows += list(made.items())
     if not made:
         rows.append(("its page", f"asperity report {result.folder}"))
     print_rows(rows)

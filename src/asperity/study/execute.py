@@ -48,7 +48,7 @@ BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short
 LARGEST_BATCH = 200
 BATCHES_AHEAD = 2  # a worker; more would only be lost in a crash
 MOST_DEATHS = 3  # of the processes that computed one case, the last of them with nothing beside it
-DASK_WAIT_S = 20.0
+DASK_WAIT_S = 10.0
 
 
 @dataclass(frozen=True)
