@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from asperity.ehl.cavitation import FilmSolution, solve_film
     from asperity.ehl.flash import FlashTemperature, flash_temperature
     from asperity.ehl.friction import Friction, friction
+    from asperity.ehl.motion import Snapshot, moving_contact
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
     from asperity.ehl.solve import solve_contact
     from asperity.ehl.state import ContactState, contact_state
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
     from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack
     from asperity.grid import Grid
+    from asperity.history import History, load_history, run_history
     from asperity.lubricant import (
         BairWiner,
         Barus,
@@ -42,11 +44,19 @@ if TYPE_CHECKING:
     )
     from asperity.recording import Recording, check_recording, open_recording, read_recording
     from asperity.report import write_report
+    from asperity.report.motion_page import write_motion_report
     from asperity.report.study_page import write_study_report
     from asperity.report.track_page import write_track_report
     from asperity.rig import Disturbance, Rig, RigRecording, simulate_rig
     from asperity.run import Run, load_run, solve_case
     from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
+    from asperity.study.anchors import Anchor, compare, load_anchors, rig_deviation, rig_prediction
+    from asperity.study.calibration import Calibration, calibrate
+    from asperity.study.curve import WearCurve, curve_of, wear_curve
+    from asperity.study.execute import StudyResult, load_study, run_study, study_executor
+    from asperity.study.plan import Plan, plan_points, plan_study
+    from asperity.study.ranges import Range
+    from asperity.study.sensitivity import Sensitivity, sensitivity
     from asperity.surface import (
         CompositeSurface,
         ProfileParameters,
@@ -64,6 +74,7 @@ if TYPE_CHECKING:
         self_affine_surface,
         surface_parameters,
     )
+    from asperity.surface.moving import MovingSurfaces
     from asperity.tracking import Track, track_recordings
     from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
     from asperity.wear.indicators import Resonance, contact_resonance
@@ -80,6 +91,7 @@ _NAMES = {
     "ehl.cavitation": ("FilmSolution", "solve_film"),
     "ehl.flash": ("FlashTemperature", "flash_temperature"),
     "ehl.friction": ("Friction", "friction"),
+    "ehl.motion": ("Snapshot", "moving_contact"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
     "ehl.solve": ("solve_contact",),
     "ehl.state": ("ContactState", "contact_state"),
@@ -90,6 +102,7 @@ _NAMES = {
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
     "excitation": ("FilteredNoise", "PatchAverage", "SurfaceTrack"),
     "grid": ("Grid",),
+    "history": ("History", "load_history", "run_history"),
     "lubricant": (
         "BairWiner",
         "Barus",
@@ -108,10 +121,18 @@ _NAMES = {
     "recording": ("Recording", "check_recording", "open_recording", "read_recording"),
     "report": ("write_report",),
     "report.study_page": ("write_study_report",),
+    "report.motion_page": ("write_motion_report",),
     "report.track_page": ("write_track_report",),
     "rig": ("Disturbance", "Rig", "RigRecording", "simulate_rig"),
     "run": ("Run", "load_run", "solve_case"),
     "signals": ("Signal", "Spectrum", "averaged_spectrum", "power_spectrum", "smooth"),
+    "study.calibration": ("Calibration", "calibrate"),
+    "study.ranges": ("Range",),
+    "study.sensitivity": ("Sensitivity", "sensitivity"),
+    "study.anchors": ("Anchor", "compare", "load_anchors", "rig_deviation", "rig_prediction"),
+    "study.curve": ("WearCurve", "curve_of", "wear_curve"),
+    "study.execute": ("StudyResult", "load_study", "run_study", "study_executor"),
+    "study.plan": ("Plan", "plan_points", "plan_study"),
     "surface": (
         "CompositeSurface",
         "ProfileParameters",
@@ -129,6 +150,7 @@ _NAMES = {
         "self_affine_surface",
         "surface_parameters",
     ),
+    "surface.moving": ("MovingSurfaces",),
     "tracking": ("Track", "track_recordings"),
     "vibration": ("ContactOscillator", "acceleration", "expected_spectrum", "motion"),
     "wear.indicators": ("Resonance", "contact_resonance"),
@@ -141,10 +163,12 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "Alarm",
+    "Anchor",
     "AsperityError",
     "BadInput",
     "BairWiner",
     "Barus",
+    "Calibration",
     "Case",
     "CleanSpectrum",
     "CompositeSurface",
@@ -164,17 +188,21 @@ __all__ = [
     "Friction",
     "FrictionCurve",
     "Grid",
+    "History",
     "Incompressible",
     "Iteration",
     "LinearBairWiner",
     "LoadShare",
     "Lubricant",
+    "MovingSurfaces",
     "Newtonian",
     "NewtonianShear",
     "NotConverged",
     "Options",
     "PatchAverage",
+    "Plan",
     "ProfileParameters",
+    "Range",
     "Recording",
     "ReeEyring",
     "Resonance",
@@ -182,12 +210,15 @@ __all__ = [
     "RigRecording",
     "Roelands",
     "Run",
+    "Sensitivity",
     "Signal",
+    "Snapshot",
     "Solid",
     "Spectrum",
     "Stages",
     "Status",
     "StressTensor",
+    "StudyResult",
     "SubsurfaceStress",
     "Surface",
     "SurfaceParameters",
@@ -198,14 +229,18 @@ __all__ = [
     "UnreadableFile",
     "Vibration",
     "VibrationModel",
+    "WearCurve",
     "acceleration",
     "alarm",
     "averaged_spectrum",
+    "calibrate",
     "check_recording",
+    "compare",
     "consistency",
     "contact_resonance",
     "contact_state",
     "contact_vibration",
+    "curve_of",
     "expected_spectrum",
     "flash_temperature",
     "flat_surface",
@@ -213,22 +248,33 @@ __all__ = [
     "friction_and_heat",
     "gaussian_surface",
     "ground_surface",
+    "load_anchors",
     "load_case",
+    "load_history",
     "load_run",
     "load_share",
     "load_solution",
+    "load_study",
     "motion",
+    "moving_contact",
     "non_gaussian_surface",
     "open_recording",
+    "plan_points",
+    "plan_study",
     "power_spectrum",
     "prepare_surface",
     "profile_parameters",
     "read_recording",
     "read_surface",
     "remove_lines",
+    "rig_deviation",
+    "rig_prediction",
+    "run_history",
     "run_in_surface",
+    "run_study",
     "sandblasted_surface",
     "self_affine_surface",
+    "sensitivity",
     "series_resonances",
     "simulate_rig",
     "smooth",
@@ -238,11 +284,14 @@ __all__ = [
     "solve_thermal_contact",
     "split_stages",
     "stribeck_curve",
+    "study_executor",
     "subsurface_stress",
     "surface_parameters",
     "tangent_stiffness",
     "track_recordings",
     "traction_curve",
+    "wear_curve",
+    "write_motion_report",
     "write_report",
     "write_study_report",
     "write_track_report",
