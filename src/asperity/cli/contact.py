@@ -109,7 +109,9 @@ def solve(
 def report(
     runs: Annotated[
         list[Path],
-        typer.Argument(metavar="RUN...|STUDY", help="Runs kept by asperity solve --out, or a study's folder."),
+        typer.Argument(
+            metavar="RUN...|DIR", help="Runs kept by asperity solve --out, or the folder of a study or history."
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run, or in the study.")
@@ -124,11 +126,16 @@ def report(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one self-contained HTML page of one run, of several, or of a study."""
+    """Make one self-contained HTML page of one run, of several, of a study or of a history."""
     studies = [path for path in runs if path.is_dir()]
     if studies:
         if len(runs) > 1:
             raise BadInput(f"a study's page holds nothing else, got {len(runs)} paths; name {studies[0]} alone")
+        from asperity.history import is_history
+
+        if is_history(studies[0]):
+            _report_history(studies[0], out, as_json=as_json, quiet=quiet)
+            return
         _report_study(studies[0], out, figures, anchors, as_json=as_json, quiet=quiet)
         return
     if figures is not None or anchors is not None:
@@ -145,6 +152,22 @@ def report(
         return
     for run in loaded:
         print(run.verdict())
+    if not quiet:
+        print(f"\nReport: {out}")
+
+
+def _report_history(folder: Path, out: Path | None, *, as_json: bool, quiet: bool) -> None:
+    out = out or folder / "report.html"
+    require_output(out, ".html")
+    from asperity.history import load_history
+    from asperity.report.motion_page import write_motion_report
+
+    history = load_history(folder)
+    write_motion_report(history, out)
+    if as_json:
+        print_json({"report": str(out), "history": history.scalars()})
+        return
+    print(history.verdict())
     if not quiet:
         print(f"\nReport: {out}")
 
