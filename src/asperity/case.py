@@ -190,7 +190,7 @@ def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
         return number, own
     try:
         if own and unit:
-            return cast(Decimal, _units().Quantity(number, own).to(unit).magnitude), unit
+            return _units().Quantity(number, own).to(unit).magnitude, unit
     except (pint.PintError, ValueError, TypeError, AssertionError, ArithmeticError, SyntaxError, TokenError):
         pass
     raise BadInput(f"must be in {unit or 'no unit'} as the range's beginning is, got {_shown(value)}")
@@ -665,6 +665,20 @@ def _validated(model: type[S], table: object) -> S:
         raise _first_mistake(model, error) from None
 
 
+def checked(model: type[S], table: object, source: str) -> S:
+    """A table with units, of a case or of another file, as the section that it is meant to be.
+
+    Raises
+    ------
+    BadInput
+        for what the section refuses; the sentence begins with `source` and names the key.
+    """
+    try:
+        return _validated(model, table)
+    except _Located as mistake:
+        raise BadInput(f"{source}: {_dotted(mistake.keys)} {mistake.message}") from None
+
+
 def _first_mistake(model: type[Section], error: ValidationError) -> _Located:
     """The mistake to mend first, in a sentence: a mistyped key explains a missing one."""
     mistakes = error.errors(include_url=False)
@@ -691,9 +705,16 @@ def _first_mistake(model: type[Section], error: ValidationError) -> _Located:
 
 def _keys_of(model: type[Section], keys: tuple[str | int, ...]) -> list[str]:
     for key in keys:
-        annotation = model.model_fields[str(key)].annotation
-        model = next(m for m in (annotation, *get_args(annotation)) if isinstance(m, type) and issubclass(m, Section))
+        if isinstance(key, str):
+            model = next(_sections_in(model.model_fields[key].annotation))
     return [entry.alias or name for name, entry in model.model_fields.items()]
+
+
+def _sections_in(annotation: Any) -> Iterator[type[Section]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _sections_in(part)
 
 
 def _dotted(keys: tuple[str | int, ...]) -> str:
@@ -1070,11 +1091,7 @@ def load_case(
 
 
 def _case(tables: dict[str, Any], folder: Path, source: str, stored: Surface | None = None) -> Case:
-    try:
-        contents = _validated(CaseFile, tables)
-    except _Located as mistake:
-        raise BadInput(f"{source}: {_dotted(mistake.keys)} {mistake.message}") from None
-    return Case(contents, folder, source, stored)
+    return Case(checked(CaseFile, tables, source), folder, source, stored)
 
 
 def _case_again(text: str, folder: Path, source: str, stored: Surface | None, stored_notes: tuple[str, ...]) -> Case:

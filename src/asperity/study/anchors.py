@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field as Entry
-from pydantic import ValidationError
 
-from asperity.case import Length, Section
+from asperity.case import Length, Section, checked
 from asperity.errors import BadInput, UnreadableFile
 from asperity.rig import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS
 from asperity.study.curve import WearCurve
@@ -254,12 +253,7 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
         tables = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UnreadableFile(f"{path} cannot be read as TOML: {error}") from None
-    try:
-        sections = _AnchorFile.model_validate(tables).anchor
-    except ValidationError as error:
-        mistake = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in mistake["loc"])
-        raise BadInput(f"{path}: {where}: {mistake['msg']}, got {mistake['input']!r}; see docs/study.md") from None
+    sections = checked(_AnchorFile, tables, str(path)).anchor
     anchors = []
     for section in sections:
         if (section.sq is None) != (section.quantity == SPLIT):
