@@ -1,5 +1,6 @@
 """The page of a study and its figures: the numbers of the table, the printed ones beside them, failures loud."""
 
+import io
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -155,7 +156,7 @@ def test_anchors_stand_in_a_table(page, wear):
 
 def test_page_says_what_was_computed(page, wear):
     facts = {name: plain(value) for name, value in (row for row in page.rows if len(row) == 2)}
-    assert facts["Cases"] == "12: 4 points of 3 surfaces each"
+    assert facts["Cases"] == "12: 4 points of 3 surfaces"
     assert facts["surface.sq"] == "0.75 µm, 1.0 µm, 2.0 µm, 3.5 µm"
     assert f"asperity {asperity.__version__}" in facts["Versions"]
     assert wear.plan.case.text in page.text
@@ -185,6 +186,18 @@ def test_all_failed_is_a_page_and_nothing_computed_is_refused():
     assert not page.images()
     with pytest.raises(BadInput, match=r"no computed case yet, of 75"):
         StudyReport(replace(study, table=study.table[:0]), None, lambda _: None)
+
+
+def test_a_case_without_vibration_has_no_resonance_to_show():
+    study = with_knee()
+    heard = [name for name in study.table if name.startswith("crf")] + ["full_load_crf_hz"]
+    report = without_maps(replace(study, table=study.table.drop(columns=heard)))
+    page = Page(report.page())
+    assert len(page.images()) == 1  # Fig 7 alone
+    assert "The case has no [vibration]" in page.text
+    anchors = [row[0] for row in page.rows if "Lubricants" in row[0]]
+    assert len(anchors) == 10  # CAR and CLR
+    assert not any("CRF at" in name or "split" in name for name in anchors)
 
 
 def test_unfinished_study_says_so():
@@ -227,6 +240,17 @@ def test_stages_are_marked_where_crf_bends():
         assert splits == [1.8, 2.5]  # simulated and between the rig's samples of 1.68 and 1.92 um
     assert [text.get_text() for text in figure.axes[0].texts] == ["normal", "severe"]
     assert dict(points_of(figure.axes[0], "CRF of the rig, printed")) == pytest.approx({0.54: 2921.93})
+
+
+def test_levels_at_which_nothing_is_heard_keep_their_place():
+    study = with_knee()
+    quiet = study.table.copy()
+    quiet.loc[quiet["surface.sq"] < 3.9e-6, ["crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper"]] = np.nan
+    figure = study_figures.resonance(curve_of(replace(study, table=quiet)), (), ON_PAPER)
+    figure.savefig(io.BytesIO())  # a name of a stage outside the axes would leave them no room, and warn
+    low, high = figure.axes[0].get_xlim()
+    assert low < 0.5
+    assert high > 4.0
 
 
 def test_a_smooth_curve_has_no_stages(wear):

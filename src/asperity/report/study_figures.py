@@ -59,6 +59,10 @@ class Medium:
     titled: bool
     style: dict[str, Any] = field(default_factory=dict)
 
+    def width(self, panels: int) -> float:
+        """Of a figure with so many panels in a row [inches]."""
+        return self.double if panels > 2 else self.single
+
     @property
     def line_height(self) -> float:
         """Of a line of type [inches]."""
@@ -138,7 +142,7 @@ def contact_maps(runs: "Sequence[Run]", medium: Medium) -> Figure:
         else:
             keys.append(Patch(color=GAP_COLOUR, label="open gap"))
         keys.append(Line2D([], [], color="black", linestyle=(0, (4, 3)), linewidth=1.0, label="Hertz zone"))
-        figure.legend(handles=keys, loc="outside lower center", ncols=4)
+        figure.legend(handles=keys, loc="outside lower center", ncols=4 if len(runs) > 2 else 2)
     return figure
 
 
@@ -147,12 +151,11 @@ def _map_sheet(runs: "Sequence[Run]", medium: Medium, kind: str) -> tuple[Figure
     across = min(ACROSS, len(runs))
     down = -(-len(runs) // across)
     extent = runs[0].case.grid.extent
-    shape = min(max(extent[1] / extent[0], 0.15), 1.4)
-    line = medium.line_height
-    panel = (medium.double - 4.0 * line) / ACROSS - 0.6 * line
+    line, width = medium.line_height, medium.width(across)
+    panel = (width - 4.0 * line) / across - 0.6 * line
     above, below = {"surfaces": (1.4, 5.4), "maps": (3.0, 4.4)}[kind]  # lines of type
-    height = down * (panel * shape + above * line) + below * line
-    figure = Figure(figsize=(4.0 * line + across * (panel + 0.6 * line), height), layout="compressed")
+    height = down * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
+    figure = Figure(figsize=(width, height), layout="compressed")
     grid = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True)
     panels = list(grid.flat)
     for spare in panels[len(runs) :]:
@@ -284,6 +287,7 @@ def _draw_mean(
     if seeds:
         at, each = _seeds(curve, column)
         axes.plot(at * MICRO, each * scale, ".", color=colour, alpha=0.5, markersize=4.5, markeredgewidth=0, zorder=1)
+    axes.update_datalim([(end, 0.0) for end in sq[[0, -1]]], updatey=False)  # levels without a value, too
     low, high = (curve.interval(column) * scale).T
     axes.fill_between(sq, low, high, color=colour, alpha=0.22, linewidth=0, zorder=1)
     axes.plot(sq, curve.mean(column) * scale, stroke, color=colour, markersize=3.5, label=label, zorder=2)

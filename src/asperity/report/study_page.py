@@ -20,7 +20,7 @@ from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import AsperityError, BadInput
 from asperity.report import study_figures, sweep_figures
 from asperity.report.figures import MICRO
-from asperity.report.page import NOT_FOUND, PAPER, Tile, in_print, page_template, picture
+from asperity.report.page import NOT_FOUND, PAPER, Tile, in_print, page_template, picture, with_deviation
 from asperity.report.study_figures import ON_PAGE, ON_PAPER, Medium
 from asperity.report.sweep_figures import Axis, Output, axis_of, outputs_of
 from asperity.run import Run, solve_case
@@ -169,12 +169,18 @@ class StudyReport:
         """The wear curve of a study of Sq alone."""
         return curve_of(self.result) if len(self.used) and is_wear_study(self.result) else None
 
+    @property
+    def papers(self) -> bool:
+        """Whether the paper's printed numbers stand beside the study's."""
+        return self.given is None and self.curve is not None and papers_contact(self.result.plan.case)
+
     @cached_property
     def anchors(self) -> tuple[Anchor, ...]:
         """What the curve should meet."""
         if self.given is not None:
             return tuple(self.given)
-        return PAPER_ANCHORS if papers_contact(self.result.plan.case) else ()
+        said = {SPLIT, *self.used} if self.curve is not None and self.curve.stages else set(self.used)
+        return tuple(anchor for anchor in PAPER_ANCHORS if self.papers and anchor.quantity in said)
 
     @cached_property
     def axes(self) -> list[Axis]:
@@ -228,19 +234,21 @@ class StudyReport:
         if isinstance(self.runs, str):
             said.append(self.runs)
         else:
-            kept = [float(clr) for clr in self.used.loc[self.used["number"].isin(self.mapped), "clr"]]
+            mapped = self.used[self.used["number"].isin(self.mapped)]
             said += [
                 f"The contact mapped at Sq {run.state.sq * MICRO:.3g} µm, solved anew, has a CLR of "
                 f"{100.0 * run.state.clr:.1f} % and {100.0 * clr:.1f} % in the study's table: other versions made that."
-                for clr, run in zip(kept, self.runs, strict=True)
+                for clr, run in zip(mapped["clr"] if len(mapped) else (), self.runs, strict=True)
                 if abs(run.state.clr - clr) > SHOWS
             ]
         unheard = {name: self.used[f"crf_{name}_hz"].isna().sum() for name in PRESETS if f"crf_{name}_hz" in self.used}
+        if self.curve is not None and not unheard:
+            said.append("The case has no [vibration]: there is no contact resonance to show.")
         if any(unheard.values()):
             counts = ", ".join(f"{count} with the vibration preset {name}" for name, count in unheard.items())
             said.append(
-                f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); means of CRF and CRFA "
-                "leave them out."
+                f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); means of CRF and "
+                "CRFA leave them out."
             )
         return said
 
@@ -275,7 +283,7 @@ class StudyReport:
         seeds = f"Means over {self._seeds()} a level with the 90 % interval of the mean; dots are single surfaces."
         first, last = curve.sq[0] * MICRO, curve.sq[-1] * MICRO
         anchored = " Hollow marks: what should be met, with its tolerance." if self.anchors else ""
-        if self.anchors == PAPER_ANCHORS:
+        if self.papers:
             anchored = (
                 " Diamonds: CAR as printed, which does not say of which area; crosses: CLR behind the CRF printed for "
                 "the rig's smoothest and roughest ring. Their bars are tolerances of ours."
@@ -304,7 +312,7 @@ class StudyReport:
         if not heard:
             return shown
         stages = " ".join(f"Preset {name}: {_printed(found.verdict)}" for name, found in curve.stages.items())
-        if self.anchors == PAPER_ANCHORS:
+        if self.papers:
             off = rig_deviation(curve, f"crf_{heard[0]}_hz")
             shown.append(
                 Shown(
@@ -413,7 +421,7 @@ class StudyReport:
         tables["levels"] = self.curve.summary()
         if self.anchors:
             tables["anchors"] = compare(self.curve, self.anchors)
-        if self.anchors == PAPER_ANCHORS:
+        if self.papers:
             tables |= {f"rig-{preset}": rig_prediction(self.curve, f"crf_{preset}_hz") for preset in self.curve.stages}
         return tables
 
@@ -455,7 +463,7 @@ class StudyReport:
             pictures=pictures,
             wear=self.curve is not None,
             anchors=self._anchor_rows(),
-            printed=self.anchors == PAPER_ANCHORS,
+            printed=self.papers,
             levels=self._level_rows(),
             points=self._point_rows(),
             many=self.curve is None and len(plan.points) > MOST_POINTS,
@@ -565,17 +573,17 @@ class StudyReport:
             cells = [*(Cell(axis.written(axis.values[first])) for axis in self.axes), Cell(f"{point['cases']:.0f}")]
             for output in shown:
                 mean, std = (point[name] * output.scale for name in (output.column, f"{output.column}_std"))
-                below = f"± {std:.2g}" if np.isfinite(std) else ""
-                cells.append(Cell(f"{mean:.4g}", below) if np.isfinite(mean) else Cell(NOT_FOUND))
+                cells.append(Cell(*with_deviation(mean, std)) if np.isfinite(mean) else Cell(NOT_FOUND))
             rows.append(cells)
         return rows
 
     def _facts(self) -> list[tuple[str, str]]:
         """What the study was."""
         plan = self.result.plan
+        points = f"{len(plan.points)} points" if len(plan.points) > 1 else "1 point"
         rows = [
             ("Computed", {"solve": "contact and vibration", "vibrate": "the vibration model alone"}[plan.kind]),
-            ("Cases", f"{len(plan.cases)}: {len(plan.points)} points of {self._seeds()} each"),
+            ("Cases", f"{len(plan.cases)}: {points} of {self._seeds()}"),
         ]
         rows += [(key, self._range(key)) for key in plan.axes]
         seeding = {

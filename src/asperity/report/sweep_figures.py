@@ -215,10 +215,9 @@ def _sheet(count: int, medium: Medium, *, shape: float, key: float) -> tuple[Fig
     """So many equal panels, in rows."""
     across = min(ACROSS, count)
     down = -(-count // across)
-    width = medium.double * across / ACROSS
-    line = medium.line_height
-    height = down * (medium.double / ACROSS * shape + 1.0 * line) + (2.0 + key) * line
-    figure = Figure(figsize=(max(width, medium.single), height), layout="constrained")
+    line, width = medium.line_height, medium.width(across)
+    height = down * (width / across * shape + 1.0 * line) + (2.0 + key) * line
+    figure = Figure(figsize=(width, height), layout="constrained")
     panels = list(figure.subplots(down, across, squeeze=False).flat)
     for spare in panels[count:]:
         spare.remove()
