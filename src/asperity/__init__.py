@@ -51,9 +51,12 @@ if TYPE_CHECKING:
     from asperity.run import Run, load_run, solve_case
     from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
     from asperity.study.anchors import Anchor, compare, load_anchors, rig_deviation, rig_prediction
+    from asperity.study.calibration import Calibration, calibrate
     from asperity.study.curve import WearCurve, curve_of, wear_curve
     from asperity.study.execute import StudyResult, load_study, run_study, study_executor
     from asperity.study.plan import Plan, plan_points, plan_study
+    from asperity.study.ranges import Range
+    from asperity.study.sensitivity import Sensitivity, sensitivity
     from asperity.surface import (
         CompositeSurface,
         ProfileParameters,
@@ -123,6 +126,9 @@ _NAMES = {
     "rig": ("Disturbance", "Rig", "RigRecording", "simulate_rig"),
     "run": ("Run", "load_run", "solve_case"),
     "signals": ("Signal", "Spectrum", "averaged_spectrum", "power_spectrum", "smooth"),
+    "study.calibration": ("Calibration", "calibrate"),
+    "study.ranges": ("Range",),
+    "study.sensitivity": ("Sensitivity", "sensitivity"),
     "study.anchors": ("Anchor", "compare", "load_anchors", "rig_deviation", "rig_prediction"),
     "study.curve": ("WearCurve", "curve_of", "wear_curve"),
     "study.execute": ("StudyResult", "load_study", "run_study", "study_executor"),
@@ -162,6 +168,7 @@ __all__ = [
     "BadInput",
     "BairWiner",
     "Barus",
+    "Calibration",
     "Case",
     "CleanSpectrum",
     "CompositeSurface",
@@ -195,6 +202,7 @@ __all__ = [
     "PatchAverage",
     "Plan",
     "ProfileParameters",
+    "Range",
     "Recording",
     "ReeEyring",
     "Resonance",
@@ -202,6 +210,7 @@ __all__ = [
     "RigRecording",
     "Roelands",
     "Run",
+    "Sensitivity",
     "Signal",
     "Snapshot",
     "Solid",
@@ -224,6 +233,7 @@ __all__ = [
     "acceleration",
     "alarm",
     "averaged_spectrum",
+    "calibrate",
     "check_recording",
     "compare",
     "consistency",
@@ -264,6 +274,7 @@ __all__ = [
     "run_study",
     "sandblasted_surface",
     "self_affine_surface",
+    "sensitivity",
     "series_resonances",
     "simulate_rig",
     "smooth",

@@ -4,7 +4,29 @@ The first line of the output is the verdict; `--json` prints one object and noth
 Exit codes: 0 done, 2 bad input or usage, 3 done but the verdict is an alarm, 1 anything else.
 """
 
-from asperity.cli import contact, friction, motion, recordings, rig, study, surface, vibrate  # each adds its commands
+from asperity.cli import (  # each adds its commands
+    contact,
+    exploration,
+    friction,
+    motion,
+    recordings,
+    rig,
+    study,
+    surface,
+    vibrate,
+)
 from asperity.cli.app import app, main
 
-__all__ = ["app", "contact", "friction", "main", "motion", "recordings", "rig", "study", "surface", "vibrate"]
+__all__ = [
+    "app",
+    "contact",
+    "exploration",
+    "friction",
+    "main",
+    "motion",
+    "recordings",
+    "rig",
+    "study",
+    "surface",
+    "vibrate",
+]

@@ -1,0 +1,485 @@
+"""Which of the quantities that are left open moves CAR, CLR, CRF and CRFA most, and where the trend's knee lies.
+
+Samples and indices are SALib's (Morris' elementary effects, Sobol's variances), contacts the real solver's. The surface
+is a factor too: a uniform variable that picks the realisation. What the ranges are is `ranges`' business.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.case import Case
+from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.study.evaluate import DONE
+from asperity.study.execute import Progress, StudyResult, run_study
+from asperity.study.plan import SEEDS, Plan, plan_points
+from asperity.study.ranges import Range, at_cells, open_ranges, overrides_at, parse_range, require_ranges, stated
+from asperity.study.silence import silent, with_silence
+from asperity.wear import split_stages
+from asperity.wear.stages import FEWEST_PLACES
+
+if TYPE_CHECKING:
+    import pandas
+
+Method = Literal["morris", "sobol"]
+SIZES: dict[str, int] = {"morris": 12, "sobol": 64}  # trajectories; base samples, a power of two
+LEVELS = 4  # places a factor of Morris' design can take
+SQ = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
+CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
+CELLS = 128
+SEED = "seed"  # the factor's name
+CONFIDENCE = 0.95  # of SALib's intervals
+RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
+RESERVED = {
+    "surface.sq": "it is what the curves run along; give sq",
+    "surface.seed": "the surface is a factor by itself",
+    "vibration.seed": "it goes with the surface, which is a factor by itself",
+    "grid.cells": "they go with the domain; give cells",
+}
+
+
+class Design(NamedTuple):
+    """Points to evaluate, as shares 0 to 1 of each factor's range, shape (points, factors).
+
+    Runs of `block` points stand or fall together: without one of them the rest says nothing.
+    """
+
+    method: Method
+    shares: Field
+    block: int
+
+
+class Outcome(NamedTuple):
+    """A number that a point of the design gives: a quantity at one Sq [m], or of the whole curve (Sq is nan)."""
+
+    name: str
+    quantity: str
+    sq: float
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What moves a wear study's curves, and how much.
+
+    Parameters
+    ----------
+    case, method : what was asked, and how
+    ranges : of the factors, in order; the surface's seed comes after them where the case has one
+    factors : names, the seed's included
+    outcomes : what was looked at
+    effects : a row an outcome and factor. Morris: `mu_star`, the mean size of the effect of crossing the whole range,
+        in the outcome's unit, `mu` with its sign, `sigma` its standard deviation over the other factors' places,
+        `mu_star_conf`. Sobol: `s1`, the share of the outcome's variance that the factor has alone, `st` with all its
+        interactions, `s1_conf`, `st_conf`. Intervals are half-widths at 95 %. `share`: of all factors' mu_star or st
+    values : a row a point: each factor's share of its range, then every outcome
+    left_out : points of blocks in which a contact failed
+    distinct : share of the points whose curve has a distinct stage by `split_stages`; nan where it was not asked
+    silent : share of contacts with a film too full to hear anything, whose CRF counts as that of a load share of 1 %,
+        and whose CRFA as the lowest heard
+    result : the study behind it
+    """
+
+    case: Case
+    method: Method
+    ranges: tuple[Range, ...]
+    factors: tuple[str, ...]
+    outcomes: tuple[Outcome, ...]
+    effects: "pandas.DataFrame"
+    values: "pandas.DataFrame"
+    left_out: int
+    distinct: float
+    silent: float
+    result: StudyResult
+
+    @property
+    def measure(self) -> str:
+        """The column of `effects` that ranks factors."""
+        return "mu_star" if self.method == "morris" else "st"
+
+    def ranking(self, outcome: str) -> "pandas.DataFrame":
+        """The rows of `effects` of one outcome, the factor that moves it most first."""
+        rows = self.effects[self.effects["outcome"] == outcome]
+        return rows.sort_values(self.measure, ascending=False, kind="stable", ignore_index=True)
+
+    def spread(self, outcome: str) -> tuple[float, float]:
+        """5th and 95th percentile of an outcome over the sample."""
+        low, high = np.nanpercentile(self.values[outcome], (5.0, 95.0))
+        return float(low), float(high)
+
+    def overall(self) -> "pandas.Series[float]":
+        """Mean share of each factor over the outcomes, the largest first."""
+        return self.effects.groupby("factor", sort=False)["share"].mean().sort_values(ascending=False, kind="stable")
+
+    def verdict(self) -> str:
+        """How far the curves can be trusted, in a sentence or two."""
+        parts = []
+        for quantity, name, scale, unit in (
+            ("car", "CAR", 100.0, "%"),
+            ("clr", "CLR", 100.0, "%"),
+            ("crf_hz", "CRF", 1.0, "Hz"),
+        ):
+            found = [outcome for outcome in self.outcomes if outcome.quantity == quantity]
+            if found:
+                widest = max(found, key=lambda outcome: float(np.subtract(*self.spread(outcome.name)[::-1])))
+                low, high = (scale * end for end in self.spread(widest.name))
+                first = self.ranking(widest.name)["factor"].iloc[0]
+                parts.append(
+                    f"{name} at Sq {1e6 * widest.sq:g} um from {low:.0f} to {high:.0f} {unit} (most by {first})"
+                )
+        order = self.overall()
+        ranked = ", ".join(f"{name} {100 * share:.0f} %" for name, share in order.items())
+        return (
+            f"Over the ranges (5 to 95 % of {len(self.values)} points) the curves go {'; '.join(parts)}. "
+            f"Mean share of what moves them: {ranked}."
+        )
+
+    def scalars(self) -> dict[str, Any]:
+        """What `asperity sensitivity --json` prints; SI, None where there is none."""
+        ends = {outcome.name: self.spread(outcome.name) for outcome in self.outcomes}
+        return {
+            "verdict": self.verdict(),
+            "method": self.method,
+            "factors": [
+                {
+                    "key": entry.key,
+                    "low": entry.low,
+                    "high": entry.high,
+                    "unit": entry.unit,
+                    "log": entry.log,
+                    "reason": entry.reason,
+                }
+                for entry in self.ranges
+            ],
+            "points": len(self.values),
+            "cases": len(self.result.plan.cases),
+            "failed": self.result.failed,
+            "left_out": self.left_out,
+            "silent": self.silent,
+            "distinct": _or_none(self.distinct),
+            "seconds": self.result.seconds,
+            "outcomes": [
+                {
+                    "outcome": outcome.name,
+                    "quantity": outcome.quantity,
+                    "sq_m": _or_none(outcome.sq),
+                    "p05": ends[outcome.name][0],
+                    "p95": ends[outcome.name][1],
+                    "effects": [
+                        {
+                            key: _or_none(value)
+                            for key, value in row.items()
+                            if key not in ("outcome", "quantity", "sq_m")
+                        }
+                        for row in self.ranking(outcome.name).to_dict("records")
+                    ],
+                }
+                for outcome in self.outcomes
+            ],
+        }
+
+
+def sensitivity(
+    case: Case,
+    *,
+    vary: Sequence[Range | str] | None = None,
+    method: Method = "morris",
+    size: int | None = None,
+    sq: Sequence[float] = SQ,
+    levels: int = CURVE_LEVELS,
+    cells: int | None = CELLS,
+    seeds: int = 1,
+    sample_seed: int = 0,
+    out: Path | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Sensitivity:
+    """Find what moves the curves over Sq most.
+
+    Parameters
+    ----------
+    case : the contact, with roughness whose `surface.sq` can be set
+    vary : ranges, or their texts (`parse_range`); by default those that the paper leaves open and the case has
+    method : "morris", elementary effects; "sobol", shares of variance, at many times the cost
+    size : trajectories of Morris, base samples of Sobol (a power of two); by default 12 and 64. A study has
+        size x (factors + 1), or size x (factors + 2), points, each with all levels
+    sq : roughness at which the curves are read [m]
+    levels : roughness levels from the least to the largest of `sq`, for the knee of CRF; below 7 no knee is looked for
+    cells : along each axis of the widest domain; a moved end of the domain takes its cells along, so that their size
+        stays. None: the case's own
+    seeds : surfaces that each point is the mean of; 1 is what a single surface can tell
+    sample_seed : of sample and surfaces
+    out : folder that keeps the study and goes on from it
+    executor, workers, progress : see `run_study`
+
+    Raises
+    ------
+    BadInput
+        for a range or setting that cannot be used, or without SALib.
+    AsperityError
+        if contacts failed in all blocks of the sample but one.
+    """
+    if method not in SIZES:
+        raise BadInput(f"method must be one of {', '.join(SIZES)}, got {method!r}")
+    if seeds < 1:
+        raise BadInput(f"seeds must be 1 or more, got {seeds}")
+    case = at_cells(case, cells)
+    if stated(case, "surface.kind") == "flat":
+        raise BadInput(f"{case.source}: surface is flat and has no Sq to vary; take a rough one")
+    curve = _curve_levels(sq, levels)
+    ranges = open_ranges(case) if vary is None else tuple(parse_range(r) if isinstance(r, str) else r for r in vary)
+    require_ranges(case, ranges, RESERVED)
+    seeded = [key for key in SEEDS if stated(case, key) is not None]
+    factors = (*(entry.key for entry in ranges), *([SEED] if seeded else []))
+    design = sample_design(method, len(factors), size or SIZES[method], sample_seed)
+    plan = _plan(case, ranges, seeded, design, curve, seeds, sample_seed)
+    result = run_study(plan, out=out, executor=executor, workers=workers, progress=progress)
+    return _analysed(case, ranges, factors, design, result, sq, curve, seeds)
+
+
+# The sample and its indices ------------------------------------------------------------------------------------------
+
+
+def sample_design(method: Method, factors: int, size: int, seed: int = 0) -> Design:
+    """Morris' trajectories or Saltelli's sample over the unit cube, by SALib.
+
+    Raises
+    ------
+    BadInput
+        for a size that the method cannot take, or without SALib.
+    """
+    _require_salib()
+    if size < 2:
+        raise BadInput(f"{_counted(method)} must be 2 or more, got {size}; {SIZES[method]} is the default")
+    if method == "morris":
+        from SALib.sample import morris
+
+        return Design(method, morris.sample(_problem(factors), size, num_levels=LEVELS, seed=seed), factors + 1)
+    if size & (size - 1):
+        nearest = 2 ** round(math.log2(size))
+        raise BadInput(f"samples of the method sobol must be a power of two, got {size}; take {nearest}")
+    from SALib.sample import sobol
+
+    shares = sobol.sample(_problem(factors), size, calc_second_order=False, seed=seed)
+    return Design(method, shares, factors + 2)
+
+
+def indices(design: Design, outcome: Field) -> dict[str, Field]:
+    """Each factor's effect on an outcome of shape (points,), by SALib; blocks that hold a nan are left out.
+
+    Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape (factors,).
+
+    Raises
+    ------
+    AsperityError
+        if fewer than two blocks are left.
+    """
+    whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
+    if np.count_nonzero(whole) < 2:
+        raise AsperityError("too many contacts failed to say what moves the curves; narrow the ranges")
+    kept = np.repeat(whole, design.block)
+    values, shares = outcome[kept], design.shares[kept]
+    factors = shares.shape[1]
+    names = (
+        ("mu", "mu_star", "mu_star_conf", "sigma") if design.method == "morris" else ("s1", "s1_conf", "st", "st_conf")
+    )
+    if np.ptp(values) == 0.0:
+        return {name: np.zeros(factors) for name in names}
+    problem = _problem(factors)
+    if design.method == "morris":
+        from SALib.analyze import morris
+
+        found = morris.analyze(problem, shares, values, num_levels=LEVELS, conf_level=CONFIDENCE, seed=RESAMPLING)
+    else:
+        from SALib.analyze import sobol
+
+        found = sobol.analyze(problem, values, calc_second_order=False, conf_level=CONFIDENCE, seed=RESAMPLING)
+    return {name: np.asarray(found[_SALIB.get(name, name)], dtype=float) for name in names}
+
+
+_SALIB = {"s1": "S1", "s1_conf": "S1_conf", "st": "ST", "st_conf": "ST_conf"}
+
+
+def _problem(factors: int) -> dict[str, Any]:
+    return {"num_vars": factors, "names": [f"x{i}" for i in range(factors)], "bounds": [[0.0, 1.0]] * factors}
+
+
+def _counted(method: Method) -> str:
+    return "trajectories" if method == "morris" else "samples"
+
+
+def _require_salib() -> None:
+    try:
+        import SALib  # noqa: F401
+    except ModuleNotFoundError:
+        raise BadInput("sensitivity needs SALib; pip install 'asperity[study]'") from None
+
+
+# The study -----------------------------------------------------------------------------------------------------------
+
+
+def _curve_levels(sq: Sequence[float], levels: int) -> tuple[float, ...]:
+    """Every Sq to solve at [m]: those asked for, and evenly spaced ones between the ends."""
+    if not sq:
+        raise BadInput("sensitivity needs at least one Sq to look at, got none")
+    for value in sq:
+        require_positive("Sq", value, "m")
+    if levels < 0:
+        raise BadInput(f"levels must be 0 or more, got {levels}")
+    between = np.linspace(min(sq), max(sq), levels) if len(sq) > 1 and levels > 1 else np.empty(0)
+    return tuple(sorted({float(f"{value:.6g}") for value in (*sq, *between)}))
+
+
+def _plan(
+    case: Case,
+    ranges: Sequence[Range],
+    seeded: Sequence[str],
+    design: Design,
+    curve: Sequence[float],
+    seeds: int,
+    seed: int,
+) -> Plan:
+    points = []
+    for number, shares in enumerate(design.shares):
+        chosen = overrides_at(case, ranges, [float(share) for share in shares[: len(ranges)]])
+        for level in curve:
+            for surface in range(seeds):
+                point = {**chosen, "surface.sq": f"{1e6 * level:g} um"}
+                if seeded:
+                    point |= _seeds(seeded, design, number, float(shares[-1]), surface, seed)
+                points.append(point)
+    return plan_points(case, points)
+
+
+def _seeds(seeded: Sequence[str], design: Design, number: int, share: float, surface: int, seed: int) -> dict[str, int]:
+    """The realisation that a share of the seed's range stands for.
+
+    Sobol's shares are all different. Morris' are four, so each trajectory has four realisations of its own: its step
+    along the seed is a change of surface drawn anew.
+    """
+    trajectory = number // design.block if design.method == "morris" else 0
+    drawn = np.random.SeedSequence([seed, trajectory, round(share * 2**31), surface]).generate_state(len(SEEDS))
+    return {key: int(word) for key, word in zip(SEEDS, drawn, strict=True) if key in seeded}
+
+
+def _analysed(
+    case: Case,
+    ranges: tuple[Range, ...],
+    factors: tuple[str, ...],
+    design: Design,
+    result: StudyResult,
+    sq: Sequence[float],
+    curve: Sequence[float],
+    seeds: int,
+) -> Sensitivity:
+    import pandas
+
+    shape = (len(design.shares), len(curve), seeds)
+    curves, unheard = _curves(result, shape)
+    outcomes, columns = _outcomes(curves, sq, curve)
+    values = pandas.DataFrame(
+        {
+            **{name: design.shares[:, i] for i, name in enumerate(factors)},
+            **{outcome.name: column for outcome, column in zip(outcomes, columns, strict=True)},
+        }
+    )
+    effects = []
+    for outcome, column in zip(outcomes, columns, strict=True):
+        found = indices(design, column)
+        ranked = found["mu_star" if design.method == "morris" else "st"]
+        whole = float(np.sum(np.maximum(ranked, 0.0)))
+        for i, factor in enumerate(factors):
+            row: dict[str, Any] = {
+                "outcome": outcome.name,
+                "quantity": outcome.quantity,
+                "sq_m": outcome.sq,
+                "factor": factor,
+            }
+            row |= {name: float(column[i]) for name, column in found.items()}
+            row["share"] = max(float(ranked[i]), 0.0) / whole if whole > 0.0 else 0.0
+            effects.append(row)
+    lost = np.isnan(np.asarray(columns)).any(axis=0).reshape(-1, design.block).any(axis=1)
+    return Sensitivity(
+        case=case,
+        method=design.method,
+        ranges=ranges,
+        factors=factors,
+        outcomes=tuple(outcomes),
+        effects=pandas.DataFrame(effects),
+        values=values,
+        left_out=int(np.count_nonzero(lost)) * design.block,
+        distinct=_distinct(curves, curve),
+        silent=unheard,
+        result=result,
+    )
+
+
+def _curves(result: StudyResult, shape: tuple[int, int, int]) -> tuple[dict[str, Field], float]:
+    """Quantities over (points, levels), means over surfaces, nan where one failed; the share in full film."""
+    if result.failed == len(result.table):
+        raise AsperityError(f"no contact could be solved; the first: {result.failures['reason'].iloc[0]}")
+    table = result.table.set_index("number").reindex(range(math.prod(shape)))
+    done = (table["status"] == DONE).to_numpy()
+
+    def over(values: Field) -> Field:
+        return np.asarray(np.where(done, values, np.nan).reshape(shape).mean(axis=2))
+
+    def column(name: str) -> Field:
+        return table[name].to_numpy(dtype=float, na_value=np.nan)
+
+    found = {name: over(column(name)) for name in ("car", "clr")}
+    if "full_load_crf_hz" not in table:
+        return found, math.nan
+    filled = with_silence(table)
+    crfa = filled["crfa"].to_numpy(dtype=float)
+    found["crf_hz"] = over(filled["crf_hz"].to_numpy(dtype=float))
+    if np.nanmax(crfa, initial=0.0) > 0.0:
+        found["log10_crfa"] = over(np.log10(np.where(crfa == 0.0, np.nanmin(crfa[crfa > 0.0]), crfa)))
+    return found, float(np.mean(silent(table)[done]))
+
+
+def _outcomes(
+    curves: dict[str, Field], sq: Sequence[float], curve: Sequence[float]
+) -> tuple[list[Outcome], list[Field]]:
+    outcomes, columns = [], []
+    places = {level: place for place, level in enumerate(curve)}
+    for quantity, values in curves.items():
+        for level in sq:
+            outcomes.append(Outcome(f"{quantity} at {1e6 * level:g} um", quantity, level))
+            columns.append(values[:, places[float(f"{level:.6g}")]])
+    if "crf_hz" in curves and len(curve) >= FEWEST_PLACES:
+        outcomes.append(Outcome("knee", "knee_m", math.nan))
+        columns.append(np.array([knee(np.array(curve), crf) for crf in curves["crf_hz"]]))
+    return outcomes, columns
+
+
+def knee(x: Field, y: Field) -> float:
+    """Where the least-squares broken line through (x, y) bends, whether or not the points call for a bend; nan for nan.
+
+    `split_stages` says whether there is a stage. This is the place that it would have, for curves with one and without.
+    """
+    if not np.isfinite(y).all():
+        return math.nan
+    breaks = np.linspace(x[1], x[-2], 201)
+    left = [
+        np.linalg.lstsq(np.stack([np.ones_like(x), x - x[0], np.maximum(x - at, 0.0)], axis=1), y, rcond=None)[1].sum()
+        for at in breaks
+    ]
+    return float(breaks[int(np.argmin(left))])
+
+
+def _distinct(curves: dict[str, Field], curve: Sequence[float]) -> float:
+    if "crf_hz" not in curves or len(curve) < FEWEST_PLACES:
+        return math.nan
+    whole = [crf for crf in curves["crf_hz"] if np.isfinite(crf).all()]
+    return float(np.mean([split_stages(curve, crf).found for crf in whole])) if whole else math.nan
+
+
+def _or_none(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

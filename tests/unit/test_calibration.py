@@ -1,0 +1,216 @@
+"""Calibration: parameters that made the anchors come back, closed forms, and what cannot be told is called so.
+
+Dry contacts, mostly: all load is on asperities, and the resonance is Hertz's, which needs no solver to be known.
+"""
+
+import json
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity import calibrate, load_case
+from asperity.cli import main
+from asperity.errors import BadInput
+from asperity.study.anchors import Anchor
+from asperity.study.calibration import _levels, _Slopes
+from asperity.study.execute import run_study
+from asperity.study.plan import plan_points
+
+PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
+DRY = {
+    "lubricant": "none",
+    "surface.correlation_length": "60 um",
+    "vibration.duration": "1 s",
+    "vibration.damping_ratio": 0.005,
+    "grid.cells": [32, 32],
+    "study": "none",
+}
+CAP = "material.hardness=0.5 GPa..4 GPa"
+MODULUS = "material.youngs_modulus=120 GPa..300 GPa"
+FRICTION = "material.boundary_friction=0.05..0.3"
+QUICK = {"cells": 32, "seeds": 1, "screened": 6, "starts": 1}
+
+
+@pytest.fixture(scope="module")
+def dry():
+    return load_case(PAPER).with_overrides(DRY)
+
+
+@pytest.fixture
+def threads():
+    with ThreadPoolExecutor(1) as executor:
+        yield executor
+
+
+def full_load_crf(modulus):
+    """The paper's Eqs 2 to 4 for two bodies of that modulus [Pa], 500 N, 5.4 mm and 0.1 kg."""
+    reduced = modulus / 2.0 / (1.0 - 0.3**2)
+    depth = (9.0 * 500.0**2 / (16.0 * reduced**2 * 5.4e-3)) ** (1.0 / 3.0)
+    return math.sqrt(1.5 * 500.0 / depth / 0.1) / (2.0 * math.pi)
+
+
+def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, threads, tmp_path):
+    truth = dry.with_overrides({"material.hardness": "1.3 GPa", "material.youngs_modulus": "230 GPa"})
+    made = run_study(plan_points(truth, [{"surface.sq": "3 um"}], seeding="common"), executor=threads).table
+    anchors = [
+        Anchor(name="CAR", quantity="car_domain", sq=3e-6, value=float(made["car_domain"].iloc[0]), tolerance=0.01),
+        Anchor(name="CRF", quantity="crf_hz", sq=3e-6, value=full_load_crf(230e9), tolerance=10.0),
+    ]
+    settings = {"free": [CAP, MODULUS, FRICTION], **QUICK, "out": tmp_path}
+    found = calibrate(dry, anchors, **settings, executor=threads)
+    cap, modulus, friction = found.parameters
+    assert cap.value == pytest.approx(1.3, rel=0.03)
+    assert modulus.value == pytest.approx(230.0, rel=0.02)
+    assert found.misfit < 0.5
+    assert found.fit["met"].all()
+    assert (cap.identifiable, modulus.identifiable, friction.identifiable) == (True, True, False)
+    assert friction.learnt == pytest.approx(0.0, abs=1e-12)
+    assert found.unidentifiable == ("material.boundary_friction",)
+    assert cap.low < 1.3 < cap.high
+    assert found.directions[-1].weights == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
+    assert not found.directions[-1].determined
+    # CRF ~ E^(1/3) is all that tells E here: its standard deviation follows from that of CRF
+    crf_alone = 3.0 * 10.0 / full_load_crf(230e9)
+    reached = 0.5 * math.log(modulus.high / modulus.low)
+    assert reached == pytest.approx(crf_alone, rel=0.4)
+    assert "Not determined by the anchors: material.boundary_friction." in found.verdict()
+    stated = found.calibrated.conditions
+    assert stated.hardness == pytest.approx(1e9 * cap.value)
+    assert stated.pair.youngs_moduli[0] == pytest.approx(1e9 * modulus.value)
+    assert found.calibrated.grid.cells == dry.grid.cells
+    json.dumps(found.scalars(), allow_nan=False)
+
+    parts = sorted((tmp_path / "evaluations" / "parts").iterdir())
+    again = calibrate(dry, anchors, **settings, executor=threads)  # from the folder
+    assert again.parameters == found.parameters
+    assert sorted((tmp_path / "evaluations" / "parts").iterdir()) == parts
+
+
+def test_anchors_that_contradict_each_other_are_met_halfway_and_named(dry, threads):
+    """Two CRFs for one modulus: the misses are equal and opposite, and each is what the other costs."""
+    low, high = full_load_crf(180e9), full_load_crf(220e9)
+    anchors = [
+        Anchor(name="soft", quantity="crf_hz", sq=2e-6, value=low, tolerance=20.0),
+        Anchor(name="stiff", quantity="crf_hz", sq=2e-6, value=high, tolerance=20.0),
+    ]
+    found = calibrate(dry, anchors, free=[MODULUS], **QUICK, executor=threads)
+    miss = found.fit.set_index("anchor")["miss"]
+    half = (high - low) / 2.0
+    assert miss["soft"] == pytest.approx(half, abs=0.15 * half)
+    assert miss["stiff"] == pytest.approx(-half, abs=0.15 * half)
+    assert found.misfit == pytest.approx(2.0 * (half / 20.0) ** 2, rel=0.1)
+    assert {(trade.given_up, trade.relieved) for trade in found.trade_offs} == {("soft", "stiff"), ("stiff", "soft")}
+    for trade in found.trade_offs:
+        assert trade.misfit == pytest.approx((half / 20.0) ** 2, rel=0.1)
+        assert trade.without < 0.05 * trade.misfit
+    assert "0 of 2 anchors are met" in found.verdict()
+
+
+def test_a_bound_that_is_kept_does_not_pull(dry, threads):
+    anchors = [
+        Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=full_load_crf(200e9), tolerance=10.0),
+        Anchor(name="above", quantity="crf_hz", sq=2e-6, value=1000.0, tolerance=1.0, sense="at least"),
+    ]
+    found = calibrate(dry, anchors, free=[MODULUS], **QUICK, executor=threads)
+    assert found.parameters[0].value == pytest.approx(200.0, rel=0.02)
+    assert found.fit.set_index("anchor").loc["above", "miss"] == 0.0
+    pushed = calibrate(dry, [replace(anchors[1], value=9000.0)], free=[MODULUS], **QUICK, executor=threads)
+    assert pushed.parameters[0].at_end
+    assert "At the end of the range: material.youngs_modulus." in pushed.verdict()
+
+
+def test_scatter_over_surfaces_is_no_information():
+    """Slopes of pure noise: their products over different surfaces cancel, where their squares add up."""
+    rng = np.random.default_rng(3)
+    learnt, naive = [], []
+    for _ in range(200):
+        slopes = _Slopes(np.zeros((6, 4)), 5.0 * rng.standard_normal((6, 4, 1)))
+        learnt.append(slopes.information[0, 0])
+        naive.append(float(np.sum(slopes.mean**2)))
+    assert np.mean(naive) == pytest.approx(4 * 25.0 / 6.0, rel=0.1)
+    assert np.median(learnt) < 0.25 * np.mean(naive)
+    assert np.mean(np.array(learnt) > 12.0) < 0.2  # seldom enough to count as determined; the squares mostly are
+    assert np.mean(np.array(naive) > 12.0) > 0.5
+    true = _Slopes(np.zeros((6, 4)), 5.0 + 5.0 * rng.standard_normal((6, 4, 1)))
+    assert true.information[0, 0] == pytest.approx(4 * 25.0, rel=0.5)
+
+
+def test_information_of_a_line_is_that_of_least_squares():
+    rng = np.random.default_rng(4)
+    jacobian = rng.standard_normal((5, 3))
+    slopes = _Slopes(np.zeros((3, 5)), np.repeat(jacobian[None], 3, axis=0))
+    assert slopes.information == pytest.approx(jacobian.T @ jacobian)
+    covariance, scale = slopes.covariance(2)
+    assert scale == 1.0
+    assert covariance == pytest.approx(np.linalg.inv(jacobian.T @ jacobian + 12.0 * np.eye(3)))
+
+
+def test_levels_are_the_anchors_and_near_ones_are_solved_once():
+    anchors = [
+        Anchor(name=f"{sq}", quantity="clr", sq=1e-6 * sq, since=None, value=0.5, tolerance=0.1)
+        for sq in (0.5, 0.54, 2.5, 3.49, 3.5, 4.0)
+    ]
+    assert [1e6 * level for level in _levels(anchors, None)] == pytest.approx([0.5, 0.54, 2.5, 3.5, 4.0])
+    assert _levels(anchors, [4e-6, 0.5e-6]) == (0.5e-6, 4e-6)
+    with pytest.raises(BadInput, match=r"must span the anchors' Sq from 0\.5 to 4 um, got 1, 4"):
+        _levels(anchors, [1e-6, 4e-6])
+
+
+CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.0)
+
+
+@pytest.mark.parametrize(
+    ("anchors", "settings", "said"),
+    [
+        ([], {}, "needs an anchor"),
+        ([replace(CRF, fitted=False)], {}, "needs an anchor"),
+        ([Anchor(name="bend", quantity="split", value=2.0, tolerance=0.1)], {}, "'bend' is a split"),
+        ([CRF], {"free": ["surface.sq=1 um..2 um"]}, "surface.sq cannot be varied"),
+        ([CRF], {"free": []}, "nothing is varied"),
+        ([CRF], {"seeds": 0}, "seeds must be 1 or more"),
+        ([replace(CRF, quantity="crv_hz")], {}, "no column 'crv_hz'"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_a_sentence(dry, threads, anchors, settings, said):
+    with pytest.raises(BadInput) as refused:
+        calibrate(dry, anchors, **{"free": [MODULUS], **QUICK, **settings}, executor=threads)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_an_anchor_of_the_resonance_needs_a_vibration(dry):
+    with pytest.raises(BadInput, match=r"'CRF' needs a vibration; add \[vibration\]"):
+        calibrate(dry.with_overrides({"vibration": "none"}), [CRF], free=[MODULUS])
+
+
+def test_the_command_writes_a_case_that_a_study_can_run(dry, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("case.toml").write_text(dry.text, "utf-8")
+    crf = full_load_crf(210e9)
+    Path("anchors.toml").write_text(
+        f'[[anchor]]\nname = "CRF"\nquantity = "crf_hz"\nsq = "2 um"\nvalue = {crf}\ntolerance = 10.0\n', "utf-8"
+    )
+    arguments = [
+        "calibrate", "case.toml", "--anchors", "anchors.toml", "--free", MODULUS, "--cells", "32", "--seeds", "1",
+        "--screened", "4", "--starts", "1", "--workers", "1", "--out", "found",
+    ]  # fmt: skip
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    out, err = capsys.readouterr()
+    assert (end.value.code or 0, err) == (0, "")
+    assert out.startswith("1 of 1 anchors are met within their tolerances with material.youngs_modulus ")
+    calibrated = load_case("found/calibrated.toml")
+    assert calibrated.conditions.pair.youngs_moduli[0] == pytest.approx(210e9, rel=0.02)
+    assert calibrated.contents.study is not None
+    assert Path("found/calibration.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("found/anchors.csv").read_text("utf-8").count("\n") == 4
+    with pytest.raises(SystemExit):
+        main([*arguments, "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert said["verdict"] == out.splitlines()[0]
+    assert said["parameters"][0]["identifiable"] is True
+    assert said["calibrated"] == str(Path("found", "calibrated.toml"))
