@@ -53,8 +53,11 @@ def killed(out: Path, after: float, target: str) -> str:
         os.kill(victim, signal.SIGKILL)
         if victim == running.pid:
             running.wait()
-            time.sleep(2.0)
-            left = [pid for pid in workers if Path(f"/proc/{pid}").exists()]
+            for _ in range(200):
+                left = [pid for pid in workers if Path(f"/proc/{pid}").exists()]
+                if not left:
+                    break
+                time.sleep(0.1)
             return f"parent killed, {len(left)} workers left behind"
         running.wait()
         return f"worker killed, study ended with {running.returncode}"

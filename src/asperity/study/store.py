@@ -114,8 +114,11 @@ class Store:
     def _write(self, path: Path, table: "pyarrow.Table") -> None:
         import pyarrow.parquet
 
-        with whole_file(path) as part:
-            pyarrow.parquet.write_table(table, part)
+        try:
+            with whole_file(path) as part:
+                pyarrow.parquet.write_table(table, part)
+        except AsperityError as refused:
+            raise type(refused)(f"{refused}; finished cases are kept, make room and run the study again") from refused
 
 
 @contextmanager
