@@ -178,6 +178,21 @@ def test_another_case_in_the_folder_is_refused(case, plan, executor, tmp_path):
         run_study(plan, out=tmp_path, executor=executor)
 
 
+def test_a_study_of_another_version_can_still_be_read(plan, unbroken, executor, tmp_path):
+    run_study(plan, out=tmp_path, executor=executor)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    manifest["versions"]["asperity"], manifest["design"] = "0.0.1", "that of a case file with other keys"
+    renamed = {old: f"{number:016x}" for number, old in enumerate(manifest["ids"])}
+    manifest["ids"] = list(renamed.values())
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    for part in (tmp_path / "parts").glob("*.parquet"):
+        table = pandas.read_parquet(part)
+        table["case_id"] = table["case_id"].map(renamed)
+        table.to_parquet(part)
+    table = load_study(tmp_path).table.drop(columns=["case_id", "seconds"])
+    pandas.testing.assert_frame_equal(table, unbroken.drop(columns="case_id"))
+
+
 def test_two_processes_do_not_compute_in_one_folder(plan, executor, tmp_path):
     def again(_):
         with pytest.raises(BadInput, match="another process computes this study"):

@@ -170,7 +170,8 @@ def load_study(folder: str | Path) -> StudyResult:
     folder = Path(folder)
     plan = read_plan(folder)
     path = folder / TABLE
-    return StudyResult(plan, open_read(folder, plan).table(), folder, path if path.exists() else None)
+    table = Store(folder, plan, (1, 1)).table()
+    return StudyResult(plan, table, folder, path if path.exists() else None)
 
 
 def cores() -> int:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from difflib import get_close_matches
 from functools import cached_property
@@ -50,6 +50,7 @@ class Plan:
     seeding : "independent", every case has seeds of its own; "common", the k-th realisation has the same at every
         point, which lets differences between points show with fewer of them
     seeds : the surfaces' seeds in place of ones drawn for the study
+    ids : of the cases, where they were computed by an asperity whose case file had other keys
     """
 
     case: Case
@@ -59,6 +60,7 @@ class Plan:
     kind: Kind = "solve"
     seeding: Seeding = "independent"
     seeds: tuple[int, ...] | None = None
+    ids: tuple[str, ...] | None = field(default=None, repr=False)
 
     @cached_property
     def cases(self) -> tuple[StudyCase, ...]:
@@ -106,7 +108,8 @@ class Plan:
                     key: int(seed) for key, seed in zip(SEEDS, drawn, strict=True) if key in seeded and key not in point
                 }
                 identity = {**self._fixed, **plain, **chosen}
-                yield StudyCase(number, place, realisation, {**point, **chosen}, _hash(identity)[:16])
+                name = _hash(identity)[:16] if self.ids is None else self.ids[number]
+                yield StudyCase(number, place, realisation, {**point, **chosen}, name)
                 number += 1
 
 

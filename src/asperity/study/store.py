@@ -9,7 +9,7 @@ import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from platform import python_version
@@ -190,7 +190,7 @@ def read_plan(folder: Path) -> Plan:
     try:
         home = (folder / manifest["case_folder"]).resolve()
         case = load_case(manifest["case"], folder=home, name=manifest["source"])
-        return plan_points(
+        plan = plan_points(
             case,
             manifest["points"],
             axes=manifest["axes"],
@@ -198,6 +198,10 @@ def read_plan(folder: Path) -> Plan:
             kind=manifest["kind"],
             seeding=manifest["seeding"],
         )
+        ids = tuple(manifest["ids"])
+        if len(ids) != len(plan.cases):
+            raise KeyError("ids")
+        return replace(plan, ids=ids)
     except KeyError:
         raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
 
@@ -233,8 +237,8 @@ def _manifest(plan: Plan, folder: Path) -> dict[str, Any]:
         "seeds": plan.seeds,
         "realisations": plan.realisations,
         "axes": plan.axes,
-        "cases": len(plan.cases),
         "points": plan.points,
+        "ids": [case.id for case in plan.cases],
     }
 
 
