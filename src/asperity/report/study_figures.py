@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 RIG_SPLIT_UM = (1.68, 1.92)  # measured, section 4.2 of the paper
 SPLIT_COLOUR, SPLIT_STRIP = "#8a5a00", "#f2e3c6"
 SPLIT_STROKES: tuple[Any, ...] = ("-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 1)))
+MOST_MARKERS = 20  # on a curve
 ACROSS = 4  # maps in a row
 SQ_LABEL = "composite roughness Sq [µm]"
 
@@ -290,7 +291,10 @@ def _draw_mean(
     axes.update_datalim([(end, 0.0) for end in sq[[0, -1]]], updatey=False)  # levels without a value, too
     low, high = (curve.interval(column) * scale).T
     axes.fill_between(sq, low, high, color=colour, alpha=0.22, linewidth=0, zorder=1)
-    axes.plot(sq, curve.mean(column) * scale, stroke, color=colour, markersize=3.5, label=label, zorder=2)
+    axes.plot(
+        sq, curve.mean(column) * scale, stroke, color=colour, markersize=3.5, markevery=-(-sq.size // MOST_MARKERS),
+        label=label, zorder=2,
+    )  # fmt: skip
 
 
 def _draw_anchors(
