@@ -398,6 +398,22 @@ def test_values_that_crowd_low_get_a_logarithmic_axis(values, logarithmic):
     assert sweep_figures.axis_of(study.plan, study.table, "contact.slip").logarithmic is logarithmic
 
 
+def test_a_point_that_leaves_a_key_alone_has_the_cases_own_value():
+    study = made([{"contact.load": "200 N"}, {"surface.sq": "2 um"}], clr=[0.1, 0.2])
+    assert sweep_figures.axis_of(study.plan, study.table, "contact.load").values.tolist() == [200.0, 500.0]
+    assert sweep_figures.axis_of(study.plan, study.table, "surface.sq").values.tolist() == [1.0, 2.0]
+
+
+def test_many_cases_are_a_picture():
+    sq = np.linspace(0.5, 3.0, 4000)
+    study = made([{"surface.sq": f"{value:.6f} um"} for value in sq], clr=sq / 4.0, car=sq / 5.0)
+    axis = sweep_figures.axis_of(study.plan, study.table, "surface.sq")
+    figure = sweep_figures.against(study.table, axis, sweep_figures.outputs_of(study.table), ON_PAGE)
+    drawing = io.BytesIO()
+    figure.savefig(drawing, format="svg")
+    assert drawing.tell() < 200_000  # 8000 dots as drawings take a megabyte
+
+
 def test_names_are_places_on_an_axis():
     points = [{"surface.correlation_length": pair} for pair in (["10 um", "40 um"], ["20 um", "40 um"])]
     study = made(points, clr=[0.1, 0.2])

@@ -3,6 +3,7 @@
 Swept quantities are shown in the unit they were written in, outputs in display units.
 """
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from asperity.arrays import Field
-from asperity.case import split_amount
+from asperity.case import Case, split_amount
 from asperity.errors import BadInput
 from asperity.report.figures import BLUE, GREY
 from asperity.report.study_figures import Medium, stay_near
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 LEVEL = 0.90  # of the intervals
 MOST_VALUES = 12  # of a swept quantity that has a mean each, however few cases share one
 BINS = 8  # of one with more
+MOST_DRAWN = 1500  # dots as drawings; more are a picture
 MOST_WRITTEN = 8  # values a side of a map whose cells hold their number
 ACROSS = 4
 NAMES = {
@@ -112,7 +114,8 @@ class Axis:
 
 def axis_of(plan: "Plan", table: "pandas.DataFrame", key: str) -> Axis:
     """A swept key over the rows of a study's table, in the unit that its first value was written in."""
-    written = [plan.cases[number].overrides[key] for number in table["number"]]
+    own = _own_value(plan.case, key)
+    written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]
     short = key.rpartition(".")[2]
     name = NAMES.get(short, short.replace("_", " "))
     try:
@@ -123,6 +126,14 @@ def axis_of(plan: "Plan", table: "pandas.DataFrame", key: str) -> Axis:
         return Axis(key, name, np.array([names.index(text) for text in texts], dtype=float), names)
     label = f"{name} [{UNITS.get(unit, unit)}]" if unit else name
     return Axis(key, label, numbers, logarithmic=_crowds_low(np.unique(numbers)))
+
+
+def _own_value(case: Case, key: str) -> Any:
+    """What a case says of a key that a point leaves alone."""
+    value: Any = tomllib.loads(case.text)
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, dict) else None
+    return "not set" if value is None else value
 
 
 def _numbers(written: Sequence[Any]) -> tuple[Field, str]:
@@ -158,7 +169,16 @@ def against(table: "pandas.DataFrame", axis: Axis, outputs: Sequence[Output], me
         for output, axes in zip(outputs, panels, strict=True):
             values = table[output.column].to_numpy(dtype=float) * output.scale
             known = np.isfinite(values)
-            axes.plot(axis.values[known], values[known], ".", color=GREY, alpha=0.6, markersize=4.5, markeredgewidth=0)
+            axes.plot(
+                axis.values[known],
+                values[known],
+                ".",
+                color=GREY,
+                alpha=0.6,
+                markersize=4.5,
+                markeredgewidth=0,
+                rasterized=values.size > MOST_DRAWN,
+            )
             x, mean, low, high = means(axis.values[known], values[known], binned=axis.binned)
             joined = "none" if axis.names else "-"
             reach = np.array([mean - low, high - mean])
