@@ -11,6 +11,7 @@ from benchmarks import (
     films,
     friction,
     indicators,
+    motion,
     recordings,
     robustness,
     roughness_levels,
@@ -49,7 +50,7 @@ def main() -> None:
     )
     print()
     with threadpool_limits(1):
-        for part in (speed, films, robustness, vibration, surfaces, friction, stress, indicators):
+        for part in (speed, films, robustness, motion, vibration, surfaces, friction, stress, indicators):
             for line in part.lines(fast=wanted.fast):
                 print(line, flush=True)
             print()
