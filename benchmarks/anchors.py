@@ -1,0 +1,65 @@
+"""Three studies against what the paper prints: `python -m benchmarks.anchors [CELLS]`.
+
+Default: examples/paper.toml; as printed: the domain that the paper prints, which starves the film; calibrated: the
+free parameters that meet the anchors best (docs/theory/calibration.md).
+"""
+
+import sys
+from pathlib import Path
+
+from asperity.case import load_case
+from asperity.study.anchors import PAPER_ANCHORS, compare, rig_deviation
+from asperity.study.curve import WearCurve, curve_of
+from asperity.study.execute import run_study, study_executor
+from asperity.study.plan import plan_study
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+CASES = {"default": "paper.toml", "as printed": "paper-as-printed.toml", "calibrated": "paper-calibrated.toml"}
+PERCENT = ("car", "car_domain", "clr")
+
+
+def shown(quantity: str, value: float) -> str:
+    if value != value:
+        return "-"
+    if quantity in PERCENT:
+        return f"{100 * value:.1f} %"
+    return f"{value:.2f} um" if quantity == "split" else f"{value:.0f} Hz"
+
+
+def curves(cells: int | None) -> dict[str, WearCurve]:
+    found = {}
+    with study_executor() as executor:
+        for name, file in CASES.items():
+            case = load_case(EXAMPLES / file)
+            if cells is not None:
+                case = case.with_overrides({"grid.cells": [cells, cells]})
+            found[name] = curve_of(run_study(plan_study(case), executor=executor))
+    return found
+
+
+def print_anchors(cells: int | None = None) -> None:
+    found = curves(cells)
+    print("\n| anchor | printed | " + " | ".join(found) + " |")
+    print("|---|---|" + "---|" * len(found))
+    tables = {name: compare(curve).set_index("anchor") for name, curve in found.items()}
+    for anchor in PAPER_ANCHORS:
+        sign = {"about": "", "at least": "≥ ", "at most": "≤ "}[anchor.sense]
+        cells_shown = []
+        for table in tables.values():
+            row = table.loc[anchor.name]
+            span = f"{shown(anchor.quantity, row['low'])} to {shown(anchor.quantity, row['high'])}"
+            text = "none" if row["ours"] != row["ours"] else f"{shown(anchor.quantity, row['ours'])} ({span})"
+            cells_shown.append(f"**{text}**" if row["met"] else text)
+        print(f"| {anchor.name} | {sign}{shown(anchor.quantity, anchor.value)} | {' | '.join(cells_shown)} |")
+    for name, what in (("ends", "two printed ends"), ("knee", "12 rings, bent"), ("smooth", "12 rings, saturating")):
+        off = [f"{rig_deviation(curve)[name]:.0f} Hz" for curve in found.values()]
+        print(f"| rms deviation of CRF from the rig, {what} | - | {' | '.join(off)} |")
+    for preset in ("sound", "paper"):
+        stages = [curve.stages[preset].kind for curve in found.values()]
+        print(f"| stages, preset {preset} | severe | {' | '.join(stages)} |")
+    failed = [str(curve.left_out) for curve in found.values()]
+    print(f"| cases that failed, of 180 | - | {' | '.join(failed)} |")
+
+
+if __name__ == "__main__":
+    print_anchors(int(sys.argv[1]) if len(sys.argv) > 1 else None)
