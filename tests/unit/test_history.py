@@ -1,0 +1,325 @@
+"""Histories: what is read off each step, kept and gone on with; where moving surfaces are; the page and the command."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from asperity.case import load_case
+from asperity.cli import main
+from asperity.ehl.motion import moving_contact
+from asperity.ehl.solution import Status
+from asperity.errors import BadInput, NotConverged, UnreadableFile
+from asperity.grid import Grid
+from asperity.history import MODELS, load_history, run_history
+from asperity.report.motion_page import render_motion_page
+from asperity.surface import CompositeSurface, Surface, flat_surface, gaussian_surface
+from asperity.surface.moving import MovingSurfaces, track_grid
+
+GRID = Grid((32, 16), (0.0, 0.0), (64e-6, 16e-6))
+SMALL = {"grid.cells": "[48, 32]", "surface.correlation_length": "40 um", "grid.x": "[-3, 1.8]"}
+
+
+def case(**overrides):
+    return load_case("examples/paper.toml").with_overrides(SMALL | overrides)
+
+
+def rough(grid=GRID, seed=1):
+    return gaussian_surface(grid, sq=1e-6, correlation_length=8e-6, rng=np.random.default_rng(seed))
+
+
+# Where surfaces are
+
+
+def test_whole_cells_are_the_same_heights_further_on():
+    surfaces = MovingSurfaces.one_rough(rough(), (2.0, 0.0))
+    np.testing.assert_array_equal(surfaces.at(3e-6).heights, np.roll(rough().heights, 3, axis=0))
+
+
+def test_the_second_surface_moves_at_its_own_speed_face_down():
+    composite = CompositeSurface(rough(seed=1), rough(seed=2), (4.0, 2.0))
+    surfaces = MovingSurfaces.of(composite)
+    np.testing.assert_allclose(surfaces.at(0.0).heights, composite.surface.heights)
+    moved = np.roll(composite.first.heights, 4, axis=0) + np.roll(composite.second.heights, 2, axis=0)[:, ::-1]
+    np.testing.assert_allclose(surfaces.at(2e-6).heights, moved)
+
+
+def test_parts_of_a_cell_move_every_wave_exactly():
+    x = GRID.x[:, None] * np.ones(16)
+    waves = [(2.0 * np.pi * k / 64e-6, phase) for k, phase in ((1, 0.3), (5, 1.1), (13, 2.0))]
+
+    def heights(shift):
+        return sum(1e-6 * np.cos(number * (x - shift) + phase) for number, phase in waves)
+
+    surfaces = MovingSurfaces.one_rough(Surface(heights(0.0), GRID), (1.0, 0.0))
+    for shift in (0.37e-6, 12.9e-6, 640.0077e-6):
+        np.testing.assert_allclose(surfaces.at(shift).heights, heights(shift), atol=1e-16)
+
+
+def test_a_surface_neither_fades_nor_strays_however_long_it_runs():
+    surfaces = MovingSurfaces.one_rough(rough(), (1.0, 0.0))
+    assert surfaces.at(123.4567e-3).sq == pytest.approx(surfaces.at(0.0).sq, rel=1e-6)
+    np.testing.assert_allclose(surfaces.at(1000 * 64e-6).heights, surfaces.at(0.0).heights, atol=1e-15)
+
+
+def test_a_track_may_be_longer_than_the_contact():
+    track = track_grid(GRID, 3)
+    surface = rough(track)
+    surfaces = MovingSurfaces(surface, flat_surface(track), (1.0, 0.0), GRID)
+    np.testing.assert_array_equal(surfaces.at(0.0).heights, surface.heights[:32])
+    np.testing.assert_allclose(surfaces.at(64e-6).heights, surface.heights[64:])
+    assert surfaces.passage(0) == pytest.approx(192e-6)
+    assert surfaces.passage(1) == float("inf")
+
+
+def test_a_track_shorter_than_the_contact_is_refused():
+    half = Grid((16, 16), (0.0, 0.0), (32e-6, 16e-6))
+    with pytest.raises(BadInput, match="as long"):
+        MovingSurfaces(rough(half), flat_surface(half), (1.0, 1.0), GRID)
+
+
+@pytest.mark.parametrize("which", ["first", "second"])
+def test_a_case_begins_with_the_roughness_that_it_solves(which):
+    chosen = case(**{"motion.rough": which})
+    surfaces = chosen.moving_surfaces()
+    np.testing.assert_allclose(surfaces.at(0.0).heights, chosen.surface().heights, atol=1e-18)
+    assert surfaces.rough == (which == "first", which == "second")
+
+
+def test_both_bodies_share_the_roughness():
+    surfaces = case(**{"motion.rough": "both", "motion.track": 2}).moving_surfaces()
+    for one in (surfaces.first, surfaces.second):
+        assert one.sq == pytest.approx(1e-6 / np.sqrt(2.0))
+    together = np.corrcoef(surfaces.first.heights.ravel(), surfaces.second.heights.ravel())[0, 1]
+    assert abs(together) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        ({"lubricant": "none"}, "dry contact"),
+        ({"thermal.feedback": True}, "thermal.feedback=false"),
+        ({"motion.start": "anew"}, 'motion.start must be "steady" or "stationary"'),
+        ({"motion.time_step": 20}, "motion.time_step must be less than or equal to 8"),
+        ({"motion.rugh": "both"}, "did you mean rough"),
+    ],
+)
+def test_motions_that_cannot_be_meant_are_refused(overrides, said):
+    with pytest.raises(BadInput, match=said):
+        run_history(case(**overrides), steps=1)
+
+
+# Histories
+
+
+@pytest.fixture(scope="module")
+def history():
+    return run_history(case(), steps=12, every=5)
+
+
+def test_a_row_is_what_the_step_says(history):
+    chosen, table = history.case, history.table
+    assert list(table["step"]) == list(range(13))
+    dx = chosen.grid.spacing[0]
+    np.testing.assert_allclose(np.diff(table["time_s"]), dx / chosen.conditions.entrainment_speed)
+    np.testing.assert_allclose(table["contact_force_n"], table["clr"] * chosen.conditions.load)
+    np.testing.assert_allclose(table["friction_asperity_part"], 0.15 * table["clr"])
+    slid = table["friction_coefficient"] * chosen.conditions.load * chosen.conditions.sliding_speed
+    np.testing.assert_allclose(table["friction_power_w"], slid)
+    power = (table["friction_power_w"] + table["flow_power_w"]).to_numpy()
+    assert table["heat_j"].iloc[-1] == pytest.approx(np.trapezoid(power, table["time_s"]))
+    # Hertz's point spring stiffens as the cube root of its load, the resonance as the sixth
+    ratio = table["resonance_hz"].iloc[-1] / table["resonance_hz"].iloc[0]
+    assert ratio == pytest.approx((table["clr"].iloc[-1] / table["clr"].iloc[0]) ** (1.0 / 6.0))
+    assert [frame.number for frame in history.frames] == [0, 5, 10]
+    assert history.frames[1].time == table["time_s"][5]
+
+
+def test_what_it_says_is_of_the_later_steps(history):
+    said, late = history.scalars(), history.table.iloc[6:]
+    assert said["settled_from_step"] == 6
+    assert said["clr"] == pytest.approx(late["clr"].mean())
+    assert said["clr_std"] == pytest.approx(np.std(late["clr"].to_numpy()))
+    assert said["clr_start"] == history.table["clr"].iloc[0]
+    assert said["crf_hz"] == pytest.approx(late["resonance_hz"].mean(), rel=0.01)
+    json.dumps(said, allow_nan=False)
+
+
+def test_it_begins_with_the_snapshot(history):
+    from asperity.run import solve_case
+
+    alone = solve_case(history.case).scalars()
+    first = history.table.iloc[0]
+    for name in ("clr", "car", "car_domain", "h_min_m", "h_mean_m", "p_max_pa", "friction_coefficient"):
+        assert first[name] == pytest.approx(alone[name]), name
+
+
+def test_a_history_goes_on_bit_for_bit(history, tmp_path):
+    folder = tmp_path / "kept"
+    for steps in (4, 5, 12):
+        last = run_history(case(), steps=steps, every=5, out=folder)
+        assert last.computed == {4: 5, 5: 1, 12: 7}[steps]
+    pd.testing.assert_frame_equal(last.table, history.table, check_exact=True)
+    for ours, theirs in zip(last.frames, history.frames, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+    loaded = load_history(folder)
+    pd.testing.assert_frame_equal(loaded.table, history.table, check_exact=True)
+    assert loaded.case == history.case
+
+
+def test_a_history_killed_at_any_moment_goes_on_bit_for_bit(history, tmp_path):
+    folder = tmp_path / "killed"
+    script = f"""
+import asperity.history as histories
+from asperity.case import load_case
+from pathlib import Path
+histories.KEPT_EVERY_S = 0.0
+case = load_case("examples/paper.toml").with_overrides({SMALL!r})
+histories.run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
+"""
+    running = subprocess.Popen([sys.executable, "-c", script])
+    for _ in range(600):
+        if (folder / "memory.npz").exists() and int(np.load(folder / "memory.npz")["number"]) >= 3:
+            break
+        time.sleep(0.05)
+    os.kill(running.pid, signal.SIGKILL)
+    running.wait()
+    before = int(np.load(folder / "memory.npz")["number"])
+    assert before >= 3
+    again = run_history(case(), steps=max(12, before + 2), every=5, out=folder)
+    assert again.computed == again.steps - before
+    pd.testing.assert_frame_equal(again.table[:13], history.table, check_exact=True)
+    assert not list(folder.glob(".*.part"))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"contact.load": "300 N"}, {"surface.seed": 8}, {"motion.rough": "second"}, {"motion.start": "stationary"}],
+)
+def test_a_folder_keeps_one_history(tmp_path, change):
+    run_history(case(), steps=1, out=tmp_path / "kept")
+    with pytest.raises(BadInput, match="another case"):
+        run_history(case(**change), steps=2, out=tmp_path / "kept")
+
+
+def test_folders_that_hold_no_history_are_left_alone(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(BadInput, match="holds no history"):
+        run_history(case(), steps=1, out=tmp_path)
+    with pytest.raises(UnreadableFile, match=r"no manifest\.json"):
+        load_history(tmp_path)
+
+
+def test_a_damaged_memory_is_said_to_be(tmp_path):
+    run_history(case(), steps=1, out=tmp_path / "kept")
+    (tmp_path / "kept" / "memory.npz").write_bytes(b"half")
+    with pytest.raises(UnreadableFile, match="damaged"):
+        run_history(case(), steps=2, out=tmp_path / "kept")
+
+
+@pytest.fixture
+def fails_at_three(monkeypatch):
+    """A model whose third step does not converge."""
+
+    def steps(*arguments, **options):
+        for snapshot in moving_contact(*arguments, **options):
+            if snapshot.number == 3:
+                ending = replace(snapshot.solution.convergence, status=Status.OUT_OF_ITERATIONS)
+                snapshot = replace(snapshot, solution=replace(snapshot.solution, convergence=ending))
+            yield snapshot
+
+    monkeypatch.setitem(MODELS, "unified", steps)
+
+
+@pytest.mark.usefixtures("fails_at_three")
+def test_the_first_bad_step_stops_a_history_and_is_done_again(history, tmp_path, monkeypatch):
+    with pytest.raises(NotConverged, match="step 3 of 5") as stopped:
+        run_history(case(), steps=5, out=tmp_path / "kept")
+    unfinished = stopped.value.solution
+    assert unfinished.steps == 3
+    assert unfinished.failed == (3,)
+    assert unfinished.verdict().startswith("NOT CONVERGED at step 3")
+    monkeypatch.setitem(MODELS, "unified", moving_contact)
+    again = run_history(case(), steps=5, out=tmp_path / "kept")
+    pd.testing.assert_frame_equal(again.table, history.table[:6], check_exact=True)
+
+
+@pytest.mark.usefixtures("fails_at_three")
+def test_bad_steps_are_marked_where_it_shall_go_on():
+    marked = run_history(case(), steps=5, strict=False)
+    assert marked.steps == 5
+    assert marked.failed == (3,)
+
+
+def test_passes_are_of_the_rough_surface():
+    chosen = case(**{"contact.slip": 0.2, "motion.rough": "second"})
+    done = run_history(chosen, passes=0.1)
+    assert done.steps == int(np.ceil(0.1 * 48 / 0.9))
+    with pytest.raises(BadInput, match="leave one out"):
+        run_history(chosen, passes=1.0, steps=3)
+
+
+# Page and command
+
+
+def test_the_page_has_every_map_and_loads_nothing(history):
+    page = render_motion_page(history)
+    assert page == render_motion_page(history)
+    data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+    assert len(data["frames"]) == len(data["said"]) == 3
+    assert data["size"] == [48, 32]
+    assert "step 10 of 12" in data["said"][2]
+    beside_the_data = re.sub(r'"data:[^"]*"', '"#"', page)
+    assert not re.findall(r"""(?:src|href)=["'](?!#)|url\(|@import|fetch\(""", beside_the_data)
+    assert all(uri.startswith("data:image/png;base64,") for uri in data["frames"])
+
+
+def test_a_picture_shows_what_the_step_has(history):
+    from io import BytesIO
+
+    from PIL import Image
+
+    from asperity.report.motion_figures import CONTACT_COLOUR, frame_picture, ranges
+
+    frame = history.frames[1]
+    packed, (width, height) = frame_picture(frame, ranges(history))
+    pixels = np.asarray(Image.open(BytesIO(packed)).convert("RGB"))
+    assert pixels.shape == (3 * height, width, 3)
+    yellow = np.array([int(CONTACT_COLOUR[k : k + 2], 16) for k in (1, 3, 5)])
+    touching = np.all(pixels[2 * height :] == yellow, axis=2)
+    np.testing.assert_array_equal(touching[::-1].T, frame.in_contact)
+
+
+def test_the_command_runs_goes_on_and_makes_the_page(tmp_path, capsys):
+    arguments = ["run", "examples/paper.toml", "--out", str(tmp_path / "kept"), "--json"]
+    for key, value in SMALL.items():
+        arguments += ["--set", f"{key}={value}"]
+    for steps, computed in ((3, 4), (5, 2)):
+        with pytest.raises(SystemExit) as ended:
+            main([*arguments, "--steps", str(steps), "--report", str(tmp_path / "page.html")])
+        assert not ended.value.code
+        said = json.loads(capsys.readouterr().out)
+        assert (said["steps"], said["computed"], said["failed"]) == (steps, computed, [])
+    assert (tmp_path / "page.html").stat().st_size > 10_000
+    with pytest.raises(SystemExit) as ended:
+        main(["report", str(tmp_path / "kept")])
+    assert not ended.value.code
+    assert (tmp_path / "kept" / "report.html").exists()
+
+
+def test_the_command_says_why_not(capsys, tmp_path):
+    for arguments in (["--steps", "0"], ["--steps", "2", "--passes", "1"], ["--out", str(tmp_path), "--every", "0"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["run", "examples/paper.toml", *arguments])
+        assert ended.value.code == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
