@@ -178,6 +178,16 @@ def test_failures_are_loud_and_left_out():
     assert max(np.max(one.get_ydata()) for one in axes.get_lines()) < 100.0
 
 
+def test_many_reasons_are_summed_up():
+    study = with_knee()
+    table = study.table.copy()
+    table.loc[:13, "status"] = "not converged"
+    table.loc[:13, "reason"] = [f"stalled at a residual of {number}e-3" for number in (1, 1, *range(1, 13))]
+    reasons = without_maps(replace(study, table=table)).reasons
+    assert [reason.number for reason in reasons] == [3] + 9 * [1] + [2]
+    assert reasons[-1].text == "2 other reasons"
+
+
 def test_all_failed_is_a_page_and_nothing_computed_is_refused():
     study = with_knee()
     none = replace(study, table=study.table.assign(status="failed", reason="no oil"))

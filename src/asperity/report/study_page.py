@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 MOST_MAPS = 8  # the paper's Figs 5 and 6 have eight
 MOST_POINTS = 60  # in a table of the page; the csv has all
 MOST_OUTPUTS = 8  # beside each other in it
+MOST_REASONS = 10
 MOST_NAMED = 5  # failed cases named for one reason
 SHOWS = 5e-4  # a difference between shares that a map's percentages would show
 NEAR = 0.1  # of the rig's own values: the paper prints speed and radius in more than one way
@@ -261,7 +262,12 @@ class StudyReport:
             names = [self._point_in_words(int(str(point)), count) for point, count in points.head(MOST_NAMED).items()]
             more = f"; and {len(points) - len(names)} more points" if len(points) > len(names) else ""
             found.append(Reason(_printed(f"{status}: {text}"), len(rows), _printed("; ".join(names) + more)))
-        return sorted(found, key=lambda reason: -reason.number)
+        found.sort(key=lambda reason: -reason.number)
+        rest = found[MOST_REASONS:]
+        if rest:
+            others = Reason(f"{len(rest)} other reasons", sum(reason.number for reason in rest), "in failures.csv")
+            return [*found[:MOST_REASONS], others]
+        return found
 
     def _point_in_words(self, point: int, cases: int) -> str:
         """The swept values of a point, and how many of its surfaces are meant where it has several."""
