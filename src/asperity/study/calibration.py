@@ -230,7 +230,7 @@ def calibrate(
     screened: int = SCREENED,
     starts: int = STARTS,
     sample_seed: int = 0,
-    out: Path | None = None,
+    out: str | Path | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -272,7 +272,7 @@ def calibrate(
         if count < 1:
             raise BadInput(f"{name} must be 1 or more, got {count}")
     with nullcontext(executor) if executor is not None else study_executor(workers) as pool:
-        bench = _Bench(case, ranges, aimed, sq, seeds, out, pool, progress)
+        bench = _Bench(case, ranges, aimed, sq, seeds, None if out is None else Path(out), pool, progress)
         best = _searched(bench, screened, starts, sample_seed)
         slopes = _Slopes.at(bench, best, SLOPE_SEEDS * seeds)
         calibrated = _calibrated(given, ranges, best)

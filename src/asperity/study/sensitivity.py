@@ -195,7 +195,7 @@ def sensitivity(
     cells: int | None = CELLS,
     seeds: int = 1,
     sample_seed: int = 0,
-    out: Path | None = None,
+    out: str | Path | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -239,7 +239,9 @@ def sensitivity(
     factors = (*(entry.key for entry in ranges), *([SEED] if seeded else []))
     design = sample_design(method, len(factors), size or SIZES[method], sample_seed)
     plan = _plan(case, ranges, seeded, design, curve, seeds, sample_seed)
-    result = run_study(plan, out=out, executor=executor, workers=workers, progress=progress)
+    result = run_study(
+        plan, out=None if out is None else Path(out), executor=executor, workers=workers, progress=progress
+    )
     return _analysed(case, ranges, factors, design, result, sq, curve, seeds)
 
 
