@@ -17,6 +17,7 @@ from benchmarks import (
     roughness_levels,
     speed,
     stress,
+    study,
     surfaces,
     vibration,
 )
@@ -54,8 +55,9 @@ def main() -> None:
             for line in part.lines(fast=wanted.fast):
                 print(line, flush=True)
             print()
-    for line in recordings.lines(fast=wanted.fast):  # on all processors, as its users have it
-        print(line, flush=True)
+    for part in (recordings, study):  # on all processors, as their users have it
+        for line in part.lines(fast=wanted.fast):
+            print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from asperity.case import load_case
@@ -26,9 +27,9 @@ CHEAP = {  # the vibration model alone, on a record of 5000 samples
 }
 
 
-def print_papers_study(levels: str = "0.1 um") -> None:
+def papers_study(levels: str = "0.1 um") -> Iterator[str]:
     """All of it from the command line, on two workers and on one."""
-    print("\nThe paper's study, 36 levels x 5 seeds at 256 x 256, vibration and indicators included")
+    yield f"The paper's study, {levels} from level to level, 5 seeds, 256 x 256, vibration and indicators included:\n"
     taken = {}
     for workers in (2, 1):
         with tempfile.TemporaryDirectory() as folder:
@@ -39,13 +40,13 @@ def print_papers_study(levels: str = "0.1 um") -> None:
                 [sys.executable, "-m", "asperity", "study", str(CASE), *words], check=True, stdout=subprocess.DEVNULL
             )
             taken[workers] = time.perf_counter() - begun
-        print(f"  {workers} workers: {taken[workers]:.1f} s from the prompt")
-    print(f"  parallel efficiency {taken[1] / (2.0 * taken[2]):.2f}")
+        yield f"- {workers} worker{'s' if workers > 1 else ''}: {taken[workers]:.1f} s from the prompt"
+    yield f"- parallel efficiency {taken[1] / (2.0 * taken[2]):.2f}"
 
 
-def print_overhead(cases: int = 10_000) -> None:
+def overhead(cases: int = 10_000) -> Iterator[str]:
     """Ten thousand cheap cases: time beside the work itself, memory of the parent."""
-    print(f"\n{cases} cases of the vibration model alone")
+    yield f"\n{cases} cases of the vibration model alone, two workers:\n"
     case = load_case(CASE).with_overrides(CHEAP).with_overrides({"study.samples": cases})
     plan = plan_study(case)
     import asperity.study.evaluate as evaluation
@@ -65,12 +66,12 @@ def print_overhead(cases: int = 10_000) -> None:
     parent, workers = (time.process_time() - own) / cases, (_children_s() - theirs) / cases
     early, late = (min(held, key=lambda done: abs(done - share * cases)) for share in (0.1, 0.9))
     beside = 1e3 * (parent + workers - work)
-    print(
-        f"  {1e3 * wall / cases:.2f} ms a case on two workers; processor time: parent {1e3 * parent:.2f} ms, "
-        f"workers {1e3 * workers:.2f} ms, of it work {1e3 * work:.2f} ms: overhead {beside:.2f} ms a case"
+    yield (
+        f"- {1e3 * wall / cases:.2f} ms a case; processor time: parent {1e3 * parent:.2f} ms, workers "
+        f"{1e3 * workers:.2f} ms, of it work {1e3 * work:.2f} ms; overhead {beside:.2f} ms a case"
     )
     memory = f"{held[early]:.0f} MiB after {early} cases, {held[late]:.0f} after {late}"
-    print(f"  the parent holds {memory}; {result.failed} failed")
+    yield f"- the parent holds {memory}; {result.failed} cases failed"
     shutil.rmtree(folder)
 
 
@@ -83,6 +84,13 @@ def _resident_mib() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
 
+def lines(*, fast: bool) -> Iterator[str]:
+    """Both, shortened if asked."""
+    yield "## Studies\n"
+    yield from papers_study("0.5 um" if fast else "0.1 um")
+    yield from overhead(1000 if fast else 10_000)
+
+
 if __name__ == "__main__":
-    print_overhead()
-    print_papers_study()
+    for line in lines(fast="--fast" in sys.argv):
+        print(line, flush=True)
