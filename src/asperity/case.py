@@ -482,6 +482,7 @@ class MotionSection(Section):
     rough: Literal["first", "second", "both"] = "first"  # which body carries a generated surface; both: a half each
     start: Start = "steady"
     track: Count = 1  # lengths of the domain after which a surface repeats
+    flattening: Annotated[bool, Strict()] = False  # what is pressed flat stays flat: running-in
 
 
 class _Located(BadInput):

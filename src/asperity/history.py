@@ -70,7 +70,8 @@ class History:
     that asperities carry), friction's coefficient, its two parts and `friction_power_w`, `flow_power_w` (heat of the
     pressure-driven flow), `heat_j` (both, summed over time by the trapezoidal rule), `elastic_energy_j` (of a line
     contact up to a constant), `rigid_approach_m`, `resonance_hz` (natural frequency of the contact oscillator on this
-    step's contact; NaN without one), `newton_steps` and `converged`. `seconds` is what computing took this time, of
+    step's contact; NaN without one), `track_sq_m` and `flattened_m` (Sq of the whole tracks, and how far they have been
+    pressed down on average), `newton_steps` and `converged`. `seconds` is what computing took this time, of
     `computed` steps; `folder` where it is kept.
     """
 
@@ -93,9 +94,33 @@ class History:
 
     @property
     def settled(self) -> "pandas.DataFrame":
-        """The steps after the start is forgotten: oil has crossed the domain once, or else the second half."""
+        """The steps that means are of: oil has crossed the domain once, or else the second half.
+
+        Where surfaces are flattened nothing repeats, and it is the last pass.
+        """
+        if self.case.motion.flattening:
+            length = _steps_a_pass(self.case, self.case.moving_surfaces())
+            if length < self.steps:
+                last: pandas.DataFrame = self.table[self.table["step"] > self.steps - length + 1e-9]
+                return last
         crossing = math.ceil(self.case.grid.cells[0] / self.case.motion.time_step)
         return self.table[self.table["step"] >= min(crossing, (self.steps + 1) // 2)]
+
+    def by_pass(self) -> "pandas.DataFrame":
+        """Each whole pass of the rough surface's track (of two, the slower one's), the start apart: means of its steps.
+
+        Columns as in `table`, `pass` in place of `step`; of what only grows or falls (`time_s`, `track_sq_m`,
+        `flattened_m`, `heat_j`) the value at its end.
+        """
+        length = _steps_a_pass(self.case, self.case.moving_surfaces())
+        moving = self.table[self.table["step"] > 0]
+        number = np.ceil(moving["step"] / length - 1e-9).astype(int)
+        whole = moving[number * length <= self.steps + 1e-9]
+        grouped = whole.groupby(number.rename("pass"))
+        means: pandas.DataFrame = grouped.mean(numeric_only=True).drop(columns="step").reset_index()
+        for column in ("time_s", "track_sq_m", "flattened_m", "heat_j"):
+            means[column] = grouped[column].last().to_numpy()
+        return means
 
     @cached_property
     def vibration(self) -> Vibration | None:
@@ -132,6 +157,10 @@ class History:
             said[f"{name}_start"] = _number(first[name])
         resonance = None if self.vibration is None else self.vibration.resonance
         heard = resonance is not None and resonance.found
+        if self.case.motion.flattening:
+            kept = ["pass", "time_s", "car", "clr", "track_sq_m", "flattened_m", "friction_coefficient", "resonance_hz"]
+            passes = self.by_pass()[kept].astype(object)
+            said["passes"] = passes.where(passes.notna(), None).to_dict("records")
         said["crf_hz"] = _number(resonance.crf_hz) if resonance is not None and heard else None
         said["crfa"] = _number(resonance.crfa) if resonance is not None and heard else None
         return said
@@ -224,6 +253,7 @@ def run_history(
                 start=case.motion.start,
                 resume=keeper.memory,
                 time_step=case.motion.time_step,
+                flattening=case.motion.flattening,
                 options=case.options,
             )
             for snapshot in taken:
@@ -291,15 +321,19 @@ def _last_step(case: Case, surfaces: MovingSurfaces, steps: int | None, passes: 
     elif steps is not None:
         raise BadInput(f"both steps ({steps}) and passes ({passes:g}) are given; leave one out")
     else:
-        rough = surfaces.rough if any(surfaces.rough) else (True, True)
-        passage = max(surfaces.passage(index) for index in (0, 1) if rough[index])
-        seconds = passes * passage / step_seconds(case.conditions, surfaces, case.motion.time_step)
-        if not 0.0 < seconds < math.inf:
+        exact = passes * _steps_a_pass(case, surfaces)
+        if not 0.0 < exact < math.inf:
             raise BadInput(f"passes must be positive, of a rough surface that moves, got {passes:g}; give steps")
-        wanted = math.ceil(seconds - 1e-9)
+        wanted = math.ceil(exact - 1e-9)
     if wanted < 1:
         raise BadInput(f"steps must be at least 1, got {wanted}")
     return wanted
+
+
+def _steps_a_pass(case: Case, surfaces: MovingSurfaces) -> float:
+    rough = surfaces.rough if any(surfaces.rough) else (True, True)
+    passage = max(surfaces.passage(index) for index in (0, 1) if rough[index])
+    return passage / step_seconds(case.conditions, surfaces, case.motion.time_step)
 
 
 def _row(snapshot: Snapshot, case: Case, before: Row | None) -> Row:
@@ -319,6 +353,8 @@ def _row(snapshot: Snapshot, case: Case, before: Row | None) -> Row:
         "elastic_energy_j": snapshot.elastic_energy,
         "rigid_approach_m": solution.rigid_approach,
         "resonance_hz": _resonance_hz(state, case),
+        "track_sq_m": snapshot.track_sq,
+        "flattened_m": snapshot.flattened,
         "newton_steps": solution.convergence.iterations,
         "converged": solution.convergence.converged,
     }

@@ -80,6 +80,19 @@ def test_a_track_may_be_longer_than_the_contact():
     assert surfaces.passage(1) == float("inf")
 
 
+@pytest.mark.parametrize("index", [0, 1])
+def test_what_a_contact_leaves_lies_where_it_was_left(index):
+    surfaces = MovingSurfaces(rough(), rough(seed=2), (1.0, 1.0), GRID)
+    mark = np.zeros(GRID.cells)
+    mark[10, 3], side = 1.0, 3 if index == 0 else 12
+    whole = surfaces.on_track(index, mark, 8e-6)  # four cells
+    assert whole[6, side] == whole.sum() == 1.0
+    between = surfaces.on_track(index, mark, 8.5e-6)
+    assert between[6, side] == pytest.approx(0.75)
+    assert between[5, side] == pytest.approx(0.25)
+    assert between.sum() == pytest.approx(1.0)
+
+
 def test_a_track_shorter_than_the_contact_is_refused():
     half = Grid((16, 16), (0.0, 0.0), (32e-6, 16e-6))
     with pytest.raises(BadInput, match="as long"):
@@ -265,6 +278,19 @@ def test_passes_are_of_the_rough_surface():
     assert done.steps == int(np.ceil(0.1 * 48 / 0.9))
     with pytest.raises(BadInput, match="leave one out"):
         run_history(chosen, passes=1.0, steps=3)
+
+
+def test_passes_are_told_apart_where_surfaces_are_flattened():
+    chosen = case(**{"motion.flattening": True, "material.hardness": "0.7 GPa", "contact.slip": 0.0})
+    done = run_history(chosen, steps=100)
+    passes = done.by_pass()
+    assert list(passes["pass"]) == [1, 2]
+    table = done.table.set_index("step")
+    assert passes["clr"][1] == pytest.approx(table["clr"].loc[49:96].mean())
+    assert passes["track_sq_m"][0] == table["track_sq_m"].loc[48]
+    assert passes["flattened_m"][1] > passes["flattened_m"][0] > 0.0
+    assert len(done.scalars()["passes"]) == 2
+    json.dumps(done.scalars(), allow_nan=False)
 
 
 # Page and command

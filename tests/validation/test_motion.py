@@ -8,8 +8,9 @@ from benchmarks.motion import VENNER, contact, waves
 
 from asperity.ehl.friction import friction
 from asperity.ehl.motion import moving_contact
+from asperity.ehl.scales import Scales
 from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
+from asperity.ehl.solve import contact_problem, solve_contact
 from asperity.ehl.state import contact_state
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian
@@ -183,6 +184,50 @@ def test_going_on_from_a_snapshot_is_as_if_there_had_been_no_stop():
         assert one.number == other.number
         assert np.array_equal(one.solution.pressure, other.solution.pressure)
         assert np.array_equal(one.solution.gap, other.solution.gap)
+
+
+@pytest.fixture(scope="module")
+def run_in():
+    """Two passes of a rough surface that is flattened as it passes, in pure rolling."""
+    conditions = paper.contact(hardness=0.7e9, surface_speeds=(1.91, 1.91))
+    on = paper.grid((48, 48), x=(-3.0, 1.8))
+    surfaces = MovingSurfaces.one_rough(paper.rough(on, 1e-6, correlation_length=40e-6), conditions.surface_speeds)
+    return surfaces, list(islice(moving_contact(conditions, paper.barus(), surfaces, flattening=True), 97))
+
+
+def overlap(one):
+    """How deep the bodies overlap [m], from pressure and roughness alone."""
+    solution = one.solution
+    scales = Scales.of(solution.conditions, solution.lubricant)
+    posed = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
+    bent = posed.undeformed + posed.deflection(solution.pressure / scales.pressure)
+    gap = bent * scales.gap + solution.rigid_approach
+    return np.maximum(solution.options.contact_film - gap, 0.0) * (solution.pressure == solution.conditions.hardness)
+
+
+def test_tracks_lose_what_overlapped_and_nothing_else(run_in):
+    surfaces, taken = run_in
+    lost = np.cumsum([overlap(one).sum() for one in taken])
+    np.testing.assert_allclose([one.memory["lowered_first"].sum() for one in taken], lost, rtol=1e-9)
+    np.testing.assert_allclose([one.flattened for one in taken], lost / surfaces.first.heights.size, rtol=1e-9)
+    assert not np.any(taken[-1].memory["lowered_second"])  # it is smooth
+    last, before = taken[-1].solution.surface.heights, taken[-2].memory["lowered_first"]
+    np.testing.assert_allclose(last, np.roll(surfaces.first.heights - before, 96, axis=0), atol=1e-15)
+
+
+def test_what_is_flat_stays_flat(run_in):
+    """Asperities that have been through once carry the load on more area: the second pass takes off less."""
+    _, taken = run_in
+    first, second = taken[48].flattened - taken[0].flattened, taken[96].flattened - taken[48].flattened
+    assert 0.0 < second < 0.5 * first
+    assert taken[96].track_sq < taken[0].track_sq
+
+
+def test_an_elastic_surface_is_never_flattened():
+    on, conditions = paper.grid((48, 48), x=(-3.0, 1.8)), paper.contact()
+    surfaces = MovingSurfaces.one_rough(paper.rough(on, 0.5e-6, correlation_length=60e-6), conditions.surface_speeds)
+    *_, last = islice(moving_contact(conditions, paper.barus(), surfaces, flattening=True), 4)
+    assert last.flattened == 0.0
 
 
 @pytest.mark.parametrize(

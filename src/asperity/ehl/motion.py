@@ -23,7 +23,7 @@ from asperity.ehl.solution import ATTEMPTS, ContactSolution, Options
 from asperity.ehl.solve import Progress, Search, contact_problem, solve_contact
 from asperity.ehl.state import ContactState, state_of
 from asperity.errors import BadInput, require_positive
-from asperity.kernels.reynolds import LUBRICATED, RUPTURED
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 from asperity.surface.moving import MovingSurfaces
@@ -33,6 +33,7 @@ Memory = Mapping[str, "np.ndarray[Any, Any]"]
 
 LONGEST_STEP = 8.0  # cells that the oil may travel in one
 HELD = ATTEMPTS[2]
+_LOWERED = ("lowered_first", "lowered_second")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +43,9 @@ class Snapshot:
     `number` of the step (0 is the start) and its `time` [s]; `solution` and `state` as of a contact that stands still,
     with the squeeze term in the balance of oil; `flow_power` [W] what the pressure-driven flow of the oil turns to heat
     where a film parts the bodies (the rest is friction's), `elastic_energy` [J] half of the sum of pressure times
-    deflection, of a line contact up to a constant; both of the whole contact. `memory` is all that the next step needs
-    to know.
+    deflection, of a line contact up to a constant; both of the whole contact. `flattened` [m] is how far the tracks of
+    the rough surfaces have been pressed down on average since the start, both together, and `track_sq` [m] the root of
+    their Sq squared and added. `memory` is all that the next step needs to know.
     """
 
     number: int
@@ -52,6 +54,8 @@ class Snapshot:
     state: ContactState
     flow_power: float
     elastic_energy: float
+    flattened: float
+    track_sq: float
     memory: Memory
 
 
@@ -66,6 +70,7 @@ def moving_contact(
     start: Start = "steady",
     resume: Memory | None = None,
     time_step: float = 1.0,
+    flattening: bool = False,
     options: Options | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Snapshot]:
@@ -79,6 +84,8 @@ def moving_contact(
         from rest, bodies pressed together dry and every gap full of oil
     resume : `memory` of an earlier snapshot, to go on from; that snapshot is not yielded again
     time_step : over the time that the oil takes from cell to cell; 1 follows the oil along its way
+    flattening : remember where the cap has let the bodies overlap: the rough surface (both, by halves, where both are
+        rough) is lower there by as much when it comes again
     options : tolerances of every step; `Options()` unless given
     progress : called after every Newton step
 
@@ -97,7 +104,7 @@ def moving_contact(
         raise BadInput(f"time step must be at most {LONGEST_STEP:g} cells, got {time_step:g}; 1 follows the oil")
     if start not in ("steady", "stationary"):
         raise BadInput(f"start must be steady or stationary, got {start!r}")
-    contact = _Contact(conditions, lubricant, surfaces, options or Options(), time_step, progress)
+    contact = _Contact(conditions, lubricant, surfaces, options or Options(), time_step, flattening, progress)
     if resume is None:
         first = contact.start(standing=start == "steady")
         yield first
@@ -123,15 +130,17 @@ class _Contact:
         surfaces: MovingSurfaces,
         options: Options,
         time_step: float,
+        flattening: bool,
         progress: Progress | None,
     ) -> None:
         self.conditions, self.lubricant, self.surfaces = conditions, lubricant, surfaces
-        self.options, self.progress = options, progress
+        self.options, self.flattening, self.progress = options, flattening, progress
         self.scales = Scales.of(conditions, lubricant)
         self.seconds = step_seconds(conditions, surfaces, time_step)
         self.length = self.seconds * conditions.entrainment_speed / self.scales.length
         self.one_line = surfaces.uniform and conditions.geometry == "line"
         rough = any(surfaces.rough)
+        self.shares = [float(one) / max(sum(surfaces.rough), 1) for one in surfaces.rough]  # of what is flattened
         self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # on smooth bodies, the accurate wedge
         self.followed = rough and time_step == 1.0
 
@@ -146,12 +155,16 @@ class _Contact:
         if not standing:  # what was touching dry has the contact film between
             gap = np.maximum(solution.gap, self.options.contact_film)
             solution = replace(solution, gap=gap)
-        return self._snapshot(0, solution, balance, approach, None, standing=standing)
+        memory = {} if not standing else {"content_before": _content(balance)}
+        return self._snapshot(0, solution, balance, approach, memory, self.surfaces)
 
     def step(self, number: int, memory: Memory) -> Snapshot:
         """The contact a step later."""
         began = time.perf_counter()
-        surface = self.surfaces.at(number * self.seconds)
+        surfaces = self.surfaces
+        if self.flattening:
+            surfaces = surfaces.lowered(memory["lowered_first"], memory["lowered_second"])
+        surface = surfaces.at(number * self.seconds)
         whole = self._problem(surface, self._past(memory))
         problem = _on_one_line(whole) if self.one_line else whole
         pressure, approach = memory["pressure"][:, : problem.cells[1]], float(memory["approach"])
@@ -171,7 +184,9 @@ class _Contact:
         balance = step.balance
         if self.one_line:
             balance = whole.evaluate(np.repeat(balance.pressure, whole.cells[1], axis=1), step.approach)
-        return self._snapshot(number, solution, balance, step.approach, memory["content"], standing=True)
+        kept = {"content_before": memory["content"]}
+        kept |= {name: memory[name] for name in _LOWERED if self.flattening}
+        return self._snapshot(number, solution, balance, step.approach, kept, surfaces)
 
     def _problem(self, surface: Surface, past: Past | None) -> Problem:
         posed = contact_problem(self.conditions, self.lubricant, surface, self.options, attempt=self.attempt)
@@ -194,32 +209,50 @@ class _Contact:
         solution: ContactSolution,
         balance: Balance,
         approach: float,
-        before: Field | None,
-        *,
-        standing: bool,
+        kept: dict[str, Any],
+        surfaces: MovingSurfaces,
     ) -> Snapshot:
-        assert balance.film is not None  # a moving contact has oil
-        memory = {
+        when = number * self.seconds
+        memory = kept | {
             "number": np.array(number),
             "pressure": balance.pressure,
             "approach": np.array(approach),
-            "content": balance.film.content,
+            "content": _content(balance),
         }
-        if standing:
-            memory["content_before"] = balance.film.content if before is None else before
         flow, elastic = _powers(balance)
         grid, conditions = solution.grid, self.conditions
         area = self.scales.length**2 * (1.0 if conditions.length is None else conditions.length / grid.extent[1])
         energy = self.scales.pressure * self.scales.gap * area
+        flattened, track_sq = 0.0, float(np.hypot(surfaces.first.sq, surfaces.second.sq))
+        if self.flattening:
+            overlap = _overlap(balance) * self.scales.gap * solution.convergence.converged
+            for index, name in enumerate(_LOWERED):
+                share = self.shares[index] * overlap
+                before = kept.get(name, 0.0)
+                memory[name] = before + self.surfaces.on_track(index, share, when)
+                flattened += float(memory[name].mean())
         return Snapshot(
             number=number,
-            time=number * self.seconds,
+            time=when,
             solution=solution,
             state=state_of(solution, balance),
             flow_power=flow * energy * conditions.entrainment_speed / self.scales.length,
             elastic_energy=elastic * energy,
+            flattened=flattened,
+            track_sq=track_sq,
             memory=memory,
         )
+
+
+def _content(balance: Balance) -> Field:
+    assert balance.film is not None  # a moving contact has oil
+    return balance.film.content
+
+
+def _overlap(balance: Balance) -> Field:
+    """How deep the cap has let the bodies overlap, dimensionless."""
+    depth = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)
+    return np.where(balance.rows.state == CAPPED, depth, 0.0)
 
 
 def _on_one_line(problem: Problem) -> Problem:

@@ -85,6 +85,32 @@ class MovingSurfaces:
         first, second = (self._seen(index, time) for index in (0, 1))
         return Surface(first + second[:, ::-1], self.grid)
 
+    def lowered(self, first: Field, second: Field) -> "MovingSurfaces":
+        """The same surfaces, their heights lower by so much on each track [m]."""
+        return MovingSurfaces(
+            Surface(self.first.heights - first, self.first.grid),
+            Surface(self.second.heights - second, self.second.grid),
+            self.speeds,
+            self.grid,
+        )
+
+    def on_track(self, index: int, field: Field, time: float) -> Field:
+        """What a field on the contact's grid at `time` [s] is on the track of surface 0 or 1, and nothing beside it.
+
+        What straddles two cells of the track is shared between them, so that its sum is kept and its sign.
+        """
+        surface = (self.first, self.second)[index]
+        cells = self.speeds[index] * time / self.grid.spacing[0]
+        whole = round(cells)
+        part = 0.0
+        if abs(cells - whole) >= WHOLE:
+            whole = int(np.floor(cells))
+            part = cells - whole
+        track = np.zeros(surface.grid.cells)
+        track[: self.grid.cells[0]] = field if index == 0 else field[:, ::-1]
+        here = np.roll(track, -whole, axis=0)
+        return np.asarray((1.0 - part) * here + part * np.roll(here, -1, axis=0))
+
     def passage(self, index: int) -> float:
         """Time in which surface 0 or 1 runs its whole track [s]; infinite for one that stands still."""
         surface, speed = (self.first, self.second)[index], abs(self.speeds[index])
