@@ -246,7 +246,7 @@ def _print_calibration(found: "Calibration") -> None:
         print("\n  what the others would gain without an anchor, by slopes")
         for trade in dearest:
             print(
-                f"    {trade.given_up}: misfit of the others {trade.misfit:.2g} to {trade.without:.2g}; "
+                f"    {trade.given_up}: misfit of the others {trade.misfit:.1f} to {trade.without:.1f}; "
                 f"most {trade.relieved}, {trade.miss:+.1f} to {trade.miss_without:+.1f} tolerances"
             )
     print(

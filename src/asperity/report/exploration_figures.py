@@ -211,6 +211,6 @@ def _curves(axes: Axes, found: Calibration) -> None:
 
 def _wrapped(name: str) -> str:
     """Two lines of about equal length."""
-    words = name.split()
+    words = name.replace(" um", "\u00a0um").split(" ")
     cut = min(range(1, len(words) + 1), key=lambda i: abs(len(" ".join(words[:i])) - len(name) / 2))
     return "\n".join(part for part in (" ".join(words[:cut]), " ".join(words[cut:])) if part)

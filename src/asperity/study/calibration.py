@@ -65,8 +65,9 @@ RESERVED = {
 class Parameter(NamedTuple):
     """A quantity that was free: what was found, and how well the anchors determine it.
 
-    `low` and `high` are one standard deviation either way, the range searched counting as what was known before;
-    `learnt` is how much of the range's variance the anchors took away, 0 nothing, 1 all.
+    `low` and `high` are one standard deviation either way, the range searched counting as what was known before, and
+    the whole range where the anchors do not determine the quantity; `learnt` is how much of the range's variance they
+    took away, 0 nothing, 1 all.
     """
 
     range: Range
@@ -594,7 +595,9 @@ def _calibrated(case: Case, ranges: Sequence[Range], best: Field) -> Case:
 def _parameters(case: Case, ranges: Sequence[Range], best: Field, deviations: Field) -> list[Parameter]:
     found = []
     for entry, share, std in zip(ranges, best, deviations, strict=True):
-        low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in (share - std, share + std))
+        learnt = float(1.0 - std**2 / PRIOR_VARIANCE)
+        reach = (share - std, share + std) if learnt >= LEARNT_FROM else (0.0, 1.0)
+        low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in reach)
         found.append(
             Parameter(
                 range=entry,
@@ -603,7 +606,7 @@ def _parameters(case: Case, ranges: Sequence[Range], best: Field, deviations: Fi
                 low=low,
                 high=high,
                 std_share=float(std),
-                learnt=float(1.0 - std**2 / PRIOR_VARIANCE),
+                learnt=learnt,
                 at_end=not EDGE < share < 1.0 - EDGE,
             )
         )
