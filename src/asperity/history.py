@@ -174,6 +174,8 @@ class History:
             f"motion, {100 * first['clr']:.1f} % in the {at_start}: {self.steps} steps, "
             f"{1e6 * self.table['time_s'].iloc[-1]:.4g} us"
         )
+        if self.case.motion.flattening and len(passes := self.by_pass()):
+            sentence += f", the mean of the last of {len(passes)} passes"
         if self.failed:
             sentence = f"NOT CONVERGED at step {self.failed[0]}, do not use what follows it: {sentence}"
         return f"{sentence}."

@@ -290,6 +290,7 @@ def test_passes_are_told_apart_where_surfaces_are_flattened():
     assert passes["track_sq_m"][0] == table["track_sq_m"].loc[48]
     assert passes["flattened_m"][1] > passes["flattened_m"][0] > 0.0
     assert len(done.scalars()["passes"]) == 2
+    assert "Running-in, a point a pass" in render_motion_page(done)
     json.dumps(done.scalars(), allow_nan=False)
 
 

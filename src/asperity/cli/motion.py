@@ -125,6 +125,9 @@ def _print_history(history: "History", report: Path | None) -> None:
         ("contact resonance by load share", f"{shown('resonance_hz', 1, 1)} Hz"),
         ("oil lost or re-created, over oil carried", f"{shown('mass_flux_imbalance', 100, 1)} %"),
     ]
+    for one in said.get("passes", [])[:: max(1, len(said.get("passes", [])) - 1)]:
+        shares = f"CLR {100 * one['clr']:.1f} %, CAR {100 * one['car']:.2f} %"
+        rows.append((f"pass {one['pass']}", f"{shares}, Sq of the tracks {1e6 * one['track_sq_m']:.3f} um"))
     if said["crf_hz"] is not None:
         rows.append(("CRF of the mean contact", f"{said['crf_hz']:.1f} Hz"))
     print()

@@ -16,6 +16,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from asperity.arrays import Field
 from asperity.ehl.state import hertz_zone
@@ -169,6 +170,32 @@ def curves(history: History) -> Curves:
     every[-1].set_xlabel("time [µs]")
     box = every[0].get_position()
     return Curves(figure, box.x0, box.x1)
+
+
+@styled()
+def running_in(history: History) -> Figure:
+    """Load and area shares, Sq of the tracks, how far they are pressed down, and resonance, pass by pass."""
+    table = history.by_pass()
+    passes = table["pass"].to_numpy()
+    shares = [("clr", "CLR, load on asperities", 100.0), ("car", "CAR, Hertz zone", 100.0)]
+    panels = [
+        ("share [%]", shares),
+        ("Sq of the tracks [µm]", [("track_sq_m", "", MICRO)]),
+        ("pressed down, mean [nm]", [("flattened_m", "", 1e9)]),
+    ]
+    if bool(table["resonance_hz"].notna().any()):
+        panels.append(("resonance [Hz]", [("resonance_hz", "", 1.0)]))
+    figure = Figure(figsize=(9.6, 2.4 * -(-len(panels) // 2)), layout="constrained")
+    for number, (label, lines) in enumerate(panels, 1):
+        axes = figure.add_subplot(-(-len(panels) // 2), 2, number)
+        for (name, said, scale), colour, marker in zip(lines, (BLUE, VERMILION), "os", strict=False):
+            axes.plot(passes, scale * table[name].to_numpy(), marker=marker, markersize=3.5, color=colour, label=said)
+        if len(lines) > 1:
+            axes.set_ylim(bottom=0.0)
+            axes.legend(loc="upper right")
+        axes.set(ylabel=label, xlabel="pass")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return figure
 
 
 def _draw(axes: Axes, time: Field, lines: Sequence[tuple[Field, str]]) -> None:

@@ -85,6 +85,8 @@ def render_motion_page(history: History) -> str:
         ),
         begins=100.0 * over_time.begins,
         ends=100.0 * over_time.ends,
+        running_in=_running_in(history),
+        flattening=motion.flattening,
         numbers=_numbers(history),
         settled_from=int(rows["step"].iloc[0]),
         start=motion.start,
@@ -118,6 +120,18 @@ def _film(history: History, kind: str, reach: figures.Ranges) -> Film:
     shares = (100.0 * share for share in (empty.left, empty.top, empty.width, empty.height))
     left, top, width, height = shares
     return Film(kind, axes, left, top, width, height, zone)
+
+
+def _running_in(history: History) -> Picture | None:
+    if not history.case.motion.flattening or len(history.by_pass()) < 2:
+        return None
+    return picture(
+        figures.running_in(history),
+        "Running-in, a point a pass of the rough surface: shares and resonance are means over the pass, Sq and how far "
+        "the tracks are pressed down stand as at its end. What is pressed down is taken to come up everywhere alike: the "
+        "mean plane rises, which under a held load parts the bodies by as much and changes nothing else.",
+        "Shares, Sq, flattening and resonance over passes",
+    )
 
 
 def _said(history: History, number: int) -> str:
