@@ -128,8 +128,8 @@ def _running_in(history: History) -> Picture | None:
     return picture(
         figures.running_in(history),
         "Running-in, a point a pass of the rough surface: shares and resonance are means over the pass, Sq and how far "
-        "the tracks are pressed down stand as at its end. What is pressed down is taken to come up everywhere alike: the "
-        "mean plane rises, which under a held load parts the bodies by as much and changes nothing else.",
+        "the tracks are pressed down stand as at its end. What is pressed down is taken to come up everywhere alike: "
+        "the mean plane rises, which under a held load parts the bodies by as much and changes nothing else.",
         "Shares, Sq, flattening and resonance over passes",
     )
 
