@@ -241,11 +241,14 @@ def run_history(
     NotConverged
         if `strict`; its `solution` is the history, the bad step the last of it.
     """
+    from threadpoolctl import threadpool_limits
+
     surfaces = _surfaces_of(case)
     last = _last_step(case, surfaces, steps, passes)
     model = MODELS[case.contents.model]
     began = time.perf_counter()
-    with _keeper(case, surfaces, last, out, every) as keeper:
+    # sums over several threads depend on their number, and vectors this short are slower for it
+    with _keeper(case, surfaces, last, out, every) as keeper, threadpool_limits(1):
         before = len(keeper.rows)
         if last > keeper.last:
             taken: Iterator[Snapshot] = model(
