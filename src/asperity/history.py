@@ -88,6 +88,11 @@ class History:
         return int(self.table["step"].iloc[-1])
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that a reader of the numbers has to know."""
+        return (*self.case.surface_notes, *self.case.notes)
+
+    @property
     def failed(self) -> tuple[int, ...]:
         """Steps that did not converge."""
         return tuple(int(number) for number in self.table["step"][~self.table["converged"]])
@@ -245,7 +250,7 @@ def run_history(
 
     surfaces = _surfaces_of(case)
     last = _last_step(case, surfaces, steps, passes)
-    model = MODELS[case.contents.model]
+    model = _model_of(case)
     began = time.perf_counter()
     # sums over several threads depend on their number, and vectors this short are slower for it
     with _keeper(case, surfaces, last, out, every) as keeper, threadpool_limits(1):
@@ -318,6 +323,13 @@ def _surfaces_of(case: Case) -> MovingSurfaces:
     if case.thermal.feedback:
         raise BadInput(f"{case.source}: motion knows no warm film; set thermal.feedback=false")
     return case.moving_surfaces()
+
+
+def _model_of(case: Case) -> Steps:
+    name: str = case.contents.model
+    if name not in MODELS:
+        raise BadInput(f"{case.source}: model {name} has no steps in time; {' or '.join(MODELS)} has")
+    return MODELS[name]
 
 
 def _last_step(case: Case, surfaces: MovingSurfaces, steps: int | None, passes: float | None) -> int:

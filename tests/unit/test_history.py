@@ -115,6 +115,41 @@ def test_both_bodies_share_the_roughness():
     assert abs(together) < 0.3
 
 
+@pytest.fixture
+def measured(tmp_path):
+    """A case in a folder with two measured surfaces, each larger than the contact."""
+    import x3pio
+
+    for name, seed in (("ring.x3p", 1), ("roller.x3p", 2)):
+        heights = np.random.default_rng(seed).standard_normal((200, 220)).cumsum(0).cumsum(1)
+        x3pio.write(tmp_path / name, (heights * (1e-6 / heights.std())).T, x_scale=2e-6, y_scale=2e-6)
+    return replace(case(), folder=tmp_path)
+
+
+def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measured):
+    two = measured.with_overrides({"surface": {"file": "ring.x3p", "sq": "1 um", "second": {"file": "roller.x3p"}}})
+    surfaces = two.moving_surfaces()
+    assert surfaces.speeds == two.conditions.surface_speeds
+    assert surfaces.first.sq == pytest.approx(1e-6)
+    assert surfaces.rough == (True, True)
+    for one in (surfaces.first, surfaces.second):
+        inside = np.abs(np.diff(one.heights, axis=0)).mean()
+        assert np.abs(one.heights[0] - one.heights[-1]).mean() < 3.0 * inside
+    assert run_history(two, steps=1).failed == ()
+
+
+def test_one_measured_surface_cannot_lie_on_both_bodies(measured):
+    alone = measured.with_overrides({"surface": {"file": "ring.x3p"}, "motion.rough": "both"})
+    with pytest.raises(BadInput, match="name the other as second"):
+        alone.moving_surfaces()
+
+
+def test_roughness_kept_in_a_run_has_no_track():
+    kept = replace(case(), stored=case().surface())
+    with pytest.raises(BadInput, match="let the case file move"):
+        run_history(kept, steps=1)
+
+
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [
@@ -270,6 +305,13 @@ def test_bad_steps_are_marked_where_it_shall_go_on():
     marked = run_history(case(), steps=5, strict=False)
     assert marked.steps == 5
     assert marked.failed == (3,)
+
+
+def test_a_model_without_steps_in_time_is_refused(monkeypatch):
+    monkeypatch.delitem(MODELS, "unified")
+    monkeypatch.setitem(MODELS, "another", moving_contact)
+    with pytest.raises(BadInput, match="another has"):
+        run_history(case(), steps=1)
 
 
 def test_passes_are_of_the_rough_surface():

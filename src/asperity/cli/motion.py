@@ -132,6 +132,8 @@ def _print_history(history: "History", report: Path | None) -> None:
         rows.append(("CRF of the mean contact", f"{said['crf_hz']:.1f} Hz"))
     print()
     print_rows(rows)
+    for note in history.notes:
+        print(f"  note: {note}")
     if history.folder is not None:
         print(f"\nKept in {history.folder}; asperity run with the same folder and more steps goes on")
     if report is not None:

@@ -93,6 +93,7 @@ def render_motion_page(history: History) -> str:
         characteristic=motion.time_step == 1.0,
         time_step=motion.time_step,
         imbalance=f"{100.0 * rows['mass_flux_imbalance'].mean():.0f} %",
+        notes=[in_print(note) for note in history.notes],
         case_text=history.case.text,
         script_data=json.dumps(
             {
