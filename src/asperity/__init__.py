@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from asperity.ehl.flash import FlashTemperature, flash_temperature
     from asperity.ehl.friction import Friction, friction
     from asperity.ehl.motion import Snapshot, moving_contact
+    from asperity.ehl.sharing import LoadSharing, load_below, load_sharing
     from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
     from asperity.ehl.solve import solve_contact
     from asperity.ehl.state import ContactState, contact_state
@@ -92,6 +93,7 @@ _NAMES = {
     "ehl.flash": ("FlashTemperature", "flash_temperature"),
     "ehl.friction": ("Friction", "friction"),
     "ehl.motion": ("Snapshot", "moving_contact"),
+    "ehl.sharing": ("LoadSharing", "load_below", "load_sharing"),
     "ehl.solution": ("ContactSolution", "Convergence", "Iteration", "Options", "Status"),
     "ehl.solve": ("solve_contact",),
     "ehl.state": ("ContactState", "contact_state"),
@@ -193,6 +195,7 @@ __all__ = [
     "Iteration",
     "LinearBairWiner",
     "LoadShare",
+    "LoadSharing",
     "Lubricant",
     "MovingSurfaces",
     "Newtonian",
@@ -249,10 +252,12 @@ __all__ = [
     "gaussian_surface",
     "ground_surface",
     "load_anchors",
+    "load_below",
     "load_case",
     "load_history",
     "load_run",
     "load_share",
+    "load_sharing",
     "load_solution",
     "load_study",
     "motion",

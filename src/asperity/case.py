@@ -646,7 +646,7 @@ def _preset_table(name: str) -> dict[str, Any]:
 class CaseFile(Section):
     """A whole case file. `lubricant = "none"` is a dry contact: an oil is not something to forget."""
 
-    model: Literal["unified"] = "unified"
+    model: Literal["unified", "conserving"] = "unified"
     contact: ContactSection
     material: MaterialSection
     lubricant: Annotated[LubricantSection | None, PlainValidator(_lubricant_section)]
@@ -837,6 +837,7 @@ class Case:
             tolerance=section.tolerance,
             max_iterations=section.max_iterations,
             contact_film=float(section.contact_film),
+            model=self.contents.model,
         )
 
     @cached_property

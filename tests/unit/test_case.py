@@ -166,7 +166,7 @@ BAD = [
     ("lubricant", "water", "lubricant"),
     ("surface.file", "ring.x3p", "both kind and file"),
     ("study", {"sq": {"from": "1 um"}}, "study.sq.to is missing"),
-    ("model", "conserving", "model must be"),
+    ("model", "lossy", "model must be"),
 ]
 
 

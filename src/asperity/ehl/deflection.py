@@ -39,6 +39,15 @@ class Deflection:
         waves *= self.spectrum[pressure.dtype == np.float32]
         return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
 
+    def undone(self, displacement: Field) -> Field:
+        """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
+        import scipy.fft as fft
+
+        (nx, ny), (long, wide) = self.cells, self.padded
+        waves = fft.fft(fft.rfft(displacement, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        waves /= np.abs(self.spectrum[0])  # the mean of a line contact has a sign of its own
+        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
+
     @property
     def near(self) -> Field:
         """Compliance of cells 0, 1, 2 along x and of the first far one: what the preconditioner keeps of the kernel."""

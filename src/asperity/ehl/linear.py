@@ -51,7 +51,7 @@ class Linear:
             self.weight = np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0))
             self.block = (_block(self.cells[0]), _block(self.cells[1]))
             nx, ny = (-(-n // size) for n, size in zip(self.cells, self.block, strict=True))
-            self.pattern = _pattern((nx, ny))
+            self.pattern = five_point_pattern((nx, ny))
             self.factors = self._factor()
 
     def product(self, d_pressure: Field, d_approach: float) -> Field:
@@ -174,7 +174,8 @@ class _Pattern(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _pattern(cells: tuple[int, int]) -> _Pattern:
+def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
+    """The pattern of a grid, found once."""
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 

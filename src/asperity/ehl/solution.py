@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     import xarray
 
 
+UNIFIED, CONSERVING = MODELS = ("unified", "conserving")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
     """How hard to solve.
@@ -29,11 +32,13 @@ class Options:
     max_iterations : Newton steps allowed on each grid level and in each attempt
     contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
         some per cent per factor of ten, so it belongs beside every CLR.
+    model : "unified", which lets oil vanish where bodies touch and appear where it ruptures, or "conserving"
     """
 
     tolerance: float = 1e-4
     max_iterations: int = 200
     contact_film: float = 5e-9
+    model: str = UNIFIED
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 0.1:
@@ -41,6 +46,8 @@ class Options:
         if self.max_iterations < 1:
             raise BadInput(f"max_iterations must be at least 1, got {self.max_iterations}")
         require_positive("contact film", self.contact_film, "m")
+        if self.model not in MODELS:
+            raise BadInput(f"model must be {' or '.join(MODELS)}, got {self.model!r}")
 
 
 # what is tried, one after the other, until one converges
@@ -148,13 +155,28 @@ class Convergence:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Oil:
+    """What the conserving model knows of the oil besides, (nx, ny).
+
+    `content` is the share of the gap that is oil, `pressure` [Pa] the oil's own (the rest of the solution's is elastic
+    contact), `growth` [m] how far oil at the cap has pressed the gap open for good: part of the solution's gap.
+    """
+
+    content: Field
+    pressure: Field
+    growth: Field
+
+
 @dataclass(frozen=True, kw_only=True)
 class ContactSolution:
     """A solved contact.
 
     `pressure` [Pa], `gap` [m] between the deformed surfaces and `in_contact` have shape (nx, ny) on `grid`;
     `rigid_approach` [m] is h0 in h = h0 + x^2/(2R) + deflection - roughness.
-    What was solved travels along: conditions, lubricant (None when dry), surface and options.
+    What was solved travels along: conditions, lubricant (None when dry), surface and options. `oil` is what the
+    conserving model adds; there `in_contact` are the cells whose elastic bodies touch, with oil at the cap perhaps
+    pressed between them since (the solid side), and `gap` is the film's whole height.
     """
 
     conditions: ContactConditions
@@ -167,6 +189,7 @@ class ContactSolution:
     rigid_approach: float
     convergence: Convergence
     viscosity_factor: Field | None = None  # what warmth left of the oil's viscosity, (nx, ny); None where it left all
+    oil: Oil | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)  # free text kept with the run, such as its case
 
     @property
@@ -176,9 +199,11 @@ class ContactSolution:
 
     @property
     def cavitated(self) -> Mask:
-        """Cells in which the oil has ruptured (no pressure, no contact); all False in a dry contact."""
+        """Cells in which the oil has ruptured: no pressure, no contact; in the conserving model any not full of oil."""
         if self.lubricant is None:
             return np.zeros(self.pressure.shape, dtype=bool)
+        if self.oil is not None:
+            return np.asarray(self.oil.content < 1.0)
         return (self.pressure <= 0.0) & ~self.in_contact
 
     @property

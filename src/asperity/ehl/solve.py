@@ -11,7 +11,16 @@ from asperity.conditions import ContactConditions
 from asperity.ehl.iterate import Step, newton
 from asperity.ehl.problem import Balance, Form, Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.solution import ATTEMPTS, ContactSolution, Convergence, Figures, Iteration, Options, Status
+from asperity.ehl.solution import (
+    ATTEMPTS,
+    CONSERVING,
+    ContactSolution,
+    Convergence,
+    Figures,
+    Iteration,
+    Options,
+    Status,
+)
 from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Lubricant
@@ -63,11 +72,24 @@ def solve_contact(
     _check_grid(conditions, surface)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
+    if options.model == CONSERVING:
+        from asperity.ehl.conserving_solve import solve_conserving  # it builds on this module
+
+        return solve_conserving(
+            conditions,
+            lubricant,
+            surface,
+            options=options,
+            start=start,
+            viscosity_factor=viscosity_factor,
+            strict=strict,
+            progress=progress,
+        )
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = _on_one_line(whole) if whole.uniform else whole
+    finest = on_one_line(whole) if whole.uniform else whole
     search = Search(options, scales.gap, progress)
     if start is None:
-        levels = _levels(finest)
+        levels = grid_levels(finest)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
     else:
         levels = [finest]
@@ -321,7 +343,7 @@ def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
     return float(3.63 * speed**0.68 * material**0.49 * load**-0.073 * side_leakage * radius)
 
 
-def _levels(finest: Problem) -> list[Problem]:
+def grid_levels(finest: Problem) -> list[Problem]:
     """The problem on its own grid and on coarser and coarser ones."""
     levels = [finest]
     while (cells := _halved(levels[-1].cells)) != levels[-1].cells:
@@ -334,7 +356,8 @@ def _halved(cells: tuple[int, int]) -> tuple[int, int]:
     return nx, ny
 
 
-def _on_one_line(problem: Problem) -> Problem:
+def on_one_line(problem: Problem) -> Problem:
+    """What does not vary along y, on one line of cells that is as wide as all."""
     factor, (dx, dy) = problem.viscosity_factor, problem.spacing
     return replace(
         problem,

@@ -6,6 +6,8 @@ import numpy as np
 
 from asperity.arrays import Mask
 from asperity.conditions import ContactConditions
+from asperity.ehl.conserving import OilBalance, evaluate
+from asperity.ehl.conserving_solve import unknowns_of
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
@@ -57,21 +59,27 @@ def contact_state(solution: ContactSolution) -> ContactState:
         solution.viscosity_factor,
         attempt=solution.convergence.attempt,
     )
+    if solution.oil is not None:
+        return state_of(solution, evaluate(problem, unknowns_of(solution, problem, scales)))
     return state_of(
         solution, problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
     )
 
 
-def state_of(solution: ContactSolution, balance: Balance) -> ContactState:
+def state_of(solution: ContactSolution, balance: Balance | OilBalance) -> ContactState:
     """The scalars of a solution whose equations, those of a moving contact perhaps, are left with `balance`."""
     grid, touching, problem = solution.grid, solution.in_contact, balance.problem
     sq, oil = solution.surface.sq, solution.lubricant
     zone, centre = problem.zone(), problem.zone(CENTRE)
-    capped = balance.rows.state == CAPPED
     dx, dy = problem.spacing
-    unbalanced = np.abs(balance.outflow[zone & (balance.rows.state != LUBRICATED)]).sum() * dx * dy
     width = grid.cells[1] * dy if problem.form.periodic else 2.0 * problem.form.aspect
-    carried = balance.film.content[zone].mean() * width if balance.film else np.inf
+    if isinstance(balance, OilBalance):
+        capped = balance.unknowns.pressure >= problem.p_cap
+        unbalanced, carried = np.abs(balance.outflow[zone]).sum(), balance.flow.content[zone].mean()
+    else:
+        capped = balance.rows.state == CAPPED
+        unbalanced = np.abs(balance.outflow[zone & (balance.rows.state != LUBRICATED)]).sum()
+        carried = balance.film.content[zone].mean() if balance.film else np.inf
     return ContactState(
         car=float(touching[zone].mean()),
         car_domain=float(touching.mean() * _hertz_areas(solution.conditions, grid)),
@@ -85,7 +93,7 @@ def state_of(solution: ContactSolution, balance: Balance) -> ContactState:
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,
-        mass_flux_imbalance=float(unbalanced / carried),
+        mass_flux_imbalance=float(unbalanced * dx * dy / (carried * width)),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Options, Status
+from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Oil, Options, Status
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
@@ -45,6 +45,11 @@ _OWN = (
 _ERRORS = ("iteration_error", "discretisation_error")
 _FIELDS = ("pressure", "gap", "surface_height")
 _FACTOR = "viscosity_factor"
+_OIL = {  # variable: field of Oil, what it is, unit
+    "film_content": ("content", "share of the gap that is oil", "1"),
+    "oil_pressure": ("pressure", "pressure of the oil alone", "Pa"),
+    "plastic_growth": ("growth", "gap that oil at the cap has pressed open for good", "m"),
+}
 
 
 def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
@@ -89,6 +94,7 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
         "in_contact": (("x", "y"), solution.in_contact.astype(np.int8), contact),
         "rigid_approach": ((), solution.rigid_approach, approach),
         **_factor_variable(solution.viscosity_factor),
+        **_oil_variables(solution.oil),
         **{
             name: (("step",), np.array(data), {"long_name": text, "units": "1"}) for name, (text, data) in steps.items()
         },
@@ -228,6 +234,15 @@ def _factor_variable(factor: Field | None) -> dict[str, Any]:
     return {_FACTOR: (("x", "y"), factor, {"long_name": "viscosity over that at ambient temperature", "units": "1"})}
 
 
+def _oil_variables(oil: Oil | None) -> dict[str, Any]:
+    if oil is None:
+        return {}
+    return {
+        name: (("x", "y"), getattr(oil, part), {"long_name": text, "units": unit})
+        for name, (part, text, unit) in _OIL.items()
+    }
+
+
 def _laws_in(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
     described = {}
     for family, laws in _LAWS.items():
@@ -271,8 +286,15 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
         rigid_approach=float(dataset["rigid_approach"].values),
         convergence=_convergence(described["convergence"], history),
         viscosity_factor=dataset[_FACTOR].values if _FACTOR in dataset else None,
+        oil=_oil(dataset),
         attributes={str(name): value for name, value in dataset.attrs.items() if name not in _OWN},
     )
+
+
+def _oil(dataset: "xarray.Dataset") -> Oil | None:
+    if not set(_OIL) <= set(dataset.variables):
+        return None
+    return Oil(**{part: dataset[name].values for name, (part, _, _) in _OIL.items()})
 
 
 def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> Convergence:

@@ -1,0 +1,217 @@
+"""The contact that loses no oil: what must hold whatever the surface, checked from the solution's fields alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.ehl.conserving import Earlier, Unknowns, evaluate
+from asperity.ehl.conserving_linear import Linear
+from asperity.ehl.conserving_solve import unknowns_of
+from asperity.ehl.scales import Scales
+from asperity.ehl.sharing import load_below, load_sharing
+from asperity.ehl.solution import Options, Status
+from asperity.ehl.solve import contact_problem, solve_contact
+from asperity.ehl.state import contact_state
+from asperity.ehl.storage import load_solution
+from asperity.errors import BadInput, NotConverged
+from asperity.surface import flat_surface
+from reference_solvers.paper import ETA0, RADIUS, barus, contact, grid, rough
+
+CAP, FLOOR = 2e9, 5e-9
+A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
+ON = grid((64, 64))
+OPTIONS = Options(model="conserving", contact_film=FLOOR)
+
+
+def solved(surface, *, hardness=CAP, options=OPTIONS, **more):
+    return solve_contact(contact(hardness=hardness), barus(), surface, options=options, **more)
+
+
+# a full film, a mixed contact, and one of asperities that the cap flattens
+@pytest.fixture(
+    scope="module", params=[(0.5e-6, 60e-6, CAP), (1e-6, 40e-6, 0.7e9), (2.5e-6, 40e-6, CAP)], ids=["film", "0.7", "2"]
+)
+def some(request):
+    sq, length, hardness = request.param
+    return solved(rough(ON, sq, correlation_length=length), hardness=hardness)
+
+
+@pytest.fixture(scope="module")
+def flattened():
+    return solved(rough(ON, 2.5e-6, correlation_length=40e-6))
+
+
+def flows(solution):
+    """Oil through each section along x [m^2/s per width, at ambient density], from pressure, content and gap alone."""
+    oil, h, u = solution.oil, solution.gap, contact().entrainment_speed
+    dx, dy = solution.grid.spacing
+    p = oil.pressure
+    rho = 1.0 + 0.6e-9 * p / (1.0 + 1.7e-9 * p)
+    mobility = rho * h**3 / (12.0 * ETA0 * np.exp(18.2e-9 * p))
+    carried = u * rho * oil.content * h
+    along = carried[:-1] - (mobility[:-1] + mobility[1:]) / 2.0 * np.diff(p, axis=0) / dx
+    across = (mobility + np.roll(mobility, -1, 1)) / 2.0 * (p - np.roll(p, -1, 1)) / dy
+    lost = np.diff(along, axis=0) / dx + ((across - np.roll(across, 1, 1)) / dy)[1:-1]
+    return along.mean(axis=1), lost
+
+
+def test_no_oil_is_lost_on_the_way(some):
+    along, lost = flows(some)
+    assert np.ptp(along) < 1e-6 * along.mean()
+    assert np.abs(lost).mean() * (ON.upper[0] - ON.lower[0]) < 2e-6 * along.mean()
+    assert contact_state(some).mass_flux_imbalance < 1e-4
+
+
+def test_the_unified_model_loses_some(flattened):
+    unified = solved(flattened.surface, options=replace(OPTIONS, model="unified"))
+    assert contact_state(unified).mass_flux_imbalance > 0.3
+    assert contact_state(flattened).mass_flux_imbalance < 1e-4
+
+
+def test_every_alternative_is_decided(some):
+    """Full or ruptured, apart or touching, below the cap or at it; the cap bounds oil and contact together."""
+    p, oil, cap = some.pressure, some.oil, some.p_cap
+    assert p.min() >= 0.0
+    assert p.max() <= cap * (1.0 + 1e-12)
+    assert oil.pressure.min() >= 0.0
+    assert (oil.pressure <= p * (1.0 + 1e-9) + 1e-4 * P_H).all()
+    assert 0.0 < oil.content.min() <= oil.content.max() == 1.0
+    assert not oil.pressure[oil.content < 1.0].any()
+    assert (oil.growth >= 0.0).all()
+    assert (oil.pressure[oil.growth > 0.0] > cap * (1.0 - 1e-6)).all()
+    np.testing.assert_allclose(p[~some.in_contact], oil.pressure[~some.in_contact], atol=1e-4 * P_H)
+    assert some.gap.min() >= FLOOR * (1.0 - 1e-9)
+    assert p.mean() * some.grid.extent[0] == pytest.approx(50e3, rel=1e-4)
+
+
+def test_the_gap_is_the_surface_bent_by_the_pressure(some):
+    """h = h0 + x^2/(2R) + deflection - roughness, plus growth, where bodies do not touch."""
+    problem = contact_problem(some.conditions, some.lubricant, some.surface, some.options)
+    bent = problem.deflection(some.pressure / P_H) * A**2 / RADIUS
+    x = some.grid.x[:, None]
+    expected = some.rigid_approach + x**2 / (2.0 * RADIUS) + bent - some.surface.heights
+    apart = ~some.in_contact
+    np.testing.assert_allclose((some.gap - some.oil.growth)[apart], expected[apart], atol=1e-12)
+    assert (expected[some.in_contact] < 1.02 * FLOOR).all()
+
+
+def test_a_smooth_film_is_the_unified_one_to_first_order():
+    """The unified model's film is accurate to 0.1 % at 256 cells."""
+    fine = grid((256, 8))
+    reference = solved(flat_surface(fine), options=replace(OPTIONS, model="unified"))
+    errors = []
+    for cells in (64, 128, 256):
+        film = solved(flat_surface(grid((cells, 8))))
+        assert np.ptp(film.gap, axis=1).max() == 0.0
+        along, _ = flows(film)
+        assert np.ptp(along) < 1e-6 * along.mean()
+        errors.append(contact_state(film).h_central / contact_state(reference).h_central - 1.0)
+    assert abs(errors[-1]) < 0.012
+    assert abs(errors[1]) < abs(errors[0]) / 1.6
+    assert abs(errors[2]) < abs(errors[1]) / 1.6
+
+
+def test_the_linearisation_is_exact_but_at_borders(flattened):
+    """Against central differences of the balance itself, of every kind of cell at once."""
+    scales = Scales.of(flattened.conditions, flattened.lubricant)
+    problem = contact_problem(flattened.conditions, flattened.lubricant, flattened.surface, flattened.options)
+    at = unknowns_of(flattened, problem, scales)
+    for edge in (0, -1):  # a plateau, pressure and a cavity at both ends too
+        at.fluid[edge, :24], at.fluid[edge, 24:40] = 1.2 * problem.p_cap, 0.5
+    rng = np.random.default_rng(3)
+    way = Unknowns(rng.standard_normal(at.fluid.shape), 0.1 * rng.standard_normal(at.fluid.shape), 0.03)
+    step = 1e-6
+    ends = [Unknowns(*(a + s * step * w for a, w in zip(at, way, strict=True))) for s in (-1.0, 1.0)]
+    for earlier in (
+        None,
+        Earlier(np.ones(problem.cells), 3.0, followed=False),
+        Earlier(np.ones(problem.cells), 1.0 / problem.spacing[0], followed=True),
+    ):
+        here, before, after = (evaluate(problem, one, earlier) for one in (at, *ends))
+        expected = (after.outflow - before.outflow) * here.fluid_scale / (2.0 * step)
+        found = Linear(here).rows(way.fluid, way.pressure, way.approach)[0]
+        same = (before.fluid_state == after.fluid_state) & (here.fluid_state == after.fluid_state)
+        same &= (before.gap > problem.contact_gap) == (after.gap > problem.contact_gap)
+        for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            same &= np.roll(same, shift, axis)
+        assert {0, 1, 2} == set(here.fluid_state[same].tolist())
+        np.testing.assert_allclose(found[same], expected[same], rtol=1e-4, atol=1e-4)
+    assert same.mean() > 0.8
+
+
+def test_elastic_bodies_have_no_plateau():
+    film = solved(rough(ON, 1e-6, correlation_length=60e-6), hardness=None)
+    assert not film.oil.growth.any()
+    along, _ = flows(film)
+    assert np.ptp(along) < 1e-6 * along.mean()
+
+
+def test_what_is_invariant_hardly_depends_on_the_start(flattened):
+    """The plateau makes heavily loaded cells ambiguous: invariants to 3 %, not digits."""
+    neighbour = solved(replace(flattened.surface, heights=0.95 * flattened.surface.heights))
+    again = solved(flattened.surface, start=neighbour)
+    unified = solved(flattened.surface, options=replace(OPTIONS, model="unified"))
+    from_unified = solved(flattened.surface, start=unified)
+    one = load_sharing(flattened)
+    for other in map(load_sharing, (again, from_unified)):
+        assert other.clr_solid == pytest.approx(one.clr_solid, abs=0.03)
+        assert other.oil == pytest.approx(one.oil, rel=0.03)
+        assert other.cavitated == pytest.approx(one.cavitated, abs=0.03)
+
+
+def test_the_usual_tolerance_is_close_to_a_much_tighter_one(some):
+    tight = solved(some.surface, hardness=some.p_cap, options=replace(OPTIONS, tolerance=1e-7), start=some)
+    here, there = load_sharing(some), load_sharing(tight)
+    np.testing.assert_allclose(here.below, there.below, atol=5e-3)
+    assert here.clr_solid == pytest.approx(there.clr_solid, abs=5e-3)
+    assert contact_state(some).h_mean == pytest.approx(contact_state(tight).h_mean, rel=1e-3)
+
+
+def test_load_shares_name_their_film(flattened):
+    shares = load_sharing(flattened)
+    assert shares.films == (FLOOR, 20e-9, 50e-9, 100e-9, 200e-9)
+    assert (np.diff([0.0, *shares.below, 1.0]) >= 0.0).all()
+    assert shares.clr_solid == pytest.approx(contact_state(flattened).clr)
+    assert shares.clr_floor < shares.clr_solid  # oil at the cap lies between bodies that touch
+    assert load_below(flattened, 1.0) == pytest.approx(1.0)
+    assert 0.1 < shares.cavitated < 0.9
+    with pytest.raises(BadInput, match="film must be positive"):
+        load_below(flattened, 0.0)
+    unified = load_sharing(solved(flattened.surface, options=replace(OPTIONS, model="unified")))
+    assert unified.clr_solid == pytest.approx(unified.clr_floor)
+    assert unified.oil > shares.oil
+
+
+def test_a_solution_comes_back_from_disk(flattened, tmp_path):
+    back = load_solution(flattened.save(tmp_path / "run.nc"))
+    assert back.options.model == "conserving"
+    for part in ("content", "pressure", "growth"):
+        np.testing.assert_array_equal(getattr(back.oil, part), getattr(flattened.oil, part))
+    assert contact_state(back) == contact_state(flattened)
+
+
+def test_a_start_at_the_solution_stays_there(flattened):
+    again = solved(flattened.surface, start=flattened)
+    assert again.convergence.iterations <= 3
+    np.testing.assert_allclose(again.pressure, flattened.pressure, atol=1e-3 * P_H)
+
+
+def test_what_does_not_converge_is_loud(flattened):
+    few, seen = replace(OPTIONS, max_iterations=2), []
+    with pytest.raises(NotConverged, match="not solved") as failed:
+        solved(flattened.surface, options=few, progress=seen.append)
+    unfinished = failed.value.solution
+    assert unfinished.convergence.status is Status.OUT_OF_ITERATIONS
+    assert unfinished.oil.content.shape == ON.cells
+    assert tuple(seen) == unfinished.convergence.history
+    assert not solved(flattened.surface, options=few, strict=False).convergence.converged
+
+
+def test_what_it_does_not_cover_is_refused():
+    with pytest.raises(BadInput, match="dry contact"):
+        solve_contact(contact(), None, flat_surface(ON), options=OPTIONS)
+    with pytest.raises(BadInput, match="model must be unified or conserving"):
+        Options(model="lossy")
+    with pytest.raises(BadInput, match="solve without start"):
+        solved(flat_surface(grid((96, 64))), start=solved(flat_surface(ON)))
