@@ -92,7 +92,8 @@ def render_motion_page(history: History) -> str:
         start=motion.start,
         characteristic=motion.time_step == 1.0,
         time_step=motion.time_step,
-        imbalance=f"{100.0 * rows['mass_flux_imbalance'].mean():.0f} %",
+        model=history.case.contents.model,
+        imbalance=f"{100.0 * rows['mass_flux_imbalance'].mean():.2g} %",
         notes=[in_print(note) for note in history.notes],
         case_text=history.case.text,
         script_data=json.dumps(
