@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 Sense = Literal["about", "at least", "at most"]
 SPLIT = "split"
-_TEXT = "section 3.1 of Xu et al., Lubricants 2025, 13, 78"
-_RIG = "section 4.2 of Xu et al., Lubricants 2025, 13, 78"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,99 +69,8 @@ class Anchor:
         return max(off, 0.0) if self.sense == "at most" else off
 
 
-def _car(quantity: str, name: str, fitted: bool) -> tuple[Anchor, ...]:
-    common = {"quantity": quantity, "fitted": fitted, "source": _TEXT}
-    return (
-        Anchor(name=f"{name} at 0.5 um", sq=0.5e-6, value=0.0557, tolerance=0.03, **common),  # type: ignore[arg-type]
-        Anchor(name=f"{name} at 2.5 um", sq=2.5e-6, value=0.5922, tolerance=0.03, **common),  # type: ignore[arg-type]
-        Anchor(  # "gradually increases and reaches a saturation state"
-            name=f"{name}, change from 2.5 to 4 um",
-            since=2.5e-6,
-            sq=4e-6,
-            value=0.0,
-            tolerance=0.05,
-            **common,  # type: ignore[arg-type]
-        ),
-    )
-
-
-PAPER_ANCHORS: tuple[Anchor, ...] = (
-    *_car("car_domain", "CAR of the domain", True),
-    *_car("car", "CAR of the Hertz zone", False),
-    Anchor(
-        name="CLR, rise from 2.5 to 4 um",
-        quantity="clr",
-        since=2.5e-6,
-        sq=4e-6,
-        value=0.03,
-        tolerance=0.02,
-        sense="at least",
-        source=_TEXT,
-    ),
-    Anchor(
-        name="CLR steady, change from 3.5 to 4 um",
-        quantity="clr",
-        since=3.5e-6,
-        sq=4e-6,
-        value=0.0,
-        tolerance=0.03,
-        source=_TEXT,
-    ),
-    Anchor(  # from CRF ~ (CLR F)^(1/6) and the full-load CRF
-        name="CLR at 0.54 um behind the rig's CRF",
-        quantity="clr",
-        sq=0.54e-6,
-        value=0.19,
-        tolerance=0.05,
-        source=_RIG,
-        fitted=False,
-    ),
-    Anchor(
-        name="CLR at 3.49 um behind the rig's CRF",
-        quantity="clr",
-        sq=3.49e-6,
-        value=0.935,
-        tolerance=0.04,
-        source=_RIG,
-        fitted=False,
-    ),
-    Anchor(
-        name="CRF at 0.54 um, rig",
-        quantity="crf_sound_hz",
-        sq=0.54e-6,
-        value=CRF_ENDS_HZ[0],
-        tolerance=60.0,
-        source=_RIG,
-    ),
-    Anchor(
-        name="CRF at 3.49 um, rig",
-        quantity="crf_sound_hz",
-        sq=3.49e-6,
-        value=CRF_ENDS_HZ[1],
-        tolerance=30.0,
-        source=_RIG,
-    ),
-    Anchor(
-        name="split, simulated",
-        quantity=SPLIT,
-        value=2.5,
-        tolerance=0.3,
-        source=_TEXT,
-        fitted=False,
-    ),
-    Anchor(
-        name="split, rig",
-        quantity=SPLIT,
-        value=1.8,
-        tolerance=0.12,
-        source=_RIG,
-        fitted=False,
-    ),
-)
-
-
-def compare(curve: WearCurve, anchors: Sequence[Anchor] = PAPER_ANCHORS) -> "pandas.DataFrame":
-    """A row an anchor: what is printed, what the curve has, its 90 % interval over seeds, the miss, and whether met.
+def compare(curve: WearCurve, anchors: Sequence[Anchor] | None = None) -> "pandas.DataFrame":
+    """A row an anchor, the paper's unless given: what is printed, ours with its 90 % interval, the miss, whether met.
 
     `met` is True where the miss is within the tolerance, and `possible` where some value of the interval would be.
     Both are False where the curve has no value (a Sq that was not computed, stages that are not there).
@@ -171,7 +78,7 @@ def compare(curve: WearCurve, anchors: Sequence[Anchor] = PAPER_ANCHORS) -> "pan
     import pandas
 
     rows = []
-    for anchor in anchors:
+    for anchor in PAPER_ANCHORS if anchors is None else anchors:
         ours, low, high = anchor.of(curve)
         ends = [abs(anchor.miss(end)) for end in (low, high) if np.isfinite(end)]
         crossed = bool(np.isfinite(low) and low <= anchor.value <= high)
@@ -262,3 +169,6 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
         lengths = {name: None if values[name] is None else float(values[name]) for name in ("sq", "since")}
         anchors.append(Anchor(**{**values, **lengths}))
     return tuple(anchors)
+
+
+PAPER_ANCHORS = load_anchors(Path(__file__).with_name("paper_anchors.toml"))
