@@ -206,7 +206,7 @@ def _curves(axes: Axes, found: Calibration) -> None:
     axes.set(
         xlabel="composite roughness Sq [µm]", ylabel="share [%]", ylim=(0.0, 105.0), title="Checked on other surfaces"
     )
-    axes.legend(loc="center right", fontsize=8)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.45, -0.34), ncols=4, columnspacing=1.0)
 
 
 def _wrapped(name: str) -> str:
