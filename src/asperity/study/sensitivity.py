@@ -130,12 +130,12 @@ class Sensitivity:
                 low, high = (scale * end for end in self.spread(widest.name))
                 first = self.ranking(widest.name)["factor"].iloc[0]
                 parts.append(
-                    f"{name} at Sq {1e6 * widest.sq:g} um from {low:.0f} to {high:.0f} {unit} (most by {first})"
+                    f"{name} at Sq {1e6 * widest.sq:g} um from {low:.0f} to {high:.0f} {unit} (moved most by {first})"
                 )
         order = self.overall()
         ranked = ", ".join(f"{name} {100 * share:.0f} %" for name, share in order.items())
         return (
-            f"Over the ranges (5 to 95 % of {len(self.values)} points) the curves go {'; '.join(parts)}. "
+            f"Over the ranges (5 to 95 % of {len(self.values)} points): {'; '.join(parts)}. "
             f"Mean share of what moves them: {ranked}."
         )
 
