@@ -102,28 +102,28 @@ def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], 
 def _print_history(history: "History", report: Path | None) -> None:
     said = history.scalars()
 
-    def shown(name: str, scale: float, digits: int) -> str:
+    def shown(name: str, scale: float, form: str) -> str:
         if said[name] is None:
             return "-"
-        start = "-" if said[f"{name}_start"] is None else f"{scale * said[f'{name}_start']:.{digits}f}"
-        return f"{scale * said[name]:.{digits}f} ± {scale * said[f'{name}_std']:.{digits}f} (start {start})"
+        start = "-" if said[f"{name}_start"] is None else f"{scale * said[f'{name}_start']:{form}}"
+        return f"{scale * said[name]:{form}} ± {scale * said[f'{name}_std']:{form}} (start {start})"
 
-    motion, each = history.case.motion, 1e9 * (said["step_s"] or 0.0)
+    motion, each = history.case.motion, 1e6 * (said["step_s"] or 0.0)
     rows = [
         ("steps, of which computed now", f"{history.steps}, {history.computed} in {history.seconds:.1f} s"),
-        ("a step", f"{each:.4g} ns, {motion.time_step:g} cells of the oil's way; start {motion.start}"),
+        ("a step", f"{each:.4g} us, {motion.time_step:g} of the oil's way from cell to cell; start {motion.start}"),
         (f"means and deviations, from step {said['settled_from_step']}", ""),
-        ("CLR, load on asperities", f"{shown('clr', 100, 2)} %"),
-        ("CAR, contact in the Hertz zone", f"{shown('car', 100, 2)} %"),
-        ("film: least", f"{shown('h_min_m', 1e6, 3)} um"),
-        ("film: central", f"{shown('h_central_m', 1e6, 3)} um"),
-        ("film: mean", f"{shown('h_mean_m', 1e6, 3)} um"),
-        ("largest pressure", f"{shown('p_max_pa', 1e-9, 3)} GPa"),
-        ("friction coefficient", shown("friction_coefficient", 1, 4)),
-        ("heat of friction", f"{shown('friction_power_w', 1, 3)} W"),
-        ("heat of pressure-driven flow", f"{shown('flow_power_w', 1, 3)} W"),
-        ("contact resonance by load share", f"{shown('resonance_hz', 1, 1)} Hz"),
-        ("oil lost or re-created, over oil carried", f"{shown('mass_flux_imbalance', 100, 1)} %"),
+        ("CLR, load on asperities", f"{shown('clr', 100, '.2f')} %"),
+        ("CAR, contact in the Hertz zone", f"{shown('car', 100, '.2f')} %"),
+        ("film: least", f"{shown('h_min_m', 1e6, '.3f')} um"),
+        ("film: central", f"{shown('h_central_m', 1e6, '.3f')} um"),
+        ("film: mean", f"{shown('h_mean_m', 1e6, '.3f')} um"),
+        ("largest pressure", f"{shown('p_max_pa', 1e-9, '.3f')} GPa"),
+        ("friction coefficient", shown("friction_coefficient", 1, ".4f")),
+        ("heat of friction", f"{shown('friction_power_w', 1, '.4g')} W"),
+        ("heat of pressure-driven flow", f"{shown('flow_power_w', 1, '.4g')} W"),
+        ("contact resonance by load share", f"{shown('resonance_hz', 1, '.1f')} Hz"),
+        ("oil lost or re-created, over oil carried", f"{shown('mass_flux_imbalance', 100, '.1f')} %"),
     ]
     for one in said.get("passes", [])[:: max(1, len(said.get("passes", [])) - 1)]:
         shares = f"CLR {100 * one['clr']:.1f} %, CAR {100 * one['car']:.2f} %"

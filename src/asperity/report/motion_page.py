@@ -16,20 +16,20 @@ from asperity.history import History
 from asperity.report import motion_figures as figures
 from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture
 
-_NUMBERS = (  # column, its name, unit, scale, digits
-    ("clr", "Load share of asperities, CLR", "%", 100.0, 2),
-    ("car", "Contact area share in the Hertz zone, CAR", "%", 100.0, 2),
-    ("car_domain", "Contact area of the whole domain, over the Hertz area", "%", 100.0, 2),
-    ("contact_force_n", "Load that asperities carry", "N", 1.0, 1),
-    ("h_min_m", "Least film", "µm", 1e6, 3),
-    ("h_central_m", "Central film", "µm", 1e6, 3),
-    ("h_mean_m", "Mean film in the Hertz zone", "µm", 1e6, 3),
-    ("p_max_pa", "Largest pressure", "GPa", 1e-9, 3),
-    ("friction_coefficient", "Friction coefficient", "", 1.0, 4),
-    ("friction_power_w", "Heat of friction", "W", 1.0, 3),
-    ("flow_power_w", "Heat of pressure-driven flow, where a film parts the bodies", "W", 1.0, 3),
-    ("resonance_hz", "Contact resonance by load share", "Hz", 1.0, 1),
-    ("mass_flux_imbalance", "Oil lost or re-created, over oil carried", "%", 100.0, 1),
+_NUMBERS = (  # column, its name, unit, scale, format
+    ("clr", "Load share of asperities, CLR", "%", 100.0, ".2f"),
+    ("car", "Contact area share in the Hertz zone, CAR", "%", 100.0, ".2f"),
+    ("car_domain", "Contact area of the whole domain, over the Hertz area", "%", 100.0, ".2f"),
+    ("contact_force_n", "Load that asperities carry", "N", 1.0, ".1f"),
+    ("h_min_m", "Least film", "µm", 1e6, ".3f"),
+    ("h_central_m", "Central film", "µm", 1e6, ".3f"),
+    ("h_mean_m", "Mean film in the Hertz zone", "µm", 1e6, ".3f"),
+    ("p_max_pa", "Largest pressure", "GPa", 1e-9, ".3f"),
+    ("friction_coefficient", "Friction coefficient", "", 1.0, ".4f"),
+    ("friction_power_w", "Heat of friction", "W", 1.0, ".4g"),
+    ("flow_power_w", "Heat of pressure-driven flow, where a film parts the bodies", "W", 1.0, ".4g"),
+    ("resonance_hz", "Contact resonance by load share", "Hz", 1.0, ".1f"),
+    ("mass_flux_imbalance", "Oil lost or re-created, over oil carried", "%", 100.0, ".1f"),
 )
 
 
@@ -147,26 +147,26 @@ def _said(history: History, number: int) -> str:
 def _tiles(history: History) -> list[Tile]:
     said = history.scalars()
     tiles = []
-    for name, title, unit, scale, digits in _NUMBERS:
+    for name, title, unit, scale, form in _NUMBERS:
         if name in ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz") and said[name] is not None:
-            rest = in_print(f"± {scale * said[f'{name}_std']:.{digits}f} {unit}".rstrip())
-            tiles.append(Tile(title, f"{scale * said[name]:.{digits}f}", rest))
+            rest = in_print(f"± {scale * said[f'{name}_std']:{form}} {unit}".rstrip())
+            tiles.append(Tile(title, f"{scale * said[name]:{form}}", rest))
     return tiles
 
 
 def _numbers(history: History) -> list[dict[str, Any]]:
     said = history.scalars()
 
-    def shown(value: float | None, scale: float, digits: int) -> str:
-        return NOT_FOUND if value is None else f"{scale * value:.{digits}f}"
+    def shown(value: float | None, scale: float, form: str) -> str:
+        return NOT_FOUND if value is None else format(scale * value, form)
 
     return [
         {
             "name": title,
             "unit": unit,
-            "start": shown(said[f"{name}_start"], scale, digits),
-            "mean": shown(said[name], scale, digits),
-            "std": shown(said[f"{name}_std"], scale, digits),
+            "start": shown(said[f"{name}_start"], scale, form),
+            "mean": shown(said[name], scale, form),
+            "std": shown(said[f"{name}_std"], scale, form),
         }
-        for name, title, unit, scale, digits in _NUMBERS
+        for name, title, unit, scale, form in _NUMBERS
     ]
