@@ -24,6 +24,7 @@ import numpy as np
 from asperity.arrays import Field, Mask
 from asperity.case import Case, load_case, relative_to
 from asperity.coupling import Vibration, contact_vibration, needs_solution, oscillator
+from asperity.ehl.conserving_motion import moving_conserving_contact
 from asperity.ehl.friction import friction
 from asperity.ehl.motion import Memory, Snapshot, Steps, moving_contact, step_seconds
 from asperity.ehl.state import ContactState
@@ -39,7 +40,7 @@ MANIFEST, TABLE, MEMORY, MAPS = "manifest.json", "history.parquet", "memory.npz"
 KEPT_EVERY_S = 2.0  # what a crash may cost
 MAPS_KEPT = 40  # in a whole history, unless said otherwise
 
-MODELS: dict[str, Steps] = {"unified": moving_contact}  # by the case's `model`
+MODELS: dict[str, Steps] = {"unified": moving_contact, "conserving": moving_conserving_contact}  # by the case's `model`
 
 Row = dict[str, float | int | bool]
 

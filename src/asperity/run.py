@@ -25,6 +25,7 @@ from asperity.coupling import (
 )
 from asperity.ehl.flash import FlashTemperature
 from asperity.ehl.friction import Friction
+from asperity.ehl.sharing import FILMS, load_below, load_sharing
 from asperity.ehl.solution import ContactSolution, Iteration
 from asperity.ehl.state import ContactState, contact_state
 from asperity.ehl.storage import load_solution, save_dataset
@@ -102,7 +103,7 @@ class Run:
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its name in `asperity solve --json`, SI; None where there is none."""
-        state, convergence = self.state, self.solution.convergence
+        state, convergence, sharing = self.state, self.solution.convergence, load_sharing(self.solution)
         rubbing, heat, stress = self.friction, self.heat, self.stress
         resonance = None if self.vibration is None else self.vibration.resonance
         heard = resonance is not None and resonance.found
@@ -114,6 +115,10 @@ class Run:
             "clr": state.clr,
             "clr_error": None if error is None else error.clr,
             "capped_oil_load_ratio": state.capped_oil_load_ratio,
+            **{f"load_below_{film * 1e9:.0f}nm": load_below(self.solution, film) for film in FILMS},
+            "load_at_floor": sharing.clr_floor,
+            "cavitated_share": sharing.cavitated,
+            "oil_film_m": sharing.oil,
             "sq_m": state.sq,
             "h_min_m": state.h_min,
             "h_min_error_m": None if error is None else error.h_min,
@@ -358,9 +363,24 @@ def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
     model = case.vibration
     with case.naming("vibration"):
         vibration = None if model is None else contact_vibration(state, case.conditions, model, solution=solution)
+    if solution.oil is not None:
+        notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
     return Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes)
+
+
+def _threshold(solution: ContactSolution) -> str:
+    """What the conserving model's share of asperities counts, and what another film would make of it."""
+    sharing = load_sharing(solution)
+    shares = ", ".join(
+        f"{100 * share:.0f} % of at most {film * 1e9:.0f} nm"
+        for film, share in zip(sharing.films, sharing.below, strict=True)
+    )
+    return (
+        "Model conserving: CLR and CAR count cells whose elastic bodies touch, though oil at the cap may have parted "
+        f"them since; by film, the load lies on {shares}. The share at the contact film depends on the grid."
+    )
 
 
 def _finite(value: float) -> float | None:

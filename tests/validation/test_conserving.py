@@ -1,12 +1,14 @@
 """The contact that loses no oil: what must hold whatever the surface, checked from the solution's fields alone."""
 
 from dataclasses import replace
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
 
 from asperity.ehl.conserving import Earlier, Unknowns, evaluate
 from asperity.ehl.conserving_linear import Linear
+from asperity.ehl.conserving_motion import moving_conserving_contact
 from asperity.ehl.conserving_solve import unknowns_of
 from asperity.ehl.scales import Scales
 from asperity.ehl.sharing import load_below, load_sharing
@@ -15,7 +17,8 @@ from asperity.ehl.solve import contact_problem, solve_contact
 from asperity.ehl.state import contact_state
 from asperity.ehl.storage import load_solution
 from asperity.errors import BadInput, NotConverged
-from asperity.surface import flat_surface
+from asperity.surface import Surface, flat_surface
+from asperity.surface.moving import MovingSurfaces
 from reference_solvers.paper import ETA0, RADIUS, barus, contact, grid, rough
 
 CAP, FLOOR = 2e9, 5e-9
@@ -215,3 +218,102 @@ def test_what_it_does_not_cover_is_refused():
         Options(model="lossy")
     with pytest.raises(BadInput, match="solve without start"):
         solved(flat_surface(grid((96, 64))), start=solved(flat_surface(ON)))
+
+
+PURE_ROLLING = (1.91, 1.91)
+
+
+def moving(surface, *, speeds=PURE_ROLLING, hardness=CAP, **more):
+    rolling = contact(hardness=hardness, surface_speeds=speeds)
+    return moving_conserving_contact(
+        rolling, barus(), MovingSurfaces.one_rough(surface, speeds), options=OPTIONS, **more
+    )
+
+
+def oil_carried(solution):
+    """rho theta h [m], and what pressure drives through both ends and along [m^2/s]."""
+    oil, h, (dx, _) = solution.oil, solution.gap, solution.grid.spacing
+    p = oil.pressure
+    rho = 1.0 + 0.6e-9 * p / (1.0 + 1.7e-9 * p)
+    mobility = rho * h**3 / (12.0 * ETA0 * np.exp(18.2e-9 * p))
+    out = (mobility + h**3 / (12.0 * ETA0))[[0, -1]] * p[[0, -1]] / dx
+    return rho * oil.content * h, out.sum(axis=0)
+
+
+def test_every_step_balances_its_oil():
+    """What the domain holds more than before came in with the surfaces, less what left at both ends."""
+    x0, (dx, _) = ON.lower[0] + ON.spacing[0] / 2.0, ON.spacing
+    before = None
+    for snapshot in islice(moving(rough(ON, 1.5e-6, correlation_length=40e-6)), 6):
+        solution = snapshot.solution
+        assert solution.convergence.converged
+        held, driven_out = oil_carried(solution)
+        if before is not None:
+            ahead = solution.gap[0] + ((x0 - dx) ** 2 - x0**2) / (2.0 * RADIUS)
+            gained = (held - before).sum() * dx
+            out = (before[-1] - ahead).sum() * dx + driven_out.sum() * dx / 1.91
+            assert abs(gained + out) < 1e-6 * ahead.sum() * dx
+        before = held
+
+
+def test_oil_behind_the_contact_is_carried_as_it_is():
+    """Where nothing presses, m_i^n = m_(i-1)^(n-1) whatever the roughness does."""
+    snapshots = list(islice(moving(rough(ON, 1e-6, correlation_length=60e-6), speeds=(2.3, 1.52)), 5))
+    for before, after in pairwise(snapshots):
+        held, now = (oil_carried(one.solution)[0] for one in (before, after))
+        free = after.solution.oil.pressure == 0.0
+        alone = free[1:-1] & free[2:] & free[:-2] & np.roll(free, 1, 1)[1:-1] & np.roll(free, -1, 1)[1:-1]
+        assert alone.sum() > 300
+        np.testing.assert_allclose(now[1:-1][alone], held[:-2][alone], rtol=1e-4)
+
+
+def test_a_snapshot_stays_where_nothing_moves():
+    surface = Surface(np.tile(1e-7 * np.cos(2.0 * np.pi * ON.y / ON.extent[1]), (64, 1)), ON)  # a lay along rolling
+    first, *later = islice(moving(surface), 4)
+    for snapshot in later:
+        assert snapshot.solution.convergence.converged
+        np.testing.assert_allclose(snapshot.solution.gap, first.solution.gap, rtol=2e-3)
+        np.testing.assert_allclose(snapshot.solution.pressure, first.solution.pressure, atol=2e-3 * P_H)
+
+
+def test_motion_goes_on_from_what_it_remembers_to_the_last_digit():
+    surface = rough(ON, 1.5e-6, correlation_length=40e-6)
+    whole = list(islice(moving(surface), 4))
+    rest = list(islice(moving(surface, resume=whole[1].memory), 2))
+    for one, other in zip(whole[2:], rest, strict=True):
+        assert one.number == other.number
+        np.testing.assert_array_equal(one.solution.pressure, other.solution.pressure)
+        np.testing.assert_array_equal(one.solution.oil.content, other.solution.oil.content)
+
+
+def test_motion_from_rest_draws_oil_in_step_by_step():
+    snapshots = list(islice(moving(rough(ON, 0.5e-6, correlation_length=60e-6), start="stationary"), 6))
+    assert (snapshots[0].solution.oil.content == 1.0).all()
+    assert all(one.solution.convergence.converged for one in snapshots)
+    clr = [one.state.clr for one in snapshots]
+    assert clr[0] > 0.99
+    assert (np.diff(clr) < -0.02).all()
+
+
+def test_a_bad_step_is_marked():
+    few = replace(OPTIONS, max_iterations=3)
+    surface = rough(ON, 1.5e-6, correlation_length=40e-6)
+    good = next(moving(surface))
+    marked = MovingSurfaces.one_rough(surface, PURE_ROLLING)
+    rolling = contact(hardness=CAP, surface_speeds=PURE_ROLLING)
+    bad = next(moving_conserving_contact(rolling, barus(), marked, options=few, resume=good.memory))
+    assert not bad.solution.convergence.converged
+    assert bad.solution.convergence.iterations <= 4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"time_step": 0.5}, "time step must be 1"),
+        ({"flattening": True}, "does not remember"),
+        ({"start": "flying"}, "steady or stationary"),
+    ],
+)
+def test_motion_refuses_what_it_does_not_cover(wrong, says):
+    with pytest.raises(BadInput, match=says):
+        next(moving(flat_surface(ON), **wrong))

@@ -81,7 +81,7 @@ def solve_conserving(
     scales = Scales.of(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = on_one_line(whole) if whole.uniform else whole
-    climb = _Climb(options, scales, progress)
+    climb = Climb(options, scales, progress)
     if start is None:
         for way in WAYS:
             step = climb.up(grid_levels(finest), conditions, lubricant, grow=way == WAYS[1])
@@ -152,7 +152,7 @@ def figures(balance: OilBalance, gap_scale: float) -> Figures:
     )
 
 
-class _Climb:
+class Climb:
     """The way to the solution, all Newton steps of it on record."""
 
     def __init__(self, options: Options, scales: Scales, progress: Progress | None) -> None:
