@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from asperity.case import load_case
 from asperity.study.execute import run_study
 from asperity.study.plan import plan_study
@@ -54,10 +56,11 @@ def overhead(cases: int = 10_000) -> Iterator[str]:
     few = plan.cases[:: len(plan.cases) // 200]
     bare = [plan.case.with_overrides(one.overrides) for one in few]
     evaluation.evaluate(plan.case, "vibrate", few[0].overrides)
-    begun = time.process_time()
-    for one in bare:
-        evaluation.EVALUATIONS["vibrate"](one, ())
-    work = (time.process_time() - begun) / len(few)
+    with threadpool_limits(1):  # as in the workers
+        begun = time.process_time()
+        for one in bare:
+            evaluation.EVALUATIONS["vibrate"](one, ())
+        work = (time.process_time() - begun) / len(few)
     held: dict[int, float] = {}
     folder = Path(tempfile.mkdtemp())
     begun, own, theirs = time.perf_counter(), time.process_time(), _children_s()
