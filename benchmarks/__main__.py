@@ -8,6 +8,7 @@ import sys
 from threadpoolctl import threadpool_limits
 
 from benchmarks import (
+    conserving,
     films,
     friction,
     indicators,
@@ -51,7 +52,7 @@ def main() -> None:
     )
     print()
     with threadpool_limits(1):
-        for part in (speed, films, robustness, motion, vibration, surfaces, friction, stress, indicators):
+        for part in (speed, films, robustness, motion, conserving, vibration, surfaces, friction, stress, indicators):
             for line in part.lines(fast=wanted.fast):
                 print(line, flush=True)
             print()

@@ -1,0 +1,198 @@
+"""The contact that loses no oil: rigid films, 16 contacts on three surfaces standing still, the same in motion, cost.
+
+The rigid films are those of `tests/validation/test_cavitation.py`, where closed forms and quadratures stand beside
+them. Every steady solve starts cold; times are those of the processor. One pass is as many steps as the domain has
+cells along rolling.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice, product
+from statistics import mean, median
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.case import Case
+from asperity.ehl.cavitation import solve_film
+from asperity.ehl.conserving import evaluate
+from asperity.ehl.conserving_motion import moving_conserving_contact
+from asperity.ehl.conserving_solve import unknowns_of
+from asperity.ehl.motion import Snapshot
+from asperity.ehl.scales import Scales
+from asperity.ehl.sharing import LoadSharing, load_sharing
+from asperity.ehl.solution import CONSERVING, ContactSolution
+from asperity.ehl.solve import contact_problem, solve_contact
+from asperity.surface.moving import MovingSurfaces
+from benchmarks.roughness_levels import paper_case
+
+SQ_UM, LENGTHS_UM, CAPS_GPA, SEEDS = (0.5, 1.0, 2.5, 4.0), (40, 80), (0.7, 2.0), (7, 8, 9)
+FILMS_NM = (5, 20, 50, 100, 200)
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    """All tables as Markdown; `fast` takes one surface of three."""
+    yield "## The contact that loses no oil\n"
+    yield from rigid_films()
+    yield ""
+    yield from standing(SEEDS[:1] if fast else SEEDS)
+    yield ""
+    yield from moving(SEEDS[:1] if fast else SEEDS)
+    yield ""
+    yield from cost()
+
+
+def rigid_films() -> Iterator[str]:
+    """A parabolic slider and one with a pocket (physics: p = 0 where the film ruptures), over cells."""
+    yield "| rigid film | cells | p_max off | flow off | flow varies by | Newton steps |"
+    yield "|---|---|---|---|---|---|"
+    for cells in (100, 400, 1600):
+        x = (np.arange(cells) + 0.5) / cells
+        length, least = 76.2e-3, 25.4e-6
+        film = solve_film(
+            least * (1.0 + (2.0 * x - 1.0) ** 2),
+            spacing=length / cells,
+            entrainment_speed=4.57 / 2.0,
+            viscosity=0.039,
+            ends=(3364.14, 0.0),
+        )
+        peak, flow = film.pressure.max() / 3.594269e6 - 1.0, film.flux.mean() / 6.547565e-5 - 1.0
+        vary = np.ptp(film.flux) / film.flux.mean()
+        yield f"| parabolic slider | {cells} | {100 * peak:.4f} % | {flow:.1e} | {vary:.1e} | {film.steps} |"
+    for cells in (100, 400, 1600):
+        x = (np.arange(cells) + 0.5) / cells * 20e-3
+        film = solve_film(
+            np.where((x > 4e-3) & (x < 10e-3), 2e-6, 1e-6),
+            spacing=20e-3 / cells,
+            entrainment_speed=0.5,
+            viscosity=0.01,
+            ends=(1e5, 1e5),
+        )
+        peak, flow = film.pressure.max() / 350e3 - 1.0, film.flux.mean() / 5.002083e-7 - 1.0
+        vary = np.ptp(film.flux) / film.flux.mean()
+        yield f"| slider with a pocket | {cells} | {100 * peak:.4f} % | {flow:.1e} | {vary:.1e} | {film.steps} |"
+
+
+class Contact(NamedTuple):
+    """One of the 16 contacts on one of the surfaces."""
+
+    sq_um: float
+    length_um: int
+    cap_gpa: float
+    seed: int
+
+    def case(self, cells: int) -> Case:
+        """The paper's contact with this surface and cap."""
+        return paper_case(self.sq_um, self.seed, cells).with_overrides(
+            {
+                "surface.correlation_length": [f"{self.length_um} um"] * 2,
+                "material.hardness": f"{self.cap_gpa} GPa",
+                "model": CONSERVING,
+            }
+        )
+
+
+def contacts(seeds: tuple[int, ...]) -> Iterator[Contact]:
+    """All levels of all surfaces."""
+    yield from (Contact(*level, seed) for seed in seeds for level in product(SQ_UM, LENGTHS_UM, CAPS_GPA))
+
+
+def lost(solution: ContactSolution) -> float:
+    """Oil that all cells together lose, over the throughflow."""
+    scales = Scales.of(solution.conditions, solution.lubricant)
+    problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
+    balance = evaluate(problem, unknowns_of(solution, problem, scales))
+    dx, dy = problem.spacing
+    return abs(float(balance.outflow.sum()) * dx * dy / balance.throughflow)
+
+
+def standing(seeds: tuple[int, ...]) -> Iterator[str]:
+    """Snapshots at 128 x 128 of both models."""
+    solved: dict[int, int] = defaultdict(int)
+    ratios, seconds, worst = [], [], 0.0
+    shares: dict[tuple[str, float], list[LoadSharing]] = defaultdict(list)
+    for one in contacts(seeds):
+        case = one.case(128)
+        surface, options = case.surface(), case.options
+        spent = {}
+        for model in ("unified", CONSERVING):
+            began = process_time()
+            solution = solve_contact(
+                case.conditions, case.lubricant, surface, options=replace(options, model=model), strict=False
+            )
+            spent[model] = process_time() - began
+            if solution.convergence.converged:
+                shares[model, one.sq_um].append(load_sharing(solution))
+        if solution.convergence.converged:
+            solved[one.seed] += 1
+            worst = max(worst, lost(solution))
+        ratios.append(spent[CONSERVING] / spent["unified"])
+        seconds.append(spent[CONSERVING])
+    each = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
+    yield (
+        f"Standing still, 128 x 128: solved {each}. Oil lost by all cells together at most {worst:.1e} of the "
+        f"throughflow. Cold in {median(seconds):.2f} s in the median (longest {max(seconds):.1f} s), "
+        f"{median(ratios):.1f} times the unified model (longest {max(ratios):.0f} times).\n"
+    )
+    yield from _shares(shares)
+
+
+def _shares(shares: dict[tuple[str, float], list[LoadSharing]]) -> Iterator[str]:
+    films = " | ".join(f"L({film} nm)" for film in FILMS_NM)
+    yield f"| Sq um | model | CLR_s | CAR_s | {films} | cavitated | oil um | contacts |"
+    yield "|---" * (7 + len(FILMS_NM)) + "|"
+    for (model, sq), found in sorted(shares.items(), key=lambda item: item[0][1]):
+
+        def spread(values: list[float], scale: float = 1.0) -> str:
+            return f"{scale * mean(values):.2f} ± {scale * float(np.std(values)):.2f}"
+
+        below = " | ".join(spread([one.below[index] for one in found]) for index in range(len(FILMS_NM)))
+        yield (
+            f"| {sq:g} | {model} | {spread([one.clr_solid for one in found])} | "
+            f"{spread([one.car_solid for one in found])} | {below} | {spread([one.cavitated for one in found])} | "
+            f"{spread([one.oil for one in found], 1e6)} | {len(found)} |"
+        )
+
+
+def moving(seeds: tuple[int, ...]) -> Iterator[str]:
+    """One pass at 64 x 64 of every contact."""
+    taken = accepted = 0
+    first_bad, worst = [], 0.0
+    shares: dict[tuple[str, float], list[LoadSharing]] = defaultdict(list)
+    for one in contacts(seeds):
+        for snapshot in islice(_steps(one.case(64)), 1, 65):
+            good, taken = snapshot.solution.convergence.converged, taken + 1
+            accepted += good
+            if not good:
+                first_bad.append((one, snapshot.number))
+            else:
+                worst = max(worst, snapshot.state.mass_flux_imbalance)
+        shares["moving", one.sq_um].append(load_sharing(snapshot.solution))
+    yield (
+        f"Moving, 64 x 64, one pass: {accepted} of {taken} steps accepted ({100 * accepted / taken:.1f} %); in any "
+        f"accepted step all that cells of the Hertz zone lose and gain is at most {worst:.1e} of the oil carried there."
+    )
+    yield f"First steps not accepted: {first_bad[:5]}\n" if first_bad else ""
+    yield from _shares(shares)
+
+
+def _steps(case: Case) -> Iterator[Snapshot]:
+    surfaces = MovingSurfaces.one_rough(case.surface(), case.conditions.surface_speeds)
+    yield from moving_conserving_contact(case.conditions, case.lubricant, surfaces, options=case.options)
+
+
+def cost() -> Iterator[str]:
+    """Seconds a step in motion on three grids, Sq 1 and 2.5 um."""
+    yield "| cells | seconds a step, Sq 1 um | Sq 2.5 um | Newton steps |"
+    yield "|---|---|---|---|"
+    for cells in (64, 128, 256):
+        spent, newton = [], []
+        for sq in (1.0, 2.5):
+            steps = _steps(Contact(sq, 40, 2.0, 7).case(cells))
+            next(steps)
+            began = process_time()
+            newton += [snapshot.solution.convergence.iterations for snapshot in islice(steps, 6)]
+            spent.append((process_time() - began) / 6.0)
+        yield f"| {cells} x {cells} | {spent[0]:.2f} | {spent[1]:.2f} | {mean(newton):.0f} |"
