@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.linear import Linear, _pattern
+from asperity.ehl.linear import Linear, five_point_pattern
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import Options
 from asperity.ehl.solve import contact_problem, first_guess
@@ -249,7 +249,7 @@ def test_aggregation_is_a_galerkin_product(rng, stencil, block):
 @pytest.mark.parametrize("cells", [(9, 7), (5, 2), (6, 1), (1, 4)])
 def test_factored_matrix_is_the_stencils(rng, cells):
     stencil = Stencil(5.0 + rng.random(cells), *(-rng.random(cells) for _ in range(4)))
-    pattern, wanted = _pattern(cells), rng.standard_normal(cells)
+    pattern, wanted = five_point_pattern(cells), rng.standard_normal(cells)
     found = pattern.solve(pattern.factored(stencil), wanted)
     np.testing.assert_allclose(dense(stencil) @ found.ravel(), wanted.ravel(), atol=1e-12)
 
