@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
     from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack
     from asperity.grid import Grid
+    from asperity.hearing import HistoryVibration, history_vibration
     from asperity.history import History, load_history, run_history
     from asperity.lubricant import (
         BairWiner,
@@ -104,6 +105,7 @@ _NAMES = {
     "errors": ("AsperityError", "BadInput", "NotConverged", "UnreadableFile"),
     "excitation": ("FilteredNoise", "PatchAverage", "SurfaceTrack"),
     "grid": ("Grid",),
+    "hearing": ("HistoryVibration", "history_vibration"),
     "history": ("History", "load_history", "run_history"),
     "lubricant": (
         "BairWiner",
@@ -191,6 +193,7 @@ __all__ = [
     "FrictionCurve",
     "Grid",
     "History",
+    "HistoryVibration",
     "Incompressible",
     "Iteration",
     "LinearBairWiner",
@@ -251,6 +254,7 @@ __all__ = [
     "friction_and_heat",
     "gaussian_surface",
     "ground_surface",
+    "history_vibration",
     "load_anchors",
     "load_below",
     "load_case",

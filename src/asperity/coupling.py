@@ -305,11 +305,17 @@ def _loaded_oscillator(
 ) -> ContactOscillator:
     depth = model.reference_depth or roller_depth(conditions)
     stiffness = STIFFNESS_LAWS[model.stiffness_law](Pressed(clr, state, conditions, depth, solution))
+    load = (clr if model.stiffness_law in ASPERITIES_ALONE else 1.0) * conditions.load
+    return damped_oscillator(stiffness, load, model)
+
+
+def damped_oscillator(stiffness: float, load: float, model: VibrationModel) -> ContactOscillator:
+    """The model's mass and damping on a spring of `stiffness` [N/m] that carries `load` [N]."""
     return ContactOscillator(
         mass=model.mass,
         stiffness=stiffness,
         damping_ratio=require_damping_ratio(DAMPING_LAWS[model.damping_law](model, stiffness)),
-        load=(clr if model.stiffness_law in ASPERITIES_ALONE else 1.0) * conditions.load,
+        load=load,
     )
 
 

@@ -12,7 +12,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -73,7 +73,8 @@ class History:
     contact up to a constant), `rigid_approach_m`, `resonance_hz` (natural frequency of the contact oscillator on this
     step's contact; NaN without one), `track_sq_m` and `flattened_m` (Sq of the whole tracks, and how far they have been
     pressed down on average), `newton_steps` and `converged`. `seconds` is what computing took this time, of
-    `computed` steps; `folder` where it is kept.
+    `computed` steps; `folder` where it is kept, `memory` what the
+    next step needs to know.
     """
 
     case: Case
@@ -82,6 +83,7 @@ class History:
     folder: Path | None
     seconds: float
     computed: int
+    memory: Memory | None = field(default=None, repr=False)
 
     @property
     def steps(self) -> int:
@@ -137,11 +139,22 @@ class History:
         model, case = self.case.vibration, self.case
         if model is None or needs_solution(model):
             return None
+        with case.naming("vibration"):
+            return contact_vibration(self.mean_state, case.conditions, model)
+
+    @property
+    def mean_state(self) -> ContactState:
+        """The mean contact of the settled steps; it has no lambda ratio."""
         means = self.settled.mean(numeric_only=True)
         values: dict[str, Any] = {name: float(means[column]) for name, column in _STATE.items()}
-        state = ContactState(**values | {"lambda_ratio": None})
-        with case.naming("vibration"):
-            return contact_vibration(state, case.conditions, model)
+        return ContactState(**values | {"lambda_ratio": None})
+
+    def surfaces(self) -> MovingSurfaces:
+        """The case's surfaces, as far pressed flat as they are at the end."""
+        surfaces = self.case.moving_surfaces()
+        if self.case.motion.flattening and self.memory is not None:
+            return surfaces.lowered(self.memory["lowered_first"], self.memory["lowered_second"])
+        return surfaces
 
     def scalars(self) -> dict[str, Any]:
         """What `asperity run --json` says of the history: means and standard deviations over the settled steps."""
@@ -307,6 +320,7 @@ def load_history(folder: str | Path) -> History:
         folder=folder,
         seconds=0.0,
         computed=0,
+        memory=_memory(folder),
     )
 
 
@@ -469,6 +483,7 @@ class _Keeper:
             folder=self.folder,
             seconds=seconds,
             computed=computed,
+            memory=self.memory,
         )
 
 

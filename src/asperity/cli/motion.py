@@ -12,6 +12,7 @@ from asperity.cli.common import chosen_case, print_json, print_rows, require_out
 from asperity.errors import AsperityError, BadInput, NotConverged
 
 if TYPE_CHECKING:
+    from asperity.hearing import HistoryVibration
     from asperity.history import History, Progress
 
 
@@ -41,6 +42,9 @@ def run_case(
     keep_going: Annotated[
         bool, typer.Option("--keep-going", help="Mark a step that does not converge, and go on from it.")
     ] = False,
+    listen: Annotated[
+        bool, typer.Option("--listen", help="Let the mass ride on the history, by the contact's own stiffness.")
+    ] = False,
     report: Annotated[Path | None, typer.Option(metavar="OUT.html", help="Make the page of the history too.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -69,12 +73,19 @@ def run_case(
         from asperity.report.motion_page import write_motion_report
 
         write_motion_report(history, report)
+    heard = _listened(history) if listen and failure is None else None
     if as_json:
-        print_json({**history.scalars(), "report": None if report is None else str(report)})
+        print_json(
+            {
+                **history.scalars(),
+                **({} if heard is None else heard.scalars()),
+                "report": None if report is None else str(report),
+            }
+        )
     else:
         print(history.verdict())
         if not quiet:
-            _print_history(history, report)
+            _print_history(history, heard, report)
     if failure is not None:
         raise AsperityError(failure)
 
@@ -99,7 +110,13 @@ def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], 
         yield tell
 
 
-def _print_history(history: "History", report: Path | None) -> None:
+def _listened(history: "History") -> "HistoryVibration":
+    from asperity.hearing import history_vibration
+
+    return history_vibration(history)
+
+
+def _print_history(history: "History", heard: "HistoryVibration | None", report: Path | None) -> None:
     said = history.scalars()
 
     def shown(name: str, scale: float, form: str) -> str:
@@ -130,6 +147,8 @@ def _print_history(history: "History", report: Path | None) -> None:
         rows.append((f"pass {one['pass']}", f"{shares}, Sq of the tracks {1e6 * one['track_sq_m']:.3f} um"))
     if said["crf_hz"] is not None:
         rows.append(("CRF of the mean contact", f"{said['crf_hz']:.1f} Hz"))
+    if heard is not None:
+        rows += _heard_rows(heard)
     print()
     print_rows(rows)
     for note in history.notes:
@@ -138,3 +157,18 @@ def _print_history(history: "History", report: Path | None) -> None:
         print(f"\nKept in {history.folder}; asperity run with the same folder and more steps goes on")
     if report is not None:
         print(f"Report: {report}")
+
+
+def _heard_rows(heard: "HistoryVibration") -> list[tuple[str, str]]:
+    said = heard.scalars()
+    rows = [
+        (
+            f"contact's own resonance, at {len(heard.moments)} moments",
+            f"{said['tangent_resonance_hz']:.1f} ± {said['tangent_resonance_std_hz']:.1f} Hz",
+        )
+    ]
+    if said["approach_std_m"] is not None:
+        rows.append(("approach of the bodies, that a mass rides on", f"{1e9 * said['approach_std_m']:.3g} nm rms"))
+    if said["history_crf_hz"] is None:
+        return [*rows, ("CRF of the history", f"none: {said['history_crf_reason']}")]
+    return [*rows, ("CRF of the history", f"{said['history_crf_hz']:.1f} Hz")]

@@ -1,0 +1,261 @@
+"""What a mass that rides on a contact hears of its history, without the paper's coupling.
+
+The load is held at every step, so that the approach of the bodies is the way that a slow mass would go: it is the
+profile, and the tangent stiffness of the solved contact is the spring. No height from Sq, no cut-off from CAR, no
+sphere's stiffness from CLR; the paper's way stands beside it, on the same history.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.coupling import (
+    BAND_FACTOR,
+    Vibration,
+    VibrationModel,
+    contact_vibration,
+    damped_oscillator,
+    needs_solution,
+)
+from asperity.ehl.scales import Scales
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.stiffness import tangent_stiffness
+from asperity.errors import BadInput, NotConverged
+from asperity.history import History
+from asperity.signals import Signal, Spectrum, power_spectrum
+from asperity.surface.moving import MovingSurfaces
+from asperity.vibration import ContactOscillator, acceleration
+from asperity.wear import Resonance, contact_resonance, no_resonance
+from asperity.wear.indicators import FEWEST_LINES
+
+MOMENTS = 5  # of the settled steps, at which the tangent stiffness is taken
+WAVES = 0.4  # of a passage's steps: the shortest wave that is told has two and a half steps
+RUNG_DOWN = 12.0  # time constants of the oscillator: what is left of the start is e^-12
+SAMPLES_PER_PERIOD = 60.0  # straight lines between samples then cost the resonance 0.2 % of its power
+SILENT = 1e-5  # of a²/R: what the solver's tolerance leaves of the approach is no roughness
+
+
+@dataclass(frozen=True, kw_only=True)
+class HistoryVibration:
+    """A history as an accelerometer would hear it.
+
+    `oscillator` has the mean of `stiffness` [N/m], shape (moments,), the tangent stiffness of the contact as it lies at
+    the steps `moments`; steps at which a neighbouring load could not be solved are in `unsolved`. `profile` [m] is
+    one passage of the rough track, the approach of the bodies about its mean, which repeats; `response` [m/s^2] and
+    `spectrum` are the steady answer to it, whose lines are `spacing_hz` apart, speed over track. `not_periodic` is what
+    of the approach does not repeat, root mean square over root mean square. Without roughness, or where nothing
+    repeats, these are None and `resonance.reason` says why; `resonance` is looked for as in any record, `coupled` is
+    the paper's way to the vibration of the history's mean contact.
+    """
+
+    oscillator: ContactOscillator
+    stiffness: Field
+    moments: tuple[int, ...]
+    unsolved: tuple[int, ...]
+    profile: Signal | None
+    response: Signal | None
+    spectrum: Spectrum | None
+    spacing_hz: float | None
+    not_periodic: float | None
+    resonance: Resonance
+    coupled: Vibration
+
+    @property
+    def dynamic_load(self) -> float | None:
+        """Root mean square of the dynamic force over the load; above 0.2 a linear spring misleads."""
+        if self.response is None or self.oscillator.load is None:
+            return None
+        return float(self.oscillator.mass * np.std(self.response.values) / self.oscillator.load)
+
+    def scalars(self) -> dict[str, Any]:
+        """What `asperity run --listen --json` says besides the history; None where there is none."""
+        slower, coupled = self.oscillator.natural_frequency_hz, self.coupled.oscillator
+        return {
+            "history_crf_hz": self.resonance.crf_hz if self.resonance.found else None,
+            "history_crf_std_hz": _number(self.resonance.crf_std_hz),
+            "history_crf_reason": self.resonance.reason,
+            "tangent_resonance_hz": slower,
+            "tangent_resonance_std_hz": 0.5 * slower * float(np.std(self.stiffness) / np.mean(self.stiffness)),
+            "tangent_stiffness_n_per_m": float(np.mean(self.stiffness)),
+            "tangent_stiffness_std_n_per_m": float(np.std(self.stiffness)),
+            "tangent_unsolved": list(self.unsolved),
+            "coupled_crf_hz": self.coupled.resonance.crf_hz if self.coupled.resonance.found else None,
+            "coupled_resonance_hz": None if coupled is None else coupled.natural_frequency_hz,
+            "approach_std_m": None if self.profile is None else float(np.std(self.profile.values)),
+            "line_spacing_hz": self.spacing_hz,
+            "not_periodic": self.not_periodic,
+            "history_dynamic_load": self.dynamic_load,
+        }
+
+
+def history_vibration(
+    history: History, model: VibrationModel | None = None, *, moments: int = MOMENTS
+) -> HistoryVibration:
+    """Let the mass of a vibration model ride on a history.
+
+    Parameters
+    ----------
+    history : its settled steps are listened to, at least one passage of the rough track
+    model : mass, damping law, reference depth and indicator; the case's unless given. Its stiffness law and its
+        excitation are those of `coupled` only, and the paper's there if they ask for one solved contact
+    moments : how many steps, evenly over the settled ones, the tangent stiffness is the mean of
+
+    Raises
+    ------
+    BadInput
+        for no model, no moments, or what `contact_vibration` refuses.
+    NotConverged
+        if the tangent stiffness could be had at none of the moments.
+    """
+    case = history.case
+    model = case.vibration if model is None else model
+    if model is None:
+        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+    if moments < 1:
+        raise BadInput(f"the tangent stiffness is taken at 1 moment or more, got {moments}; {MOMENTS} is the default")
+    surfaces = history.surfaces()
+    steps, stiffness, unsolved = _tangents(history, surfaces, model, moments)
+    with case.naming("vibration"):
+        oscillator = damped_oscillator(float(np.mean(stiffness)), case.conditions.load, model)
+        alone = replace(model, stiffness_law="hertz-point", excitation="noise") if needs_solution(model) else model
+        coupled = contact_vibration(history.mean_state, case.conditions, alone)
+    rows = history.settled
+    period, objection = _period(surfaces)
+    if period is not None:
+        profile, not_periodic, objection = repeating(
+            rows["time_s"].to_numpy(), rows["rigid_approach_m"].to_numpy(), period
+        )
+        if profile is not None and np.std(profile.values) < SILENT * Scales.of(case.conditions, case.lubricant).gap:
+            objection = "the approach of the bodies does not change: there is nothing to excite a vibration"
+    f0 = oscillator.natural_frequency_hz
+    if objection is not None or period is None or profile is None:
+        band = f0 / BAND_FACTOR, f0 * BAND_FACTOR
+        return HistoryVibration(
+            oscillator=oscillator,
+            stiffness=stiffness,
+            moments=steps,
+            unsolved=unsolved,
+            profile=None,
+            response=None,
+            spectrum=None,
+            spacing_hz=None if period is None else 1.0 / period,
+            not_periodic=None,
+            resonance=no_resonance(objection or "", band, model.method),
+            coupled=coupled,
+        )
+    profile = resampled(profile, SAMPLES_PER_PERIOD * f0)
+    response = steady_response(oscillator, profile)
+    spectrum = power_spectrum(response, window="boxcar")
+    return HistoryVibration(
+        oscillator=oscillator,
+        stiffness=stiffness,
+        moments=steps,
+        unsolved=unsolved,
+        profile=profile,
+        response=response,
+        spectrum=spectrum,
+        spacing_hz=1.0 / period,
+        not_periodic=not_periodic,
+        resonance=_resonance(spectrum, f0, model),
+        coupled=coupled,
+    )
+
+
+def repeating(time: Field, heights: Field, period: float) -> tuple[Signal | None, float, str | None]:
+    """One period of what repeats in `heights` [m] at evenly spaced `time` [s], both (steps,), about its mean.
+
+    Least squares of the period's waves, so that it need be no whole number of steps. Returns it, what is left of the
+    heights over what they vary by, both root mean square, and why it could not be told (or None).
+    """
+    step = (time[-1] - time[0]) / (time.size - 1)
+    length = period / step
+    if time.size < length:
+        missing = f"{time.size} settled steps are less than a passage of the rough track, {length:.0f}"
+        return None, math.nan, f"{missing}; let the history go on for {math.ceil(length) - time.size} steps more"
+    waves = int(WAVES * length)
+    phase = 2.0 * np.pi * np.outer(time / period, np.arange(1, waves + 1))
+    basis = np.hstack([np.ones((time.size, 1)), np.cos(phase), np.sin(phase)])
+    found: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
+    left = float(np.std(heights - basis @ found))
+    varied = float(np.std(heights))
+    samples = math.ceil(length)
+    lines = np.zeros(samples // 2 + 1, dtype=complex)
+    lines[1 : waves + 1] = samples / 2.0 * (found[1 : waves + 1] - 1j * found[waves + 1 :])
+    return Signal(np.fft.irfft(lines, samples), samples / period, "m"), left / varied if varied else 0.0, None
+
+
+def resampled(profile: Signal, rate_hz: float) -> Signal:
+    """A profile that repeats, at `rate_hz` or faster: its own waves and no others."""
+    import scipy.fft as fft
+
+    samples = profile.values.size
+    finer = fft.next_fast_len(max(samples, math.ceil(samples * rate_hz / profile.rate_hz)), real=True)
+    lines = np.fft.rfft(profile.values) * (finer / samples)
+    if samples % 2 == 0 and finer > samples:
+        lines[-1] /= 2.0  # half the sampling rate was one line of two signs
+    return Signal(np.fft.irfft(lines, finer), profile.rate_hz * finer / samples, profile.unit)
+
+
+def steady_response(oscillator: ContactOscillator, profile: Signal) -> Signal:
+    """One period of the acceleration [m/s^2] over a profile that repeats for ever; the start has rung down."""
+    decay = RUNG_DOWN / (oscillator.damping_ratio * oscillator.angular_frequency)
+    times = math.ceil(decay / profile.duration_s) + 2
+    ridden = acceleration(oscillator, replace(profile, values=np.tile(profile.values, times)))
+    samples = profile.values.size  # the last period has no kink at its end
+    return replace(ridden, values=ridden.values[-2 * samples : -samples])
+
+
+def _period(surfaces: MovingSurfaces) -> tuple[float | None, str | None]:
+    """Time after which the contact is what it was [s], or why there is none."""
+    if not any(surfaces.rough):
+        return None, "the surfaces are flat: there is no roughness to excite a vibration"
+    passages = [surfaces.passage(index) for index in (0, 1) if surfaces.rough[index]]
+    moving = [passage for passage in passages if math.isfinite(passage)]
+    if not moving:
+        return None, "the roughness stands still: nothing passes that could excite a vibration"
+    if not math.isclose(moving[0], moving[-1], rel_tol=1e-9):
+        return None, "two rough surfaces at different speeds do not meet alike again: no passage repeats"
+    return moving[0], None
+
+
+def _tangents(
+    history: History, surfaces: MovingSurfaces, model: VibrationModel, moments: int
+) -> tuple[tuple[int, ...], Field, tuple[int, ...]]:
+    case, rows = history.case, history.settled
+    chosen = np.unique(np.linspace(0, len(rows) - 1, moments + 2)[1:-1].round().astype(int))
+    solved, stiffness, unsolved = [], [], []
+    for number, time in zip(rows["step"].iloc[chosen], rows["time_s"].iloc[chosen], strict=True):
+        try:
+            contact = solve_contact(case.conditions, case.lubricant, surfaces.at(float(time)), options=case.options)
+            stiffness.append(tangent_stiffness(contact, reference_depth=model.reference_depth).total)
+            solved.append(int(number))
+        except NotConverged as unfinished:
+            failure = unfinished
+            unsolved.append(int(number))
+    if not stiffness:
+        raise NotConverged(
+            failure.solution, f"the tangent stiffness could be had at none of {len(unsolved)} steps: {failure}"
+        )
+    return tuple(solved), np.array(stiffness), tuple(unsolved)
+
+
+def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonance:
+    """Looked for about f0, where the lines are close enough to show one."""
+    band = f0 / BAND_FACTOR, min(f0 * BAND_FACTOR, float(spectrum.frequency_hz[-1]))
+    apart = spectrum.spacing_hz
+    if (band[1] - band[0]) / apart < FEWEST_LINES + 1:
+        least = math.ceil((FEWEST_LINES + 1) * apart / (band[1] - band[0]))
+        return no_resonance(
+            f"the track repeats: its lines lie {apart:.0f} Hz apart, too far to show a resonance near {f0:.0f} Hz; "
+            f"make motion.track {least} times as long or more",
+            band,
+            model.method,
+        )
+    return contact_resonance(spectrum, band_hz=band, method=model.method)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

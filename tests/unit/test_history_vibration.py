@@ -1,0 +1,241 @@
+"""What a mass on a contact hears of its history: the profile that repeats, the steady answer to it, the paper's way."""
+
+import json
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from asperity.case import load_case
+from asperity.cli import main
+from asperity.coupling import VibrationModel
+from asperity.ehl.motion import moving_contact
+from asperity.ehl.solve import solve_contact
+from asperity.ehl.stiffness import tangent_stiffness
+from asperity.errors import BadInput
+from asperity.hearing import history_vibration, repeating, resampled, steady_response
+from asperity.history import load_history, run_history
+from asperity.signals import Signal, power_spectrum
+from asperity.surface import Surface
+from asperity.surface.moving import MovingSurfaces, track_grid
+from asperity.vibration import ContactOscillator
+from asperity.wear import contact_resonance
+
+SMALL = {"grid.cells": "[48, 16]", "surface.correlation_length": "40 um", "grid.x": "[-3, 1.8]"}
+SPRING = ContactOscillator(mass=0.1, stiffness=2.0e8, damping_ratio=0.02, load=500.0)
+
+
+def case(**overrides):
+    return load_case("examples/paper.toml").with_overrides(SMALL | overrides)
+
+
+@pytest.fixture(scope="module")
+def history(tmp_path_factory):
+    return run_history(case(), steps=96, out=tmp_path_factory.mktemp("history") / "kept")
+
+
+@pytest.fixture(scope="module")
+def heard(history):
+    return history_vibration(history, moments=2)
+
+
+def waves(period, numbers, samples, rate):
+    time = np.arange(samples) / rate
+    return sum(1e-9 * k * np.cos(2.0 * np.pi * k * time / period + k) for k in numbers)
+
+
+# The profile that repeats
+
+
+def test_waves_of_a_period_that_is_no_whole_number_of_steps_are_found():
+    period, rate = 43.21e-6, 1e6
+    time = np.arange(100) / rate
+    told, left, objection = repeating(time, 5e-7 + waves(period, (1, 3, 11), 100, rate), period)
+    assert objection is None
+    assert left < 1e-9
+    assert told.duration_s == pytest.approx(period, rel=1e-12)
+    expected = waves(period, (1, 3, 11), told.values.size, told.rate_hz)
+    np.testing.assert_allclose(told.values, expected, atol=1e-16)
+
+
+def test_what_does_not_repeat_is_said():
+    period, rate = 40e-6, 1e6
+    steady = waves(period, (1, 3), 200, rate)
+    drift = np.random.default_rng(1).standard_normal(200) * 0.5 * np.std(steady)
+    told, left, _ = repeating(np.arange(200) / rate, steady + drift, period)
+    # noise of 0.5 beside 1; of 200 numbers 33 are the period's own, and take their share of the noise
+    assert left == pytest.approx(np.sqrt(0.25 * (1 - 33 / 200) / 1.25), rel=0.1)
+    assert np.std(told.values - waves(period, (1, 3), 40, rate)) < np.std(drift)
+
+
+def test_less_than_a_passage_says_how_many_steps_are_missing():
+    told, _, objection = repeating(np.arange(30) * 1e-6, np.zeros(30), 41.5e-6)
+    assert told is None
+    assert "12 steps more" in objection
+
+
+def test_a_finer_rate_keeps_the_waves():
+    coarse = Signal(waves(50e-6, (1, 4, 9), 50, 1e6), 1e6, "m")
+    fine = resampled(coarse, 7.3e6)
+    assert fine.rate_hz >= 7.3e6
+    assert fine.duration_s == pytest.approx(50e-6, rel=1e-12)
+    np.testing.assert_allclose(fine.values, waves(50e-6, (1, 4, 9), fine.values.size, fine.rate_hz), atol=1e-16)
+
+
+# The mass on it
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.5, 1.0, 2.0])
+def test_the_answer_to_a_sine_is_the_closed_form(ratio):
+    f = ratio * SPRING.natural_frequency_hz
+    samples = round(400 / min(ratio, 1.0))  # kinks of the straight lines far above f0
+    profile = Signal(1e-8 * np.cos(2.0 * np.pi * np.arange(samples) / samples), samples * f, "m")
+    answer = steady_response(SPRING, profile)
+    m, c, s, w = 0.1, 2 * 0.02 * np.sqrt(2.0e8 * 0.1), 2.0e8, 2j * np.pi * f
+    transfer = w**2 * (c * w + s) / (m * w**2 + c * w + s)
+    expected = 1e-8 * np.real(transfer * np.exp(2j * np.pi * np.arange(samples) / samples))
+    np.testing.assert_allclose(answer.values, expected, atol=3e-4 * abs(1e-8 * transfer))
+
+
+def test_a_slow_wave_is_followed():
+    f = SPRING.natural_frequency_hz / 100.0
+    profile = Signal(1e-6 * np.cos(2.0 * np.pi * np.arange(20_000) / 20_000), 20_000 * f, "m")
+    answer = steady_response(SPRING, profile)
+    followed = -((2.0 * np.pi * f) ** 2) * profile.values
+    np.testing.assert_allclose(answer.values, followed, atol=2e-4 * np.max(np.abs(followed)))
+
+
+def test_answers_add_up():
+    one, other = (Signal(waves(200e-6, numbers, 300, 1.5e6), 1.5e6, "m") for numbers in ((1, 2), (5,)))
+    both = steady_response(SPRING, replace(one, values=one.values + 3.0 * other.values)).values
+    apart = steady_response(SPRING, one).values + 3.0 * steady_response(SPRING, other).values
+    np.testing.assert_allclose(both, apart, rtol=1e-9, atol=1e-9 * np.max(np.abs(both)))
+
+
+def test_a_long_track_shows_the_resonance_to_its_own_error():
+    f0, samples, period = SPRING.natural_frequency_hz, 20_000, 0.05
+    rng = np.random.default_rng(3)
+    number = np.arange(1, samples // 2 + 1)
+    lines = np.zeros(samples // 2 + 1, complex)
+    lines[1:] = rng.standard_normal(2 * number.size).view(complex) / number**2  # white base acceleration
+    profile = resampled(Signal(1e-3 * np.fft.irfft(lines, samples), samples / period, "m"), 60.0 * f0)
+    spectrum = power_spectrum(steady_response(SPRING, profile), window="boxcar")
+    assert spectrum.spacing_hz == pytest.approx(1.0 / period)
+    found = contact_resonance(spectrum, band_hz=(f0 / 1.5, 1.5 * f0))
+    deviation = np.sqrt(0.02 * f0 / (2.0 * np.pi * period))
+    assert abs(found.crf_hz - f0) < 3.0 * deviation
+    assert found.crf_std_hz == pytest.approx(deviation, rel=0.5)
+
+
+# On a contact
+
+
+def test_the_approach_follows_a_wave_much_longer_than_the_contact():
+    chosen = case(**{"contact.slip": 0.0})
+    conditions, grid = chosen.conditions, chosen.grid
+    track = track_grid(grid, 10)
+    height = 20e-9 * np.cos(2.0 * np.pi * (track.x - track.lower[0]) / track.extent[0])
+    surface = Surface(np.repeat(height[:, None], grid.cells[1], axis=1), track)
+    surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds, grid)
+    taken = list(islice(moving_contact(conditions, chosen.lubricant, surfaces, options=chosen.options), 48 + 481))
+    rows = taken[49:]
+    told, left, objection = repeating(
+        np.array([one.time for one in rows]),
+        np.array([one.solution.rigid_approach for one in rows]),
+        surfaces.passage(0),
+    )
+    assert objection is None
+    assert left < 0.01
+    line = np.fft.rfft(told.values)[1] * 2.0 / told.values.size
+    begun = -grid.lower[0] / grid.extent[0] / 10  # x = 0 lies so far along the track
+    expected = 20e-9 * np.exp(-2j * np.pi * begun)
+    assert abs(line - expected) < 0.1 * 20e-9
+    assert abs(line) == pytest.approx(20e-9, rel=0.04)
+
+
+def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, heard):
+    chosen, rows = history.case, history.settled
+    assert heard.unsolved == ()
+    number = heard.moments[0]
+    surface = chosen.moving_surfaces().at(float(rows["time_s"][rows["step"] == number].iloc[0]))
+    contact = solve_contact(chosen.conditions, chosen.lubricant, surface, options=chosen.options)
+    assert heard.stiffness[0] == pytest.approx(tangent_stiffness(contact).total, rel=1e-6)
+    assert heard.oscillator.stiffness == pytest.approx(np.mean(heard.stiffness))
+    assert heard.oscillator.damping_ratio == chosen.vibration.damping_ratio
+    assert heard.not_periodic < 0.5
+    assert np.std(heard.profile.values) == pytest.approx(rows["rigid_approach_m"].std(ddof=0), rel=0.15)
+    # the power of the answer is that of the profile's lines by the closed form
+    lines = np.abs(np.fft.rfft(heard.profile.values)[1:] / heard.profile.values.size) ** 2 * 2.0
+    frequency = np.arange(1, lines.size + 1) * heard.spacing_hz
+    inside = frequency < heard.profile.rate_hz / 6.0
+    power = np.sum(lines[inside] * heard.oscillator.gain(frequency[inside]))
+    assert np.var(heard.response.values) == pytest.approx(power, rel=0.05)
+
+
+def test_a_track_as_short_as_the_contact_shows_no_resonance_and_says_so(history, heard):
+    speed, track = history.case.conditions.surface_speeds[0], history.case.grid.extent[0]
+    assert heard.spacing_hz == pytest.approx(speed / track)
+    assert not heard.resonance.found
+    assert "motion.track" in heard.resonance.reason
+
+
+def test_the_papers_way_stands_beside_it(history, heard):
+    assert heard.coupled.oscillator == history.vibration.oscillator
+    model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent", rate_hz=2e5)
+    other = history_vibration(history, model, moments=1)
+    assert other.coupled.oscillator.stiffness == pytest.approx(heard.coupled.oscillator.stiffness)
+
+
+def test_a_kept_history_is_heard_alike(history, heard):
+    again = history_vibration(load_history(history.folder), moments=2)
+    np.testing.assert_allclose(again.response.values, heard.response.values, rtol=1e-9)
+
+
+def test_a_smooth_contact_hears_nothing():
+    flat = case(**{"surface": {"kind": "flat"}})
+    heard = history_vibration(run_history(flat, steps=3), moments=1)
+    assert heard.profile is None
+    assert "flat" in heard.resonance.reason
+    assert heard.coupled.oscillator is None
+    assert heard.oscillator.natural_frequency_hz > 5000.0
+
+
+def test_two_rough_surfaces_that_slide_do_not_repeat():
+    both = run_history(case(**{"motion.rough": "both"}), steps=2)
+    assert "do not meet alike again" in history_vibration(both, moments=1).resonance.reason
+
+
+def test_what_is_pressed_flat_is_heard_flat():
+    chosen = case(**{"motion.flattening": True, "material.hardness": "0.7 GPa"})
+    history = run_history(chosen, steps=4)
+    first = history.surfaces().first
+    assert first.heights.mean() == pytest.approx(-history.table["flattened_m"].iloc[-1], abs=1e-15)
+    assert "steps more" in history_vibration(history, moments=1).resonance.reason
+
+
+def test_without_a_model_or_moments_it_is_refused(history):
+    with pytest.raises(BadInput, match="1 moment"):
+        history_vibration(history, moments=0)
+    mute = run_history(case(vibration="none"), steps=1)
+    with pytest.raises(BadInput, match="vibration is left out"):
+        history_vibration(mute)
+
+
+def test_the_command_listens(history, capsys):
+    arguments = ["run", "examples/paper.toml", "--out", str(history.folder), "--steps", "96", "--listen"]
+    for key, value in SMALL.items():
+        arguments += ["--set", f"{key}={value}"]
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--json"])
+    assert not ended.value.code
+    said = json.loads(capsys.readouterr().out)
+    heard = history_vibration(history)
+    assert said["computed"] == 0
+    assert said["tangent_resonance_hz"] == pytest.approx(heard.oscillator.natural_frequency_hz)
+    assert said["coupled_crf_hz"] == pytest.approx(heard.coupled.resonance.crf_hz)
+    assert said["history_crf_hz"] is None
+    assert "motion.track" in said["history_crf_reason"]
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert "contact's own resonance" in capsys.readouterr().out
