@@ -10,6 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import MISSING, dataclass, field, fields, replace
 from decimal import Decimal
 from difflib import get_close_matches
@@ -1051,7 +1052,7 @@ class Case:
                 if not isinstance(table.get(parent), dict):
                     table[parent] = {}
                 table = table[parent]
-            table[key] = _toml_value(value) if isinstance(value, str) else value
+            table[key] = _toml_value(value) if isinstance(value, str) else deepcopy(value)  # a later key may go into it
         case = _case(tables, self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface
         return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case

@@ -269,3 +269,26 @@ def test_a_folder_that_is_no_study_is_said_so(tmp_path):
     (tmp_path / "manifest.json").write_text("{}")
     with pytest.raises(UnreadableFile, match="not a study's manifest"):
         load_study(tmp_path)
+
+
+SWEPT = {
+    "grid": {"cells": [[24, 24], [32, 24]]},
+    "material": {"hardness": ["1 GPa", "none"]},
+    "surface": [{"kind": "flat"}, {"kind": "gaussian", "sq": "1 um", "correlation_length": "30 um"}],
+}
+
+
+@pytest.mark.parametrize(
+    ("key", "swept", "written"),
+    [
+        ("grid.cells", SWEPT["grid"], ["[24.0, 24.0]", "[32.0, 24.0]"]),
+        ("material.hardness", SWEPT["material"], ["1000000000.0", "none"]),
+        ("surface", SWEPT["surface"], [json.dumps(table) for table in SWEPT["surface"]]),
+    ],
+)
+def test_pairs_tables_and_numbers_beside_names_are_columns_of_text(case, executor, tmp_path, key, swept, written):
+    plan = plan_study(case.with_overrides({"study": {key.partition(".")[0]: swept}}))
+    result = run_study(plan, out=tmp_path, executor=executor)
+    assert list(pandas.read_parquet(tmp_path / "table.parquet")[key]) == written
+    assert list(load_study(tmp_path).table[key]) == written
+    assert not result.failed

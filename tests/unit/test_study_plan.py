@@ -120,6 +120,11 @@ REFUSED = [
     ({"sq": sq_range(step="0.1 pm"), "seeds": 5}, "widen its steps"),
     ({"sq": sq_range(step="1 um"), "seeds": 0}, "study.seeds must be 1 or more"),
     ({"slip": {"from": 0, "to": 1, "count": 3, "scale": "log"}}, "must be positive on a log scale"),
+    ({"load": ["200 N", "0.2 kN"]}, "has the point contact.load = 0.2 kN twice"),
+    ({"load": ["200 N", "300 N"], "samples": 3}, "twice; write each value once"),
+    ({"sq": ["1 um"], "seeds": [3, 3]}, "seeds must differ from one another, got 3, 3"),
+    ({"sq": ["1 um"], "surface": [{"kind": "flat"}]}, "sweeps surface and surface.sq, a part of it"),
+    ({"motion": {"steps": [3, 4]}}, "study.motion.steps changes nothing in a study"),
 ]
 
 
@@ -142,3 +147,40 @@ def test_the_text_of_a_case_restates_its_study(paper):
     )
     assert load_case(case.text) == case
     assert plan_study(load_case(case.text)).points == plan_study(case).points
+
+
+def test_whole_tables_are_swept_and_each_has_the_seeds_that_it_knows(paper):
+    plan = planned(
+        paper,
+        surface=[
+            {"kind": "gaussian", "sq": "1 um", "correlation_length": "30 um"},
+            {"kind": "gaussian", "sq": "2 um", "correlation_length": "30 um", "seed": 5},
+            {"kind": "flat"},
+        ],
+        lubricant={"viscosity": [{"law": "roelands", "eta0": "0.1 Pa s", "alpha": "20 1/GPa"}]},
+        seeds=2,
+    )
+    assert plan.axes == ("surface", "lubricant.viscosity")
+    cases = [paper.with_overrides(case.overrides) for case in plan.cases]
+    assert [case.contents.surface.kind for case in cases] == 2 * ["gaussian"] + 2 * ["gaussian"] + 2 * ["flat"]
+    assert cases[0].contents.surface.seed != cases[1].contents.surface.seed
+    assert [case.contents.surface.seed for case in cases[2:4]] == [5, 5]
+    assert {case.contents.lubricant.viscosity.law for case in cases} == {"roelands"}
+    assert len({case.id for case in plan.cases}) == 6
+    assert "seed" not in plan.points[0]["surface"]
+    assert planned(paper, viscosity=[{"law": "barus", "eta0": "1 Pa s", "alpha": "20 1/GPa"}]).axes == (
+        "lubricant.viscosity",
+    )
+
+
+def test_a_swept_surface_file_that_changes_makes_another_case(paper, tmp_path):
+    files = [tmp_path / "one.txt", tmp_path / "two.txt"]
+    for file in files:
+        file.write_text("1 2 3")
+    measured = paper.with_overrides({"surface": {"file": str(files[0]), "pixel": "1 um"}})
+    study = {"surface": {"file": [str(file) for file in files]}}
+    before = [case.id for case in planned(measured, **study).cases]
+    files[1].write_text("1 2 4")
+    after = [case.id for case in planned(measured, **study).cases]
+    assert before[0] == after[0]
+    assert before[1] != after[1]

@@ -54,7 +54,7 @@ def study(
     part = _shard(shard)
     if out is None and not dry_run:
         raise BadInput("study needs a folder to keep its cases in; give --out DIR")
-    if report is not None:
+    if report is not None and not _in_folder_to_come(report, out):
         require_output(report, ".html", "--report")
     plan = plan_study(chosen_case(case, None, override or []))
     if dry_run:
@@ -182,6 +182,13 @@ def _shard(text: str) -> tuple[int, int]:
     return int(written[1]), int(written[2])
 
 
+def _in_folder_to_come(report: Path, out: Path | None) -> bool:
+    """Whether a page is to lie in the study's folder, which the study makes."""
+    return (
+        out is not None and not out.exists() and report.suffix == ".html" and report.resolve().parent == out.resolve()
+    )
+
+
 def _make_page(result: "StudyResult", report: Path | None, figures: Path | None, *, quiet: bool) -> dict[str, str]:
     if report is None and figures is None:
         return {}
@@ -196,12 +203,14 @@ def _make_page(result: "StudyResult", report: Path | None, figures: Path | None,
 
 def _print_study(result: "StudyResult", made: dict[str, str]) -> None:
     from asperity.study.curve import curve_of, is_wear_study
+    from asperity.study.plan import as_written
 
     print()
     if is_wear_study(result) and len(result.table) > result.failed:
         _print_curve(curve_of(result).summary())
     for _, row in result.failures.head(SHOWN_FAILURES).iterrows():
-        where = ", ".join(f"{key} = {row[key]:g}" for key in result.plan.axes)
+        chosen = result.plan.cases[row["number"]].overrides
+        where = ", ".join(f"{key} = {as_written(chosen[key])}" for key in result.plan.axes if key in chosen)
         print(f"  failed: {where}, realisation {row['realisation']}: {row['reason']}")
     if result.failed > SHOWN_FAILURES:
         print(f"  ... and {result.failed - SHOWN_FAILURES} more; column reason of the table")

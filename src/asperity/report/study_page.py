@@ -29,7 +29,7 @@ from asperity.study.curve import SQ, WearCurve, curve_of, is_wear_study
 from asperity.study.evaluate import BOTH_PRESETS as PRESETS
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyResult
-from asperity.study.plan import SEEDS
+from asperity.study.plan import SEEDS, as_written
 from asperity.study.store import read_manifest
 
 if TYPE_CHECKING:
@@ -272,7 +272,7 @@ class StudyReport:
     def _point_in_words(self, point: int, cases: int) -> str:
         """The swept values of a point, and how many of its surfaces are meant where it has several."""
         values = self.result.plan.points[point]
-        words = ", ".join(f"{key} {sweep_figures.as_written(value)}" for key, value in values.items()) or "its case"
+        words = ", ".join(f"{key} {as_written(value)}" for key, value in values.items()) or "its case"
         several = self.result.plan.realisations
         return words if several == 1 else f"{words} ({cases} of {several} surfaces)"
 
@@ -608,9 +608,7 @@ class StudyReport:
 
     def _range(self, key: str) -> str:
         """The values of a swept key in words."""
-        values = list(
-            dict.fromkeys(sweep_figures.as_written(point[key]) for point in self.result.plan.points if key in point)
-        )
+        values = list(dict.fromkeys(as_written(point[key]) for point in self.result.plan.points if key in point))
         if len(values) <= 8:
             return _printed(", ".join(values))
         return _printed(f"{len(values)} values, {values[0]} to {values[-1]}")

@@ -4,7 +4,7 @@ Swept quantities are shown in the unit they were written in, outputs in display 
 """
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from asperity.case import Case, split_amount
 from asperity.errors import BadInput
 from asperity.report.figures import BLUE, GREY
 from asperity.report.study_figures import Medium, stay_near
+from asperity.study.plan import as_written
 
 if TYPE_CHECKING:
     import pandas
@@ -31,6 +32,8 @@ BINS = 8  # of one with more
 MOST_DRAWN = 1500  # dots as drawings; more are a picture
 MOST_WRITTEN = 8  # values a side of a map whose cells hold their number
 ACROSS = 4
+SAME = 1e-9  # relative difference that is rounding
+CHOICES = ("law", "kind", "file")  # keys that say what a table is
 NAMES = {
     "sq": "Sq",
     "alpha": "pressure-viscosity coefficient α",
@@ -82,9 +85,15 @@ def outputs_of(table: "pandas.DataFrame") -> list[Output]:
     for output in OUTPUTS:
         if output.column in ("crf_hz", "crfa") and "crf_sound_hz" in table:
             continue
-        if output.column in table and table[output.column].nunique() > 1:
+        if output.column in table and _varies(table[output.column].to_numpy(dtype=float)):
             shown.append(output)
     return shown
+
+
+def _varies(values: Field) -> bool:
+    """Whether numbers differ by more than their last digits."""
+    known = values[np.isfinite(values)]
+    return known.size > 0 and float(np.ptp(known)) > SAME * float(np.abs(known).max())
 
 
 @dataclass(frozen=True)
@@ -122,10 +131,21 @@ def axis_of(plan: "Plan", table: "pandas.DataFrame", key: str) -> Axis:
         numbers, unit = _numbers(written)
     except BadInput:
         texts = [as_written(value) for value in written]
-        names = tuple(dict.fromkeys(texts))
-        return Axis(key, name, np.array([names.index(text) for text in texts], dtype=float), names)
+        shown = {text: _short(value) for text, value in zip(texts, written, strict=True)}
+        if len(set(shown.values())) < len(shown):
+            shown = {text: text for text in shown}
+        order = list(shown)
+        values = np.array([order.index(text) for text in texts], dtype=float)
+        return Axis(key, name, values, tuple(shown.values()))
     label = f"{name} [{UNITS.get(unit, unit)}]" if unit else name
     return Axis(key, label, numbers, logarithmic=_crowds_low(np.unique(numbers)))
+
+
+def _short(value: Any) -> str:
+    """A table by what it chooses, a file by its name."""
+    if isinstance(value, Mapping):
+        value = next((value[key] for key in CHOICES if key in value), value)
+    return as_written(value).rpartition("/")[2]
 
 
 def _own_value(case: Case, key: str) -> Any:
@@ -146,11 +166,6 @@ def _numbers(written: Sequence[Any]) -> tuple[Field, str]:
         single.append(entries[0])
     unit = split_amount(single[0])[1]
     return np.array([float(split_amount(value, unit)[0]) for value in single]), unit
-
-
-def as_written(value: Any) -> str:
-    """A value of a case file in words."""
-    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 def _crowds_low(places: Field) -> bool:

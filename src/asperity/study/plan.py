@@ -24,6 +24,9 @@ Seeding = Literal["independent", "common"]
 SEEDS = ("surface.seed", "vibration.seed")
 MOST_CASES = 10_000_000
 DIGITS = 9  # of a sampled value
+FOR_RUNS = "motion"  # the section that only `asperity run` reads
+# keys that may change which seeds a case has, and which files its surface is read from
+SHAPING = frozenset({"surface", "surface.kind", "surface.file", "surface.second", "surface.second.file", "vibration"})
 
 
 class StudyCase(NamedTuple):
@@ -74,17 +77,7 @@ class Plan:
     @cached_property
     def surface_digest(self) -> str | None:
         """Hash of the measured surface's file, of the stored roughness, or None: a case file does not hold them."""
-        section = self.case.contents.surface
-        if self.case.stored is not None:
-            return hashlib.sha256(self.case.stored.heights.tobytes()).hexdigest()
-        files = [getattr(part, "file", None) for part in (section, getattr(section, "second", None))]
-        digest = hashlib.sha256()
-        for file in (self.case.folder / name for name in files if name is not None):
-            try:
-                digest.update(file.read_bytes())
-            except OSError as error:
-                raise UnreadableFile(f"{file} cannot be read: {error.strerror}; check surface.file") from None
-        return digest.hexdigest() if any(files) else None
+        return _surface_digest(self.case)
 
     @cached_property
     def design(self) -> str:
@@ -92,11 +85,17 @@ class Plan:
         return _hash(self._fixed)
 
     def _cases(self) -> Iterator[StudyCase]:
-        seeded = [key for key in SEEDS if _has_seed(self.case, key)]
-        base = int(self._fixed.get("surface.seed") or 0)
+        base = int(getattr(self.case.contents.surface, "seed", None) or 0)
         number = 0
         for place, point in enumerate(self.points):
             plain = {key: in_si(value) for key, value in point.items()}
+            shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
+            seeded = [key for key in SEEDS if _has_seed(shaped, key) and not _states(point, key)]
+            shared: dict[str, Any] = {}
+            if self.ids is None:
+                shared = {**self._fixed, **plain}
+                if shaped is not self.case:
+                    shared["surface file"] = _surface_digest(shaped)
             words = [] if self.seeding == "common" else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
             for realisation in range(self.realisations):
                 if self.seeds is None:
@@ -104,11 +103,8 @@ class Plan:
                 else:
                     own = self.seeds[realisation]
                     drawn = np.array([own, np.random.SeedSequence([own, *words]).generate_state(1)[0]])
-                chosen = {
-                    key: int(seed) for key, seed in zip(SEEDS, drawn, strict=True) if key in seeded and key not in point
-                }
-                identity = {**self._fixed, **plain, **chosen}
-                name = _hash(identity)[:16] if self.ids is None else self.ids[number]
+                chosen = {key: int(seed) for key, seed in zip(SEEDS, drawn, strict=True) if key in seeded}
+                name = _hash({**shared, **chosen})[:16] if self.ids is None else self.ids[number]
                 yield StudyCase(number, place, realisation, {**point, **chosen}, name)
                 number += 1
 
@@ -132,6 +128,12 @@ def plan_study(case: Case) -> Plan:
     keys = {_full_key(case, name): (name, values) for name, values in section.axes.items()}
     if len(keys) < len(section.axes):
         raise BadInput(f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}")
+    for key in keys:
+        for part in keys:
+            if part.startswith(f"{key}."):
+                raise BadInput(
+                    f"{case.source}: study sweeps {key} and {part}, a part of it; write {part} in its tables"
+                )
     count = math.prod(
         len(values) if isinstance(values, tuple) else _range_size(case, name, values) for name, values in keys.values()
     )
@@ -151,6 +153,7 @@ def plan_study(case: Case) -> Plan:
         points = [dict(zip(swept, combined, strict=True)) for combined in product(*swept.values())]
     else:
         points = _sampled(case, keys, section.samples, section.sample_seed)
+    _require_distinct(case, points)
     return plan_points(
         case,
         points,
@@ -195,6 +198,8 @@ def plan_points(
     realisations = seeds if isinstance(seeds, int) else len(seeds)
     if realisations < 1:
         raise BadInput(f"seeds must be 1 or more, got {realisations}")
+    if given is not None and len(set(given)) < realisations:
+        raise BadInput(f"seeds must differ from one another, got {', '.join(map(str, given))}")
     return Plan(base, tuple(axes), tuple(points), realisations, kind, seeding, given)
 
 
@@ -211,29 +216,56 @@ def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[st
             case.with_overrides({key: value})
 
 
+def _require_distinct(case: Case, points: Sequence[Mapping[str, Any]]) -> None:
+    """Refuse a point that is there twice: its cases are the same, and would count as independent ones."""
+    seen = set()
+    for point in points:
+        plain = json.dumps({key: in_si(value) for key, value in point.items()}, sort_keys=True)
+        if plain in seen:
+            where = ", ".join(f"{key} = {as_written(value)}" for key, value in point.items())
+            raise BadInput(
+                f"{case.source}: study has the point {where} twice; write each value once, "
+                "and ask for more surfaces by seeds"
+            )
+        seen.add(plain)
+
+
 def _full_key(case: Case, name: str) -> str:
     """The dotted key that a name in [study] means: itself, or the one key of the case that ends so."""
-    keys = [key for key in _keys(case.contents) if not key.startswith("study")]
-    if name in keys:
+    tables: list[str] = []
+    keys: list[str] = []
+    for key, value in _entries(case.contents):
+        if key.partition(".")[0] not in ("study", FOR_RUNS):
+            (tables if isinstance(value, Section) else keys).append(key)
+    if name.partition(".")[0] == FOR_RUNS:
+        raise BadInput(f"{case.source}: study.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run")
+    if name in (*keys, *tables):
         return name
     meant = [key for key in keys if key.rpartition(".")[2] == name]
+    meant = meant or [key for key in tables if key.rpartition(".")[2] == name]
     if len(meant) == 1:
         return meant[0]
     if meant:
         raise BadInput(f"{case.source}: study.{name} could mean {' or '.join(meant)}; write one of them")
-    near = get_close_matches(name, [*keys, *(key.rpartition(".")[2] for key in keys)], n=1)
+    near = get_close_matches(name, [*tables, *keys, *(key.rpartition(".")[2] for key in keys)], n=1)
     remedy = f"did you mean {near[0]}?" if near else "name one such as surface.sq or contact.load"
     raise BadInput(f"{case.source}: study.{name} is not a key of the case; {remedy}")
 
 
-def _keys(section: Section, parents: tuple[str, ...] = ()) -> Iterator[str]:
+def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
+    """Every key of a case with its value: tables, and what is in them."""
     for name, entry in type(section).model_fields.items():
-        keys = (*parents, entry.alias or name)
-        value = getattr(section, name)
+        keys, value = (*parents, entry.alias or name), getattr(section, name)
+        yield ".".join(keys), value
         if isinstance(value, Section):
-            yield from _keys(value, keys)
-        else:
-            yield ".".join(keys)
+            yield from _entries(value, keys)
+
+
+def as_written(value: Any) -> str:
+    """A value of a case file in words."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {as_written(entry)}" for key, entry in value.items()) + "}"
+    return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
 # Ranges --------------------------------------------------------------------------------------------------------------
@@ -334,16 +366,30 @@ def _has_seed(case: Case, key: str) -> bool:
     return table is not None and name in type(table).model_fields
 
 
-def _flat(section: Section, parents: tuple[str, ...] = ()) -> dict[str, Any]:
+def _states(point: Mapping[str, Any], key: str) -> bool:
+    """Whether a point says itself which seed is meant: by the key, or in a whole table."""
+    section, name = key.split(".")
+    table = point.get(section)
+    return key in point or (isinstance(table, Mapping) and name in table)
+
+
+def _surface_digest(case: Case) -> str | None:
+    section = case.contents.surface
+    if case.stored is not None:
+        return hashlib.sha256(case.stored.heights.tobytes()).hexdigest()
+    files = [getattr(part, "file", None) for part in (section, getattr(section, "second", None))]
+    digest = hashlib.sha256()
+    for file in (case.folder / name for name in files if name is not None):
+        try:
+            digest.update(file.read_bytes())
+        except OSError as error:
+            raise UnreadableFile(f"{file} cannot be read: {error.strerror}; check surface.file") from None
+    return digest.hexdigest() if any(files) else None
+
+
+def _flat(section: Section) -> dict[str, Any]:
     """Every value of the case in SI by its dotted key."""
-    flat: dict[str, Any] = {}
-    for name, entry in type(section).model_fields.items():
-        keys, value = (*parents, entry.alias or name), getattr(section, name)
-        if isinstance(value, Section):
-            flat |= _flat(value, keys)
-        else:
-            flat[".".join(keys)] = in_si(value)
-    return flat
+    return {key: in_si(value) for key, value in _entries(section) if not isinstance(value, Section)}
 
 
 def _hash(values: Mapping[str, Any]) -> str:

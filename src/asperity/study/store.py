@@ -305,10 +305,10 @@ def in_order(parts: Sequence["pyarrow.Table"], plan: Plan) -> "pandas.DataFrame"
     for key in (*plan.axes, *(seed for seed in SEEDS if seed not in plan.axes)):
         values = [in_si(case.overrides.get(key)) for case in plan.cases]
         if any(value is not None for value in values):
-            planned[key] = [json.dumps(value) if isinstance(value, list) else value for value in values]
+            planned[key] = _of_one_type(values)
     for seed in SEEDS:
         if seed in planned:
-            planned[seed] = planned[seed].astype("int64")
+            planned[seed] = planned[seed].astype("int64" if planned[seed].notna().all() else "Int64")
     if parts:
         fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
         table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
@@ -325,6 +325,15 @@ def in_order(parts: Sequence["pyarrow.Table"], plan: Plan) -> "pandas.DataFrame"
     merged = planned.merge(finished, on="case_id", how="inner").sort_values("number", ignore_index=True)
     rest = [name for name in merged.columns if name not in _LEADING]
     return merged[[*_LEADING, *rest]]
+
+
+def _of_one_type(values: Sequence[Any]) -> list[Any]:
+    """A swept quantity as a column: numbers, or text (JSON for pairs and tables) where some value is no number."""
+    if any(isinstance(value, list) for value in values):  # an even pair has become one number
+        values = [[value, value] if isinstance(value, int | float) else value for value in values]
+    if all(value is None or isinstance(value, int | float) for value in values):
+        return list(values)
+    return [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
 
 
 def failed(table: "pandas.DataFrame") -> "pandas.DataFrame":
