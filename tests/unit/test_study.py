@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -269,6 +271,19 @@ def test_a_folder_that_is_no_study_is_said_so(tmp_path):
     (tmp_path / "manifest.json").write_text("{}")
     with pytest.raises(UnreadableFile, match="not a study's manifest"):
         load_study(tmp_path)
+
+
+def test_a_script_that_workers_cannot_import_is_told_so_and_no_case_is_blamed(case, tmp_path):
+    (tmp_path / "case.toml").write_text(case.text)
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import asperity as asp\n"
+        "asp.run_study(asp.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"  # and no __main__
+    )
+    ran = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert ran.returncode == 1
+    assert 'under if __name__ == "__main__":, or give executor' in ran.stderr
+    assert not list((tmp_path / "out" / "parts").glob("*"))
 
 
 SWEPT = {

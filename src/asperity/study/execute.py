@@ -102,13 +102,13 @@ class StudyResult:
 def run_study(
     plan: Plan,
     *,
-    out: Path | None = None,
+    out: str | Path | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     shard: tuple[int, int] = (1, 1),
     retry_failed: bool = False,
     fields: Sequence[str] = (),
-    merge_from: Sequence[Path] = (),
+    merge_from: Sequence[str | Path] = (),
     progress: Callable[[Progress], None] | None = None,
 ) -> StudyResult:
     """Compute what is missing of a study.
@@ -144,10 +144,11 @@ def run_study(
     if fields:
         require_zarr()
     begun = time.perf_counter()
+    out = None if out is None else Path(out)
     with nullcontext() if out is None else open_store(out, plan, shard) as store:
         for other in merge_from:
             assert store is not None
-            store.take_from(other)
+            store.take_from(Path(other))
         work = _Work(plan, store, shard, retry_failed, tuple(fields), begun, progress)
         if work.waiting:
             _compute(work, executor, workers)
@@ -216,6 +217,17 @@ def dask_executor(address: str) -> Iterator[Executor]:
 
 def _pool(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(workers, get_context("spawn"), set_up_worker)
+
+
+def _require_start(pool: Executor) -> None:
+    """AsperityError where processes die before they are given a case: then no case is to blame."""
+    try:
+        pool.submit(os.getpid).result()
+    except BrokenExecutor:
+        raise AsperityError(
+            "worker processes cannot start, nothing was computed by them; a script needs to be a file with its calls "
+            'under if __name__ == "__main__":, or give executor=ThreadPoolExecutor()'
+        ) from None
 
 
 class _Work:
@@ -297,10 +309,14 @@ def _compute(work: _Work, executor: Executor | None, workers: int | None) -> Non
             raise AsperityError("the executor lost its workers; finished cases are kept, run the study again to go on")
         return
     count = min(workers or cores(), len(work.waiting))
+    started = True
     while work.waiting:  # a pool that lost a process is broken, and another takes over
-        pool = _pool(count)
+        pool, before = _pool(count), work.done
         try:
+            if not started:
+                _require_start(pool)
             _spread(work, pool, count)
+            started = work.done > before
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -395,7 +411,7 @@ class Estimate:
 
 
 def estimate(
-    plan: Plan, *, out: Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
+    plan: Plan, *, out: str | Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
 ) -> Estimate:
     """Time three cases of a study, from its beginning, middle and end; nothing is kept.
 
@@ -405,8 +421,8 @@ def estimate(
         for a folder that holds another study.
     """
     kept = 0
-    if out is not None and (out / MANIFEST).exists():
-        known = open_read(out, plan).finished()
+    if out is not None and (Path(out) / MANIFEST).exists():
+        known = open_read(Path(out), plan).finished()
         kept = sum(case.id in known for case in plan.cases if case.number % shard[1] == shard[0] - 1)
     share = [case for case in plan.cases if case.number % shard[1] == shard[0] - 1]
     if not share:
