@@ -112,9 +112,16 @@ def _state_at(solution: ContactSolution, depth: float | None, factor: float) -> 
         viscosity_factor=solution.viscosity_factor,
     )
     borne = float(solved.pressure[solved.in_contact].sum() / solved.pressure.sum())
-    approach = -solved.rigid_approach
+    return borne * conditions.load, (1.0 - borne) * conditions.load, approach_of(solved, depth)
+
+
+def approach_of(solution: ContactSolution, depth: float | None) -> float:
+    """Approach of the bodies [m], of a line contact that of points `depth` [m] away, at any load from the same zero.
+
+    The solver measures a line contact from points one half-width away, and the half-width grows with the load.
+    """
+    conditions, approach = solution.conditions, -solution.rigid_approach
     if depth is not None:
-        # the solver measures a line contact from points one half-width away, and the half-width grows with the load
         slope = 2.0 * conditions.line_load / (np.pi * conditions.pair.reduced_modulus)
         approach += slope * float(np.log(depth / conditions.hertz.half_widths[0]))
-    return borne * conditions.load, (1.0 - borne) * conditions.load, approach
+    return approach

@@ -1,0 +1,257 @@
+"""One table over roughness: load and area shares, load by film, films and resonances, of three models of one contact.
+
+The paper's contact with a cap of 0.7 GPa and a correlation length of 40 um: snapshot and moving contact of the unified
+model, moving contact of the conserving one. Means over one passage of the rough surface after oil has crossed the
+domain once; mean and standard deviation over seeds. What is computed is kept in build/motion_table.csv and not
+computed again: `python -m benchmarks.motion_table --cells 64 --seeds 0 1 2`.
+"""
+
+import argparse
+import csv
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import islice
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from asperity.case import Case
+from asperity.ehl.conserving_motion import moving_conserving_contact
+from asperity.ehl.motion import Snapshot, moving_contact, step_seconds
+from asperity.ehl.sharing import FILMS, load_below, load_sharing
+from asperity.ehl.stiffness import approach_of, roller_depth, tangent_stiffness
+from asperity.errors import NotConverged
+from asperity.hertz import point_stiffness
+from benchmarks.roughness_levels import paper_case
+
+KEPT = Path(__file__).parents[1] / "build" / "motion_table.csv"
+SQ_UM = (0.5, 1.0, 2.5, 4.0)
+SEEDS = (0, 1, 2)
+SNAPSHOT, UNIFIED, CONSERVING = "unified snapshot", "unified moving", "conserving moving"
+MODELS = {UNIFIED: moving_contact, CONSERVING: moving_conserving_contact}
+KINDS: dict[str, type] = {"model": str, "cells": int, "seed": int, "steps": int, "bad": int}  # numbers else
+LOAD_STEP = 0.02
+MOMENTS = 2  # of a passage, at which the tangent stiffness is taken
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Means of one surface's passage, SI; `tangent_hz` and `shared_hz` are resonances, `bad` steps not converged."""
+
+    model: str
+    cells: int
+    sq_um: float
+    seed: int
+    clr: float
+    car: float
+    floor: float
+    below_20: float
+    below_50: float
+    below_100: float
+    below_200: float
+    h_min: float
+    h_mean: float
+    cavitated: float
+    approach_std: float
+    tangent_hz: float
+    shared_hz: float
+    steps: int
+    bad: int
+    seconds: float
+
+
+def table_case(sq_um: float, seed: int, cells: int) -> Case:
+    """The paper's contact under the table's cap and correlation length."""
+    case = paper_case(sq_um, seed, cells)
+    return case.with_overrides({"material.hardness": "0.7 GPa", "surface.correlation_length": "40 um"})
+
+
+def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcome]:
+    """The moving contact of a model, and before it, of the unified one, its snapshot."""
+    case = table_case(sq_um, seed, cells)
+    assert case.lubricant is not None
+    surfaces = case.moving_surfaces()
+    passage = surfaces.passage(0) / step_seconds(case.conditions, surfaces, 1.0)
+    last = cells + math.ceil(passage)
+    began = perf_counter()
+    settled: list[Snapshot] = []
+    bad = 0
+    for snapshot in islice(MODELS[model](case.conditions, case.lubricant, surfaces, options=case.options), last + 1):
+        bad += not snapshot.solution.convergence.converged
+        if snapshot.number == 0 and model == UNIFIED:
+            yield _outcome(SNAPSHOT, case, sq_um, seed, [snapshot], [snapshot], 0, perf_counter() - began)
+        if snapshot.number > cells:
+            settled.append(snapshot)
+    moments = settled[:: len(settled) // MOMENTS][:MOMENTS]
+    yield _outcome(model, case, sq_um, seed, settled, moments, bad, perf_counter() - began)
+
+
+def _outcome(
+    model: str,
+    case: Case,
+    sq_um: float,
+    seed: int,
+    rows: list[Snapshot],
+    moments: list[Snapshot],
+    bad: int,
+    seconds: float,
+) -> Outcome:
+    def mean(values: Iterable[float]) -> float:
+        return float(np.mean(list(values)))
+
+    conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
+    sharing = [load_sharing(one.solution) for one in rows]
+    clr = mean(one.clr_solid for one in sharing)
+    spring = point_stiffness(clr * conditions.load, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
+    below = [mean(load_below(one.solution, film) for one in rows) for film in FILMS]
+    stiffness = [found for one in moments if (found := _tangent(one)) is not None]
+    return Outcome(
+        model,
+        case.grid.cells[0],
+        sq_um,
+        seed,
+        clr,
+        mean(one.car_solid for one in sharing),
+        mean(one.clr_floor for one in sharing),
+        below[0],
+        below[1],
+        below[2],
+        below[3],
+        h_min=mean(one.state.h_min for one in rows),
+        h_mean=mean(one.state.h_mean for one in rows),
+        cavitated=mean(one.cavitated for one in sharing),
+        approach_std=float(np.std([one.solution.rigid_approach for one in rows])),
+        tangent_hz=math.sqrt(mean(stiffness) / mass) / (2.0 * math.pi) if stiffness else math.nan,
+        shared_hz=math.sqrt(spring / mass) / (2.0 * math.pi) if clr > 0.0 else math.nan,
+        steps=len(rows),
+        bad=bad,
+        seconds=seconds,
+    )
+
+
+def _tangent(snapshot: Snapshot) -> float | None:
+    try:
+        return tangent_stiffness(snapshot.solution).total
+    except NotConverged:
+        return None
+
+
+def tangent_in_motion(sq_um: float, seed: int, cells: int, model: str = UNIFIED) -> tuple[float, float]:
+    """Resonance [Hz] by the tangent stiffness of the moving contact, and that by the standing one's at MOMENTS times.
+
+    In motion: the same passage under a load 2 % less and 2 % more, difference of loads over that of mean approaches.
+    """
+    case = table_case(sq_um, seed, cells)
+    assert case.lubricant is not None
+    conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
+    surfaces, depth = case.moving_surfaces(), roller_depth(conditions)
+    last = cells + math.ceil(surfaces.passage(0) / step_seconds(conditions, surfaces, 1.0))
+    approaches = []
+    for load in ((1.0 - LOAD_STEP) * conditions.load, (1.0 + LOAD_STEP) * conditions.load):
+        pressed = replace(conditions, load=load)
+        taken = islice(MODELS[model](pressed, case.lubricant, surfaces, options=case.options), last + 1)
+        approaches.append(float(np.mean([approach_of(one.solution, depth) for one in taken if one.number > cells])))
+    stiffness = 2.0 * LOAD_STEP * conditions.load / (approaches[1] - approaches[0])
+    compute(cells, [seed], [model], [sq_um])
+    return math.sqrt(stiffness / mass) / (2.0 * math.pi), kept()[model, cells, sq_um, seed].tangent_hz
+
+
+def kept() -> dict[tuple[str, int, float, int], Outcome]:
+    """What has been computed, by model, cells, Sq and seed."""
+    if not KEPT.exists():
+        return {}
+    with KEPT.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    found = []
+    for row in rows:
+        values: dict[str, Any] = {one.name: KINDS.get(one.name, float)(row[one.name]) for one in fields(Outcome)}
+        found.append(Outcome(**values))
+    return {(one.model, one.cells, one.sq_um, one.seed): one for one in found}
+
+
+def compute(cells: int, seeds: Iterable[int], models: Iterable[str], sq_um: Iterable[float] = SQ_UM) -> None:
+    """Whatever is not kept yet, kept as soon as it is there."""
+    models, sq_um = list(models), list(sq_um)
+    for seed in seeds:
+        for sq in sq_um:
+            for model in models:
+                if (model, cells, sq, seed) in kept():
+                    continue
+                for outcome in outcomes(model, sq, seed, cells):
+                    KEPT.parent.mkdir(exist_ok=True)
+                    new = not KEPT.exists()
+                    with KEPT.open("a", newline="") as file:
+                        writer = csv.DictWriter(file, [one.name for one in fields(Outcome)])
+                        if new:
+                            writer.writeheader()
+                        writer.writerow(asdict(outcome))
+
+
+COLUMNS = (  # heading, field, scale, digits
+    ("CLR_s", "clr", 1.0, 3),
+    ("CAR_s", "car", 1.0, 3),
+    ("L(floor)", "floor", 1.0, 3),
+    ("L(20 nm)", "below_20", 1.0, 3),
+    ("L(50 nm)", "below_50", 1.0, 3),
+    ("L(100 nm)", "below_100", 1.0, 3),
+    ("L(200 nm)", "below_200", 1.0, 3),
+    ("h_min [nm]", "h_min", 1e9, 1),
+    ("h_mean [um]", "h_mean", 1e6, 2),
+    ("cavitated", "cavitated", 1.0, 3),
+    ("CRF by share [Hz]", "shared_hz", 1.0, 0),
+    ("CRF by tangent [Hz]", "tangent_hz", 1.0, 0),
+)
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    """The table as Markdown; `fast` takes one seed at 64 cells."""
+    compute(64, SEEDS[:1] if fast else SEEDS, MODELS)
+    yield "## One contact, three models"
+    yield ""
+    yield from table()
+
+
+def table() -> Iterator[str]:
+    """What is kept."""
+    found = kept()
+    yield f"| Sq [um] | model | cells | seeds | {' | '.join(name for name, *_ in COLUMNS)} | not converged |"
+    yield "|" + "---|" * (len(COLUMNS) + 5)
+    for sq in SQ_UM:
+        for model in (SNAPSHOT, *MODELS):
+            for cells in sorted({one.cells for one in found.values()}):
+                rows = [one for one in found.values() if (one.model, one.cells, one.sq_um) == (model, cells, sq)]
+                if not rows:
+                    continue
+                shown = " | ".join(_shown(rows, name, scale, digits) for _, name, scale, digits in COLUMNS)
+                bad = f"{sum(one.bad for one in rows)} of {sum(one.steps + cells for one in rows)}"
+                yield f"| {sq:g} | {model} | {cells} | {len(rows)} | {shown} | {'-' if model == SNAPSHOT else bad} |"
+
+
+def _shown(rows: list[Outcome], name: str, scale: float, digits: int) -> str:
+    values = np.array([getattr(one, name) for one in rows]) * scale
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return "-"
+    spread = f" ± {np.std(values, ddof=1):.{digits}f}" if values.size > 1 else ""
+    return f"{np.mean(values):.{digits}f}{spread}"
+
+
+def main() -> None:
+    """Compute a part of the table, and print what there is of it."""
+    arguments = argparse.ArgumentParser(prog="python -m benchmarks.motion_table", description=__doc__)
+    arguments.add_argument("--cells", type=int, default=64)
+    arguments.add_argument("--seeds", type=int, nargs="*", default=SEEDS)
+    arguments.add_argument("--sq", type=float, nargs="*", default=SQ_UM)
+    arguments.add_argument("--models", nargs="*", choices=list(MODELS), default=list(MODELS))
+    wanted = arguments.parse_args()
+    with threadpool_limits(1):
+        compute(wanted.cells, wanted.seeds, wanted.models, wanted.sq)
+    print("\n".join(table()))
+
+
+if __name__ == "__main__":
+    main()
