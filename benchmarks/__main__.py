@@ -13,6 +13,7 @@ from benchmarks import (
     friction,
     indicators,
     motion,
+    motion_table,
     recordings,
     robustness,
     roughness_levels,
@@ -52,7 +53,19 @@ def main() -> None:
     )
     print()
     with threadpool_limits(1):
-        for part in (speed, films, robustness, motion, conserving, vibration, surfaces, friction, stress, indicators):
+        for part in (
+            speed,
+            films,
+            robustness,
+            motion,
+            motion_table,
+            conserving,
+            vibration,
+            surfaces,
+            friction,
+            stress,
+            indicators,
+        ):
             for line in part.lines(fast=wanted.fast):
                 print(line, flush=True)
             print()

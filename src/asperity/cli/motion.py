@@ -160,6 +160,8 @@ def _print_history(history: "History", heard: "HistoryVibration | None", report:
 
 
 def _heard_rows(heard: "HistoryVibration") -> list[tuple[str, str]]:
+    from asperity.coupling import LINEAR_UP_TO
+
     said = heard.scalars()
     rows = [
         (
@@ -169,6 +171,10 @@ def _heard_rows(heard: "HistoryVibration") -> list[tuple[str, str]]:
     ]
     if said["approach_std_m"] is not None:
         rows.append(("approach of the bodies, that a mass rides on", f"{1e9 * said['approach_std_m']:.3g} nm rms"))
+        force = f"{100 * said['history_dynamic_load']:.0f} % of the load"
+        if said["history_dynamic_load"] > LINEAR_UP_TO:
+            force += f", more than the {100 * LINEAR_UP_TO:.0f} % up to which a linear spring may be trusted"
+        rows.append(("dynamic force on a linear spring", force))
     if said["history_crf_hz"] is None:
         return [*rows, ("CRF of the history", f"none: {said['history_crf_reason']}")]
     return [*rows, ("CRF of the history", f"{said['history_crf_hz']:.1f} Hz")]
