@@ -75,6 +75,25 @@ def test_an_outcome_that_nothing_moves_has_no_effects():
     assert all((values == 0.0).all() for values in indices(design, np.ones(len(design.shares))).values())
 
 
+def test_rounding_is_no_effect_and_counts_for_no_factor(paper, threads):
+    dry = paper.with_overrides(
+        {
+            "surface.correlation_length": "30 um",
+            "lubricant": "none",
+            "grid.cells": [24, 24],
+            "grid.x": [-1.9, 1.9],
+            "vibration": "none",
+        }
+    )
+    found = sensitivity(
+        dry, vary=["contact.load=200 N..800 N"], size=2, sq=[1e-6], levels=0, cells=24, executor=threads
+    )
+    assert found.spread("clr at 1 um") == pytest.approx((1.0, 1.0), abs=1e-12)  # all load on asperities, to rounding
+    assert (found.ranking("clr at 1 um")["mu_star"] == 0.0).all()
+    assert found.overall().sum() == pytest.approx(1.0)  # of CAR alone
+    assert "CLR at Sq 1 um from 100 to 100 % (moved by none of them)" in found.verdict()
+
+
 def test_the_knee_of_a_broken_line_is_its_break():
     x = np.linspace(0.5, 4.0, 8)
     assert knee(x, 3.0 + 2.0 * x - 1.5 * np.maximum(x - 1.73, 0.0)) == pytest.approx(1.73, abs=0.02)

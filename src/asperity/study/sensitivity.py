@@ -36,6 +36,7 @@ CELLS = 128
 SEED = "seed"  # the factor's name
 CONFIDENCE = 0.95  # of SALib's intervals
 RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
+ROUNDING = 1e-9  # relative difference that nothing has made
 RESERVED = {
     "surface.sq": "it is what the curves run along; give sq",
     "surface.seed": "the surface is a factor by itself",
@@ -113,8 +114,10 @@ class Sensitivity:
         return float(low), float(high)
 
     def overall(self) -> "pandas.Series[float]":
-        """Mean share of each factor over the outcomes, the largest first."""
-        return self.effects.groupby("factor", sort=False)["share"].mean().sort_values(ascending=False, kind="stable")
+        """Mean share of each factor over the outcomes that move at all, the largest first."""
+        moved = self.effects.groupby("outcome")["share"].transform("sum") > 0.0
+        shares = (self.effects[moved] if moved.any() else self.effects).groupby("factor", sort=False)["share"].mean()
+        return shares.sort_values(ascending=False, kind="stable")
 
     def verdict(self) -> str:
         """How far the curves can be trusted, in a sentence or two."""
@@ -128,10 +131,9 @@ class Sensitivity:
             if found:
                 widest = max(found, key=lambda outcome: float(np.subtract(*self.spread(outcome.name)[::-1])))
                 low, high = (scale * end for end in self.spread(widest.name))
-                first = self.ranking(widest.name)["factor"].iloc[0]
-                parts.append(
-                    f"{name} at Sq {1e6 * widest.sq:g} um from {low:.0f} to {high:.0f} {unit} (moved most by {first})"
-                )
+                first = self.ranking(widest.name).iloc[0]
+                mover = f"most by {first['factor']}" if first["share"] > 0.0 else "by none of them"
+                parts.append(f"{name} at Sq {1e6 * widest.sq:g} um from {low:.0f} to {high:.0f} {unit} (moved {mover})")
         order = self.overall()
         ranked = ", ".join(f"{name} {100 * share:.0f} %" for name, share in order.items())
         return (
@@ -291,7 +293,7 @@ def indices(design: Design, outcome: Field) -> dict[str, Field]:
     names = (
         ("mu", "mu_star", "mu_star_conf", "sigma") if design.method == "morris" else ("s1", "s1_conf", "st", "st_conf")
     )
-    if np.ptp(values) == 0.0:
+    if np.ptp(values) <= ROUNDING * np.abs(values).max():
         return {name: np.zeros(factors) for name in names}
     problem = _problem(factors)
     if design.method == "morris":
