@@ -14,6 +14,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.coupling import (
     BAND_FACTOR,
+    LINEAR_UP_TO,
     Vibration,
     VibrationModel,
     contact_vibration,
@@ -69,6 +70,27 @@ class HistoryVibration:
         if self.response is None or self.oscillator.load is None:
             return None
         return float(self.oscillator.mass * np.std(self.response.values) / self.oscillator.load)
+
+    def verdict(self) -> str:
+        """One sentence: the contact's own resonance, the paper's, and what drives the mass."""
+        said = self.scalars()
+        paper = said["coupled_resonance_hz"]
+        sentence = (
+            f"By its own stiffness, taken at {len(self.moments)} moments, the contact resonates at "
+            f"{said['tangent_resonance_hz']:.0f} ± {said['tangent_resonance_std_hz']:.0f} Hz, "
+            + ("by the paper's coupling not at all" if paper is None else f"by the paper's coupling at {paper:.0f} Hz")
+        )
+        force = self.dynamic_load
+        if self.profile is not None and force is not None:
+            sentence += (
+                f"; the approach of the bodies drives a mass on it by {1e9 * np.std(self.profile.values):.3g} nm rms, "
+                f"with a force of {100 * force:.0f} % of the load"
+            )
+            if force > LINEAR_UP_TO:
+                sentence += ", too much for a linear spring"
+        if self.resonance.found:
+            return f"{sentence}; the history shows {self.resonance.crf_hz:.0f} Hz."
+        return f"{sentence}; the history shows no resonance ({self.resonance.reason})."
 
     def scalars(self) -> dict[str, Any]:
         """What `asperity run --listen --json` says besides the history; None where there is none."""

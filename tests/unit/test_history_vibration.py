@@ -1,5 +1,6 @@
 """What a mass on a contact hears of its history: the profile that repeats, the steady answer to it, the paper's way."""
 
+import html
 import json
 from dataclasses import replace
 from itertools import islice
@@ -16,6 +17,7 @@ from asperity.ehl.stiffness import tangent_stiffness
 from asperity.errors import BadInput
 from asperity.hearing import history_vibration, repeating, resampled, steady_response
 from asperity.history import load_history, run_history
+from asperity.report.page import in_print
 from asperity.signals import Signal, power_spectrum
 from asperity.surface import Surface
 from asperity.surface.moving import MovingSurfaces, track_grid
@@ -222,7 +224,7 @@ def test_without_a_model_or_moments_it_is_refused(history):
         history_vibration(mute)
 
 
-def test_the_command_listens(history, capsys):
+def test_the_command_listens(history, capsys, tmp_path):
     arguments = ["run", "examples/paper.toml", "--out", str(history.folder), "--steps", "96", "--listen"]
     for key, value in SMALL.items():
         arguments += ["--set", f"{key}={value}"]
@@ -237,5 +239,6 @@ def test_the_command_listens(history, capsys):
     assert said["history_crf_hz"] is None
     assert "motion.track" in said["history_crf_reason"]
     with pytest.raises(SystemExit):
-        main(arguments)
-    assert "contact's own resonance" in capsys.readouterr().out
+        main([*arguments, "--report", str(tmp_path / "page.html")])
+    assert heard.verdict() in capsys.readouterr().out
+    assert in_print(heard.verdict()) in html.unescape((tmp_path / "page.html").read_text("utf-8"))

@@ -69,19 +69,14 @@ def run_case(
         if not isinstance(unfinished.solution, History):  # there was no snapshot to start from
             raise
         history, failure = unfinished.solution, str(unfinished)
+    heard = _listened(history) if listen and failure is None else None
     if report is not None:
         from asperity.report.motion_page import write_motion_report
 
-        write_motion_report(history, report)
-    heard = _listened(history) if listen and failure is None else None
+        write_motion_report(history, report, heard=heard)
     if as_json:
-        print_json(
-            {
-                **history.scalars(),
-                **({} if heard is None else heard.scalars()),
-                "report": None if report is None else str(report),
-            }
-        )
+        said = history.scalars() if heard is None else {**history.scalars(), **heard.scalars()}
+        print_json({**said, "report": None if report is None else str(report)})
     else:
         print(history.verdict())
         if not quiet:
@@ -147,34 +142,13 @@ def _print_history(history: "History", heard: "HistoryVibration | None", report:
         rows.append((f"pass {one['pass']}", f"{shares}, Sq of the tracks {1e6 * one['track_sq_m']:.3f} um"))
     if said["crf_hz"] is not None:
         rows.append(("CRF of the mean contact", f"{said['crf_hz']:.1f} Hz"))
-    if heard is not None:
-        rows += _heard_rows(heard)
     print()
     print_rows(rows)
     for note in history.notes:
         print(f"  note: {note}")
+    if heard is not None:
+        print(f"\n{heard.verdict()}")
     if history.folder is not None:
         print(f"\nKept in {history.folder}; asperity run with the same folder and more steps goes on")
     if report is not None:
         print(f"Report: {report}")
-
-
-def _heard_rows(heard: "HistoryVibration") -> list[tuple[str, str]]:
-    from asperity.coupling import LINEAR_UP_TO
-
-    said = heard.scalars()
-    rows = [
-        (
-            f"contact's own resonance, at {len(heard.moments)} moments",
-            f"{said['tangent_resonance_hz']:.1f} ± {said['tangent_resonance_std_hz']:.1f} Hz",
-        )
-    ]
-    if said["approach_std_m"] is not None:
-        rows.append(("approach of the bodies, that a mass rides on", f"{1e9 * said['approach_std_m']:.3g} nm rms"))
-        force = f"{100 * said['history_dynamic_load']:.0f} % of the load"
-        if said["history_dynamic_load"] > LINEAR_UP_TO:
-            force += f", more than the {100 * LINEAR_UP_TO:.0f} % up to which a linear spring may be trusted"
-        rows.append(("dynamic force on a linear spring", force))
-    if said["history_crf_hz"] is None:
-        return [*rows, ("CRF of the history", f"none: {said['history_crf_reason']}")]
-    return [*rows, ("CRF of the history", f"{said['history_crf_hz']:.1f} Hz")]

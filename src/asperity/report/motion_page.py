@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import BadInput
+from asperity.hearing import HistoryVibration
 from asperity.history import History
 from asperity.report import motion_figures as figures
 from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture
@@ -45,8 +46,8 @@ class Film(NamedTuple):
     zone: tuple[float, ...]  # where lines mark the Hertz zone of a line contact, in per cent of the field
 
 
-def write_motion_report(history: History, path: str | Path) -> Path:
-    """Write one self-contained HTML page about a history, whole or not at all.
+def write_motion_report(history: History, path: str | Path, *, heard: HistoryVibration | None = None) -> Path:
+    """Write one self-contained HTML page about a history, whole or not at all; with what a mass `heard` of it.
 
     Raises
     ------
@@ -58,11 +59,11 @@ def write_motion_report(history: History, path: str | Path) -> Path:
     if not history.frames:
         raise BadInput("a report needs at least one map of the history, got none; run the case into a new folder")
     with whole_file(path) as part:
-        part.write_text(render_motion_page(history), encoding="utf-8", newline="\n")
+        part.write_text(render_motion_page(history, heard), encoding="utf-8", newline="\n")
     return path
 
 
-def render_motion_page(history: History) -> str:
+def render_motion_page(history: History, heard: HistoryVibration | None = None) -> str:
     """The page as HTML text."""
     reach = figures.ranges(history)
     pictures = [figures.frame_picture(frame, reach) for frame in history.frames]
@@ -72,6 +73,7 @@ def render_motion_page(history: History) -> str:
     return page_template("motion.html.j2").render(
         title="A contact in motion",
         version=version("asperity"),
+        heard=None if heard is None else in_print(heard.verdict()),
         verdict=in_print(history.verdict().replace(" us", " µs")),
         failed=history.failed,
         steps=history.steps,
