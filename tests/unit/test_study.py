@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
+import numpy as np
 import pandas
 import pytest
 
@@ -284,6 +285,17 @@ def test_a_script_that_workers_cannot_import_is_told_so_and_no_case_is_blamed(ca
     assert ran.returncode == 1
     assert 'under if __name__ == "__main__":, or give executor' in ran.stderr
     assert not list((tmp_path / "out" / "parts").glob("*"))
+
+
+def test_what_is_finished_is_read_without_the_measured_surface_it_was_computed_on(case, executor, tmp_path):
+    heights = np.random.default_rng(1).normal(scale=1e-7, size=(40, 40))
+    np.savetxt(tmp_path / "worn.txt", heights, fmt="%.6e")
+    surface = {"file": str(tmp_path / "worn.txt"), "pixel": "5 um", "unit": "m", "fit": "tile"}
+    plan = plan_study(case.with_overrides({"surface": surface, "study": {"load": ["200 N"], "seeds": 2}}))
+    there = run_study(plan, out=tmp_path / "study", executor=executor)
+    assert not there.failed
+    (tmp_path / "worn.txt").unlink()
+    pandas.testing.assert_frame_equal(load_study(tmp_path / "study").table, there.table)
 
 
 SWEPT = {

@@ -199,7 +199,7 @@ def read_plan(folder: Path) -> Plan:
             seeding=manifest["seeding"],
         )
         ids = tuple(manifest["ids"])
-        if len(ids) != len(plan.cases):
+        if len(ids) != len(plan.points) * plan.realisations:
             raise KeyError("ids")
         return replace(plan, ids=ids)
     except KeyError:
