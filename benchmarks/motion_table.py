@@ -217,28 +217,32 @@ def lines(*, fast: bool) -> Iterator[str]:
 
 
 def table() -> Iterator[str]:
-    """What is kept."""
+    """What is kept; in brackets the same surfaces on the coarsest grid."""
     found = kept()
-    yield f"| Sq [um] | model | cells | seeds | {' | '.join(name for name, *_ in COLUMNS)} | not converged |"
+    yield f"| Sq [um] | model | cells | surfaces | {' | '.join(name for name, *_ in COLUMNS)} | not converged |"
     yield "|" + "---|" * (len(COLUMNS) + 5)
+    coarsest = min((one.cells for one in found.values()), default=0)
     for sq in SQ_UM:
         for model in (SNAPSHOT, *MODELS):
             for cells in sorted({one.cells for one in found.values()}):
                 rows = [one for one in found.values() if (one.model, one.cells, one.sq_um) == (model, cells, sq)]
                 if not rows:
                     continue
-                shown = " | ".join(_shown(rows, name, scale, digits) for _, name, scale, digits in COLUMNS)
+                same = [found[model, coarsest, sq, one.seed] for one in rows] if cells > coarsest else []
+                shown = " | ".join(_shown(rows, same, name, scale, digits) for _, name, scale, digits in COLUMNS)
                 bad = f"{sum(one.bad for one in rows)} of {sum(one.steps + cells for one in rows)}"
                 yield f"| {sq:g} | {model} | {cells} | {len(rows)} | {shown} | {'-' if model == SNAPSHOT else bad} |"
 
 
-def _shown(rows: list[Outcome], name: str, scale: float, digits: int) -> str:
-    values = np.array([getattr(one, name) for one in rows]) * scale
-    values = values[np.isfinite(values)]
+def _shown(rows: list[Outcome], same: list[Outcome], name: str, scale: float, digits: int) -> str:
+    values, coarse = (np.array([getattr(one, name) for one in some]) * scale for some in (rows, same))
+    values, coarse = values[np.isfinite(values)], coarse[np.isfinite(coarse)]
     if values.size == 0:
         return "-"
     spread = f" ± {np.std(values, ddof=1):.{digits}f}" if values.size > 1 else ""
-    return f"{np.mean(values):.{digits}f}{spread}"
+    few = f", of {values.size}" if values.size < len(rows) else ""
+    bracket = f" ({np.mean(coarse):.{digits}f})" if coarse.size else ""
+    return f"{np.mean(values):.{digits}f}{spread}{few}{bracket}"
 
 
 def main() -> None:
