@@ -4,6 +4,7 @@ Quasi-static: the film is given the time to settle that a 3 kHz vibration does n
 paper's Hertz zone in 0.06 ms, a fifth of a period). No squeeze, no film damping.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,7 +90,7 @@ def roller_depth(conditions: ContactConditions) -> float:
     The cylinder's approach (P'/πE*)(2 ln(4R/a) - 1) is the half-space's (P'/πE*)(2 ln(2d/a) + 1) at d = 2R/e.
     Source: K. L. Johnson, Contact Mechanics (1985), eqs 5.57-5.58.
     """
-    return 2.0 * conditions.radius_along_rolling / float(np.e)
+    return 2.0 * conditions.radius_along_rolling / math.e
 
 
 def _central_difference(solution: ContactSolution, depth: float | None, share: float) -> tuple[float, float]:
