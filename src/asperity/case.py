@@ -701,7 +701,7 @@ def _first_mistake(model: type[Section], error: ValidationError) -> _Located:
     expected = mistake["msg"].removeprefix("Input ").removeprefix("should ")
     if expected.startswith("be a valid dictionary"):
         expected = "be a table"
-    expected = expected.replace("'", '"')
+    expected = expected.replace("'", '"').replace("a valid tuple", "a list")
     return _Located(keys, f"must {expected}, got {_shown(given)}")
 
 

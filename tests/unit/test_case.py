@@ -158,6 +158,7 @@ BAD = [
     ("material.poisson_ratio", 0.7, "Poisson's ratio must lie above -1"),
     ("grid.cells", [3, 3], "at least 8 cells along x, got 3"),
     ("grid.cells", [64.5, 64], "grid.cells[0]"),
+    ("grid.cells", 64, "grid.cells must be a list, got 64"),
     ("grid.x", [1.9, -4.5], "upper x beyond its lower one"),
     ("grid.x", [-0.5, 1.9], "x must reach beyond the contact"),
     ("solver.tolerance", 3, "tolerance must lie between 0 and 0.1"),
