@@ -205,8 +205,8 @@ def track(
 ) -> None:
     """Follow the contact resonance through a series of recordings: normal wear, severe wear, or no way to tell."""
     from asperity.ehl.storage import require_writable
+    from asperity.processes import cores
     from asperity.tracking import track_recordings
-    from asperity.tracking.listen import cores
 
     for path in (*(out or ()), *([report] if report is not None else [])):
         require_writable(path)
@@ -267,7 +267,7 @@ def watch(
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
-    from asperity.tracking.listen import cores
+    from asperity.processes import cores
     from asperity.tracking.watch import watch_folder
 
     results = out if out is not None else folder / "asperity-watch"

@@ -7,7 +7,6 @@ import logging
 import math
 import multiprocessing
 import os
-import signal
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import wait
@@ -17,6 +16,7 @@ from asperity.arrays import Field
 from asperity.case import Case
 from asperity.coupling import contact_vibration
 from asperity.errors import AsperityError
+from asperity.processes import leave_interrupts_to_the_parent
 from asperity.run import Run, solve_case, vibrate_case, vibration_scalars
 from asperity.wear import Resonance
 
@@ -112,7 +112,7 @@ def _both_presets(case: Case, run: Run) -> Row:
 
 def set_up_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it: a parent that is killed cannot tell its workers to stop."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_interrupts_to_the_parent()
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.processes import cores
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker
 from asperity.study.plan import Plan, StudyCase
 from asperity.study.store import (
@@ -171,13 +172,8 @@ def load_study(folder: str | Path) -> StudyResult:
     folder = Path(folder)
     plan = read_plan(folder)
     path = folder / TABLE
-    table = Store(folder, plan, (1, 1)).table()
+    table = Store(folder, plan).table()
     return StudyResult(plan, table, folder, path if path.exists() else None)
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

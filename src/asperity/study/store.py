@@ -38,7 +38,6 @@ class Store:
 
     folder: Path
     plan: Plan
-    shard: tuple[int, int]
 
     def finished(self) -> dict[str, tuple[str, int]]:
         """Status and attempt of every case that some part holds."""
@@ -151,13 +150,13 @@ def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Sto
                 left.unlink(missing_ok=True)
         with whole_file(manifest) as part:
             part.write_text(json.dumps(_manifest(plan, folder), indent=1), "utf-8")
-        yield Store(folder, plan, shard)
+        yield Store(folder, plan)
 
 
 def open_read(folder: Path, plan: Plan) -> Store:
     """A study's folder to read from; BadInput where it holds another study than `plan`."""
     _require_same(read_manifest(folder), plan, folder)
-    return Store(folder, plan, (1, 1))
+    return Store(folder, plan)
 
 
 def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:

@@ -4,8 +4,6 @@ What the spectra mean together is left to `track`.
 """
 
 import json
-import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
@@ -18,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import BadInput, UnreadableFile
+from asperity.processes import leave_interrupts_to_the_parent
 from asperity.recording import Quality, open_recording
 from asperity.recording.check import Gauge
 from asperity.signals import Spectrum, averaged_spectrum
@@ -145,7 +144,7 @@ def listen_to_all(
                 progress(heard)
             yield number, heard
         return
-    pool = ProcessPoolExecutor(min(workers, len(paths)), get_context("spawn"), _leave_interrupts_to_the_parent)
+    pool = ProcessPoolExecutor(min(workers, len(paths)), get_context("spawn"), leave_interrupts_to_the_parent)
     try:
         waiting = {pool.submit(listen, *job): number for number, job in enumerate(jobs)}
         for done in as_completed(waiting):
@@ -155,15 +154,6 @@ def listen_to_all(
             yield waiting[done], heard
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _size(path: Path) -> int:
