@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from platform import python_version
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,15 +27,16 @@ from asperity.ehl.conserving_motion import moving_conserving_contact
 from asperity.ehl.friction import friction
 from asperity.ehl.motion import Memory, Snapshot, Steps, moving_contact, step_seconds
 from asperity.ehl.state import ContactState
-from asperity.ehl.storage import require_writable, save_dataset, whole_file
+from asperity.ehl.storage import save_dataset
 from asperity.errors import BadInput, NotConverged, UnreadableFile
+from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.surface.moving import MovingSurfaces
 
 if TYPE_CHECKING:
     import pandas
 
 FORMAT = 1  # counts up when a reader of the format before could not read the folder
-MANIFEST, TABLE, MEMORY, MAPS = "manifest.json", "history.parquet", "memory.npz", "fields"
+TABLE, MEMORY, MAPS = "history.parquet", "memory.npz", "fields"
 KEPT_EVERY_S = 2.0  # what a crash may cost
 MAPS_KEPT = 40  # in a whole history, unless said otherwise
 
@@ -307,7 +307,7 @@ def load_history(folder: str | Path) -> History:
         if there is none, or it is damaged.
     """
     folder = Path(folder)
-    manifest = _manifest(folder)
+    manifest = read_manifest(folder, of="history", layout=FORMAT)
     home = (folder / manifest["case_folder"]).resolve()
     case = load_case(manifest["case"], folder=home, name=manifest["source"])
     rows = _rows(folder)
@@ -327,8 +327,8 @@ def load_history(folder: str | Path) -> History:
 def is_history(folder: Path) -> bool:
     """Whether a folder says of itself that it holds a history."""
     try:
-        return (folder / TABLE).exists() and "every" in json.loads((folder / MANIFEST).read_text("utf-8"))
-    except (OSError, ValueError):
+        return (folder / TABLE).exists() and json.loads((folder / MANIFEST).read_text("utf-8"))["of"] == "history"
+    except (OSError, ValueError, KeyError, TypeError):
         return False
 
 
@@ -499,11 +499,11 @@ def _keeper(
         return
     import filelock
 
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"cannot write into {folder}: it is a file; name a folder")
+    if folder.exists():
+        make_folder(folder)  # a file is refused
     digest, manifest = _digest(case, surfaces), folder / MANIFEST
     if manifest.exists():
-        kept = _manifest(folder)
+        kept = read_manifest(folder, of="history", layout=FORMAT)
         if kept["versions"]["asperity"] != version("asperity"):
             raise BadInput(
                 f"{folder} was computed by asperity {kept['versions']['asperity']}, this is {version('asperity')}; "
@@ -517,10 +517,7 @@ def _keeper(
         usual = kept["every"]
     elif folder.exists() and any(folder.iterdir()):
         raise BadInput(f"{folder} is not empty and holds no history; name a new folder")
-    try:
-        (folder / MAPS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"cannot make the folder {folder / MAPS}: {error.strerror}; choose another") from None
+    make_folder(folder / MAPS)
     require_writable(manifest)
     try:
         with filelock.FileLock(folder / ".lock", timeout=0):
@@ -546,30 +543,15 @@ def _digest(case: Case, surfaces: MovingSurfaces) -> str:
 
 def _about(case: Case, digest: str, every: int, folder: Path) -> dict[str, Any]:
     return {
+        "of": "history",
         "format": FORMAT,
         "digest": digest,
-        "versions": {
-            **{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")},
-            "python": python_version(),
-        },
+        "versions": versions(),
         "source": case.source,
         "case": case.text,
         "case_folder": relative_to(case.folder.resolve(), folder.resolve()),
         "every": every,
     }
-
-
-def _manifest(folder: Path) -> dict[str, Any]:
-    path = folder / MANIFEST
-    try:
-        manifest = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise UnreadableFile(f"{folder} holds no history: it has no {MANIFEST}; check its name") from None
-    except (OSError, ValueError):
-        raise UnreadableFile(f"{path} is damaged; run the case into another folder") from None
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT or "every" not in manifest:
-        raise UnreadableFile(f"{path} is not a history's manifest that this asperity can read; choose another folder")
-    return manifest
 
 
 def _rows(folder: Path) -> list[Row]:

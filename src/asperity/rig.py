@@ -27,8 +27,8 @@ from asperity.coupling import (
 )
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, contact_state
-from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput, require_positive
+from asperity.files import whole_file
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.table1 import DAMPING_RATIO, MASS, PAIR, papers_contact
 

@@ -43,19 +43,9 @@ def read_option_length(name: str, text: str) -> float:
     return read_length(f"--{name.replace('_', '-')}", text)
 
 
-def make_folder(path: Path) -> None:
-    """Make a folder to write into; BadInput where that cannot be."""
-    if path.exists() and not path.is_dir():
-        raise BadInput(f"cannot write into {path}: it is a file; name a folder")
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"cannot make the folder {path}: {error.strerror}; choose another") from None
-
-
 def require_output(path: Path, suffix: str, option: str = "--out") -> None:
     """BadInput unless `path` ends in `suffix` and can be written to: asked before the work, not after."""
-    from asperity.ehl.storage import require_writable
+    from asperity.files import require_writable
 
     if path.suffix != suffix:
         raise BadInput(f"{option} must be a file that ends in {suffix}, got {path}")
@@ -64,7 +54,7 @@ def require_output(path: Path, suffix: str, option: str = "--out") -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all."""
-    from asperity.ehl.storage import whole_file
+    from asperity.files import whole_file
 
     with whole_file(path) as part:
         part.write_text(text, "utf-8")

@@ -9,7 +9,6 @@ from asperity.cli.app import AsJson, Quiet, app
 from asperity.cli.common import (
     busy,
     chosen_case,
-    make_folder,
     print_json,
     print_rows,
     require_output,
@@ -19,6 +18,7 @@ from asperity.cli.common import (
     write_text,
 )
 from asperity.errors import AsperityError, BadInput
+from asperity.files import make_folder
 
 if TYPE_CHECKING:
     from asperity.run import Run

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import chosen_case, make_folder, print_json, print_rows, write_text
+from asperity.cli.common import chosen_case, print_json, print_rows, write_text
 from asperity.cli.study import shown_study
 from asperity.errors import BadInput
+from asperity.files import make_folder
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -165,7 +166,7 @@ def calibrate(
 
 
 def _require_figure(path: Path | None) -> None:
-    from asperity.ehl.storage import require_writable
+    from asperity.files import require_writable
 
     if path is None:
         return

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import make_folder, print_json, print_rows
+from asperity.cli.common import print_json, print_rows
 from asperity.errors import BadInput
+from asperity.files import make_folder
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -204,7 +205,7 @@ def track(
     quiet: Quiet = False,
 ) -> None:
     """Follow the contact resonance through a series of recordings: normal wear, severe wear, or no way to tell."""
-    from asperity.ehl.storage import require_writable
+    from asperity.files import require_writable
     from asperity.processes import cores
     from asperity.tracking import track_recordings
 

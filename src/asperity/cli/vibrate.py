@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import chosen_case, make_folder, print_json, print_rows, shown_progress
+from asperity.cli.common import chosen_case, print_json, print_rows, shown_progress
 from asperity.errors import BadInput
+from asperity.files import make_folder
 
 if TYPE_CHECKING:
     from asperity.case import Case

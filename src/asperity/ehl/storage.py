@@ -1,13 +1,8 @@
 """A contact solution on disk: one netCDF file that holds all of it, bit for bit, and is written whole or not at all."""
 
 import json
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
-from platform import python_version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +10,8 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Oil, Options, Status
-from asperity.errors import AsperityError, BadInput, UnreadableFile
+from asperity.errors import BadInput, UnreadableFile
+from asperity.files import versions, whole_file
 from asperity.grid import Grid
 from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
 from asperity.surface import Surface
@@ -103,7 +99,7 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
         "x": ("x", grid.x, {"long_name": "position along rolling", "units": "m", "axis": "X"}),
         "y": ("y", grid.y, {"long_name": "position along the contact line", "units": "m", "axis": "Y"}),
     }
-    versions = {name: version(name) for name in ("asperity", "numpy", "scipy", "numba")}
+    used = versions()
     convergence = solution.convergence
     described = {
         "conditions": asdict(solution.conditions),
@@ -117,12 +113,12 @@ def solution_to_dataset(solution: ContactSolution) -> "xarray.Dataset":
             "attempt": convergence.attempt,
             **{name: getattr(convergence, name) and asdict(getattr(convergence, name)) for name in _ERRORS},
         },
-        "versions": {**versions, "python": python_version()},
+        "versions": used,
     }
     attributes = {
         "Conventions": "CF-1.11",
         "title": "Mixed elastohydrodynamic contact",
-        "source": f"asperity {versions['asperity']}",
+        "source": f"asperity {used['asperity']}",
         "asperity_format": FORMAT,
         **{name: json.dumps(value) for name, value in described.items()},
         **solution.attributes,
@@ -183,49 +179,6 @@ def load_solution(path: str | Path) -> ContactSolution:
         raise
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError):  # as h5py and xarray find it
         raise UnreadableFile(f"{path} is damaged or not a run of asperity; solve its case again") from None
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary path in the same folder, renamed to `path` when all went well and removed when not.
-
-    Raises
-    ------
-    BadInput
-        if the folder does not exist or cannot be written to.
-    AsperityError
-        if the system refuses to write, as on a full disk.
-    """
-    require_writable(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield part
-        with part.open("rb+") as written:
-            os.fsync(written.fileno())
-        part.replace(path)
-    except OSError as error:
-        raise AsperityError(
-            f"{path} could not be written: {error.strerror or error}; nothing was left behind"
-        ) from error
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def require_writable(path: Path) -> None:
-    """Refuse a path that could not be written, before the work that would be lost.
-
-    Raises
-    ------
-    BadInput
-        if the folder is missing or not writable, or `path` is a folder.
-    """
-    folder = path.parent
-    if not folder.is_dir():
-        raise BadInput(f"cannot write {path}: the folder {folder} does not exist; make it first")
-    if path.is_dir():
-        raise BadInput(f"cannot write {path}: it is a folder; name a file")
-    if not os.access(folder, os.W_OK):
-        raise BadInput(f"cannot write {path}: the folder {folder} is not writable; choose another")
 
 
 def _factor_variable(factor: Field | None) -> dict[str, Any]:

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput
+from asperity.files import whole_file
 from asperity.report.figures import BLUE, GREEN, GREY, MICRO, STYLE, VERMILION, styled
 from asperity.study.calibration import Calibration, Parameter
 from asperity.study.sensitivity import SEED, Outcome, Sensitivity

@@ -24,8 +24,8 @@ from asperity.arrays import Field, Mask
 from asperity.coupling import Vibration
 from asperity.ehl.solution import ContactSolution, Convergence
 from asperity.ehl.state import hertz_zone
-from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput
+from asperity.files import whole_file
 from asperity.hertz import line_pressure
 from asperity.surface import MeasuredSurface, SurfaceDescription, SurfaceSpectrum, bearing_curve, surface_spectrum
 

@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import BadInput
+from asperity.files import require_writable, whole_file
 from asperity.hearing import HistoryVibration
 from asperity.history import History
 from asperity.report import motion_figures as figures

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from asperity.conditions import ContactConditions
 from asperity.coupling import VibrationModel
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import BadInput
+from asperity.files import require_writable, whole_file
 from asperity.lubricant import (
     DENSITY_LAWS,
     FRICTION_LAWS,

@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from asperity.case import Case
-from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import AsperityError, BadInput
+from asperity.files import make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.report import study_figures, sweep_figures
 from asperity.report.figures import MICRO
 from asperity.report.page import NOT_FOUND, PAPER, Tile, in_print, page_template, picture, with_deviation
@@ -30,7 +30,7 @@ from asperity.study.evaluate import BOTH_PRESETS as PRESETS
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyResult
 from asperity.study.plan import SEEDS, as_written
-from asperity.study.store import read_manifest
+from asperity.study.store import FORMAT
 
 if TYPE_CHECKING:
     import pandas
@@ -133,12 +133,7 @@ def papers_contact(case: Case) -> bool:
 
 
 def _folder(path: Path) -> Path:
-    if path.exists() and not path.is_dir():
-        raise BadInput(f"cannot write figures into {path}: it is a file; name a folder")
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"cannot make the folder {path}: {error.strerror}; choose another") from None
+    make_folder(path)
     require_writable(path / "captions.md")
     return path
 
@@ -598,12 +593,11 @@ class StudyReport:
         }
         seeds = "surfaces' seeds given: " + ", ".join(map(str, plan.seeds)) if plan.seeds else seeding[plan.seeding]
         rows.append(("Seeds", f"{seeds}; each case's own stand in cases.csv"))
-        names = ("asperity", "numpy", "scipy", "numba")
-        versions = {name: version(name) for name in names}
+        used = versions()
         if self.result.folder is not None:
-            versions = read_manifest(self.result.folder)["versions"]
+            used = read_manifest(self.result.folder, of="study", layout=FORMAT)["versions"]
             rows.append(("Folder", self.result.folder.resolve().name))
-        rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in versions.items())))
+        rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in used.items())))
         return rows
 
     def _range(self, key: str) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.ehl.storage import require_writable, whole_file
+from asperity.files import require_writable, whole_file
 from asperity.report import track_figures as figures
 from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture, with_deviation
 from asperity.tracking.track import ALERT, DANGER, IN_A_ROW

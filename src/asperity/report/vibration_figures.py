@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from asperity.arrays import Field
 from asperity.coupling import Vibration, VibrationModel
-from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput
 from asperity.excitation import white_noise
+from asperity.files import whole_file
 from asperity.report.figures import BLUE, GREEN, GREY, MICRO, STYLE, VERMILION
 from asperity.signals import Signal, power_spectrum
 from asperity.table1 import Table1Row, continuous_crfa, expected_crfa

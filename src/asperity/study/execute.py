@@ -26,11 +26,11 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.files import MANIFEST
 from asperity.processes import cores
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker
 from asperity.study.plan import Plan, StudyCase
 from asperity.study.store import (
-    MANIFEST,
     TABLE,
     Store,
     failed,

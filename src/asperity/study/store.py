@@ -12,13 +12,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from platform import python_version
 from typing import TYPE_CHECKING, Any
 
 from asperity.arrays import Field
 from asperity.case import in_si, load_case, relative_to
-from asperity.ehl.storage import require_writable, whole_file
 from asperity.errors import AsperityError, BadInput, UnreadableFile
+from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.study.evaluate import DONE, Row
 from asperity.study.plan import SEEDS, Plan, plan_points
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 FORMAT = 1  # counts up when a reader of the format before could not read the folder
-MANIFEST, PARTS, TABLE, MAPS = "manifest.json", "parts", "table.parquet", "fields.zarr"
+PARTS, TABLE, MAPS = "parts", "table.parquet", "fields.zarr"
 LEFT_BEHIND_S = 3600.0  # age of a temporary file that no shard elsewhere can still be writing
 _LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
 
@@ -131,17 +130,13 @@ def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Sto
     AsperityError
         if the system refuses to write, as on a full disk.
     """
-    if folder.exists() and not folder.is_dir():
-        raise BadInput(f"cannot write into {folder}: it is a file; name a folder")
+    make_folder(folder)
     manifest = folder / MANIFEST
     if manifest.exists():
-        _require_same(read_manifest(folder), plan, folder)
-    elif folder.exists() and any((folder / PARTS).glob("*.parquet")):
+        _require_same(read_manifest(folder, of="study", layout=FORMAT), plan, folder)
+    elif any((folder / PARTS).glob("*.parquet")):
         raise BadInput(f"{folder} holds parts of a study without its manifest; choose another folder")
-    try:
-        (folder / PARTS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInput(f"cannot make the folder {folder / PARTS}: {error.strerror}; choose another") from None
+    make_folder(folder / PARTS)
     require_writable(manifest)
     with ExitStack() as held:
         _hold(folder, shard, held)
@@ -155,7 +150,7 @@ def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Sto
 
 def open_read(folder: Path, plan: Plan) -> Store:
     """A study's folder to read from; BadInput where it holds another study than `plan`."""
-    _require_same(read_manifest(folder), plan, folder)
+    _require_same(read_manifest(folder, of="study", layout=FORMAT), plan, folder)
     return Store(folder, plan)
 
 
@@ -185,7 +180,7 @@ def read_plan(folder: Path) -> Plan:
     UnreadableFile
         if the folder holds no study, or its manifest is damaged.
     """
-    manifest = read_manifest(folder)
+    manifest = read_manifest(folder, of="study", layout=FORMAT)
     try:
         home = (folder / manifest["case_folder"]).resolve()
         case = load_case(manifest["case"], folder=home, name=manifest["source"])
@@ -205,28 +200,12 @@ def read_plan(folder: Path) -> Plan:
         raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """What a study's folder says about itself; UnreadableFile where it says nothing that can be read."""
-    path = folder / MANIFEST
-    try:
-        manifest = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise UnreadableFile(f"{folder} holds no study: it has no {MANIFEST}; check its name") from None
-    except (OSError, ValueError):
-        raise UnreadableFile(f"{path} is damaged; compute the study into another folder") from None
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise UnreadableFile(f"{path} is not a study's manifest that this asperity can read; choose another folder")
-    return manifest
-
-
 def _manifest(plan: Plan, folder: Path) -> dict[str, Any]:
     return {
+        "of": "study",
         "format": FORMAT,
         "design": plan.design,
-        "versions": {
-            **{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")},
-            "python": python_version(),
-        },
+        "versions": versions(),
         "source": plan.case.source,
         "case": plan.case.text,
         "case_folder": relative_to(plan.case.folder.resolve(), folder.resolve()),

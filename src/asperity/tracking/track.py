@@ -15,8 +15,8 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.case import Case
-from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput
+from asperity.files import whole_file
 from asperity.recording.model import ACCELERATION
 from asperity.tracking.files import Place, Table, read_table, recordings_in
 from asperity.tracking.listen import WINDOW, Asked, Heard, common_spacing, listen_to_all

@@ -12,8 +12,8 @@ from time import sleep, time
 from typing import Any
 
 from asperity.case import Case
-from asperity.ehl.storage import whole_file
 from asperity.errors import BadInput, UnreadableFile
+from asperity.files import make_folder, whole_file
 from asperity.tracking.files import read_table, recordings_in
 from asperity.tracking.listen import Asked, Heard, common_spacing, keep, kept, listen_to_all
 from asperity.tracking.target import Target, search_target
@@ -110,10 +110,7 @@ class _Memory:
         self.settings = out / SETTINGS
         self.spacing_hz: float | None = None
         self._at_hand: dict[str, Heard] = {}
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise BadInput(f"cannot make the folder {self.folder}: {error.strerror}; choose another") from None
+        make_folder(self.folder)
         wanted = self._wanted()
         if self.settings.is_file():
             begun = _read_json(self.settings)
