@@ -1,0 +1,23 @@
+"""Every number that commands state stays what it was, unless a change is meant; see `golden_numbers`."""
+
+import json
+import os
+
+import pytest
+from golden_numbers import CASES, REFERENCE, differences, numbers
+
+# Another processor sums in another order, and Newton then stops elsewhere within the solver's 1e-4.
+TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_numbers_are_what_they_were(name):
+    then = json.loads((REFERENCE / f"{name}.json").read_text("utf-8"))
+    assert differences(then, numbers(name), TOLERANCE) == []
+
+
+def test_a_difference_is_seen():
+    then = {"rows": [{"clr": 0.5, "found": True, "reason": None}]}
+    assert differences(then, {"rows": [{"clr": 0.5004, "found": True, "reason": None, "new": 1}]}, 2e-3) == []
+    assert len(differences(then, {"rows": [{"clr": 0.502, "found": False, "reason": ""}]}, 2e-3)) == 3
+    assert differences(then, {"rows": []}, 2e-3) == [".rows: [{'clr': 0.5, 'found': True, 'reason': None}] is now []"]
