@@ -8,10 +8,16 @@ import sys
 from pathlib import Path
 
 from asperity.case import load_case
-from asperity.study.anchors import PAPER_ANCHORS, compare, rig_deviation
-from asperity.study.curve import WearCurve, curve_of
-from asperity.study.execute import run_study, study_executor
-from asperity.study.plan import plan_study
+from asperity.study import (
+    PAPER_ANCHORS,
+    WearCurve,
+    compare_with_anchors,
+    curve_of,
+    plan_study,
+    rig_deviation,
+    run_study,
+    study_executor,
+)
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 CASES = {"default": "paper.toml", "as printed": "paper-as-printed.toml", "calibrated": "paper-calibrated.toml"}
@@ -41,7 +47,7 @@ def print_anchors(cells: int | None = None) -> None:
     found = curves(cells)
     print("\n| anchor | printed | " + " | ".join(found) + " |")
     print("|---|---|" + "---|" * len(found))
-    tables = {name: compare(curve).set_index("anchor") for name, curve in found.items()}
+    tables = {name: compare_with_anchors(curve).set_index("anchor") for name, curve in found.items()}
     for anchor in PAPER_ANCHORS:
         sign = {"about": "", "at least": "≥ ", "at most": "≤ "}[anchor.sense]
         cells_shown = []

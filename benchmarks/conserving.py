@@ -16,16 +16,21 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.case import Case
-from asperity.ehl.cavitation import solve_film
+from asperity.ehl import (
+    ContactSolution,
+    LoadSharing,
+    Scales,
+    Snapshot,
+    moving_conserving_contact,
+    sharing_by_film,
+    solve_contact,
+    solve_film,
+)
 from asperity.ehl.conserving import evaluate
-from asperity.ehl.conserving_motion import moving_conserving_contact
 from asperity.ehl.conserving_solve import unknowns_of
-from asperity.ehl.motion import Snapshot
-from asperity.ehl.scales import Scales
-from asperity.ehl.sharing import LoadSharing, load_sharing
-from asperity.ehl.solution import CONSERVING, ContactSolution
-from asperity.ehl.solve import contact_problem, solve_contact
-from asperity.surface.moving import MovingSurfaces
+from asperity.ehl.solution import CONSERVING
+from asperity.ehl.solve import contact_problem
+from asperity.surface import MovingSurfaces
 from benchmarks.roughness_levels import paper_case
 
 SQ_UM, LENGTHS_UM, CAPS_GPA, SEEDS = (0.5, 1.0, 2.5, 4.0), (40, 80), (0.7, 2.0), (7, 8, 9)
@@ -124,7 +129,7 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
             )
             spent[model] = process_time() - began
             if solution.convergence.converged:
-                shares[model, one.sq_um].append(load_sharing(solution))
+                shares[model, one.sq_um].append(sharing_by_film(solution))
         if solution.convergence.converged:
             solved[one.seed] += 1
             worst = max(worst, lost(solution))
@@ -169,7 +174,7 @@ def moving(seeds: tuple[int, ...]) -> Iterator[str]:
                 first_bad.append((one, snapshot.number))
             else:
                 worst = max(worst, snapshot.state.mass_flux_imbalance)
-        shares["moving", one.sq_um].append(load_sharing(snapshot.solution))
+        shares["moving", one.sq_um].append(sharing_by_film(snapshot.solution))
     yield (
         f"Moving, 64 x 64, one pass: {accepted} of {taken} steps accepted ({100 * accepted / taken:.1f} %); in any "
         f"accepted step all that cells of the Hertz zone lose and gain is at most {worst:.1e} of the oil carried there."

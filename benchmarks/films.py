@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import smooth_film, solve_contact
+from asperity.ehl import Options, solve_contact
+from asperity.ehl.solve import smooth_film
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
 from asperity.surface import flat_surface

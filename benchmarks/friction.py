@@ -11,17 +11,25 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import iv, k0e, modstruve
 
-from asperity import load_case, solve_contact, solve_thermal_contact, subsurface_stress
+from asperity import load_case, solve_contact, subsurface_stress
 from asperity.case import Case
-from asperity.curves import stribeck_curve
-from asperity.ehl.flash import flash_temperature, moving_source
-from asperity.ehl.friction import friction
-from asperity.ehl.solution import ContactSolution, Convergence, Iteration, Options, Status
-from asperity.ehl.state import contact_state
-from asperity.ehl.thermal import friction_and_heat
+from asperity.ehl import (
+    ContactSolution,
+    Convergence,
+    Iteration,
+    Options,
+    SolveStatus,
+    contact_state,
+    flash_temperature,
+    friction,
+    friction_and_heat,
+    solve_thermal_contact,
+)
+from asperity.ehl.flash import moving_source
 from asperity.grid import Grid
 from asperity.hertz import line_pressure
 from asperity.lubricant import EyringShear, FrictionLaw, LinearBairWiner, NewtonianShear, Solid, Thermal
+from asperity.results import stribeck_curve
 from asperity.surface import flat_surface
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
@@ -99,7 +107,7 @@ def _hertz_film(case: Case, law: FrictionLaw, cells: int, gap: float) -> Contact
         gap=np.where(inside, gap, 1.0)[:, None] * ones,
         in_contact=np.zeros(grid.cells, bool),
         rigid_approach=0.0,
-        convergence=Convergence(Status.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0),
+        convergence=Convergence(SolveStatus.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0),
     )
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.rig import SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS, Disturbance, Rig, simulate_rig
+from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS, Disturbance, Rig, simulate_rig
 from asperity.signals import Spectrum
 from asperity.wear import CleanSpectrum, Resonance, contact_resonance, remove_lines, series_resonances, split_stages
 

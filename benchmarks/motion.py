@@ -10,13 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.motion import moving_contact
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
+from asperity.ehl import Options, moving_contact, solve_contact
 from asperity.grid import Grid
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.surface import Surface, flat_surface
-from asperity.surface.moving import MovingSurfaces
+from asperity.surface import MovingSurfaces, Surface, flat_surface
 from benchmarks.roughness_levels import paper_case
 
 # deformed over undeformed amplitude by wavelength over half-width, pure rolling, M 100, L 11, amplitude 0.1 H_c:

@@ -20,10 +20,18 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
-from asperity.ehl.conserving_motion import moving_conserving_contact
-from asperity.ehl.motion import Snapshot, moving_contact, step_seconds
-from asperity.ehl.sharing import FILMS, load_below, load_sharing
-from asperity.ehl.stiffness import approach_of, roller_depth, tangent_stiffness
+from asperity.ehl import (
+    FILMS,
+    Snapshot,
+    clr_below,
+    moving_conserving_contact,
+    moving_contact,
+    roller_depth,
+    sharing_by_film,
+    step_seconds,
+    tangent_stiffness,
+)
+from asperity.ehl.stiffness import approach_of
 from asperity.errors import NotConverged
 from asperity.hertz import point_stiffness
 from benchmarks.roughness_levels import paper_case
@@ -104,10 +112,10 @@ def _outcome(
         return float(np.mean(list(values)))
 
     conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
-    sharing = [load_sharing(one.solution) for one in rows]
+    sharing = [sharing_by_film(one.solution) for one in rows]
     clr = mean(one.clr_solid for one in sharing)
     spring = point_stiffness(clr * conditions.load, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
-    below = [mean(load_below(one.solution, film) for one in rows) for film in FILMS]
+    below = [mean(clr_below(one.solution, film) for one in rows) for film in FILMS]
     stiffness = [found for one in moments if (found := _tangent(one)) is not None]
     return Outcome(
         model,

@@ -17,13 +17,11 @@ import numpy as np
 
 from asperity.case import load_case
 from asperity.errors import BadInput
+from asperity.paper import simulate_rig, write_rig
 from asperity.recording import check_recording, open_channels, read_recording
-from asperity.rig import simulate_rig, write_rig
-from asperity.tracking import track_recordings
+from asperity.tracking import search_target, track_recordings
 from asperity.tracking.listen import FINEST_HZ, Asked, listen
-from asperity.tracking.target import search_target
-from asperity.wear.indicators import contact_resonance
-from asperity.wear.lines import remove_lines
+from asperity.wear import contact_resonance, remove_lines
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 MEASURED = Path(__file__).parents[2] / "shared" / "data" / "vibration"

@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.scales import Scales
-from asperity.ehl.solution import ContactSolution, Options
-from asperity.ehl.solve import contact_problem, solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import ContactSolution, Options, Scales, contact_state, solve_contact
+from asperity.ehl.solve import contact_problem
 from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian

@@ -13,10 +13,8 @@ from time import perf_counter
 import numpy as np
 
 from asperity.case import Case, load_case
+from asperity.ehl import ContactSolution, Options, contact_state, solve_contact
 from asperity.ehl.deflection import deflection
-from asperity.ehl.solution import ContactSolution, Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 SQ_UM = (0.5, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)

@@ -11,10 +11,8 @@ from time import perf_counter
 import numpy as np
 
 from asperity.conditions import ContactConditions
+from asperity.ehl import ContactSolution, Options, contact_state, solve_contact
 from asperity.ehl.deflection import deflection
-from asperity.ehl.solution import ContactSolution, Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
 from asperity.grid import Grid
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface, flat_surface

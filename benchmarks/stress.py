@@ -7,12 +7,12 @@ from time import process_time
 import numpy as np
 
 from asperity.case import load_case
+from asperity.ehl import SubsurfaceStress, friction_and_heat, subsurface_stress
 from asperity.ehl.flash import moving_source
 from asperity.ehl.influence import clear_kernels
-from asperity.ehl.stress import SubsurfaceStress, stress_below, subsurface_stress
-from asperity.ehl.thermal import friction_and_heat
+from asperity.ehl.stress import stress_below
 from asperity.grid import Grid
-from asperity.run import solve_case
+from asperity.results import solve_case
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.4)

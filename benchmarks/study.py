@@ -12,8 +12,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from asperity.case import load_case
-from asperity.study.execute import run_study
-from asperity.study.plan import plan_study
+from asperity.study import plan_study, run_study
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 CHEAP = {  # the vibration model alone, on a record of 5000 samples

@@ -11,7 +11,7 @@ import numpy as np
 
 from asperity.case import load_case
 from asperity.grid import Grid
-from asperity.run import solve_case
+from asperity.results import solve_case
 from asperity.surface import (
     Surface,
     correlation_lengths,

@@ -15,15 +15,12 @@ from scipy.ndimage import uniform_filter1d
 
 from asperity.case import load_case
 from asperity.coupling import VibrationModel, oscillator
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
-from asperity.ehl.stiffness import tangent_stiffness
-from asperity.excitation import FilteredNoise, SurfaceTrack
+from asperity.ehl import contact_state, solve_contact, tangent_stiffness
 from asperity.grid import Grid
+from asperity.paper import continuous_crfa, expected_crfa, reproduce_table1
 from asperity.signals import Signal, power_spectrum
 from asperity.surface import gaussian_surface
-from asperity.table1 import continuous_crfa, expected_crfa, table1
-from asperity.vibration import ContactOscillator, acceleration, motion
+from asperity.vibration import ContactOscillator, FilteredNoise, SurfaceTrack, acceleration, mass_motion
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 SPRING = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.02, load=200.0)
@@ -50,7 +47,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 def table_lines() -> Iterator[str]:
     yield "| cut-off [Hz] | height [um] | load [N] | CRF [Hz] | printed | off | CRFA | 5 to 95 % | printed | inside |"
     yield "|---|---|---|---|---|---|---|---|---|---|"
-    for row in table1():
+    for row in reproduce_table1():
         yield (
             f"| {row.cutoff_hz:.0f} | {1e6 * row.height_m:.0f} | {row.load_n:.0f} | {row.crf_hz:.2f} | "
             f"{row.paper_crf_hz:.2f} | {100 * row.crf_off:+.2f} % | {row.crfa:.3f} | "
@@ -147,7 +144,7 @@ def nonlinear_lines() -> Iterator[str]:
     kicks -= np.linspace(kicks[0], kicks[-1], samples)
     unit = np.std(acceleration(SPRING, Signal(kicks, rate, "m")).values[samples // 50 :]) * SPRING.mass
     for force in (0.1, 0.22, 0.45, 0.89):
-        moved = motion(SPRING, Signal(kicks * force * 200.0 / unit, rate, "m"), method="nonlinear", substeps=4)
+        moved = mass_motion(SPRING, Signal(kicks * force * 200.0 / unit, rate, "m"), method="nonlinear", substeps=4)
         spectrum = power_spectrum(Signal(moved.acceleration, rate, "m/s^2"), segment=20_000)
         highest = spectrum.frequency_hz[np.argmax(uniform_filter1d(spectrum.density, 16))]
         shift = highest / SPRING.natural_frequency_hz - 1.0

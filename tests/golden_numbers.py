@@ -172,6 +172,6 @@ def _set(overrides: tuple[str, ...]) -> list[str]:
 
 if __name__ == "__main__":
     for name in sys.argv[1:] or CASES:
-        print(name, flush=True)
+        sys.stderr.write(f"{name}\n")
         text = json.dumps(numbers(name), indent=1, sort_keys=True)
         (REFERENCE / f"{name}.json").write_text(text + os.linesep, "utf-8")

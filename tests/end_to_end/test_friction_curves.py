@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from asperity import load_case, stribeck_curve, traction_curve
+from asperity import load_case
 from asperity.errors import BadInput
+from asperity.results import stribeck_curve, traction_curve
 
 SMALL = ("--set", "grid.cells=[48, 32]", "--set", "surface.correlation_length=40 um")
 PNG = b"\x89PNG"

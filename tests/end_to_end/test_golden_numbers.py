@@ -4,6 +4,7 @@ import json
 import os
 
 import pytest
+
 from golden_numbers import CASES, REFERENCE, differences, numbers
 
 # Another processor sums in another order, and Newton then stops elsewhere within the solver's 1e-4.

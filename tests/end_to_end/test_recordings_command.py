@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from asperity.rig import Disturbance, simulate_rig
+from asperity.paper import Disturbance, simulate_rig
 
 KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # the contract
 

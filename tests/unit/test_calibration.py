@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity import calibrate, load_case
+from asperity import load_case
 from asperity.cli import main
 from asperity.errors import BadInput
-from asperity.study.anchors import Anchor
+from asperity.study import Anchor, calibrate, plan_points, run_study
 from asperity.study.calibration import _levels, _Slopes
-from asperity.study.execute import run_study
-from asperity.study.plan import plan_points
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 DRY = {

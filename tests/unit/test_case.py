@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from asperity.case import load_case
 from asperity.coupling import VibrationModel
-from asperity.ehl.solution import Options
+from asperity.ehl import Options
 from asperity.errors import BadInput, UnreadableFile
 from asperity.lubricant import Barus, DowsonHigginson, Roelands
 from asperity.surface import Surface

@@ -8,14 +8,14 @@ from asperity.coupling import (
     PRESETS,
     VibrationModel,
     contact_vibration,
-    cutoff_hz,
     dry_full_load,
     excitation,
     oscillator,
     preset_choices,
     search_band,
 )
-from asperity.ehl.state import ContactState
+from asperity.coupling.model import cutoff_hz
+from asperity.ehl import ContactState
 from asperity.errors import BadInput
 
 CONDITIONS = ContactConditions(

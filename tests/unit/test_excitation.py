@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 from asperity.errors import BadInput
-from asperity.excitation import FilteredNoise, PatchAverage, SurfaceTrack, synthesised
 from asperity.grid import Grid
 from asperity.signals import Signal, power_spectrum
 from asperity.surface import Surface, flat_surface, gaussian_surface
+from asperity.vibration import FilteredNoise, PatchAverage, SurfaceTrack
+from asperity.vibration.excitation import synthesised
 
 
 def noise(**choices) -> FilteredNoise:

@@ -15,14 +15,13 @@ import pytest
 
 from asperity.case import load_case
 from asperity.cli import main
-from asperity.ehl.motion import moving_contact
-from asperity.ehl.solution import Status
+from asperity.ehl import SolveStatus, moving_contact
 from asperity.errors import BadInput, NotConverged, UnreadableFile
 from asperity.grid import Grid
-from asperity.history import MODELS, load_history, run_history
+from asperity.history import load_history, run_history
+from asperity.history.history import MODELS
 from asperity.report.motion_page import render_motion_page
-from asperity.surface import CompositeSurface, Surface, flat_surface, gaussian_surface
-from asperity.surface.moving import MovingSurfaces, track_grid
+from asperity.surface import CompositeSurface, MovingSurfaces, Surface, flat_surface, gaussian_surface, track_grid
 
 GRID = Grid((32, 16), (0.0, 0.0), (64e-6, 16e-6))
 SMALL = {"grid.cells": "[48, 32]", "surface.correlation_length": "40 um", "grid.x": "[-3, 1.8]"}
@@ -202,7 +201,7 @@ def test_what_it_says_is_of_the_later_steps(history):
 
 
 def test_it_begins_with_the_snapshot(history):
-    from asperity.run import solve_case
+    from asperity.results import solve_case
 
     alone = solve_case(history.case).scalars()
     first = history.table.iloc[0]
@@ -280,7 +279,7 @@ def fails_at_three(monkeypatch):
     def steps(*arguments, **options):
         for snapshot in moving_contact(*arguments, **options):
             if snapshot.number == 3:
-                ending = replace(snapshot.solution.convergence, status=Status.OUT_OF_ITERATIONS)
+                ending = replace(snapshot.solution.convergence, status=SolveStatus.OUT_OF_ITERATIONS)
                 snapshot = replace(snapshot, solution=replace(snapshot.solution, convergence=ending))
             yield snapshot
 

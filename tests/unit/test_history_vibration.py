@@ -11,16 +11,13 @@ import pytest
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.coupling import VibrationModel
-from asperity.ehl.motion import moving_contact
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.stiffness import tangent_stiffness
+from asperity.ehl import moving_contact, solve_contact, tangent_stiffness
 from asperity.errors import BadInput
-from asperity.hearing import history_vibration, repeating, resampled, steady_response
-from asperity.history import load_history, run_history
+from asperity.history import history_vibration, load_history, run_history
+from asperity.history.vibration import repeating, resampled, steady_response
 from asperity.report.page import in_print
 from asperity.signals import Signal, power_spectrum
-from asperity.surface import Surface
-from asperity.surface.moving import MovingSurfaces, track_grid
+from asperity.surface import MovingSurfaces, Surface, track_grid
 from asperity.vibration import ContactOscillator
 from asperity.wear import contact_resonance
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
+from asperity.ehl import Options, Scales
 from asperity.ehl.linear import Linear, five_point_pattern
-from asperity.ehl.scales import Scales
-from asperity.ehl.solution import Options
 from asperity.ehl.solve import contact_problem, first_guess
 from asperity.kernels import relax, reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows, Stencil

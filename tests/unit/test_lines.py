@@ -6,8 +6,7 @@ import pytest
 from asperity.errors import BadInput
 from asperity.signals import Signal, power_spectrum, smooth
 from asperity.vibration import ContactOscillator, acceleration
-from asperity.wear import contact_resonance
-from asperity.wear.lines import remove_lines
+from asperity.wear import contact_resonance, remove_lines
 
 RATE, SECONDS = 10e3, 40.0
 TIME = np.arange(round(RATE * SECONDS)) / RATE

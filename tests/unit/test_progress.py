@@ -5,7 +5,7 @@ from time import sleep
 import pytest
 
 from asperity.cli import common
-from asperity.ehl.solution import Iteration
+from asperity.ehl import Iteration
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, True), (1, False)])

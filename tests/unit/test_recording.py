@@ -10,7 +10,7 @@ from asperity.errors import BadInput, UnreadableFile
 from asperity.recording import open_channels, open_recording, read_recording
 from asperity.recording.units import acceleration_scale, name_and_unit
 from asperity.signals import power_spectrum
-from asperity.wear.indicators import contact_resonance
+from asperity.wear import contact_resonance
 from recordings_made import RATE, SHARED, uff_set, vibration, write_all, write_uff
 
 G = 9.80665

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.recording import check_recording, open_channels, open_recording
-from asperity.recording.check import Gauge
+from asperity.recording import Gauge, check_recording, open_channels, open_recording
 from recordings_made import SHARED
 
 RATE = 1000.0

@@ -12,13 +12,13 @@ from matplotlib.colors import to_rgb
 
 from asperity.case import load_case
 from asperity.coupling import contact_vibration
-from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Status
-from asperity.ehl.state import ContactState
+from asperity.ehl import ContactSolution, ContactState, Convergence, Iteration, SolveStatus
+from asperity.ehl.solution import Figures
 from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure
 from asperity.report import figures, page, rubbing_figures, surface_map, write_report
-from asperity.run import Run
+from asperity.results import Run
 from asperity.surface import MeasuredSurface, Surface, SurfaceDescription, flat_surface, surface_parameters
 
 CASE = """
@@ -58,7 +58,7 @@ HISTORY = tuple(
 )
 
 
-def solution_like(case, surface=None, status=Status.CONVERGED):
+def solution_like(case, surface=None, status=SolveStatus.CONVERGED):
     """Fields a solver could have returned: Hertz's, with contact where the roughness is highest."""
     surface = surface or case.surface()
     x = surface.grid.x[:, None]
@@ -79,7 +79,7 @@ def solution_like(case, surface=None, status=Status.CONVERGED):
     )
 
 
-def run_like(text=CASE, *, status=Status.CONVERGED, surface=None, notes=(), **numbers):
+def run_like(text=CASE, *, status=SolveStatus.CONVERGED, surface=None, notes=(), **numbers):
     case = load_case(text, stored=surface)
     state = ContactState(**{
         "car": 0.3712, "car_domain": 0.6034, "clr": 0.5423, "sq": 1.25e-6, "h_min": 4.9e-9, "h_central": 0.512e-6,
@@ -133,7 +133,7 @@ def single():
 def several():
     runs = [
         run_like(sq=0.5e-6, car=0.05, clr=0.11),
-        run_like(status=Status.STALLED),
+        run_like(status=SolveStatus.STALLED),
         run_like(CASE.replace("500 N", "400 N"), sq=3e-6, car=0.6, clr=0.92, mass_flux_imbalance=0.2),
     ]
     return Page(page.render_page(runs))
@@ -484,7 +484,7 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
     def refuse(*_, **__):
         raise AsperityError("friction and temperature did not settle")
 
-    monkeypatch.setattr("asperity.run.friction_and_heat", refuse)
+    monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
     unsettled = Page(page.render_page([run_like()]))
     assert "There is no friction and no temperature to show: friction and temperature did not" in unsettled.text
     assert next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"

@@ -8,17 +8,10 @@ import pytest
 from asperity.case import load_case
 from asperity.coupling import VibrationModel
 from asperity.errors import BadInput
-from asperity.excitation import FilteredNoise
-from asperity.rig import (
-    SAMPLES_SQ_UM,
-    Disturbance,
-    RigRecording,
-    Tones,
-    simulate_rig,
-    write_rig,
-)
+from asperity.paper import SAMPLES_SQ_UM, Disturbance, RigRecording, simulate_rig, write_rig
+from asperity.paper.rig import Tones
 from asperity.signals import power_spectrum
-from asperity.vibration import acceleration
+from asperity.vibration import FilteredNoise, acceleration
 from asperity.wear import contact_resonance, remove_lines
 
 SMALL = {"samples": 2, "repeats": 1, "duration_s": 20.0}

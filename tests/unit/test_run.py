@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray
 
-import asperity.run
+import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
 from asperity.cli.contact import _friction_rows, _print_run
 
@@ -15,7 +15,9 @@ SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
 
 @pytest.fixture(scope="module")
 def run() -> Run:
-    return solve_case(load_case(files("asperity").joinpath("paper.toml").read_text("utf-8")).with_overrides(SMALL))
+    return solve_case(
+        load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8")).with_overrides(SMALL)
+    )
 
 
 def test_scalars_state_friction_heat_and_stress(run):
@@ -32,9 +34,9 @@ def test_scalars_state_friction_heat_and_stress(run):
 
 
 def test_a_film_too_hot_for_its_viscosity_is_remarked_on(run, monkeypatch):
-    monkeypatch.setattr(asperity.run, "HOT", 1e3)
+    monkeypatch.setattr(results, "HOT", 1e3)
     assert run.remarks == run.notes
-    monkeypatch.setattr(asperity.run, "HOT", 0.9 * run.heat.film_max_k)
+    monkeypatch.setattr(results, "HOT", 0.9 * run.heat.film_max_k)
     *notes, hot = run.remarks
     assert tuple(notes) == run.notes
     assert f"{run.heat.film_max_k:.4g} K" in hot
@@ -68,7 +70,7 @@ def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypa
     def refuse(*_, **__):
         raise AsperityError("friction and temperature did not settle")
 
-    monkeypatch.setattr(asperity.run, "friction_and_heat", refuse)
+    monkeypatch.setattr(results, "friction_and_heat", refuse)
     apart = Run(case=run.case, solution=run.solution, state=run.state, vibration=None)
     found = apart.scalars()
     assert found["friction_coefficient"] is found["flash_temperature_max_k"] is None
@@ -88,6 +90,6 @@ def test_the_command_line_prints_friction_heat_and_stress(run, capsys):
 
 @pytest.mark.parametrize("coefficient", [2.5, -0.1])
 def test_a_boundary_friction_that_cannot_be_is_refused_before_the_solve(coefficient):
-    case = load_case(files("asperity").joinpath("paper.toml").read_text("utf-8"))
+    case = load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8"))
     with pytest.raises(BadInput, match="boundary_friction must be"):
         case.with_overrides({"material.boundary_friction": coefficient})

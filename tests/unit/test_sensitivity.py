@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity import load_case, sensitivity
+from asperity import load_case
 from asperity.cli import main
 from asperity.errors import AsperityError, BadInput
-from asperity.study.ranges import OPEN_RANGES, Range, open_ranges, overrides_at, parse_range
-from asperity.study.sensitivity import indices, knee, sample_design
+from asperity.study import ParameterRange, sensitivity
+from asperity.study.global_sensitivity import indices, knee, sample_design
+from asperity.study.ranges import OPEN_RANGES, open_ranges, overrides_at, parse_range
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 SMALL = {"surface.correlation_length": "60 um", "vibration.duration": "1 s"}
@@ -128,7 +129,7 @@ def test_what_is_no_range_is_refused_in_a_sentence(text, said):
 
 def test_a_moved_inlet_takes_its_cells_along(paper):
     case = paper.with_overrides({"grid.cells": [128, 96]})
-    ranges = [Range("grid.x[0]", -4.5, -1.9)]
+    ranges = [ParameterRange("grid.x[0]", -4.5, -1.9)]
     spacings = []
     for share in (0.0, 0.37, 1.0):
         moved = case.with_overrides(overrides_at(case, ranges, [share]))

@@ -5,8 +5,9 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
+from asperity.wear import series_resonances
 from asperity.wear.indicators import line_shape
-from asperity.wear.series import _Blocks, _cost, _Line, _objection, _Parameters, _point, series_resonances
+from asperity.wear.series import _Blocks, _cost, _Line, _objection, _Parameters, _point
 
 BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 6000.0, 1.0)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import BadInput
-from asperity.wear.stages import split_stages
+from asperity.wear import split_stages
 
 SQ = np.array([0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49])  # the paper's samples [um]
 SQ_STD = np.array([0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06])

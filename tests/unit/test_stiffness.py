@@ -9,10 +9,7 @@ import pytest
 from asperity.case import load_case
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel, contact_vibration, excitation
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
-from asperity.ehl.stiffness import roller_depth, tangent_stiffness
+from asperity.ehl import Options, contact_state, roller_depth, solve_contact, tangent_stiffness
 from asperity.errors import BadInput
 from asperity.grid import Grid
 from asperity.hertz import point_contact, point_stiffness

@@ -6,8 +6,8 @@ import pytest
 import xarray
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import ATTEMPTS, ContactSolution, Convergence, Figures, Iteration, Options, Status
-from asperity.ehl.storage import load_solution
+from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus, load_solution
+from asperity.ehl.solution import ATTEMPTS, Figures
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
@@ -38,7 +38,7 @@ def solution():
         in_contact=rng.random(cells) < 0.3,
         rigid_approach=-1e-6 / 3.0,
         convergence=Convergence(
-            Status.STALLED,
+            SolveStatus.STALLED,
             steps,
             3e-7,
             0.1 + 0.2,

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from asperity import BadInput, ContactConditions, ElasticPair, flat_surface, solve_contact, subsurface_stress
+from asperity.ehl import StressTensor, hertz_stress
 from asperity.ehl.influence import ODD_IN_X, ODD_IN_Y, Tractions, _rectangles
-from asperity.ehl.stress import StressTensor, default_depths, hertz_stress, stress_below
+from asperity.ehl.stress import default_depths, stress_below
 from asperity.grid import Grid
 
 NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")

@@ -15,9 +15,8 @@ import pytest
 import asperity.study.execute as execution
 from asperity.case import load_case
 from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.run import solve_case
-from asperity.study.execute import estimate, load_study, run_study
-from asperity.study.plan import plan_points, plan_study
+from asperity.results import solve_case
+from asperity.study import estimate, load_study, plan_points, plan_study, run_study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRY = {
@@ -279,7 +278,7 @@ def test_a_script_that_workers_cannot_import_is_told_so_and_no_case_is_blamed(ca
     script = tmp_path / "script.py"
     script.write_text(
         "import asperity as asp\n"
-        "asp.run_study(asp.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"  # and no __main__
+        "asp.run_study(asp.study.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"  # and no __main__
     )
     ran = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=100)
     assert ran.returncode == 1

@@ -4,7 +4,7 @@ import pytest
 
 from asperity.case import load_case
 from asperity.errors import BadInput
-from asperity.study.plan import plan_points, plan_study
+from asperity.study import plan_points, plan_study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -19,14 +19,11 @@ import asperity
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.errors import BadInput
-from asperity.report import study_figures, study_page, sweep_figures
+from asperity.report import study_figures, study_page, sweep_figures, write_study_report
 from asperity.report.figures import CONTACT_COLOUR
 from asperity.report.study_figures import ON_PAGE, ON_PAPER
-from asperity.report.study_page import StudyReport, papers_contact, write_study_report
-from asperity.study.anchors import PAPER_ANCHORS, Anchor
-from asperity.study.curve import curve_of
-from asperity.study.execute import StudyResult, load_study, run_study
-from asperity.study.plan import plan_points
+from asperity.report.study_page import StudyReport, papers_contact
+from asperity.study import PAPER_ANCHORS, Anchor, StudyResult, curve_of, load_study, plan_points, run_study
 
 PAPERS = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
 SMALL = PAPERS.with_overrides({"grid.cells": "[48, 32]", "surface.correlation_length": "40 um"})

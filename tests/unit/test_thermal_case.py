@@ -9,7 +9,7 @@ import pytest
 from asperity.case import load_case
 from asperity.errors import BadInput
 from asperity.lubricant import BairWiner, EyringShear, LinearBairWiner, RoelandsWarmth, Thermal
-from asperity.run import load_run, solve_case
+from asperity.results import load_run, solve_case
 
 CASE = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
 

@@ -10,10 +10,10 @@ import pytest
 from asperity.case import load_case
 from asperity.coupling import search_band
 from asperity.errors import BadInput, UnreadableFile
-from asperity.tracking.files import read_table, recordings_in
+from asperity.tracking import recordings_in, search_target, track_recordings
+from asperity.tracking.files import read_table
 from asperity.tracking.listen import Asked, common_spacing, keep, kept, listen, segment
-from asperity.tracking.target import search_target
-from asperity.tracking.track import judge, track_recordings
+from asperity.tracking.track import judge
 
 RATE = 20e3
 CASE = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")

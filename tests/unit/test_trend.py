@@ -6,9 +6,9 @@ import pytest
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel, dry_full_load, oscillator
 from asperity.errors import BadInput
-from asperity.wear.trend import Facts, alarm, consistency, load_share
+from asperity.wear import RecordingFacts, asperity_load_share, comparability, trend_alarm
 
-FACTS = Facts(name="a.csv", rate_hz=20e3, segment=20_000, window="hann", unit="m/s^2", duration_s=300.0)
+FACTS = RecordingFacts(name="a.csv", rate_hz=20e3, segment=20_000, window="hann", unit="m/s^2", duration_s=300.0)
 
 
 def test_the_load_share_read_off_a_resonance_is_the_one_that_made_it():
@@ -23,30 +23,30 @@ def test_the_load_share_read_off_a_resonance_is_the_one_that_made_it():
     full = dry_full_load(conditions, 1e-6)
     crf = {clr: oscillator(replace(full, clr=clr), conditions, model).natural_frequency_hz for clr in (0.2, 0.9, 1.0)}
     assert crf[1.0] == pytest.approx(3879.0, abs=1.0)  # physics of the rig: 3879 Hz for 207 GPa
-    read = load_share(np.array([crf[0.2], crf[0.9]]), 0.0, crf[1.0])
+    read = asperity_load_share(np.array([crf[0.2], crf[0.9]]), 0.0, crf[1.0])
     assert read.clr == pytest.approx([0.2, 0.9], rel=1e-9)
 
 
 def test_the_interval_of_the_load_share_is_that_of_drawn_frequencies():
     rng = np.random.default_rng(0)
     crf, full = 3300.0 + 20.0 * rng.standard_normal(200_000), 3879.0 + 30.0 * rng.standard_normal(200_000)
-    read = load_share(3300.0, 20.0, 3879.0, full_load_std_hz=30.0)
+    read = asperity_load_share(3300.0, 20.0, 3879.0, full_load_std_hz=30.0)
     assert [*read.interval] == pytest.approx(np.quantile((crf / full) ** 6, [0.05, 0.95]), rel=0.01)
 
 
 def test_lost_recordings_have_no_load_share():
-    assert np.isnan(load_share(np.array([np.nan]), np.array([np.nan]), 3879.0).clr).all()
+    assert np.isnan(asperity_load_share(np.array([np.nan]), np.array([np.nan]), 3879.0).clr).all()
 
 
 @pytest.mark.parametrize(("full", "std"), [(0.0, 1.0), (3879.0, -1.0)])
 def test_impossible_frequencies_are_refused(full, std):
     with pytest.raises(BadInput):
-        load_share(3300.0, std, full)
+        asperity_load_share(3300.0, std, full)
 
 
 def test_recordings_that_are_alike_have_no_problems():
     longer = replace(FACTS, name="b.csv", duration_s=200.0, rate_hz=20_001.0)
-    assert consistency([FACTS, longer]) == ()
+    assert comparability([FACTS, longer]) == ()
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_recordings_that_are_alike_have_no_problems():
     ],
 )
 def test_a_difference_is_one_sentence_with_both_sides(change, words):
-    problems = consistency([FACTS, replace(FACTS, name="b.csv", **change)])
+    problems = comparability([FACTS, replace(FACTS, name="b.csv", **change)])
     assert len(problems) == 1
     import re
 
@@ -70,13 +70,13 @@ def test_a_difference_is_one_sentence_with_both_sides(change, words):
 
 def test_different_loads_and_speeds_are_told_apart():
     known = replace(FACTS, load_n=500.0, speed_hz=56.25)
-    assert consistency([known, known]) == ()
-    problems = consistency([known, replace(known, load_n=400.0, speed_hz=50.0)])
+    assert comparability([known, known]) == ()
+    problems = comparability([known, replace(known, load_n=400.0, speed_hz=50.0)])
     assert [problem.split()[1] for problem in problems] == ["load", "speed"]
 
 
 def levels(*values, in_a_row=3):
-    return alarm(np.array(values), alert=0.5, danger=0.9, in_a_row=in_a_row)
+    return trend_alarm(np.array(values), alert=0.5, danger=0.9, in_a_row=in_a_row)
 
 
 def test_an_alarm_takes_a_row():
@@ -105,4 +105,4 @@ def test_recordings_without_a_value_neither_raise_nor_lower():
 @pytest.mark.parametrize("arguments", [{"alert": 0.9, "danger": 0.5}, {"alert": 0.5, "danger": 0.9, "in_a_row": 0}])
 def test_alarms_that_make_no_sense_are_refused(arguments):
     with pytest.raises(BadInput):
-        alarm(np.array([0.1]), **arguments)
+        trend_alarm(np.array([0.1]), **arguments)

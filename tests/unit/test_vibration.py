@@ -5,7 +5,7 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.signals import Signal, power_spectrum
-from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, motion
+from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, mass_motion
 
 STEEL = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.02)
 HERTZ = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.02, load=200.0)
@@ -174,7 +174,7 @@ def test_the_kernel_is_scipys_dormand_prince():
 @pytest.mark.parametrize("method", ["exact", "rk5", "nonlinear"])
 def test_motion_is_consistent(method):
     profile = rough(20_000, 100e3, 1.0)
-    moved = motion(HERTZ, profile, method=method)
+    moved = mass_motion(HERTZ, profile, method=method)
     assert moved.acceleration == pytest.approx(acceleration(HERTZ, profile, method=method).values, rel=1e-9, abs=1e-9)
     assert moved.displacement + moved.compression == pytest.approx(profile.values, rel=1e-12)
     assert moved.contact_loss == 0.0
@@ -195,7 +195,7 @@ def test_undamped_hertz_keeps_its_energy_over_1000_periods():
     samples = round(1000 * rate / free.natural_frequency_hz) + 100
     heights = np.zeros(samples)
     heights[10:] = 0.9 * free.static_compression
-    moved = motion(free, Signal(heights, rate, "m"), method="nonlinear")
+    moved = mass_motion(free, Signal(heights, rate, "m"), method="nonlinear")
     assert moved.contact_loss > 0.01  # it jumps
     z0 = free.static_compression
     c = moved.compression + z0
@@ -208,7 +208,7 @@ def test_a_mass_in_the_air_falls_under_the_load_alone():
     """Thrown off by a drop of the profile: y = y0 - F/m t^2/2 until it meets the profile again."""
     heights = np.zeros(400)
     heights[10:] = -3.0 * HERTZ.static_compression
-    moved = motion(HERTZ, Signal(heights, 1e6, "m"), method="nonlinear")
+    moved = mass_motion(HERTZ, Signal(heights, 1e6, "m"), method="nonlinear")
     air = np.flatnonzero(~moved.in_contact)
     fall = slice(air[0], air[0] + 80)
     assert not moved.in_contact[fall].any()
@@ -228,7 +228,7 @@ def test_nonlinear_resonance_is_lower(force, shift):
     from scipy.ndimage import uniform_filter1d
 
     profile = rough(2_000_000, 50e3, force * 200.0)
-    moved = motion(HERTZ, profile, method="nonlinear", substeps=4)
+    moved = mass_motion(HERTZ, profile, method="nonlinear", substeps=4)
     spectrum = power_spectrum(Signal(moved.acceleration, 50e3, "m/s^2"), segment=20_000)
     highest = spectrum.frequency_hz[np.argmax(uniform_filter1d(spectrum.density, 16))]
     assert highest / HERTZ.natural_frequency_hz - 1.0 == pytest.approx(shift, rel=1 / 3)
@@ -250,7 +250,7 @@ def test_gain_of_the_sampled_response_is_that_of_its_straight_lines():
 @pytest.mark.parametrize(("rate", "filter_name"), [(10e3, "bilinear"), (50e3, "continuous")])
 def test_welch_of_a_long_record_is_the_closed_form_in_level_and_shape(rate, filter_name):
     """2 million samples; the ratio has mean 1, the scatter of its averages, no slope or bump around the resonance."""
-    from asperity.excitation import FilteredNoise
+    from asperity.vibration import FilteredNoise
 
     noise = FilteredNoise(height=2e-6, cutoff_hz=30.0, filter=filter_name)
     response = acceleration(STEEL, noise.profile(2_000_000, rate, seed=8))

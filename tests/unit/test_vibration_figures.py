@@ -3,14 +3,9 @@ import pytest
 
 from asperity.coupling import VibrationModel, contact_vibration, dry_full_load
 from asperity.errors import BadInput
-from asperity.report.vibration_figures import (
-    excitation_figure,
-    load_trend_figure,
-    response_figure,
-    table1_figure,
-    write_png,
-)
-from asperity.table1 import PRINTED, Table1Row, papers_contact
+from asperity.paper import Table1Row
+from asperity.paper.table1 import PRINTED, papers_contact
+from asperity.report import excitation_figure, load_trend_figure, response_figure, table1_figure, write_png
 
 PAPER = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
 CONTACT = papers_contact(200.0)

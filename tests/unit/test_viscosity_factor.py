@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import contact_problem, solve_contact
-from asperity.ehl.state import contact_state
-from asperity.ehl.storage import load_solution
+from asperity.ehl import Options, contact_state, load_solution, solve_contact
+from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, ReeEyring
 from reference_solvers.paper import barus, contact, grid, rough

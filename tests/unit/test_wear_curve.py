@@ -9,12 +9,21 @@ import pytest
 
 from asperity.case import load_case
 from asperity.errors import BadInput, UnreadableFile
-from asperity.rig import CRF_ENDS_HZ, SAMPLES_SQ_UM, TRENDS
-from asperity.run import solve_case
-from asperity.study.anchors import PAPER_ANCHORS, Anchor, compare, load_anchors, rig_deviation, rig_prediction
-from asperity.study.curve import WearCurve, curve_of, wear_curve
-from asperity.study.execute import run_study
-from asperity.study.plan import plan_points
+from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, TRENDS
+from asperity.results import solve_case
+from asperity.study import (
+    PAPER_ANCHORS,
+    Anchor,
+    WearCurve,
+    compare_with_anchors,
+    curve_of,
+    load_anchors,
+    plan_points,
+    rig_deviation,
+    rig_prediction,
+    run_study,
+    wear_curve,
+)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -93,7 +102,7 @@ def test_anchors_say_how_far_off_and_whether_that_is_within_tolerance():
         Anchor(name="not covered", sq=5e-6, value=0.3, **common),
         Anchor(name="no split", quantity="split", value=2.5, tolerance=0.1),
     ]
-    table = compare(curve, anchors).set_index("anchor")
+    table = compare_with_anchors(curve, anchors).set_index("anchor")
     assert table["miss"].fillna(9.0).round(9).to_dict() == {
         "met": -0.01,
         "possible": -0.035,

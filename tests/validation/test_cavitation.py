@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from asperity.ehl.cavitation import solve_film
+from asperity.ehl import solve_film
 from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Barus, DowsonHigginson
 

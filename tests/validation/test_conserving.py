@@ -6,21 +6,25 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
+from asperity.ehl import (
+    Options,
+    Scales,
+    SolveStatus,
+    clr_below,
+    contact_state,
+    load_solution,
+    moving_conserving_contact,
+    moving_contact,
+    sharing_by_film,
+    solve_contact,
+)
 from asperity.ehl.conserving import Earlier, Unknowns, evaluate
 from asperity.ehl.conserving_linear import Linear, newton_step
-from asperity.ehl.conserving_motion import moving_conserving_contact
 from asperity.ehl.conserving_solve import unknowns_of
-from asperity.ehl.motion import moving_contact
-from asperity.ehl.scales import Scales
-from asperity.ehl.sharing import load_below, load_sharing
-from asperity.ehl.solution import Options, Status
-from asperity.ehl.solve import contact_problem, solve_contact
-from asperity.ehl.state import contact_state
-from asperity.ehl.storage import load_solution
+from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
-from asperity.surface import Surface, flat_surface
-from asperity.surface.moving import MovingSurfaces
+from asperity.surface import MovingSurfaces, Surface, flat_surface
 from reference_solvers.paper import ETA0, RADIUS, barus, contact, grid, rough
 
 CAP, FLOOR = 2e9, 5e-9
@@ -176,8 +180,8 @@ def test_what_is_invariant_hardly_depends_on_the_start(flattened):
     again = solved(flattened.surface, start=neighbour)
     unified = solved(flattened.surface, options=replace(OPTIONS, model="unified"))
     from_unified = solved(flattened.surface, start=unified)
-    one = load_sharing(flattened)
-    for other in map(load_sharing, (again, from_unified)):
+    one = sharing_by_film(flattened)
+    for other in map(sharing_by_film, (again, from_unified)):
         assert other.clr_solid == pytest.approx(one.clr_solid, abs=0.03)
         assert other.oil == pytest.approx(one.oil, rel=0.03)
         assert other.cavitated == pytest.approx(one.cavitated, abs=0.03)
@@ -185,23 +189,23 @@ def test_what_is_invariant_hardly_depends_on_the_start(flattened):
 
 def test_the_usual_tolerance_is_close_to_a_much_tighter_one(some):
     tight = solved(some.surface, hardness=some.p_cap, options=replace(OPTIONS, tolerance=1e-7), start=some)
-    here, there = load_sharing(some), load_sharing(tight)
+    here, there = sharing_by_film(some), sharing_by_film(tight)
     np.testing.assert_allclose(here.below, there.below, atol=5e-3)
     assert here.clr_solid == pytest.approx(there.clr_solid, abs=5e-3)
     assert contact_state(some).h_mean == pytest.approx(contact_state(tight).h_mean, rel=1e-3)
 
 
 def test_load_shares_name_their_film(flattened):
-    shares = load_sharing(flattened)
+    shares = sharing_by_film(flattened)
     assert shares.films == (FLOOR, 20e-9, 50e-9, 100e-9, 200e-9)
     assert (np.diff([0.0, *shares.below, 1.0]) >= 0.0).all()
     assert shares.clr_solid == pytest.approx(contact_state(flattened).clr)
     assert shares.clr_floor < shares.clr_solid  # oil at the cap lies between bodies that touch
-    assert load_below(flattened, 1.0) == pytest.approx(1.0)
+    assert clr_below(flattened, 1.0) == pytest.approx(1.0)
     assert 0.1 < shares.cavitated < 0.9
     with pytest.raises(BadInput, match="film must be positive"):
-        load_below(flattened, 0.0)
-    unified = load_sharing(solved(flattened.surface, options=replace(OPTIONS, model="unified")))
+        clr_below(flattened, 0.0)
+    unified = sharing_by_film(solved(flattened.surface, options=replace(OPTIONS, model="unified")))
     assert unified.clr_solid == pytest.approx(unified.clr_floor)
     assert unified.oil > shares.oil
 
@@ -225,7 +229,7 @@ def test_what_does_not_converge_is_loud(flattened):
     with pytest.raises(NotConverged, match="not solved") as failed:
         solved(flattened.surface, options=few, progress=seen.append)
     unfinished = failed.value.solution
-    assert unfinished.convergence.status is Status.OUT_OF_ITERATIONS
+    assert unfinished.convergence.status is SolveStatus.OUT_OF_ITERATIONS
     assert unfinished.oil.content.shape == ON.cells
     assert tuple(seen) == unfinished.convergence.history
     assert not solved(flattened.surface, options=few, strict=False).convergence.converged

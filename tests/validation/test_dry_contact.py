@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 import tamaas
 
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import Options, contact_state, solve_contact
 from asperity.grid import Grid
 from asperity.surface import Surface, flat_surface, gaussian_surface
 from reference_solvers.paper import RADIUS, contact, grid, rough

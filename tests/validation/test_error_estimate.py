@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import asperity.ehl.solve as solving
+from asperity.ehl import Options, contact_state, solve_contact
 from asperity.ehl.iterate import newton
-from asperity.ehl.solution import ATTEMPTS, Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl.solution import ATTEMPTS
 from asperity.grid import Grid
 from asperity.lubricant import Barus
 from asperity.surface import flat_surface

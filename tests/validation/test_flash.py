@@ -7,10 +7,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import k0e
 
-from asperity.ehl.flash import flash_temperature, moving_source
-from asperity.ehl.friction import friction
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.thermal import friction_and_heat
+from asperity.ehl import flash_temperature, friction, friction_and_heat, solve_contact
+from asperity.ehl.flash import moving_source
 from asperity.hertz import line_pressure
 from asperity.lubricant import EyringShear, Solid, Thermal
 from reference_solvers.moving_heat import band, rectangle, rectangle_at_rest, tian_kennedy_square

@@ -7,9 +7,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.special import iv, modstruve
 
-from asperity.ehl.friction import friction
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import contact_state, friction, solve_contact
 from asperity.errors import BadInput
 from asperity.hertz import line_pressure
 from asperity.lubricant import BairWiner, EyringShear, LinearBairWiner, NewtonianShear

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import Options, contact_state, solve_contact
 from asperity.hertz import line_gap, line_pressure
 from asperity.surface import flat_surface
 from reference_solvers.paper import RADIUS, contact, grid

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.solution import Options, Status
-from asperity.ehl.solve import contact_problem, solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import Options, SolveStatus, contact_state, solve_contact
+from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
 from asperity.hertz import line_pressure
@@ -192,7 +191,7 @@ def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
     with pytest.raises(NotConverged, match=r"not solved: out of iterations, at last .* after 6 steps") as caught:
         solve_contact(contact(hardness=CAP), barus(), surface, options=hurried)
     unfinished = caught.value.solution
-    assert unfinished.convergence.status is Status.OUT_OF_ITERATIONS
+    assert unfinished.convergence.status is SolveStatus.OUT_OF_ITERATIONS
     assert not unfinished.convergence.converged
     assert unfinished.pressure.shape == COARSE.cells
     quiet = solve_contact(contact(hardness=CAP), barus(), surface, options=hurried, strict=False)

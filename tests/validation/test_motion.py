@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 from benchmarks.motion import VENNER, contact, waves
 
-from asperity.ehl.friction import friction
-from asperity.ehl.motion import moving_contact
-from asperity.ehl.scales import Scales
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import contact_problem, solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import Options, Scales, contact_state, friction, moving_contact, solve_contact
+from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian
-from asperity.surface import Surface, flat_surface
-from asperity.surface.moving import MovingSurfaces
+from asperity.surface import MovingSurfaces, Surface, flat_surface
 from reference_solvers import paper
 
 CELLS = {4.0: 64, 2.0: 64, 1.0: 64, 0.5: 64, 0.25: 128, 0.125: 64}  # a half-width

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import Options, contact_state, solve_contact
 from asperity.grid import Grid
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
 from asperity.surface import flat_surface

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.coupling import VibrationModel, contact_vibration, cutoff_hz, excitation, oscillator, search_band
-from asperity.ehl.state import ContactState
+from asperity.coupling import VibrationModel, contact_vibration, excitation, oscillator, search_band
+from asperity.coupling.model import cutoff_hz
+from asperity.ehl import ContactState
 from asperity.signals import Signal, power_spectrum
 from asperity.vibration import acceleration
 from asperity.wear import contact_resonance

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from asperity.ehl.stress import SubsurfaceStress, stress_below
+from asperity.ehl import SubsurfaceStress
+from asperity.ehl.stress import stress_below
 from asperity.grid import Grid
 from asperity.hertz import line_pressure
 from reference_solvers import sliding

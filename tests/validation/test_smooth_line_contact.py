@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from asperity.ehl.solution import Options
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
+from asperity.ehl import Options, contact_state, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import flat_surface
 from reference_solvers.line import Oil, line_contact

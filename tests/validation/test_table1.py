@@ -8,7 +8,8 @@ import pytest
 
 from asperity.coupling import VibrationModel
 from asperity.errors import BadInput
-from asperity.table1 import PRINTED, continuous_crfa, expected_crfa, highest_point, riding, table1
+from asperity.paper import continuous_crfa, expected_crfa, reproduce_table1
+from asperity.paper.table1 import PRINTED, highest_point, riding
 
 TABLE = Path(__file__).parents[1] / "reference" / "table1.csv"
 ROWS = list(csv.DictReader(TABLE.read_text().splitlines()))
@@ -22,7 +23,7 @@ def exponent(x, y) -> float:
 
 @pytest.fixture(scope="module")
 def ours():
-    return table1(records=120)
+    return reproduce_table1(records=120)
 
 
 def test_the_printed_rows_are_the_papers_twelve():
@@ -107,6 +108,6 @@ def test_the_highest_point_of_a_sine_is_its_line():
 
 def test_bad_input_is_named():
     with pytest.raises(BadInput, match="at least 20"):
-        table1(records=5)
+        reproduce_table1(records=5)
     with pytest.raises(BadInput, match="sound, paper"):
-        table1(preset="loud")
+        reproduce_table1(preset="loud")

@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.ehl.flash import flash_temperature
-from asperity.ehl.friction import friction
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import contact_state
-from asperity.ehl.thermal import friction_and_heat, solve_thermal_contact
+from asperity.ehl import (
+    contact_state,
+    flash_temperature,
+    friction,
+    friction_and_heat,
+    solve_contact,
+    solve_thermal_contact,
+)
 from asperity.errors import AsperityError, NotConverged
 from asperity.lubricant import ExponentialWarmth, EyringShear, NewtonianShear, Thermal
 from asperity.surface import flat_surface
@@ -86,7 +89,7 @@ def test_a_runaway_law_is_tamed(monkeypatch):
 
 
 def test_an_unfinished_contact_is_told():
-    from asperity.ehl.solution import Options
+    from asperity.ehl import Options
 
     given = (contact(hardness=2e9), barus(), ROUGH)
     few = Options(max_iterations=2)

@@ -3,8 +3,8 @@
 import pytest
 from benchmarks.robustness import OIL, contacts, overlap, prepared
 
+from asperity.ehl import solve_contact
 from asperity.ehl.solution import ATTEMPTS
-from asperity.ehl.solve import solve_contact
 
 
 @pytest.mark.parametrize(

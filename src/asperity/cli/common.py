@@ -11,8 +11,8 @@ from asperity.errors import BadInput
 
 if TYPE_CHECKING:
     from asperity.case import Case
-    from asperity.ehl.solution import Iteration
-    from asperity.run import Run
+    from asperity.ehl import Iteration
+    from asperity.results import Run
 
 SILENT_FOR = 2.0  # seconds without a step of the solver, after which its compilation is announced
 
@@ -20,7 +20,7 @@ SILENT_FOR = 2.0  # seconds without a step of the solver, after which its compil
 def chosen_case(path: Path, surface: Path | None, overrides: list[str]) -> "Case":
     """The case of a case file or a run, with a measured surface and `--set KEY=VALUE` values put in."""
     from asperity.case import load_case, relative_to
-    from asperity.run import load_run
+    from asperity.results import load_run
 
     case = load_run(path).case if path.suffix == ".nc" else load_case(path)
     if surface is not None:
@@ -69,7 +69,7 @@ def save_report(runs: "Sequence[Run]", path: Path) -> None:
 
 def solve_shown(case: "Case", *, label: str, quiet: bool) -> "Run":
     """Solve a case with its steps shown; a run that did not converge comes back marked."""
-    from asperity.run import solve_case
+    from asperity.results import solve_case
 
     case.surface()  # made or read here: it may take seconds, which are not the solver's
     with shown_progress(label, quiet=quiet) as report_step:

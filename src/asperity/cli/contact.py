@@ -21,7 +21,7 @@ from asperity.errors import AsperityError, BadInput
 from asperity.files import make_folder
 
 if TYPE_CHECKING:
-    from asperity.run import Run
+    from asperity.results import Run
 
 DEMO_SQ = ("0.5 um", "1.5 um", "3 um")
 
@@ -39,7 +39,7 @@ def demo(
 
     make_folder(out)
     case_file, report_file = out / "paper.toml", out / "report.html"
-    write_text(case_file, files("asperity").joinpath("paper.toml").read_text("utf-8"))
+    write_text(case_file, files("asperity.paper").joinpath("paper.toml").read_text("utf-8"))
     case = load_case(case_file)
     runs = []
     for sq in DEMO_SQ:
@@ -143,7 +143,7 @@ def report(
         raise BadInput(f"{option} is for a study's folder, got {runs[0]}; name the folder")
     out = out or (runs[0].with_suffix(".html") if len(runs) == 1 else Path("report.html"))
     require_output(out, ".html")
-    from asperity.run import load_run
+    from asperity.results import load_run
 
     loaded = [load_run(path) for path in runs]
     save_report(loaded, out)
@@ -160,7 +160,7 @@ def _report_history(folder: Path, out: Path | None, *, as_json: bool, quiet: boo
     out = out or folder / "report.html"
     require_output(out, ".html")
     from asperity.history import load_history
-    from asperity.report.motion_page import write_motion_report
+    from asperity.report import write_motion_report
 
     history = load_history(folder)
     write_motion_report(history, out)
@@ -178,9 +178,8 @@ def _report_study(
     out = out or folder / "report.html"
     require_output(out, ".html")
     from asperity.cli.study import study_scalars
-    from asperity.report.study_page import write_study_report
-    from asperity.study.anchors import load_anchors
-    from asperity.study.execute import load_study
+    from asperity.report import write_study_report
+    from asperity.study import load_anchors, load_study
 
     wanted = None if anchors is None else load_anchors(anchors)
     result = load_study(folder)

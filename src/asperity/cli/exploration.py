@@ -13,8 +13,7 @@ from asperity.files import make_folder
 
 if TYPE_CHECKING:
     from asperity.case import Case
-    from asperity.study.calibration import Calibration
-    from asperity.study.sensitivity import Sensitivity
+    from asperity.study import Calibration, Sensitivity
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a run.")]
 Override = Annotated[
@@ -52,8 +51,8 @@ def sensitivity(
 ) -> None:
     """Find which open choices move CAR, CLR, CRF, CRFA and the knee of the curve over Sq most."""
     from asperity.case import read_length
-    from asperity.study.sensitivity import SQ
-    from asperity.study.sensitivity import sensitivity as find
+    from asperity.study import SQ_LEVELS
+    from asperity.study import sensitivity as find
 
     if method not in ("morris", "sobol"):
         raise BadInput(f"--method must be morris or sobol, got {method}")
@@ -71,7 +70,7 @@ def sensitivity(
             vary=vary,
             method=method,  # type: ignore[arg-type]
             size=size,
-            sq=[read_length("--sq", text) for text in sq] if sq else SQ,
+            sq=[read_length("--sq", text) for text in sq] if sq else SQ_LEVELS,
             levels=levels,
             cells=cells,
             seeds=seeds,
@@ -85,7 +84,7 @@ def sensitivity(
         files["effects"] = out / "effects.csv"
         write_text(files["effects"], found.effects.to_csv(index=False))
     if figure is not None:
-        from asperity.report.exploration_figures import sensitivity_figure, write_figure
+        from asperity.report import sensitivity_figure, write_figure
 
         files["figure"] = write_figure(sensitivity_figure(found), figure)
     named = {name: str(path) for name, path in files.items()}
@@ -129,8 +128,8 @@ def calibrate(
 ) -> None:
     """Find the free quantities with which the wear curve best meets anchors, and what that leaves open."""
     from asperity.case import read_length
-    from asperity.study.anchors import PAPER_ANCHORS, load_anchors
-    from asperity.study.calibration import calibrate as find
+    from asperity.study import PAPER_ANCHORS, load_anchors
+    from asperity.study import calibrate as find
 
     wanted = PAPER_ANCHORS if anchors is None else load_anchors(anchors)
     chosen = chosen_case(case, None, override or [])
@@ -257,7 +256,7 @@ def _print_calibration(found: "Calibration") -> None:
 
 def _keep(found: "Calibration", out: Path) -> dict[str, Path]:
     """Write the case, the tables and the figure."""
-    from asperity.report.exploration_figures import calibration_figure, write_figure
+    from asperity.report import calibration_figure, write_figure
 
     tables = [("as given", found.start), ("fitted", found.fit), ("checked", found.check)]
     files = {name: out / f"{name}.{suffix}" for name, suffix in (("calibrated", "toml"), ("anchors", "csv"))}
@@ -278,7 +277,7 @@ def calibrated_text(found: "Calibration", folder: Path) -> str:
 def _moved(case: "Case", folder: Path) -> "Case":
     """The case with its surface files named as seen from `folder`."""
     from asperity.case import relative_to
-    from asperity.study.ranges import stated
+    from asperity.study import stated
 
     files = {key: stated(case, key) for key in ("surface.file", "surface.second.file")}
     moved = {key: relative_to(case.folder / name, folder) for key, name in files.items() if name is not None}

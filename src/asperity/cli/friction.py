@@ -12,7 +12,7 @@ from asperity.errors import AsperityError
 
 if TYPE_CHECKING:
     from asperity.case import Case
-    from asperity.curves import FrictionCurve, Progress
+    from asperity.results import FrictionCurve, Progress
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a run.")]
 Override = Annotated[
@@ -39,7 +39,7 @@ def stribeck(
     quiet: Quiet = False,
 ) -> None:
     """Friction over speed, from boundary lubrication to full film."""
-    from asperity.curves import stribeck_curve
+    from asperity.results import stribeck_curve
 
     def curve(chosen: "Case", progress: "Progress | None") -> "FrictionCurve":
         return stribeck_curve(chosen, speeds=speed, progress=progress)
@@ -61,7 +61,7 @@ def traction(
     quiet: Quiet = False,
 ) -> None:
     """Friction over the slide-to-roll ratio, from pure rolling on."""
-    from asperity.curves import traction_curve
+    from asperity.results import traction_curve
 
     def curve(chosen: "Case", progress: "Progress | None") -> "FrictionCurve":
         return traction_curve(chosen, slips=slip, progress=progress)
@@ -89,8 +89,7 @@ def _show(
         with shown_progress(f"{case.source}, Sq {1e6 * case.surface().sq:.3g} um", quiet=quiet) as report_step:
             curves.append(curve(case, report_step))
     if out is not None:
-        from asperity.report.friction_figures import friction_figure
-        from asperity.report.vibration_figures import write_png
+        from asperity.report import friction_figure, write_png
 
         write_png(friction_figure(curves), out)
     if as_json:

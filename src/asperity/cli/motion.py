@@ -12,8 +12,7 @@ from asperity.cli.common import chosen_case, print_json, print_rows, require_out
 from asperity.errors import AsperityError, BadInput, NotConverged
 
 if TYPE_CHECKING:
-    from asperity.hearing import HistoryVibration
-    from asperity.history import History, Progress
+    from asperity.history import History, HistoryVibration, Progress
 
 
 @app.command("run")
@@ -71,7 +70,7 @@ def run_case(
         history, failure = unfinished.solution, str(unfinished)
     heard = _listened(history) if listen and failure is None else None
     if report is not None:
-        from asperity.report.motion_page import write_motion_report
+        from asperity.report import write_motion_report
 
         write_motion_report(history, report, heard=heard)
     if as_json:
@@ -106,7 +105,7 @@ def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], 
 
 
 def _listened(history: "History") -> "HistoryVibration":
-    from asperity.hearing import history_vibration
+    from asperity.history import history_vibration
 
     return history_vibration(history)
 

@@ -16,9 +16,8 @@ from asperity.files import make_folder
 if TYPE_CHECKING:
     from asperity.case import Case
     from asperity.recording import OpenRecording, Quality
-    from asperity.tracking import Track
-    from asperity.tracking.listen import Heard
-    from asperity.wear.indicators import Resonance
+    from asperity.tracking import Heard, Track
+    from asperity.wear import Resonance
 
 ALARM = 3
 IN_FULL = 4  # recordings that `check` shows with every fact
@@ -73,8 +72,7 @@ def check(
 ) -> None:
     """Say what recordings hold: rate, unit, length, channels, gaps, clipping, offset, machine off, too short."""
     from asperity.recording import check_recording, open_channels
-    from asperity.tracking.files import recordings_in
-    from asperity.tracking.target import search_target
+    from asperity.tracking import recordings_in, search_target
 
     target = search_target(_case(case_file), band)
     checked: list[tuple[OpenRecording, Quality]] = []
@@ -269,7 +267,7 @@ def watch(
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
     from asperity.processes import cores
-    from asperity.tracking.watch import watch_folder
+    from asperity.tracking import watch_folder
 
     results = out if out is not None else folder / "asperity-watch"
     if not folder.is_dir():
@@ -335,7 +333,7 @@ def _tell(
 def _write(tracked: "Track", out: Sequence[Path], report: Path | None) -> list[Path]:
     written = [tracked.save(path) for path in out]
     if report is not None:
-        from asperity.report.track_page import write_track_report
+        from asperity.report import write_track_report
 
         written.append(write_track_report(tracked, report))
     return written

@@ -36,7 +36,7 @@ def rig(
     from rich.console import Console
 
     from asperity.case import load_case, read_amount
-    from asperity.rig import Disturbance, simulate_rig, write_rig
+    from asperity.paper import Disturbance, simulate_rig, write_rig
 
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out} is there already and not an empty folder; name a new one")

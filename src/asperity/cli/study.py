@@ -13,8 +13,7 @@ from asperity.cli.common import busy, chosen_case, print_json, print_rows, requi
 from asperity.errors import AsperityError, BadInput
 
 if TYPE_CHECKING:
-    from asperity.study.execute import Estimate, Progress, StudyResult
-    from asperity.study.plan import Plan
+    from asperity.study import Estimate, Progress, StudyPlan, StudyResult
 
 SHOWN_FAILURES = 5
 
@@ -48,8 +47,7 @@ def study(
     quiet: Quiet = False,
 ) -> None:
     """Sweep a case: every point of its [study], several surfaces each; goes on where it was stopped."""
-    from asperity.study.execute import estimate, run_study
-    from asperity.study.plan import plan_study
+    from asperity.study import estimate, plan_study, run_study
 
     part = _shard(shard)
     if out is None and not dry_run:
@@ -91,7 +89,7 @@ def study(
 
 def study_verdict(result: "StudyResult") -> str:
     """One sentence: how much of the study there is, and what it says."""
-    from asperity.study.curve import curve_of, is_wear_study
+    from asperity.study import curve_of, is_wear_study
 
     planned, there = len(result.plan.cases), len(result.table)
     share = f"{there} cases" if there == planned else f"{there} of {planned} cases"
@@ -105,7 +103,7 @@ def study_verdict(result: "StudyResult") -> str:
 
 def study_scalars(result: "StudyResult") -> dict[str, Any]:
     """A study as `--json` prints it."""
-    from asperity.study.curve import curve_of, is_wear_study
+    from asperity.study import curve_of, is_wear_study
 
     scalars: dict[str, Any] = {
         "verdict": study_verdict(result),
@@ -165,7 +163,7 @@ def shown_study(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], No
 
 
 def _executor(name: str | None) -> Any:
-    from asperity.study.execute import dask_executor
+    from asperity.study import dask_executor
 
     if name is None:
         return nullcontext()
@@ -192,7 +190,7 @@ def _in_folder_to_come(report: Path, out: Path | None) -> bool:
 def _make_page(result: "StudyResult", report: Path | None, figures: Path | None, *, quiet: bool) -> dict[str, str]:
     if report is None and figures is None:
         return {}
-    from asperity.report.study_page import write_study_report
+    from asperity.report import write_study_report
 
     assert result.folder is not None
     page = report or result.folder / "report.html"
@@ -202,8 +200,7 @@ def _make_page(result: "StudyResult", report: Path | None, figures: Path | None,
 
 
 def _print_study(result: "StudyResult", made: dict[str, str]) -> None:
-    from asperity.study.curve import curve_of, is_wear_study
-    from asperity.study.plan import as_written
+    from asperity.study import as_written, curve_of, is_wear_study
 
     print()
     if is_wear_study(result) and len(result.table) > result.failed:
@@ -248,7 +245,7 @@ def _print_curve(levels: Any) -> None:
     print("  mean ± standard deviation over the surfaces of a level; CRFA in (m/s^2)^2/Hz\n")
 
 
-def _print_estimate(plan: "Plan", cost: "Estimate", *, as_json: bool) -> None:
+def _print_estimate(plan: "StudyPlan", cost: "Estimate", *, as_json: bool) -> None:
     verdict = (
         f"{cost.cases} cases, {cost.kept} of them kept already: about {_time(cost.seconds)} on {cost.workers} "
         f"{'worker' if cost.workers == 1 else 'workers'}"

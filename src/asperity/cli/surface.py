@@ -60,7 +60,7 @@ def surface(
         except BadInput as error:
             refused.append((file, error))
     if out is not None and described:
-        from asperity.report.figures import surface_map
+        from asperity.report import surface_map
 
         surface_map(described[0], out)
     if described:

@@ -51,14 +51,14 @@ def vibrate(
 
 
 def _vibrate(case: "Case", figures: Path | None, *, as_json: bool, quiet: bool) -> None:
-    from asperity.run import vibrate_case, vibration_scalars, vibration_verdict
+    from asperity.results import vibrate_case, vibration_scalars, vibration_verdict
 
     with shown_progress(case.source, quiet=quiet) as report_step:
         heard, state = vibrate_case(case, progress=report_step)
     scalars = vibration_scalars(heard, state, case)
     drawn: list[Path] = []
     if figures is not None and heard.oscillator is not None and case.vibration is not None:
-        from asperity.report.vibration_figures import excitation_figure, response_figure, write_png
+        from asperity.report import excitation_figure, response_figure, write_png
 
         drawn = [
             write_png(excitation_figure(heard, case.vibration), figures / "excitation.png"),
@@ -98,12 +98,12 @@ def _table1(preset: str, records: int | None, figures: Path | None, *, as_json: 
     from rich.console import Console
 
     from asperity.coupling import VibrationModel
-    from asperity.table1 import DAMPING_RATIO, MASS, table1
+    from asperity.paper import DAMPING_RATIO, MASS, reproduce_table1
 
     console = Console(stderr=True)
     shown = console.is_terminal and not quiet
     with console.status("Table 1: riding over the records ...") if shown else nullcontext():
-        rows = table1(preset=preset, records=records)
+        rows = reproduce_table1(preset=preset, records=records)
     inside, farthest = sum(row.within for row in rows), max(abs(row.crf_off) for row in rows)
     verdict = (
         f"Table 1, preset {preset}: CRF within {100 * farthest:.2f} % of the printed ones, {inside} of {len(rows)} "
@@ -111,7 +111,7 @@ def _table1(preset: str, records: int | None, figures: Path | None, *, as_json: 
     )
     drawn: list[Path] = []
     if figures is not None:
-        from asperity.report.vibration_figures import load_trend_figure, table1_figure, write_png
+        from asperity.report import load_trend_figure, table1_figure, write_png
 
         model = VibrationModel.preset(preset, mass=MASS, damping_ratio=DAMPING_RATIO)
         drawn = [

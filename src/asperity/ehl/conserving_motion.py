@@ -26,7 +26,7 @@ from asperity.ehl.solve import Progress, contact_problem, solve_contact
 from asperity.ehl.state import state_of
 from asperity.errors import BadInput
 from asperity.lubricant import Lubricant
-from asperity.surface.moving import MovingSurfaces
+from asperity.surface import MovingSurfaces
 
 SHORTEST_WAY = 1.0 / 64.0  # of a step: the least that the contact is led on by where a whole step leads nowhere
 

@@ -12,16 +12,7 @@ from asperity.ehl.conserving import Earlier, OilBalance, Unknowns, evaluate
 from asperity.ehl.conserving_iterate import OilStep, newton
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.solution import (
-    ATTEMPTS,
-    ContactSolution,
-    Convergence,
-    Figures,
-    Iteration,
-    Oil,
-    Options,
-    Status,
-)
+from asperity.ehl.solution import ATTEMPTS, ContactSolution, Convergence, Figures, Iteration, Oil, Options, SolveStatus
 from asperity.ehl.solve import (
     CENTRE,
     COARSE_TOLERANCE,
@@ -35,7 +26,7 @@ from asperity.ehl.solve import (
 from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Lubricant
-from asperity.surface.model import Surface
+from asperity.surface import Surface
 
 BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow
 MISSING = 0.3  # share of oil that ruptured cells of a unified solution are taken to miss
@@ -320,7 +311,7 @@ class Climb:
             in_contact=np.repeat(balance.in_contact, lines, axis=1),
             rigid_approach=approach * scales.gap,
             convergence=Convergence(
-                status=Status.CONVERGED if self.settled else Status.OUT_OF_ITERATIONS,
+                status=SolveStatus.CONVERGED if self.settled else SolveStatus.OUT_OF_ITERATIONS,
                 history=tuple(self.history),
                 tolerance=self.options.tolerance,
                 seconds=seconds,

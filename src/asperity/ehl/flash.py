@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from asperity.arrays import Field, Mask
-from asperity.ehl.friction import Friction, friction
 from asperity.ehl.solution import ContactSolution
+from asperity.ehl.traction import Friction, friction
 from asperity.errors import AsperityError
 from asperity.lubricant import Solid, Thermal
 

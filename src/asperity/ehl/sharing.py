@@ -39,7 +39,7 @@ class LoadSharing:
         return self.below[0]
 
 
-def load_below(solution: ContactSolution, film: float) -> float:
+def clr_below(solution: ContactSolution, film: float) -> float:
     """Share of the load, 0 to 1, on cells whose film is no thicker than `film` [m]; 1 % above it counts as it.
 
     Raises
@@ -52,7 +52,7 @@ def load_below(solution: ContactSolution, film: float) -> float:
     return float(solution.pressure[thin].sum() / solution.pressure.sum())
 
 
-def load_sharing(solution: ContactSolution) -> LoadSharing:
+def sharing_by_film(solution: ContactSolution) -> LoadSharing:
     """Read the shares off a solution of either model."""
     zone = hertz_zone(solution.conditions, solution.grid)
     films = (solution.options.contact_film, *(film for film in FILMS if film > solution.options.contact_film))
@@ -61,7 +61,7 @@ def load_sharing(solution: ContactSolution) -> LoadSharing:
         clr_solid=float(solution.pressure[solution.in_contact].sum() / solution.pressure.sum()),
         car_solid=float(solution.in_contact[zone].mean()),
         films=films,
-        below=tuple(load_below(solution, film) for film in films),
+        below=tuple(clr_below(solution, film) for film in films),
         cavitated=float(solution.cavitated[zone].mean()),
         oil=float((content * solution.gap)[zone].mean()),
     )

@@ -13,7 +13,7 @@ from asperity.conditions import ContactConditions
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
 from asperity.lubricant import Lubricant
-from asperity.surface.model import Surface
+from asperity.surface import Surface
 
 if TYPE_CHECKING:
     import xarray
@@ -58,7 +58,7 @@ ATTEMPTS = (
 )
 
 
-class Status(StrEnum):
+class SolveStatus(StrEnum):
     """How a solve ended."""
 
     CONVERGED = "converged"
@@ -119,7 +119,7 @@ class Convergence:
     solutions on coarser grids: None on a grid too small to have a coarser one. A warm start hands on its own.
     """
 
-    status: Status
+    status: SolveStatus
     history: tuple[Iteration, ...]
     tolerance: float
     seconds: float
@@ -137,7 +137,7 @@ class Convergence:
     @property
     def converged(self) -> bool:
         """Whether residual, load error and change all met the tolerance on the finest grid."""
-        return self.status is Status.CONVERGED
+        return self.status is SolveStatus.CONVERGED
 
     @property
     def iterations(self) -> int:

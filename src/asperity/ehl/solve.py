@@ -19,12 +19,12 @@ from asperity.ehl.solution import (
     Figures,
     Iteration,
     Options,
-    Status,
+    SolveStatus,
 )
 from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Lubricant
-from asperity.surface.model import Surface
+from asperity.surface import Surface
 
 Progress = Callable[[Iteration], None]
 
@@ -73,7 +73,7 @@ def solve_contact(
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
     if options.model == CONSERVING:
-        from asperity.ehl.conserving_solve import solve_conserving  # it builds on this module
+        from asperity.ehl.conserving_solve import solve_conserving
 
         return solve_conserving(
             conditions,
@@ -231,7 +231,7 @@ class Search:
     ) -> ContactSolution:
         """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all."""
         scales, balance = Scales.of(conditions, lubricant), step.balance
-        stopped = Status.STALLED if self.lost else Status.OUT_OF_ITERATIONS
+        stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
         lines = surface.grid.cells[1] // balance.problem.cells[1]
         pressure, gap = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.gap, lines, axis=1)
         return ContactSolution(
@@ -244,7 +244,7 @@ class Search:
             in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
             rigid_approach=step.approach * scales.gap,
             convergence=Convergence(
-                status=Status.CONVERGED if self.settled(self.options.tolerance) else stopped,
+                status=SolveStatus.CONVERGED if self.settled(self.options.tolerance) else stopped,
                 history=tuple(self.history),
                 tolerance=self.options.tolerance,
                 seconds=seconds,

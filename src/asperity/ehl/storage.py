@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Oil, Options, Status
+from asperity.ehl.solution import ContactSolution, Convergence, Figures, Iteration, Oil, Options, SolveStatus
 from asperity.errors import BadInput, UnreadableFile
 from asperity.files import versions, whole_file
 from asperity.grid import Grid
@@ -253,4 +253,4 @@ def _oil(dataset: "xarray.Dataset") -> Oil | None:
 def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> Convergence:
     rest: dict[str, Any] = {name: value for name, value in described.items() if name not in ("status", *_ERRORS)}
     errors: dict[str, Any] = {name: described.get(name) and Figures(**described[name]) for name in _ERRORS}
-    return Convergence(**rest, **errors, status=Status(described["status"]), history=history)
+    return Convergence(**rest, **errors, status=SolveStatus(described["status"]), history=history)

@@ -12,12 +12,12 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.flash import FlashTemperature, flash_temperature
-from asperity.ehl.friction import BOUNDARY_FRICTION, Friction, friction, warm_factor
-from asperity.ehl.solution import ContactSolution, Options, Status
+from asperity.ehl.solution import ContactSolution, Options, SolveStatus
 from asperity.ehl.solve import Progress, solve_contact
+from asperity.ehl.traction import BOUNDARY_FRICTION, Friction, friction, warm_factor
 from asperity.errors import AsperityError, NotConverged
 from asperity.lubricant import Lubricant, Thermal
-from asperity.surface.model import Surface
+from asperity.surface import Surface
 
 SETTLED = 1e-3  # change of the film's temperature, over its largest rise
 LEAST_RISE = 1.0  # [K]; below it the change is measured against this
@@ -153,7 +153,7 @@ def solve_thermal_contact(
             solution, solved_at, share = replace(warmer, options=options), wanted, min(1.0, 2.0 * share)
         else:  # too far from cold to hot: go part of the way
             share *= 0.5
-    status = Status.CONVERGED if settled else Status.OUT_OF_ITERATIONS
+    status = SolveStatus.CONVERGED if settled else SolveStatus.OUT_OF_ITERATIONS
     ending = replace(solution.convergence, status=status, history=history, seconds=seconds)
     solution = replace(solution, convergence=ending)
     if strict and not ending.converged:

@@ -1,16 +1,5 @@
 """Recordings: read from files, with facts, and checked."""
 
-from asperity.recording.check import Quality, check_recording
-from asperity.recording.model import Fact, OpenRecording, Recording
-from asperity.recording.read import open_channels, open_recording, read_recording
+import lazy_loader
 
-__all__ = [
-    "Fact",
-    "OpenRecording",
-    "Quality",
-    "Recording",
-    "check_recording",
-    "open_channels",
-    "open_recording",
-    "read_recording",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

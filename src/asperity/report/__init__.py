@@ -1,6 +1,5 @@
 """What people look at: figures and the one-page report. Nothing is computed here that is not in a run."""
 
-from asperity.report.figures import surface_map
-from asperity.report.page import write_report
+import lazy_loader
 
-__all__ = ["surface_map", "write_report"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

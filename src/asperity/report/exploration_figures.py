@@ -15,8 +15,7 @@ from matplotlib.lines import Line2D
 from asperity.errors import BadInput
 from asperity.files import whole_file
 from asperity.report.figures import BLUE, GREEN, GREY, MICRO, STYLE, VERMILION, styled
-from asperity.study.calibration import Calibration, Parameter
-from asperity.study.sensitivity import SEED, Outcome, Sensitivity
+from asperity.study import SEED, Calibration, Outcome, Parameter, Sensitivity
 
 FORMATS = (".png", ".pdf")
 DARK = 0.55  # share from which a cell's number is white

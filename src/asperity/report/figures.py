@@ -22,8 +22,7 @@ from matplotlib.patches import Patch
 
 from asperity.arrays import Field, Mask
 from asperity.coupling import Vibration
-from asperity.ehl.solution import ContactSolution, Convergence
-from asperity.ehl.state import hertz_zone
+from asperity.ehl import ContactSolution, Convergence, hertz_zone
 from asperity.errors import BadInput
 from asperity.files import whole_file
 from asperity.hertz import line_pressure

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from asperity.curves import FrictionCurve
 from asperity.report.figures import BLUE, GREEN, GREY, MICRO, STYLE, VERMILION
+from asperity.results import FrictionCurve
 
 STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
 

@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from asperity.arrays import Field
-from asperity.ehl.state import hertz_zone
+from asperity.ehl import hertz_zone
 from asperity.history import Frame, History
 from asperity.report.figures import (
     BLUE,

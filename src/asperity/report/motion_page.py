@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 from asperity.errors import BadInput
 from asperity.files import require_writable, whole_file
-from asperity.hearing import HistoryVibration
-from asperity.history import History
+from asperity.history import History, HistoryVibration
 from asperity.report import motion_figures as figures
 from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture
 

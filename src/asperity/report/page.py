@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from asperity.conditions import ContactConditions
 from asperity.coupling import VibrationModel
-from asperity.ehl.solution import ContactSolution
+from asperity.ehl import ContactSolution
 from asperity.errors import BadInput
 from asperity.files import require_writable, whole_file
 from asperity.lubricant import (
@@ -34,7 +34,7 @@ from asperity.lubricant import (
 from asperity.report import figures, rubbing_figures
 
 if TYPE_CHECKING:
-    from asperity.run import Run
+    from asperity.results import Run
 
 NOT_FOUND = "–"
 

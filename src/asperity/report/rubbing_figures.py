@@ -11,10 +11,7 @@ from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from asperity.arrays import Field
-from asperity.ehl.flash import FlashTemperature
-from asperity.ehl.friction import Friction
-from asperity.ehl.solution import ContactSolution
-from asperity.ehl.stress import SubsurfaceStress, hertz_stress
+from asperity.ehl import ContactSolution, FlashTemperature, Friction, SubsurfaceStress, hertz_stress
 from asperity.report.figures import (
     BLUE,
     GIGA,

@@ -34,13 +34,11 @@ from asperity.report.figures import (
     mark_hertz_zone,
     show_map,
 )
-from asperity.study.anchors import PAPER_ANCHORS, SPLIT, rig_prediction
-from asperity.study.evaluate import DONE
+from asperity.study import DONE, PAPER_ANCHORS, SPLIT, rig_prediction
 
 if TYPE_CHECKING:
-    from asperity.run import Run
-    from asperity.study.anchors import Anchor
-    from asperity.study.curve import WearCurve
+    from asperity.results import Run
+    from asperity.study import Anchor, WearCurve
     from asperity.wear import Stages
 
 RIG_SPLIT_UM = (1.68, 1.92)  # measured, section 4.2 of the paper

@@ -23,14 +23,25 @@ from asperity.report.figures import MICRO
 from asperity.report.page import NOT_FOUND, PAPER, Tile, in_print, page_template, picture, with_deviation
 from asperity.report.study_figures import ON_PAGE, ON_PAPER, Medium
 from asperity.report.sweep_figures import Axis, Output, axis_of, outputs_of
-from asperity.run import Run, solve_case
-from asperity.study.anchors import PAPER_ANCHORS, SPLIT, Anchor, compare, rig_deviation, rig_prediction
-from asperity.study.curve import SQ, WearCurve, curve_of, is_wear_study
-from asperity.study.evaluate import BOTH_PRESETS as PRESETS
-from asperity.study.evaluate import DONE
-from asperity.study.execute import StudyResult
-from asperity.study.plan import SEEDS, as_written
-from asperity.study.store import FORMAT
+from asperity.results import Run, solve_case
+from asperity.study import BOTH_PRESETS as PRESETS
+from asperity.study import (
+    DONE,
+    FORMAT,
+    PAPER_ANCHORS,
+    SEEDS,
+    SPLIT,
+    SQ_KEY,
+    Anchor,
+    StudyResult,
+    WearCurve,
+    as_written,
+    compare_with_anchors,
+    curve_of,
+    is_wear_study,
+    rig_deviation,
+    rig_prediction,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -197,7 +208,7 @@ class StudyReport:
             return []
         wanted = np.linspace(self.curve.sq[0], self.curve.sq[-1], MOST_MAPS)
         levels = {float(self.curve.sq[np.argmin(np.abs(self.curve.sq - sq))]) for sq in wanted}
-        firsts = self.used[self.used[SQ].isin(levels)].groupby(SQ, sort=True)["number"].first()
+        firsts = self.used[self.used[SQ_KEY].isin(levels)].groupby(SQ_KEY, sort=True)["number"].first()
         return [int(number) for number in firsts]
 
     @cached_property
@@ -421,7 +432,7 @@ class StudyReport:
             return {**tables, "points": self._points()}
         tables["levels"] = self.curve.summary()
         if self.anchors:
-            tables["anchors"] = compare(self.curve, self.anchors)
+            tables["anchors"] = compare_with_anchors(self.curve, self.anchors)
         if self.papers:
             tables |= {f"rig-{preset}": rig_prediction(self.curve, f"crf_{preset}_hz") for preset in self.curve.stages}
         return tables

@@ -19,12 +19,13 @@ from asperity.case import Case, split_amount
 from asperity.errors import BadInput
 from asperity.report.figures import BLUE, GREY
 from asperity.report.study_figures import Medium, stay_near
-from asperity.study.plan import as_written
+from asperity.study import as_written
 
 if TYPE_CHECKING:
     import pandas
 
-    from asperity.study.plan import Plan
+    from asperity.study import StudyPlan
+
 
 LEVEL = 0.90  # of the intervals
 MOST_VALUES = 12  # of a swept quantity that has a mean each, however few cases share one
@@ -121,7 +122,7 @@ class Axis:
         return self.names[int(value)] if self.names else f"{value:.4g}".replace("-", "−")
 
 
-def axis_of(plan: "Plan", table: "pandas.DataFrame", key: str) -> Axis:
+def axis_of(plan: "StudyPlan", table: "pandas.DataFrame", key: str) -> Axis:
     """A swept key over the rows of a study's table, in the unit that its first value was written in."""
     own = _own_value(plan.case, key)
     written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]

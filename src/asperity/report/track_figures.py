@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.report.figures import BLUE, GREY, VERMILION, WIDTH, mean_of_neighbours, styled
-from asperity.tracking.track import ALERT, DANGER
-from asperity.wear.trend import INTERVAL
+from asperity.tracking import ALERT, DANGER
+from asperity.wear import INTERVAL
 
 if TYPE_CHECKING:
     from asperity.tracking import Track, Tracked
@@ -110,7 +110,7 @@ def amplitude(track: "Track") -> Figure:
 
 
 @styled()
-def load_share(track: "Track") -> Figure:
+def asperity_load_share(track: "Track") -> Figure:
     """CLR read off the CRF, with 90 % intervals, over x."""
     found = [one for one in track.recordings if np.isfinite(one.clr)]
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")

@@ -14,7 +14,7 @@ import numpy as np
 from asperity.files import require_writable, whole_file
 from asperity.report import track_figures as figures
 from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture, with_deviation
-from asperity.tracking.track import ALERT, DANGER, IN_A_ROW
+from asperity.tracking import ALERT, DANGER, IN_A_ROW
 
 if TYPE_CHECKING:
     from asperity.tracking import Track, Tracked
@@ -134,7 +134,7 @@ def _pictures(track: "Track") -> dict[str, list[Picture]]:
         if track.target.full_load_crf_hz is not None:
             shown["more"].append(
                 picture(
-                    figures.load_share(track),
+                    figures.asperity_load_share(track),
                     "CLR = (CRF/CRF at full load)⁶: the contact model's reading, not a measurement.",
                     "Trend of the load share of asperities as the model reads it.",
                 )

@@ -14,12 +14,11 @@ from matplotlib.figure import Figure
 from asperity.arrays import Field
 from asperity.coupling import Vibration, VibrationModel
 from asperity.errors import BadInput
-from asperity.excitation import white_noise
 from asperity.files import whole_file
+from asperity.paper import Table1Row, continuous_crfa, expected_crfa
 from asperity.report.figures import BLUE, GREEN, GREY, MICRO, STYLE, VERMILION
 from asperity.signals import Signal, power_spectrum
-from asperity.table1 import Table1Row, continuous_crfa, expected_crfa
-from asperity.vibration import motion
+from asperity.vibration import mass_motion, white_noise
 
 RATES = (10e3, 20e3, 50e3, 200e3)  # Hz
 SHOWN = 0.5  # seconds of a record: more is a black bar
@@ -70,7 +69,7 @@ def response_figure(heard: Vibration, model: VibrationModel) -> Figure:
     if heard.profile is None or heard.oscillator is None or heard.spectrum is None or heard.expected is None:
         raise BadInput(f"there is no response to draw: {heard.resonance.reason}")
     rate = heard.profile.rate_hz
-    moved = motion(heard.oscillator, heard.profile, method=model.response, substeps=model.substeps)
+    moved = mass_motion(heard.oscillator, heard.profile, method=model.response, substeps=model.substeps)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.6, 5.6), layout="constrained")
         (a, b), (c, d) = figure.subplots(2, 2)

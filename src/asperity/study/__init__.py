@@ -4,3 +4,7 @@
 spreads cases over processes or machines. On these stand `curve` (the paper's Figs 7 and 8), `sensitivity` and
 `calibration`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,7 +11,7 @@ from pydantic import Field as Entry
 
 from asperity.case import Length, Section, checked
 from asperity.errors import BadInput, UnreadableFile
-from asperity.rig import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS
+from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS
 from asperity.study.curve import WearCurve
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Anchor:
         return max(off, 0.0) if self.sense == "at most" else off
 
 
-def compare(curve: WearCurve, anchors: Sequence[Anchor] | None = None) -> "pandas.DataFrame":
+def compare_with_anchors(curve: WearCurve, anchors: Sequence[Anchor] | None = None) -> "pandas.DataFrame":
     """A row an anchor, the paper's unless given: what is printed, ours with its 90 % interval, the miss, whether met.
 
     `met` is True where the miss is within the tolerance, and `possible` where some value of the interval would be.

@@ -20,14 +20,14 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import AsperityError, BadInput, require_positive
-from asperity.study.anchors import PAPER_ANCHORS, SPLIT, Anchor, compare
-from asperity.study.curve import SQ, WearCurve
+from asperity.study.anchors import PAPER_ANCHORS, SPLIT, Anchor, compare_with_anchors
+from asperity.study.curve import SQ_KEY, WearCurve
 from asperity.study.evaluate import DONE
 from asperity.study.execute import Progress, run_study, study_executor
 from asperity.study.plan import plan_points
 from asperity.study.ranges import (
     OPEN_RANGES,
-    Range,
+    ParameterRange,
     at_cells,
     entry_of,
     open_ranges,
@@ -55,7 +55,7 @@ LEARNT_FROM = 0.5  # share of that variance that the anchors must take away from
 FARTHEST = 0.3  # of a range, to which slopes are trusted
 EDGE = 0.01  # of a range: a quantity this near to its end would go on
 RESERVED = {
-    SQ: "anchors are at roughnesses of their own",
+    SQ_KEY: "anchors are at roughnesses of their own",
     "surface.seed": "what is found should not hang on one surface; give seeds",
     "vibration.seed": "what is found should not hang on one record; give seeds",
     "grid.cells": "they go with the domain; give cells",
@@ -70,7 +70,7 @@ class Parameter(NamedTuple):
     took away, 0 nothing, 1 all.
     """
 
-    range: Range
+    range: ParameterRange
     start: float | None
     value: float
     low: float
@@ -224,7 +224,7 @@ def calibrate(
     case: Case,
     anchors: Sequence[Anchor] = PAPER_ANCHORS,
     *,
-    free: Sequence[Range | str] | None = None,
+    free: Sequence[ParameterRange | str] | None = None,
     levels: Sequence[float] | None = None,
     cells: int | None = CELLS,
     seeds: int = SEEDS,
@@ -346,7 +346,7 @@ class _Bench:
     def __init__(
         self,
         case: Case,
-        ranges: Sequence[Range],
+        ranges: Sequence[ParameterRange],
         aimed: Sequence[Anchor],
         sq: Sequence[float],
         seeds: int,
@@ -366,7 +366,7 @@ class _Bench:
             {} if shares is None else overrides_at(self.case, self.ranges, [float(share) for share in shares])
             for shares in wanted
         ]
-        points = [{**chosen, SQ: f"{1e6 * level:.9g} um"} for chosen in sets for level in self.sq]
+        points = [{**chosen, SQ_KEY: f"{1e6 * level:.9g} um"} for chosen in sets for level in self.sq]
         plan = plan_points(self.case, points, seeds=seeds or self.seeds, seeding="common")
         out = None if self.out is None else self.out / "evaluations"
         result = run_study(plan, out=out, executor=self.executor, progress=self.progress)
@@ -396,7 +396,7 @@ class _Bench:
 
     def checked(self, calibrated: Case) -> WearCurve:
         """The calibrated case on its own cells, on surfaces of its own at every level."""
-        plan = plan_points(calibrated, [{SQ: f"{1e6 * level:.9g} um"} for level in self.sq], seeds=CHECK_SEEDS)
+        plan = plan_points(calibrated, [{SQ_KEY: f"{1e6 * level:.9g} um"} for level in self.sq], seeds=CHECK_SEEDS)
         out = None if self.out is None else self.out / "check"
         result = run_study(plan, out=out, executor=self.executor, progress=self.progress)
         self.cases += len(plan.cases)
@@ -583,7 +583,7 @@ class _Slopes:
 # The result ----------------------------------------------------------------------------------------------------------
 
 
-def _calibrated(case: Case, ranges: Sequence[Range], best: Field) -> Case:
+def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Case:
     """The case with what was found, on its own cells, and a study of its wear curve where it has none."""
     found = overrides_at(case, ranges, [float(share) for share in best])
     found.pop("grid.cells", None)
@@ -592,7 +592,7 @@ def _calibrated(case: Case, ranges: Sequence[Range], best: Field) -> Case:
     return case.with_overrides(found)
 
 
-def _parameters(case: Case, ranges: Sequence[Range], best: Field, deviations: Field) -> list[Parameter]:
+def _parameters(case: Case, ranges: Sequence[ParameterRange], best: Field, deviations: Field) -> list[Parameter]:
     found = []
     for entry, share, std in zip(ranges, best, deviations, strict=True):
         learnt = float(1.0 - std**2 / PRIOR_VARIANCE)
@@ -613,7 +613,7 @@ def _parameters(case: Case, ranges: Sequence[Range], best: Field, deviations: Fi
     return found
 
 
-def _start(case: Case, entry: Range) -> float | None:
+def _start(case: Case, entry: ParameterRange) -> float | None:
     """What the case itself has, in the range's unit; of a pair in which both are free as one, the first."""
     from asperity.case import split_amount
 
@@ -627,14 +627,14 @@ def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> "pandas.DataFrame"
     """The anchors that the curve's levels can tell."""
     reached = [a for a in anchors if a.sq is not None and np.isfinite(a.of(curve)[0])]
     aimed_without = [a for a in anchors if a.fitted and a not in reached]
-    return compare(curve, [*reached, *aimed_without])
+    return compare_with_anchors(curve, [*reached, *aimed_without])
 
 
 def _shown(value: float) -> str:
     return f"{value:.3g}"
 
 
-def _unit(entry: Range) -> str:
+def _unit(entry: ParameterRange) -> str:
     return f" {entry.unit}" if entry.unit else ""
 
 

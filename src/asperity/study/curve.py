@@ -19,7 +19,7 @@ from asperity.wear import Stages, split_stages
 if TYPE_CHECKING:
     import pandas
 
-SQ = "surface.sq"
+SQ_KEY = "surface.sq"
 LEVEL = 0.90
 
 
@@ -51,7 +51,7 @@ class WearCurve:
         """
         if quantity not in self.table:
             raise BadInput(f"the study has no column {quantity!r}; it has {', '.join(self.table.columns)}")
-        rows = self.table[(self.table["status"] == DONE) & (self.table[SQ] == self.sq[level])]
+        rows = self.table[(self.table["status"] == DONE) & (self.table[SQ_KEY] == self.sq[level])]
         values = rows[quantity].to_numpy(dtype=float)
         return np.asarray(values[np.isfinite(values)])
 
@@ -99,7 +99,7 @@ class WearCurve:
             if f"crf_{preset}_hz" in rows:
                 std = rows[f"crf_std_{preset}_hz"].to_numpy(dtype=float)
                 found[preset] = split_stages(
-                    1e6 * rows[SQ].to_numpy(dtype=float),
+                    1e6 * rows[SQ_KEY].to_numpy(dtype=float),
                     rows[f"crf_{preset}_hz"].to_numpy(dtype=float),
                     rows[f"crfa_{preset}"].to_numpy(dtype=float),
                     crf_std_hz=np.nan_to_num(std),
@@ -168,7 +168,7 @@ def wear_curve(
     """
     for sq in sq_values:
         require_positive("Sq", sq, "m")
-    points = [{SQ: f"{1e6 * sq:.9g} um"} for sq in sorted(set(sq_values))]
+    points = [{SQ_KEY: f"{1e6 * sq:.9g} um"} for sq in sorted(set(sq_values))]
     plan = plan_points(case, points, seeds=seeds)
     return curve_of(run_study(plan, executor=executor, workers=workers, progress=progress))
 
@@ -183,14 +183,14 @@ def curve_of(result: StudyResult) -> WearCurve:
     """
     if not is_wear_study(result):
         raise BadInput(
-            f"a wear curve needs a study that varies {SQ} alone, got {', '.join(result.plan.axes) or 'none'}"
+            f"a wear curve needs a study that varies {SQ_KEY} alone, got {', '.join(result.plan.axes) or 'none'}"
         )
     if not len(result.table) or not (result.table["status"] == DONE).any():
         raise BadInput("a wear curve needs finished cases, got none; run the study first")
-    return WearCurve(np.sort(result.table[SQ].unique().astype(float)), result.table)
+    return WearCurve(np.sort(result.table[SQ_KEY].unique().astype(float)), result.table)
 
 
 def is_wear_study(result: StudyResult) -> bool:
     """Whether a study's cases differ in Sq (and seeds) alone."""
     swept = [key for key in result.plan.axes if key not in ("surface.seed", "vibration.seed")]
-    return swept == [SQ] and result.plan.kind == "solve"
+    return swept == [SQ_KEY] and result.plan.kind == "solve"

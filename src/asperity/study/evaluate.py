@@ -17,7 +17,7 @@ from asperity.case import Case
 from asperity.coupling import contact_vibration
 from asperity.errors import AsperityError
 from asperity.processes import leave_interrupts_to_the_parent
-from asperity.run import Run, solve_case, vibrate_case, vibration_scalars
+from asperity.results import Run, solve_case, vibrate_case, vibration_scalars
 from asperity.wear import Resonance
 
 DONE, NOT_CONVERGED, FAILED = "done", "not converged", "failed"

@@ -29,7 +29,7 @@ from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.files import MANIFEST
 from asperity.processes import cores
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker
-from asperity.study.plan import Plan, StudyCase
+from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.store import (
     TABLE,
     Store,
@@ -77,7 +77,7 @@ class Progress:
 class StudyResult:
     """A study: its plan, and a row for every finished case, in the plan's order."""
 
-    plan: Plan
+    plan: StudyPlan
     table: "pandas.DataFrame"
     folder: Path | None = None
     path: Path | None = None  # of the merged table
@@ -101,7 +101,7 @@ class StudyResult:
 
 
 def run_study(
-    plan: Plan,
+    plan: StudyPlan,
     *,
     out: str | Path | None = None,
     executor: Executor | None = None,
@@ -231,7 +231,7 @@ class _Work:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: StudyPlan,
         store: Store | None,
         shard: tuple[int, int],
         retry_failed: bool,
@@ -407,7 +407,7 @@ class Estimate:
 
 
 def estimate(
-    plan: Plan, *, out: str | Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
+    plan: StudyPlan, *, out: str | Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
 ) -> Estimate:
     """Time three cases of a study, from its beginning, middle and end; nothing is kept.
 

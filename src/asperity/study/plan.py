@@ -40,7 +40,7 @@ class StudyCase(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudyPlan:
     """What a study computes.
 
     Parameters
@@ -109,7 +109,7 @@ class Plan:
                 number += 1
 
 
-def plan_study(case: Case) -> Plan:
+def plan_study(case: Case) -> StudyPlan:
     """The plan that a case's [study] states.
 
     Raises
@@ -172,7 +172,7 @@ def plan_points(
     seeds: int | Sequence[int] = 1,
     kind: Kind = "solve",
     seeding: Seeding = "independent",
-) -> Plan:
+) -> StudyPlan:
     """A plan of points of one's own.
 
     Parameters
@@ -181,7 +181,7 @@ def plan_points(
     points : values by dotted key, as a case file writes them: {"surface.sq": "0.5 um", "contact.load": "200 N"}
     axes : the swept keys; by default all that the points name
     seeds : realisations a point, or the surfaces' seeds
-    kind, seeding : see `Plan`
+    kind, seeding : see `StudyPlan`
 
     Raises
     ------
@@ -200,7 +200,7 @@ def plan_points(
         raise BadInput(f"seeds must be 1 or more, got {realisations}")
     if given is not None and len(set(given)) < realisations:
         raise BadInput(f"seeds must differ from one another, got {', '.join(map(str, given))}")
-    return Plan(base, tuple(axes), tuple(points), realisations, kind, seeding, given)
+    return StudyPlan(base, tuple(axes), tuple(points), realisations, kind, seeding, given)
 
 
 def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[str, Any]]) -> None:

@@ -24,7 +24,7 @@ _ENTRY = re.compile(r"(?P<key>.+)\[(?P<place>\d+)\]")
 
 
 @dataclass(frozen=True)
-class Range:
+class ParameterRange:
     """A quantity of a case and the values it may take.
 
     Parameters
@@ -74,17 +74,23 @@ class Range:
 
 
 OPEN_RANGES = (
-    Range("material.hardness", 0.5, 5.0, "GPa", "from just above Hertz's mean pressure to quenched 45 steel (50 HRC)"),
-    Range(LENGTH_KEY, 10.0, 85.0, "um", "from four cells of the coarser grid to nearly half the domain"),
-    Range("lubricant.viscosity.alpha", 12.0, 26.0, "1/GPa", "mineral oils, warm paraffinic to cool naphthenic"),
-    Range("grid.x[0]", -4.5, -1.9, "", "from an inlet that feeds the film to the printed one"),
-    Range("solver.contact_film", 1.0, 20.0, "nm", "from a few molecules of oil to a boundary film"),
-    Range("vibration.cutoff_exponent", 0.0, 0.5, "", "from a cut-off that ignores CAR to one that goes with its root"),
-    Range("vibration.cutoff_reference", 20.0, 40.0, "Hz", "the neighbours of 30 Hz in the paper's Table 1"),
+    ParameterRange(
+        "material.hardness", 0.5, 5.0, "GPa", "from just above Hertz's mean pressure to quenched 45 steel (50 HRC)"
+    ),
+    ParameterRange(LENGTH_KEY, 10.0, 85.0, "um", "from four cells of the coarser grid to nearly half the domain"),
+    ParameterRange(
+        "lubricant.viscosity.alpha", 12.0, 26.0, "1/GPa", "mineral oils, warm paraffinic to cool naphthenic"
+    ),
+    ParameterRange("grid.x[0]", -4.5, -1.9, "", "from an inlet that feeds the film to the printed one"),
+    ParameterRange("solver.contact_film", 1.0, 20.0, "nm", "from a few molecules of oil to a boundary film"),
+    ParameterRange(
+        "vibration.cutoff_exponent", 0.0, 0.5, "", "from a cut-off that ignores CAR to one that goes with its root"
+    ),
+    ParameterRange("vibration.cutoff_reference", 20.0, 40.0, "Hz", "the neighbours of 30 Hz in the paper's Table 1"),
 )
 
 
-def parse_range(text: str) -> Range:
+def parse_range(text: str) -> ParameterRange:
     """A range as the command line has it, `KEY=LOW..HIGH`, such as "material.hardness=0.65 GPa..3 GPa".
 
     Raises
@@ -101,7 +107,7 @@ def parse_range(text: str) -> Range:
         last = split_amount(_number_or_text(high), unit)[0]
     except BadInput as error:
         raise BadInput(f"{key} {error}") from None
-    return Range(key, float(first), float(last), unit)
+    return ParameterRange(key, float(first), float(last), unit)
 
 
 def _number_or_text(text: str) -> object:
@@ -111,7 +117,7 @@ def _number_or_text(text: str) -> object:
         return text
 
 
-def open_ranges(case: Case, wanted: Sequence[Range] = OPEN_RANGES) -> tuple[Range, ...]:
+def open_ranges(case: Case, wanted: Sequence[ParameterRange] = OPEN_RANGES) -> tuple[ParameterRange, ...]:
     """Those of `wanted` that the case has a key for; lengths of roughness kept to what its grid can carry."""
     found = [entry for entry in wanted if _has(case, entry.key)]
     return tuple(_carried(case, entry, found) if entry.key == LENGTH_KEY else entry for entry in found)
@@ -126,7 +132,7 @@ def _has(case: Case, key: str) -> bool:
     return True
 
 
-def _carried(case: Case, lengths: Range, others: Sequence[Range]) -> Range:
+def _carried(case: Case, lengths: ParameterRange, others: Sequence[ParameterRange]) -> ParameterRange:
     """Two cells at least and half the domain at most, on every grid in the ranges."""
     inlets = [entry.value(share) for entry in others if entry.key == "grid.x[0]" for share in (0.0, 1.0)]
     grid = case.grid
@@ -160,7 +166,7 @@ def stated(case: Case, key: str) -> Any:
     return value[place] if isinstance(value, list) and place < len(value) else None
 
 
-def overrides_at(case: Case, ranges: Sequence[Range], shares: Sequence[float]) -> dict[str, Any]:
+def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Sequence[float]) -> dict[str, Any]:
     """The case's overrides at a share of the way through each range.
 
     Where the domain is moved along x or y, its cells go with it, so that their size stays that of the case's cells on
@@ -185,7 +191,7 @@ def overrides_at(case: Case, ranges: Sequence[Range], shares: Sequence[float]) -
     return found
 
 
-def _widest(case: Case, ranges: Sequence[Range], key: str) -> float:
+def _widest(case: Case, ranges: Sequence[ParameterRange], key: str) -> float:
     low, high = (float(value) for value in stated(case, key))
     for entry in ranges:
         name, place = entry_of(entry.key)
@@ -194,7 +200,7 @@ def _widest(case: Case, ranges: Sequence[Range], key: str) -> float:
     return high - low
 
 
-def require_ranges(case: Case, ranges: Sequence[Range], reserved: Mapping[str, str]) -> None:
+def require_ranges(case: Case, ranges: Sequence[ParameterRange], reserved: Mapping[str, str]) -> None:
     """Refuse ranges that are named twice, of a `reserved` key (the value says why), or that the case would refuse.
 
     Raises

@@ -19,7 +19,7 @@ from asperity.case import in_si, load_case, relative_to
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.study.evaluate import DONE, Row
-from asperity.study.plan import SEEDS, Plan, plan_points
+from asperity.study.plan import SEEDS, StudyPlan, plan_points
 
 if TYPE_CHECKING:
     import pandas
@@ -36,7 +36,7 @@ class Store:
     """A study's folder. Made by `open_store`, which holds its lock."""
 
     folder: Path
-    plan: Plan
+    plan: StudyPlan
 
     def finished(self) -> dict[str, tuple[str, int]]:
         """Status and attempt of every case that some part holds."""
@@ -120,7 +120,7 @@ class Store:
 
 
 @contextmanager
-def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Store]:
+def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterator[Store]:
     """A study's folder, made or found, with its manifest written, held against a second process that computes there.
 
     Raises
@@ -148,7 +148,7 @@ def open_store(folder: Path, plan: Plan, shard: tuple[int, int]) -> Iterator[Sto
         yield Store(folder, plan)
 
 
-def open_read(folder: Path, plan: Plan) -> Store:
+def open_read(folder: Path, plan: StudyPlan) -> Store:
     """A study's folder to read from; BadInput where it holds another study than `plan`."""
     _require_same(read_manifest(folder, of="study", layout=FORMAT), plan, folder)
     return Store(folder, plan)
@@ -172,7 +172,7 @@ def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
         raise BadInput(f"cannot write into {folder}: {error.strerror}; choose another") from None
 
 
-def read_plan(folder: Path) -> Plan:
+def read_plan(folder: Path) -> StudyPlan:
     """The plan of a study's folder.
 
     Raises
@@ -200,7 +200,7 @@ def read_plan(folder: Path) -> Plan:
         raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
 
 
-def _manifest(plan: Plan, folder: Path) -> dict[str, Any]:
+def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
     return {
         "of": "study",
         "format": FORMAT,
@@ -220,7 +220,7 @@ def _manifest(plan: Plan, folder: Path) -> dict[str, Any]:
     }
 
 
-def _require_same(manifest: Mapping[str, Any], plan: Plan, folder: Path) -> None:
+def _require_same(manifest: Mapping[str, Any], plan: StudyPlan, folder: Path) -> None:
     """Levels and seeds may be added to a study; what all its cases share may not change under it."""
     theirs, ours = manifest.get("versions", {}).get("asperity"), version("asperity")
     if theirs != ours:
@@ -267,7 +267,7 @@ def table_of(rows: Iterable[Row]) -> "pyarrow.Table":
     return pyarrow.Table.from_pydict({name: [row.get(name) for row in rows] for name in names})
 
 
-def in_order(parts: Sequence["pyarrow.Table"], plan: Plan) -> "pandas.DataFrame":
+def in_order(parts: Sequence["pyarrow.Table"], plan: StudyPlan) -> "pandas.DataFrame":
     """Finished rows behind the plan's own columns, by case number; of a case computed twice, the last attempt."""
     import pandas
     import pyarrow

@@ -23,7 +23,7 @@ _POINTS_TO_FIT = 20_000  # of a cylinder: five parameters need no more
 SIGMA_OVER_CUTOFF = np.sqrt(np.log(2.0) / 2.0) / np.pi  # ISO 16610: a Gaussian that passes half there
 
 
-def condition(
+def condition_surface(
     measured: MeasuredSurface,
     *,
     form: Form = "quadratic",

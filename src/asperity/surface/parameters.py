@@ -8,7 +8,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.grid import Grid
 from asperity.surface.bearing import bearing_curve, core_heights
-from asperity.surface.condition import Form, Outliers, condition
+from asperity.surface.condition import Form, Outliers, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface
 from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
@@ -118,7 +118,9 @@ def describe_surface(
         as `read_surface` and `condition` do.
     """
     measured = read_surface(path, unit=unit, lateral_unit=lateral_unit, pixel=pixel)
-    levelled, steps = condition(measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter)
+    levelled, steps = condition_surface(
+        measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
+    )
     if levelled.uniform is None:
         return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps)
     spacing = levelled.grid.spacing[1 - levelled.uniform]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
-from asperity.surface.condition import Form, Outliers, condition
+from asperity.surface.condition import Form, Outliers, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface, area_text, length_text
 from asperity.surface.read import library
 
@@ -95,7 +95,7 @@ def prepare_surface(
         raise BadInput(f"fit must be one of {', '.join(get_args(Fit))}, got {fit!r}")
     if sq is not None:
         require_positive("sq", sq, "m")
-    levelled, conditioning = condition(
+    levelled, conditioning = condition_surface(
         measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
     )
     steps = [*conditioning]

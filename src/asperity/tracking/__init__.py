@@ -1,5 +1,5 @@
 """Series of recordings: listened to, put in order, judged, and watched as they grow."""
 
-from asperity.tracking.track import Track, Tracked, track_recordings
+import lazy_loader
 
-__all__ = ["Track", "Tracked", "track_recordings"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

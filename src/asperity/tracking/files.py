@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.errors import BadInput, UnreadableFile
-from asperity.recording.sidecar import is_sidecar
+from asperity.recording import is_sidecar
 
 _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
                   ".docx", ".xlsx", ".part", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip

@@ -17,8 +17,7 @@ import numpy as np
 
 from asperity.errors import BadInput, UnreadableFile
 from asperity.processes import leave_interrupts_to_the_parent
-from asperity.recording import Quality, open_recording
-from asperity.recording.check import Gauge
+from asperity.recording import Gauge, Quality, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
 from asperity.tracking.target import Target
 

@@ -70,5 +70,5 @@ def paper_case() -> Case:
     """The paper's contact, as the package brings it along."""
     from importlib.resources import files
 
-    text = files("asperity").joinpath("paper.toml").read_text("utf-8")
+    text = files("asperity.paper").joinpath("paper.toml").read_text("utf-8")
     return load_case(text, name="paper.toml")

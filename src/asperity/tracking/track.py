@@ -17,15 +17,25 @@ from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import BadInput
 from asperity.files import whole_file
-from asperity.recording.model import ACCELERATION
+from asperity.recording import ACCELERATION
 from asperity.tracking.files import Place, Table, read_table, recordings_in
 from asperity.tracking.listen import WINDOW, Asked, Heard, common_spacing, listen_to_all
 from asperity.tracking.target import Target, search_target
-from asperity.wear.indicators import Resonance, no_resonance
-from asperity.wear.lines import CleanSpectrum, remove_lines
-from asperity.wear.series import FEWEST_RECORDINGS, series_resonances
-from asperity.wear.stages import Stages, split_stages
-from asperity.wear.trend import Alarm, Facts, alarm, consistency, load_share
+from asperity.wear import (
+    FEWEST_RECORDINGS,
+    Alarm,
+    CleanSpectrum,
+    RecordingFacts,
+    Resonance,
+    Stages,
+    asperity_load_share,
+    comparability,
+    no_resonance,
+    remove_lines,
+    series_resonances,
+    split_stages,
+    trend_alarm,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -385,10 +395,10 @@ def _staged(
         )
         severe = np.where(np.isfinite(crf), stages.probability, np.nan)
         labels = stages.labels
-    raised = alarm(severe, alert=ALERT, danger=DANGER, in_a_row=IN_A_ROW, thing="the probability of severe wear")
+    raised = trend_alarm(severe, alert=ALERT, danger=DANGER, in_a_row=IN_A_ROW, thing="the probability of severe wear")
     full = target.full_load_crf_hz
     if full is not None:
-        share = load_share(crf, np.where(np.isfinite(crf_std), crf_std, 0.0), full)
+        share = asperity_load_share(crf, np.where(np.isfinite(crf_std), crf_std, 0.0), full)
         intervals = list(zip(share.interval[0].tolist(), share.interval[1].tolist(), strict=True))
         tracked = [
             replace(one, clr=float(clr), clr_interval=interval)
@@ -399,7 +409,7 @@ def _staged(
         for one, probability, label, level in zip(tracked, severe, labels, raised.levels, strict=True)
     ]
     facts = [
-        Facts(
+        RecordingFacts(
             name=Path(one.file).name,
             rate_hz=one.heard.rate_hz,
             segment=one.heard.spectrum.segment,
@@ -424,7 +434,7 @@ def _staged(
         stages=stages,
         alarm=raised,
         comparable=comparable,
-        problems=consistency(facts),
+        problems=comparability(facts),
         notes=tuple(notes),
     )
 

@@ -21,16 +21,13 @@ from asperity.coupling import (
     damped_oscillator,
     needs_solution,
 )
-from asperity.ehl.scales import Scales
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.stiffness import tangent_stiffness
+from asperity.ehl import Scales, solve_contact, tangent_stiffness
 from asperity.errors import BadInput, NotConverged
-from asperity.history import History
+from asperity.history.history import History
 from asperity.signals import Signal, Spectrum, power_spectrum
-from asperity.surface.moving import MovingSurfaces
+from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
-from asperity.wear import Resonance, contact_resonance, no_resonance
-from asperity.wear.indicators import FEWEST_LINES
+from asperity.wear import FEWEST_LINES, Resonance, contact_resonance, no_resonance
 
 MOMENTS = 5  # of the settled steps, at which the tangent stiffness is taken
 WAVES = 0.4  # of a passage's steps: the shortest wave that is told has two and a half steps

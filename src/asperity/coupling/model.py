@@ -11,20 +11,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.conditions import ContactConditions
-from asperity.ehl.solution import ContactSolution
-from asperity.ehl.state import ContactState
-from asperity.ehl.stiffness import roller_depth, tangent_stiffness
+from asperity.ehl import ContactSolution, ContactState, roller_depth, tangent_stiffness
 from asperity.errors import BadInput, NotConverged, require_positive
-from asperity.excitation import PATCHES, Excitation, FilteredNoise, PatchAverage, SurfaceTrack, require_filter
 from asperity.hertz import line_stiffness, point_contact, point_stiffness
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.vibration import (
+    PATCHES,
     RESPONSE_METHODS,
     ContactOscillator,
+    Excitation,
+    FilteredNoise,
+    PatchAverage,
+    SurfaceTrack,
     acceleration,
     expected_spectrum,
-    motion,
+    mass_motion,
     require_damping_ratio,
+    require_filter,
 )
 from asperity.wear import INDICATOR_METHODS, Resonance, contact_resonance, no_resonance
 
@@ -146,12 +149,12 @@ class VibrationModel:
     cutoff_reference_hz, car_reference, cutoff_exponent : the profile's cut-off fc = fc_ref (CAR/CAR_ref)^q [Hz]. The
         paper names no law. 30 Hz is the base case of its dry section 2, in which everything touches, hence CAR_ref = 1;
         q = 0.18 is where its "the two effects offset" holds (in proportion, q = 1, CRFA would grow 60 000-fold)
-    filter, filter_order, height_as, height_of : of the noise, see `asperity.excitation.FilteredNoise`
+    filter, filter_order, height_as, height_of : of the noise, see `asperity.vibration.excitation.FilteredNoise`
     coefficient : of the noise: "readjusted" to the height at every cut-off, or "kept" from the reference cut-off
     patch : "none", or the contact patch over which the profile is averaged: "line" (half-width of the smooth line
         contact under the whole load), "point" (radius of the sphere's contact under the asperities' load)
     passing_speed : speed at which roughness passes, for "surface" and `patch` [m/s]; None: the sliding speed
-    response, substeps : "exact", "rk5" or "nonlinear", see `asperity.vibration.acceleration`
+    response, substeps : "exact", "rk5" or "nonlinear", see `asperity.vibration.oscillator.acceleration`
     rate_hz : samples a second; at least `samples_per_period` times the full-load resonance
     samples_per_period : 15 keeps the loss to the straight lines between samples below 3 % of CRFA (at 100 kHz and
         3.5 kHz it is 0.8 %)
@@ -475,7 +478,7 @@ def contact_vibration(
     profile = ridden_over.profile(round(model.duration_s * model.rate_hz), model.rate_hz, model.seed)
     contact_loss = 0.0
     if model.response == "nonlinear":
-        moved = motion(spring, profile, method=model.response, substeps=model.substeps)
+        moved = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
         response, contact_loss = Signal(moved.acceleration, profile.rate_hz, "m/s^2"), moved.contact_loss
     else:
         response = acceleration(spring, profile, method=model.response, substeps=model.substeps)

@@ -23,14 +23,24 @@ from asperity.coupling import (
     needs_solution,
     require_sampling,
 )
-from asperity.ehl.flash import FlashTemperature
-from asperity.ehl.friction import Friction
-from asperity.ehl.sharing import FILMS, load_below, load_sharing
-from asperity.ehl.solution import ContactSolution, Iteration
-from asperity.ehl.state import ContactState, contact_state
-from asperity.ehl.storage import load_solution, save_dataset
-from asperity.ehl.stress import SubsurfaceStress, subsurface_stress
-from asperity.ehl.thermal import HOT, friction_and_heat, solve_thermal_contact
+from asperity.ehl import (
+    FILMS,
+    HOT,
+    ContactSolution,
+    ContactState,
+    FlashTemperature,
+    Friction,
+    Iteration,
+    SubsurfaceStress,
+    clr_below,
+    contact_state,
+    friction_and_heat,
+    load_solution,
+    save_dataset,
+    sharing_by_film,
+    solve_thermal_contact,
+    subsurface_stress,
+)
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.surface import Surface
 
@@ -103,7 +113,7 @@ class Run:
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its name in `asperity solve --json`, SI; None where there is none."""
-        state, convergence, sharing = self.state, self.solution.convergence, load_sharing(self.solution)
+        state, convergence, sharing = self.state, self.solution.convergence, sharing_by_film(self.solution)
         rubbing, heat, stress = self.friction, self.heat, self.stress
         resonance = None if self.vibration is None else self.vibration.resonance
         heard = resonance is not None and resonance.found
@@ -115,7 +125,7 @@ class Run:
             "clr": state.clr,
             "clr_error": None if error is None else error.clr,
             "capped_oil_load_ratio": state.capped_oil_load_ratio,
-            **{f"load_below_{film * 1e9:.0f}nm": load_below(self.solution, film) for film in FILMS},
+            **{f"load_below_{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS},
             "load_at_floor": sharing.clr_floor,
             "cavitated_share": sharing.cavitated,
             "oil_film_m": sharing.oil,
@@ -372,7 +382,7 @@ def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
 
 def _threshold(solution: ContactSolution) -> str:
     """What the conserving model's share of asperities counts, and what another film would make of it."""
-    sharing = load_sharing(solution)
+    sharing = sharing_by_film(solution)
     shares = ", ".join(
         f"{100 * share:.0f} % of at most {film * 1e9:.0f} nm"
         for film, share in zip(sharing.films, sharing.below, strict=True)

@@ -18,11 +18,18 @@ from asperity.case import Case
 from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.study.evaluate import DONE
 from asperity.study.execute import Progress, StudyResult, run_study
-from asperity.study.plan import SEEDS, Plan, plan_points
-from asperity.study.ranges import Range, at_cells, open_ranges, overrides_at, parse_range, require_ranges, stated
+from asperity.study.plan import SEEDS, StudyPlan, plan_points
+from asperity.study.ranges import (
+    ParameterRange,
+    at_cells,
+    open_ranges,
+    overrides_at,
+    parse_range,
+    require_ranges,
+    stated,
+)
 from asperity.study.silence import silent, with_silence
-from asperity.wear import split_stages
-from asperity.wear.stages import FEWEST_PLACES
+from asperity.wear import FEWEST_PLACES, split_stages
 
 if TYPE_CHECKING:
     import pandas
@@ -30,7 +37,7 @@ if TYPE_CHECKING:
 Method = Literal["morris", "sobol"]
 SIZES: dict[str, int] = {"morris": 12, "sobol": 64}  # trajectories; base samples, a power of two
 LEVELS = 4  # places a factor of Morris' design can take
-SQ = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
+SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
 CELLS = 128
 SEED = "seed"  # the factor's name
@@ -88,7 +95,7 @@ class Sensitivity:
 
     case: Case
     method: Method
-    ranges: tuple[Range, ...]
+    ranges: tuple[ParameterRange, ...]
     factors: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
     effects: "pandas.DataFrame"
@@ -189,10 +196,10 @@ class Sensitivity:
 def sensitivity(
     case: Case,
     *,
-    vary: Sequence[Range | str] | None = None,
+    vary: Sequence[ParameterRange | str] | None = None,
     method: Method = "morris",
     size: int | None = None,
-    sq: Sequence[float] = SQ,
+    sq: Sequence[float] = SQ_LEVELS,
     levels: int = CURVE_LEVELS,
     cells: int | None = CELLS,
     seeds: int = 1,
@@ -342,13 +349,13 @@ def _curve_levels(sq: Sequence[float], levels: int) -> tuple[float, ...]:
 
 def _plan(
     case: Case,
-    ranges: Sequence[Range],
+    ranges: Sequence[ParameterRange],
     seeded: Sequence[str],
     design: Design,
     curve: Sequence[float],
     seeds: int,
     seed: int,
-) -> Plan:
+) -> StudyPlan:
     points = []
     for number, shares in enumerate(design.shares):
         chosen = overrides_at(case, ranges, [float(share) for share in shares[: len(ranges)]])
@@ -374,7 +381,7 @@ def _seeds(seeded: Sequence[str], design: Design, number: int, share: float, sur
 
 def _analysed(
     case: Case,
-    ranges: tuple[Range, ...],
+    ranges: tuple[ParameterRange, ...],
     factors: tuple[str, ...],
     design: Design,
     result: StudyResult,

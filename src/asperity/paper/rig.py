@@ -17,20 +17,12 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.case import Case, load_case
 from asperity.conditions import ContactConditions
-from asperity.coupling import (
-    ASPERITIES_ALONE,
-    VibrationModel,
-    dry_full_load,
-    excitation,
-    oscillator,
-    search_band,
-)
-from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import ContactState, contact_state
+from asperity.coupling import ASPERITIES_ALONE, VibrationModel, dry_full_load, excitation, oscillator, search_band
+from asperity.ehl import ContactState, contact_state, solve_contact
 from asperity.errors import BadInput, require_positive
 from asperity.files import whole_file
+from asperity.paper.table1 import DAMPING_RATIO, MASS, PAIR, papers_contact
 from asperity.signals import Signal, Spectrum, power_spectrum
-from asperity.table1 import DAMPING_RATIO, MASS, PAIR, papers_contact
 
 LOAD = 500.0  # [N], the paper's tests
 SAMPLES_SQ_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)  # its section 4.1
@@ -322,7 +314,7 @@ def simulate_rig(
 
 def _papers_case() -> Case:
     """The paper's case file, with the Young's modulus of its section 4, which the rig's steel has."""
-    case = load_case(files("asperity").joinpath("paper.toml").read_text("utf-8"), name="paper.toml")
+    case = load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8"), name="paper.toml")
     return case.with_overrides({"material.youngs_modulus": [f"{one * 1e-9:g} GPa" for one in PAIR.youngs_moduli]})
 
 

@@ -1,7 +1,7 @@
 """The case file: a contact written down in TOML with units, turned into the objects that the solvers take, and back.
 
 Units live here and nowhere deeper. What is wrong with a file is said in one sentence that names the file, the key,
-the value and the remedy. Solving a case is left to `asperity.run`.
+the value and the remedy. Solving a case is left to `asperity.results`.
 """
 
 import math
@@ -34,9 +34,7 @@ from pydantic import (
 
 from asperity.conditions import ContactConditions, ElasticPair, Geometry
 from asperity.coupling import PRESETS, VibrationModel, preset_choices
-from asperity.ehl.friction import BOUNDARY_FRICTION
-from asperity.ehl.motion import LONGEST_STEP, Start
-from asperity.ehl.solution import Options
+from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, Options, Start
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import (
@@ -51,22 +49,25 @@ from asperity.lubricant import (
 )
 from asperity.surface import (
     CompositeSurface,
+    Form,
+    MovingSurfaces,
+    Outliers,
     PreparedSurface,
     Surface,
+    area_text,
     correlation_lengths,
     flat_surface,
     gaussian_surface,
     ground_surface,
+    length_text,
     non_gaussian_surface,
     prepare_surface,
     read_surface,
     run_in_surface,
     sandblasted_surface,
     self_affine_surface,
+    track_grid,
 )
-from asperity.surface.condition import Form, Outliers
-from asperity.surface.model import area_text, length_text
-from asperity.surface.moving import MovingSurfaces, track_grid
 
 if TYPE_CHECKING:
     import pint

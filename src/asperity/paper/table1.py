@@ -11,9 +11,8 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel, dry_full_load, excitation, oscillator, search_band
 from asperity.errors import BadInput
-from asperity.excitation import Excitation
 from asperity.signals import power_spectrum
-from asperity.vibration import ContactOscillator, acceleration
+from asperity.vibration import ContactOscillator, Excitation, acceleration
 from asperity.wear import contact_resonance
 
 PRINTED = (  # cut-off [Hz], height [um], load [N], CRF [Hz], CRFA [(m/s^2)^2/Hz]
@@ -62,7 +61,7 @@ class Table1Row:
         return self.crfa_low <= self.paper_crfa <= self.crfa_high
 
 
-def table1(*, preset: str = "paper", records: int | None = None, seed: int = 1) -> list[Table1Row]:
+def reproduce_table1(*, preset: str = "paper", records: int | None = None, seed: int = 1) -> list[Table1Row]:
     """All twelve rows, each from `records` records of the preset's own kind, seeds `seed` and on, the same in each row.
 
     A record is read as the paper reads it, by the highest point of its raw periodogram, where the preset's method is

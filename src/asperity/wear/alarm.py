@@ -1,6 +1,6 @@
 """A series of recordings as one: whether it is one at all, what load share its CRF stands for, and when to warn.
 
-Knows neither files nor machines: what is known of each recording comes in as `Facts`.
+Knows neither files nor machines: what is known of each recording comes in as `RecordingFacts`.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class LoadShare:
     interval: tuple[Field, Field]
 
 
-def load_share(
+def asperity_load_share(
     crf_hz: Field | float,
     crf_std_hz: Field | float,
     full_load_crf_hz: float,
@@ -59,7 +59,7 @@ def load_share(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Facts:
+class RecordingFacts:
     """What is known of a recording and its spectrum; None for what is not known.
 
     `name` to speak of it, `rate_hz`, `segment` [samples], `window`, `unit`, `duration_s`; `speed_hz` of the shaft and
@@ -76,7 +76,7 @@ class Facts:
     load_n: float | None = None
 
 
-def consistency(series: Sequence[Facts]) -> tuple[str, ...]:
+def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
     """What keeps recordings from being compared with one another, a sentence each; none when nothing does.
 
     Rate, window, resolution and unit change CRFA, load and speed change CRF and CRFA themselves. A record length that
@@ -128,7 +128,7 @@ class Alarm:
     verdict: str
 
 
-def alarm(values: Field, *, alert: float, danger: float, in_a_row: int = 3, thing: str = "the value") -> Alarm:
+def trend_alarm(values: Field, *, alert: float, danger: float, in_a_row: int = 3, thing: str = "the value") -> Alarm:
     """Two levels, each raised by `in_a_row` recordings at or above it and lowered by as many below.
 
     Parameters

@@ -23,14 +23,20 @@ import numpy as np
 from asperity.arrays import Field, Mask
 from asperity.case import Case, load_case, relative_to
 from asperity.coupling import Vibration, contact_vibration, needs_solution, oscillator
-from asperity.ehl.conserving_motion import moving_conserving_contact
-from asperity.ehl.friction import friction
-from asperity.ehl.motion import Memory, Snapshot, Steps, moving_contact, step_seconds
-from asperity.ehl.state import ContactState
-from asperity.ehl.storage import save_dataset
+from asperity.ehl import (
+    ContactState,
+    Memory,
+    Snapshot,
+    Steps,
+    friction,
+    moving_conserving_contact,
+    moving_contact,
+    save_dataset,
+    step_seconds,
+)
 from asperity.errors import BadInput, NotConverged, UnreadableFile
 from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
-from asperity.surface.moving import MovingSurfaces
+from asperity.surface import MovingSurfaces
 
 if TYPE_CHECKING:
     import pandas

@@ -1,7 +1,8 @@
 """A mass riding on a contact spring over a moving profile, and the acceleration it shows.
 
 Knows nothing of oil: how stiff the spring is comes from `asperity.coupling`, what it rides over from
-`asperity.excitation`. Source: the paper's section 2, with the damping of its Eq 5 taken at the angular frequency.
+`asperity.vibration.excitation`. Source: the paper's section 2, with the damping of its Eq 5 taken at the angular
+frequency.
 docs/theory/vibration.md sets every equation beside its function and its test.
 """
 
@@ -144,11 +145,11 @@ def acceleration(oscillator: ContactOscillator, profile: Signal, *, method: str 
         _check(profile, method)
         read = np.array([oscillator.stiffness, oscillator.damping]) / oscillator.mass
         return Signal(_exact(oscillator, profile, read), profile.rate_hz, "m/s^2")
-    moved = motion(oscillator, profile, method=method, substeps=substeps)
+    moved = mass_motion(oscillator, profile, method=method, substeps=substeps)
     return Signal(moved.acceleration, profile.rate_hz, "m/s^2")
 
 
-def motion(oscillator: ContactOscillator, profile: Signal, *, method: str = "exact", substeps: int = 8) -> Motion:
+def mass_motion(oscillator: ContactOscillator, profile: Signal, *, method: str = "exact", substeps: int = 8) -> Motion:
     """Displacement, velocity and acceleration of the mass: the paper's Fig 4; arguments as for `acceleration`."""
     _check(profile, method)
     slopes: Field = np.diff(profile.values) * profile.rate_hz

@@ -11,9 +11,7 @@ import numpy as np
 
 from asperity.case import Case
 from asperity.conditions import ContactConditions
-from asperity.ehl.solution import ContactSolution, Iteration
-from asperity.ehl.state import contact_state
-from asperity.ehl.thermal import HOT, friction_and_heat, solve_thermal_contact
+from asperity.ehl import HOT, ContactSolution, Iteration, contact_state, friction_and_heat, solve_thermal_contact
 from asperity.errors import BadInput, require_positive
 from asperity.surface import Surface
 

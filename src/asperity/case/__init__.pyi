@@ -1,0 +1,11 @@
+from .case import Case as Case
+from .case import Length as Length
+from .case import RangeSection as RangeSection
+from .case import Section as Section
+from .case import checked as checked
+from .case import in_si as in_si
+from .case import load_case as load_case
+from .case import read_amount as read_amount
+from .case import read_length as read_length
+from .case import relative_to as relative_to
+from .case import split_amount as split_amount

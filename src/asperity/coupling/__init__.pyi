@@ -1,0 +1,16 @@
+from .model import ASPERITIES_ALONE as ASPERITIES_ALONE
+from .model import BAND_FACTOR as BAND_FACTOR
+from .model import BAND_MARGIN as BAND_MARGIN
+from .model import LINEAR_UP_TO as LINEAR_UP_TO
+from .model import PRESETS as PRESETS
+from .model import Vibration as Vibration
+from .model import VibrationModel as VibrationModel
+from .model import contact_vibration as contact_vibration
+from .model import damped_oscillator as damped_oscillator
+from .model import dry_full_load as dry_full_load
+from .model import excitation as excitation
+from .model import needs_solution as needs_solution
+from .model import oscillator as oscillator
+from .model import preset_choices as preset_choices
+from .model import require_sampling as require_sampling
+from .model import search_band as search_band

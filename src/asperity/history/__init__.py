@@ -1,0 +1,5 @@
+"""A case let move, step after step, and what a mass hears of it."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,15 @@
+from .rig import CRF_ENDS_HZ as CRF_ENDS_HZ
+from .rig import SAMPLES_SQ_UM as SAMPLES_SQ_UM
+from .rig import SAMPLES_STD_UM as SAMPLES_STD_UM
+from .rig import TRENDS as TRENDS
+from .rig import Disturbance as Disturbance
+from .rig import Rig as Rig
+from .rig import RigRecording as RigRecording
+from .rig import simulate_rig as simulate_rig
+from .rig import write_rig as write_rig
+from .table1 import DAMPING_RATIO as DAMPING_RATIO
+from .table1 import MASS as MASS
+from .table1 import Table1Row as Table1Row
+from .table1 import continuous_crfa as continuous_crfa
+from .table1 import expected_crfa as expected_crfa
+from .table1 import reproduce_table1 as reproduce_table1

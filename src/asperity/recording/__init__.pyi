@@ -1,0 +1,11 @@
+from .check import Gauge as Gauge
+from .check import Quality as Quality
+from .check import check_recording as check_recording
+from .model import ACCELERATION as ACCELERATION
+from .model import Fact as Fact
+from .model import OpenRecording as OpenRecording
+from .model import Recording as Recording
+from .read import open_channels as open_channels
+from .read import open_recording as open_recording
+from .read import read_recording as read_recording
+from .sidecar import is_sidecar as is_sidecar

@@ -1,0 +1,14 @@
+from .exploration_figures import calibration_figure as calibration_figure
+from .exploration_figures import sensitivity_figure as sensitivity_figure
+from .exploration_figures import write_figure as write_figure
+from .figures import surface_map as surface_map
+from .friction_figures import friction_figure as friction_figure
+from .motion_page import write_motion_report as write_motion_report
+from .page import write_report as write_report
+from .study_page import write_study_report as write_study_report
+from .track_page import write_track_report as write_track_report
+from .vibration_figures import excitation_figure as excitation_figure
+from .vibration_figures import load_trend_figure as load_trend_figure
+from .vibration_figures import response_figure as response_figure
+from .vibration_figures import table1_figure as table1_figure
+from .vibration_figures import write_png as write_png

@@ -1,0 +1,5 @@
+"""Cases solved: the contact, what is read off it, what an accelerometer would hear; friction curves."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,10 @@
+from .files import recordings_in as recordings_in
+from .listen import Heard as Heard
+from .target import search_target as search_target
+from .track import ALERT as ALERT
+from .track import DANGER as DANGER
+from .track import IN_A_ROW as IN_A_ROW
+from .track import Track as Track
+from .track import Tracked as Tracked
+from .track import track_recordings as track_recordings
+from .watch import watch_folder as watch_folder

@@ -1,0 +1,13 @@
+from .excitation import PATCHES as PATCHES
+from .excitation import Excitation as Excitation
+from .excitation import FilteredNoise as FilteredNoise
+from .excitation import PatchAverage as PatchAverage
+from .excitation import SurfaceTrack as SurfaceTrack
+from .excitation import require_filter as require_filter
+from .excitation import white_noise as white_noise
+from .oscillator import RESPONSE_METHODS as RESPONSE_METHODS
+from .oscillator import ContactOscillator as ContactOscillator
+from .oscillator import acceleration as acceleration
+from .oscillator import expected_spectrum as expected_spectrum
+from .oscillator import mass_motion as mass_motion
+from .oscillator import require_damping_ratio as require_damping_ratio
