@@ -47,7 +47,7 @@ def test_the_grid_is_measured_in_half_widths_of_the_papers_contact(paper):
 
 
 def test_the_packaged_case_is_the_example():
-    packaged = Path(__file__).parents[2] / "src" / "asperity" / "paper.toml"
+    packaged = Path(__file__).parents[2] / "src" / "asperity" / "paper" / "paper.toml"
     assert packaged.read_bytes() == (EXAMPLES / "paper.toml").read_bytes()
 
 

@@ -31,6 +31,7 @@ from asperity.ehl import (
     FlashTemperature,
     Friction,
     Iteration,
+    LoadSharing,
     SubsurfaceStress,
     clr_below,
     contact_state,
@@ -42,7 +43,9 @@ from asperity.ehl import (
     subsurface_stress,
 )
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.quantities import catalogue
 from asperity.surface import Surface
+from asperity.wear import Resonance
 
 if TYPE_CHECKING:
     import xarray
@@ -111,55 +114,25 @@ class Run:
         """Stresses in body 1 under the solved pressure and friction's traction."""
         return subsurface_stress(self.solution, shear=None if self.friction is None else self.friction.shear)
 
-    def scalars(self) -> dict[str, Scalar]:
-        """Every number of the run by its name in `asperity solve --json`, SI; None where there is none."""
-        state, convergence, sharing = self.state, self.solution.convergence, sharing_by_film(self.solution)
-        rubbing, heat, stress = self.friction, self.heat, self.stress
+    @property
+    def resonance(self) -> Resonance | None:
+        """The contact resonance; None where none was found or looked for."""
         resonance = None if self.vibration is None else self.vibration.resonance
-        heard = resonance is not None and resonance.found
-        error = convergence.error
-        return {
-            "car": state.car,
-            "car_error": None if error is None else error.car,
-            "car_domain": state.car_domain,
-            "clr": state.clr,
-            "clr_error": None if error is None else error.clr,
-            "capped_oil_load_ratio": state.capped_oil_load_ratio,
-            **{f"load_below_{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS},
-            "load_at_floor": sharing.clr_floor,
-            "cavitated_share": sharing.cavitated,
-            "oil_film_m": sharing.oil,
-            "sq_m": state.sq,
-            "h_min_m": state.h_min,
-            "h_min_error_m": None if error is None else error.h_min,
-            "h_central_m": state.h_central,
-            "h_central_error_m": None if error is None else error.h_central,
-            "h_mean_m": state.h_mean,
-            "p_max_pa": state.p_max,
-            "lambda_ratio": state.lambda_ratio,
-            "friction_coefficient": None if rubbing is None else rubbing.coefficient,
-            "friction_asperity_part": None if rubbing is None else rubbing.asperity_part,
-            "friction_oil_part": None if rubbing is None else rubbing.oil_part,
-            "friction_power_w": None if rubbing is None else rubbing.power,
-            "flash_temperature_max_k": None if heat is None else heat.max_k,
-            "film_temperature_max_k": None if heat is None else heat.film_max_k,
-            "von_mises_max_pa": stress.peak.value,
-            "von_mises_depth_m": stress.peak.depth,
-            "von_mises_core_pa": stress.core.value,
-            "von_mises_core_depth_m": stress.core.depth,
-            "shear_stress_max_pa": stress.shear_peak.value,
-            "shear_stress_depth_m": stress.shear_peak.depth,
-            "converged": convergence.converged,
-            "iterations": convergence.iterations,
-            "reynolds_residual": state.reynolds_residual,
-            "load_error": state.load_error,
-            "mass_flux_imbalance": state.mass_flux_imbalance,
-            "seconds": convergence.seconds,
-            "crf_hz": _finite(resonance.crf_hz) if resonance is not None and heard else None,
-            "crfa": _finite(resonance.crfa) if resonance is not None and heard else None,
-            "crf_std_hz": _finite(resonance.crf_std_hz) if resonance is not None and heard else None,
-            "crfa_std": _finite(resonance.crfa_std) if resonance is not None and heard else None,
-        }
+        return resonance if resonance is not None and resonance.found else None
+
+    @cached_property
+    def sharing(self) -> LoadSharing:
+        """The load by film."""
+        return sharing_by_film(self.solution)
+
+    @property
+    def load_below(self) -> dict[str, float]:
+        """Share of the load on films no thicker than each of `FILMS`."""
+        return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
+
+    def scalars(self) -> dict[str, Scalar]:
+        """Every number of the run by its key in the catalogue of quantities, SI; None where there is none."""
+        return {entry.key: _read(self, entry.source) for entry in catalogue().values() if entry.source}
 
     def verdict(self) -> str:
         """One sentence on the state of the contact.
@@ -391,6 +364,16 @@ def _threshold(solution: ContactSolution) -> str:
         "Model conserving: CLR and CAR count cells whose elastic bodies touch, though oil at the cap may have parted "
         f"them since; by film, the load lies on {shares}. The share at the contact film depends on the grid."
     )
+
+
+def _read(run: Run, source: str) -> Scalar:
+    """A number of a run by the attributes that lead to it; None where one of them is None or the number is nan."""
+    value: Any = run
+    for name in source.split("."):
+        if value is None:
+            return None
+        value = value[name] if isinstance(value, dict) else getattr(value, name)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _finite(value: float) -> float | None:

@@ -1,0 +1,158 @@
+"""The one catalogue of quantities: what each is called, its unit, how it is shown and which field holds its deviation.
+
+`quantities.csv` has a line each. Tables, pages, axes, tiles, JSON, netCDF and docs select keys here and add nothing.
+Parameters of laws say their unit and symbol beside the parameter, as `Parameter`.
+"""
+
+import csv
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from importlib.resources import files
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+NO_VALUE = "–"
+DIMENSIONLESS = "1"
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
+_FACTORS |= {"N/µm": 1e-6, "mJ": 1e3}  # display units over their SI unit; any other display unit is the SI unit itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A line of the catalogue.
+
+    `unit` is that of the stored number (SI, as netCDF writes it), `display` the one people read, `form` a format
+    specification for the number in it. `deviation` is the key that holds the standard deviation or error bar.
+    `group` is the table it belongs to; `source` the attribute of a solved case that it is read from; `detail` keeps it
+    out of short tables. `standard_name` is CF's, where CF has one.
+    """
+
+    key: str
+    symbol: str
+    unit: str
+    display: str
+    form: str
+    deviation: str
+    group: str
+    source: str
+    detail: bool
+    standard_name: str
+    name: str
+    meaning: str
+
+    @property
+    def factor(self) -> float:
+        """What a stored number is multiplied with to be in the display unit."""
+        return _FACTORS.get(self.display, 1.0)
+
+    @property
+    def title(self) -> str:
+        """Name and symbol: "load share of asperities, CLR"."""
+        return f"{self.name}, {self.symbol}" if self.symbol else self.name
+
+    @property
+    def short(self) -> str:
+        """Its symbol, or its name where it has none."""
+        return self.symbol or self.name
+
+    @property
+    def label(self) -> str:
+        """What an axis is called: symbol or name, and display unit."""
+        return f"{self.short} [{self.display}]" if self.display else self.short
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """What netCDF says of it, by the CF conventions."""
+        known = {"long_name": self.title, "units": self.unit, "standard_name": self.standard_name}
+        return {name: text for name, text in known.items() if text}
+
+    def number(self, value: Any, deviation: float | None = None) -> str:
+        """A stored value as people read it, without its unit: "84.0 ± 2.4"; `NO_VALUE` for None and nan."""
+        if isinstance(value, bool | str):
+            return value if isinstance(value, str) else "yes" if value else "NO"
+        if value is None or not math.isfinite(value):
+            return NO_VALUE
+        return with_deviation(value * self.factor, None if deviation is None else deviation * self.factor, self.form)
+
+    def text(self, value: Any, deviation: float | None = None) -> str:
+        """A stored value with its unit: "84.0 ± 2.4 %"."""
+        number = self.number(value, deviation)
+        return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
+
+    def number_in(self, values: Mapping[str, Any]) -> str:
+        """Its number in a row, a run's or a table's, with its deviation where the row has one."""
+        return self.number(values.get(self.key), values.get(self.deviation))
+
+    def text_in(self, values: Mapping[str, Any]) -> str:
+        """Its number in a row with its deviation and unit."""
+        return self.text(values.get(self.key), values.get(self.deviation))
+
+
+def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> str:
+    """A value, its deviation where one is known and shows, and the power of ten of both.
+
+    A fixed number of decimals (`.1f`) is what to show at most; `.3g` and `.1e` go over to powers of ten where a number
+    is small or large. The deviation has two digits and the value ends where it does.
+    """
+    exponent = math.floor(math.log10(abs(value))) if value and not form.endswith("f") else 0
+    if not form.endswith("e") and -3 <= exponent < 6:
+        exponent = 0
+    scaled, power = value / 10.0**exponent, f"×10{str(exponent).translate(SUPERSCRIPTS)}" if exponent else ""
+    known = deviation is not None and math.isfinite(deviation) and deviation > 0.0
+    if not known:
+        number = f"{scaled:{form.replace('e', 'f')}}"
+        return f"{number}{power}".replace("-", "−")
+    spread = (deviation or 0.0) / 10.0**exponent
+    decimals = max(0, 1 - math.floor(math.log10(spread)))
+    if form.endswith("f"):
+        decimals = min(decimals, int(form.strip(".f")))
+    shown = f" ± {spread:.{decimals}f}" if float(f"{spread:.{decimals}f}") > 0.0 else ""
+    number = f"{scaled:.{decimals}f}{shown}"
+    return (f"({number}){power}" if power and shown else f"{number}{power}").replace("-", "−")
+
+
+@cache
+def catalogue() -> dict[str, Quantity]:
+    """Every quantity by its key, in the order in which tables have them."""
+    lines = files("asperity").joinpath("quantities.csv").read_text("utf-8").splitlines()
+    return {row["key"]: Quantity(detail=bool(row.pop("detail")), **row) for row in csv.DictReader(lines)}
+
+
+def quantity(key: str) -> Quantity:
+    """The quantity of this key; `crf_sound_hz` is `crf_hz` by the vibration preset sound."""
+    known = catalogue()
+    if key in known:
+        return known[key]
+    for preset in ("sound", "paper"):
+        plain = key.replace(f"_{preset}", "")
+        if plain != key and plain in known:
+            base = known[plain]
+            deviation = base.deviation.replace("_std", f"_std_{preset}")
+            return replace(base, key=key, symbol=f"{base.short}, {preset}", deviation=deviation, source="")
+    raise KeyError(f"{key} is not in the catalogue of quantities; add it to quantities.csv")
+
+
+def select(*groups: str, detail: bool = False) -> list[Quantity]:
+    """The quantities of these groups, deviations left out; those in `detail` too where asked."""
+    known = catalogue().values()
+    deviations = {entry.deviation for entry in known}
+    return [q for q in known if q.group in groups and q.key not in deviations and (detail or not q.detail)]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """Unit [SI] and symbol of a law's parameter, beside it: `eta0: Annotated[float, Parameter("Pa s", "η₀")]`."""
+
+    unit: str = ""
+    symbol: str = ""
+
+
+def parameters(law: type) -> Iterator[tuple[str, Parameter]]:
+    """The fields of a law by name, each with its unit and symbol; a field that states none is a plain number."""
+    hints = get_type_hints(law, include_extras=True)
+    for entry in fields(law):
+        hint = hints[entry.name]
+        marks = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+        yield entry.name, next((mark for mark in marks if isinstance(mark, Parameter)), Parameter())

@@ -1,0 +1,65 @@
+from dataclasses import dataclass
+from typing import Annotated
+
+import pytest
+
+from asperity.quantities import NO_VALUE, Parameter, catalogue, parameters, quantity, select, with_deviation
+
+
+def test_every_line_is_whole():
+    for key, entry in catalogue().items():
+        assert entry.name
+        assert entry.unit, key
+        assert entry.deviation == "" or entry.deviation in catalogue(), key
+        assert entry.factor == 1.0 or entry.unit in ("1", "m", "Pa", "s", "Hz", "J", "N m-1"), key
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "form", "text"),
+    [
+        (84.04, 2.4, ".1f", "84.0 ± 2.4"),
+        (84.04, 12.4, ".1f", "84 ± 12"),
+        (84.04, 0.01, ".1f", "84.0"),
+        (84.04, None, ".1f", "84.0"),
+        (-0.25, None, ".2f", "−0.25"),
+        (3724.54, 2.04, ".1f", "3724.5 ± 2.0"),
+        (0.000013, None, ".1e", "1.3×10⁻⁵"),
+        (0.0, None, ".1e", "0.0"),
+        (0.0003172, 0.00002114, ".4g", "(3.17 ± 0.21)×10⁻⁴"),
+        (0.02361, 0.00113, ".4g", "0.0236 ± 0.0011"),
+        (12.0, float("nan"), ".4g", "12"),
+    ],
+)
+def test_a_value_ends_where_its_deviation_does(value, deviation, form, text):
+    assert with_deviation(value, deviation, form) == text
+
+
+def test_a_stored_number_is_shown_in_its_display_unit():
+    assert quantity("clr").text(0.8404, 0.024) == "84.0 ± 2.4 %"
+    assert quantity("h_min_m").text_in({"h_min_m": 1.5e-7, "h_min_error_m": None}) == "0.150 µm"
+    assert quantity("p_max_pa").number(2e9) == "2.000"
+    assert quantity("converged").text(False) == "NO"
+    assert quantity("crf_hz").text(None) == NO_VALUE
+    assert quantity("iterations").text(31) == "31"
+
+
+def test_a_presets_resonance_is_the_plain_one_by_another_name():
+    assert quantity("crf_sound_hz").label == "CRF, sound [Hz]"
+    assert quantity("crf_sound_hz").deviation == "crf_std_sound_hz"
+    with pytest.raises(KeyError, match="catalogue of quantities"):
+        quantity("clrr")
+
+
+def test_short_tables_leave_out_details_and_deviations():
+    keys = [entry.key for entry in select("load")]
+    assert keys == ["clr", "capped_oil_load_ratio", "car", "car_domain"]
+    assert "load_at_floor" in [entry.key for entry in select("sharing", detail=True)]
+
+
+def test_a_law_says_unit_and_symbol_beside_its_parameters():
+    @dataclass
+    class Law:
+        eta0: Annotated[float, Parameter("Pa s", "η₀")]
+        z: float
+
+    assert dict(parameters(Law)) == {"eta0": Parameter("Pa s", "η₀"), "z": Parameter()}
