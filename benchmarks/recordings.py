@@ -131,7 +131,7 @@ def large_file(folder: Path) -> str:
 def damaged_files(count: int) -> Iterator[str]:
     """Read or refused in a sentence, each in how long and how much."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-    from recordings_made import damaged, vibration, write_all
+    from support.recordings import damaged, vibration, write_all
 
     warnings.simplefilter("ignore")  # readers that fail leave files open
     rng = np.random.default_rng(11)

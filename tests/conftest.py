@@ -1,1 +1,1 @@
-"""Puts this folder on the import path, so that every test can import `reference_solvers`."""
+"""Puts this folder on the import path, so that every test can import `support`."""

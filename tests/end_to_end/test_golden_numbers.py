@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from golden_numbers import CASES, REFERENCE, differences, numbers
+from support.golden_numbers import CASES, REFERENCE, differences, numbers
 
 # Another processor sums in another order, and Newton then stops elsewhere within the solver's 1e-4.
 TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))

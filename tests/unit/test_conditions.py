@@ -3,7 +3,7 @@ import pytest
 from asperity.conditions import ElasticPair
 from asperity.errors import BadInput
 from asperity.hertz import elliptic_contact, point_contact
-from reference_solvers.paper import contact
+from support.paper import contact
 
 
 def test_the_papers_modulus_is_the_effective_one():

@@ -3,7 +3,7 @@ import pytest
 
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.deflection import deflection as half_space
-from reference_solvers.half_space import periodic_compliance
+from support.half_space import periodic_compliance
 
 CELLS, SPACING = (16, 12), (0.11, 0.07)
 

@@ -8,8 +8,8 @@ from asperity.ehl.linear import Linear, five_point_pattern
 from asperity.ehl.solve import contact_problem, first_guess
 from asperity.kernels import relax, reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows, Stencil
-from reference_solvers import reynolds as twin
-from reference_solvers.paper import barus, contact, grid, rough
+from support import reynolds as twin
+from support.paper import barus, contact, grid, rough
 
 CELLS, DX, DY = (10, 8), 0.13, 0.21
 NEAR = np.array([0.5, 0.3, 0.2, 0.05])

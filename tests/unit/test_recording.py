@@ -11,7 +11,7 @@ from asperity.recording import open_channels, open_recording, read_recording
 from asperity.recording.units import acceleration_scale, name_and_unit
 from asperity.signals import power_spectrum
 from asperity.wear import contact_resonance
-from recordings_made import RATE, SHARED, uff_set, vibration, write_all, write_uff
+from support.recordings import RATE, SHARED, uff_set, vibration, write_all, write_uff
 
 G = 9.80665
 VALUES = vibration()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.recording import Gauge, check_recording, open_channels, open_recording
-from recordings_made import SHARED
+from support.recordings import SHARED
 
 RATE = 1000.0
 RNG = np.random.default_rng(5)

@@ -9,7 +9,7 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.recording import check_recording, open_channels
-from recordings_made import SHARED, damaged, vibration, write_all
+from support.recordings import SHARED, damaged, vibration, write_all
 
 MANY = 250  # the benchmark takes 500
 

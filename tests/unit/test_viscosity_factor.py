@@ -9,7 +9,7 @@ from asperity.ehl import Options, contact_state, load_solution, solve_contact
 from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, ReeEyring
-from reference_solvers.paper import barus, contact, grid, rough
+from support.paper import barus, contact, grid, rough
 
 COARSE = grid((64, 32))
 

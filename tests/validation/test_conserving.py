@@ -25,7 +25,7 @@ from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
 from asperity.surface import MovingSurfaces, Surface, flat_surface
-from reference_solvers.paper import ETA0, RADIUS, barus, contact, grid, rough
+from support.paper import ETA0, RADIUS, barus, contact, grid, rough
 
 CAP, FLOOR = 2e9, 5e-9
 A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max

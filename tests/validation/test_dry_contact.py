@@ -12,7 +12,7 @@ import tamaas
 from asperity.ehl import Options, contact_state, solve_contact
 from asperity.grid import Grid
 from asperity.surface import Surface, flat_surface, gaussian_surface
-from reference_solvers.paper import RADIUS, contact, grid, rough
+from support.paper import RADIUS, contact, grid, rough
 
 A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
 ON = grid((128, 128), (-2.0, 2.0))

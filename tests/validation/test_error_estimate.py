@@ -12,7 +12,7 @@ from asperity.ehl.solution import ATTEMPTS
 from asperity.grid import Grid
 from asperity.lubricant import Barus
 from asperity.surface import flat_surface
-from reference_solvers.paper import barus, contact, grid, rough
+from support.paper import barus, contact, grid, rough
 
 CONDITIONS, OIL = contact(hardness=2e9), barus()
 

@@ -11,9 +11,9 @@ from asperity.ehl import flash_temperature, friction, friction_and_heat, solve_c
 from asperity.ehl.flash import moving_source
 from asperity.hertz import line_pressure
 from asperity.lubricant import EyringShear, Solid, Thermal
-from reference_solvers.moving_heat import band, rectangle, rectangle_at_rest, tian_kennedy_square
-from reference_solvers.paper import barus, contact, grid, rough
-from reference_solvers.sampled import sampled
+from support.moving_heat import band, rectangle, rectangle_at_rest, tian_kennedy_square
+from support.paper import barus, contact, grid, rough
+from support.sampled import sampled
 
 STEEL = Solid()
 K, KAPPA = STEEL.conductivity, STEEL.diffusivity

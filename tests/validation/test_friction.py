@@ -11,8 +11,8 @@ from asperity.ehl import contact_state, friction, solve_contact
 from asperity.errors import BadInput
 from asperity.hertz import line_pressure
 from asperity.lubricant import BairWiner, EyringShear, LinearBairWiner, NewtonianShear
-from reference_solvers.paper import ETA0, barus, contact, grid, rough
-from reference_solvers.sampled import sampled
+from support.paper import ETA0, barus, contact, grid, rough
+from support.sampled import sampled
 
 A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
 ALPHA, GAP, FAR = 18.2e-9, 0.7e-6, 1.0  # m; so wide that nothing is sheared

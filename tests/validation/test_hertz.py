@@ -6,7 +6,7 @@ import pytest
 from asperity.ehl import Options, contact_state, solve_contact
 from asperity.hertz import line_gap, line_pressure
 from asperity.surface import flat_surface
-from reference_solvers.paper import RADIUS, contact, grid
+from support.paper import RADIUS, contact, grid
 
 HERTZ = contact().hertz
 A, P_H = HERTZ.half_widths[0], HERTZ.p_max

@@ -9,8 +9,8 @@ from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
 from asperity.hertz import line_pressure
 from asperity.surface import Surface, flat_surface
-from reference_solvers.paper import RADIUS, barus, contact, grid, rough
-from reference_solvers.reynolds import mass_outflow
+from support.paper import RADIUS, barus, contact, grid, rough
+from support.reynolds import mass_outflow
 
 CAP, SQ, FLOOR = 2e9, 1e-6, 5e-9
 A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max

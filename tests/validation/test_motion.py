@@ -11,7 +11,7 @@ from asperity.ehl.solve import contact_problem
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian
 from asperity.surface import MovingSurfaces, Surface, flat_surface
-from reference_solvers import paper
+from support import paper
 
 CELLS = {4.0: 64, 2.0: 64, 1.0: 64, 0.5: 64, 0.25: 128, 0.125: 64}  # a half-width
 

@@ -12,7 +12,7 @@ from asperity.ehl import Options, contact_state, solve_contact
 from asperity.grid import Grid
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
 from asperity.surface import flat_surface
-from reference_solvers.paper import FirstPrinted
+from support.paper import FirstPrinted
 
 PAIR = ElasticPair((200e9, 200e9), (0.3, 0.3))
 RADIUS, ETA0, ALPHA = 12.5e-3, 0.04, 22e-9

@@ -8,7 +8,7 @@ from asperity.ehl import SubsurfaceStress
 from asperity.ehl.stress import stress_below
 from asperity.grid import Grid
 from asperity.hertz import line_pressure
-from reference_solvers import sliding
+from support import sliding
 
 NU = 0.3
 DEPTHS = np.concatenate([[0.0], np.geomspace(0.01, 2.5, 15)])

@@ -16,8 +16,8 @@ from threadpoolctl import threadpool_limits
 from asperity.ehl import Options, contact_state, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import flat_surface
-from reference_solvers.line import Oil, line_contact
-from reference_solvers.paper import ETA0, RADIUS, FirstPrinted, contact, grid
+from support.line import Oil, line_contact
+from support.paper import ETA0, RADIUS, FirstPrinted, contact, grid
 
 TABLE = Path(__file__).parents[1] / "reference" / "smooth_line_contact.csv"
 ROWS = list(csv.DictReader(TABLE.read_text().splitlines()))

@@ -16,7 +16,7 @@ from asperity.ehl import (
 from asperity.errors import AsperityError, NotConverged
 from asperity.lubricant import ExponentialWarmth, EyringShear, NewtonianShear, Thermal
 from asperity.surface import flat_surface
-from reference_solvers.paper import barus, contact, grid, rough
+from support.paper import barus, contact, grid, rough
 
 WARM = Thermal(feedback=True)
 SMOOTH = flat_surface(grid((96, 8)))

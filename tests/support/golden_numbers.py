@@ -1,7 +1,7 @@
 """Numbers that a change of the house must not move: what `--json` says of small cases, and the tables behind it.
 
-`python -m golden_numbers` (from this folder) writes them anew into `reference/golden`: only when a change of numbers
-is meant, and the changelog says which.
+`python -m support.golden_numbers` (from `tests`) writes them anew into `reference/golden`: only when a change of
+numbers is meant, and the changelog says which.
 """
 
 import json
@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-HERE = Path(__file__).parent
-REFERENCE = HERE / "reference" / "golden"
-EXAMPLES = HERE.parent / "examples"
+TESTS = Path(__file__).parents[1]
+REFERENCE = TESTS / "reference" / "golden"
+EXAMPLES = TESTS.parent / "examples"
 TIMES = ("seconds", "solve_seconds")  # what no two runs share
 SMALL = ("grid.cells=[64, 48]", "vibration.duration=0.2 s")
 ROLLING = ("grid.cells=[48, 32]", "surface.correlation_length=40 um")

@@ -1,1 +1,0 @@
-"""Slow, plain, independent solutions that the package is measured against; they share no code with it."""

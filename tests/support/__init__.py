@@ -1,0 +1,1 @@
+"""What tests share: slow, plain solutions that use none of the package, recordings of all formats, golden numbers."""
