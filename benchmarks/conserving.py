@@ -28,8 +28,8 @@ from asperity.ehl import (
 )
 from asperity.ehl.conserving import evaluate
 from asperity.ehl.conserving_solve import unknowns_of
-from asperity.ehl.solution import CONSERVING
-from asperity.ehl.solve import contact_problem
+from asperity.ehl.outcome import CONSERVING
+from asperity.ehl.posing import contact_problem
 from asperity.surface import MovingSurfaces
 from benchmarks.roughness_levels import paper_case
 

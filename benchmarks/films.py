@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl import Options, solve_contact
-from asperity.ehl.solve import smooth_film
+from asperity.ehl.posing import smooth_film
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
 from asperity.surface import flat_surface

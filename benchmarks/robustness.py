@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl import ContactSolution, Options, Scales, contact_state, solve_contact
-from asperity.ehl.solve import contact_problem
+from asperity.ehl.posing import contact_problem
 from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian

@@ -5,7 +5,7 @@ import pytest
 
 from asperity.ehl import Options, Scales
 from asperity.ehl.linear import Linear, five_point_pattern
-from asperity.ehl.solve import contact_problem, first_guess
+from asperity.ehl.posing import contact_problem, first_guess
 from asperity.kernels import relax, reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows, Stencil
 from support import reynolds as twin

@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from asperity.case import load_case
 from asperity.coupling import contact_vibration
 from asperity.ehl import ContactSolution, ContactState, Convergence, Iteration, SolveStatus
-from asperity.ehl.solution import Figures
+from asperity.ehl.outcome import Figures
 from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure

@@ -7,7 +7,7 @@ import xarray
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus, load_solution
-from asperity.ehl.solution import ATTEMPTS, Figures
+from asperity.ehl.outcome import ATTEMPTS, Figures
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.ehl import Options, contact_state, load_solution, solve_contact
-from asperity.ehl.solve import contact_problem
+from asperity.ehl.posing import contact_problem
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, ReeEyring
 from support.paper import barus, contact, grid, rough

@@ -21,7 +21,7 @@ from asperity.ehl import (
 from asperity.ehl.conserving import Earlier, Unknowns, evaluate
 from asperity.ehl.conserving_linear import Linear, newton_step
 from asperity.ehl.conserving_solve import unknowns_of
-from asperity.ehl.solve import contact_problem
+from asperity.ehl.posing import contact_problem
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
 from asperity.surface import MovingSurfaces, Surface, flat_surface

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import asperity.ehl.solve as solving
+import asperity.ehl.search as searching
 from asperity.ehl import Options, contact_state, solve_contact
 from asperity.ehl.iterate import newton
-from asperity.ehl.solution import ATTEMPTS
+from asperity.ehl.outcome import ATTEMPTS
 from asperity.grid import Grid
 from asperity.lubricant import Barus
 from asperity.surface import flat_surface
@@ -72,9 +72,9 @@ def test_what_fails_at_first_is_tried_with_the_bodies_held(monkeypatch):
             while not held:  # never takes a step
                 yield step
 
-    monkeypatch.setattr(solving, "newton", lame)
+    monkeypatch.setattr(searching, "newton", lame)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solving.Search, "run", counted(solving.Search.run))
+        patch.setattr(searching.Search, "run", counted(searching.Search.run))
         mended = solved(surface)
     assert mended.convergence.attempt == ATTEMPTS[2]
     assert ATTEMPTS[2] in mended.convergence.explain()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.ehl import Options, SolveStatus, contact_state, solve_contact
-from asperity.ehl.solve import contact_problem
+from asperity.ehl.posing import contact_problem
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
 from asperity.hertz import line_pressure

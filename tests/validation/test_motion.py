@@ -7,7 +7,7 @@ import pytest
 from benchmarks.motion import VENNER, contact, waves
 
 from asperity.ehl import Options, Scales, contact_state, friction, moving_contact, solve_contact
-from asperity.ehl.solve import contact_problem
+from asperity.ehl.posing import contact_problem
 from asperity.errors import BadInput
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian
 from asperity.surface import MovingSurfaces, Surface, flat_surface

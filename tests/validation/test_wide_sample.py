@@ -4,7 +4,7 @@ import pytest
 from benchmarks.robustness import OIL, contacts, overlap, prepared
 
 from asperity.ehl import solve_contact
-from asperity.ehl.solution import ATTEMPTS
+from asperity.ehl.outcome import ATTEMPTS
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, NotConverged, require_positive
@@ -120,20 +121,7 @@ def solve_film(
         inflow_content=inflow_content,
     )
     _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
-    signed = np.zeros(channel.gap.shape)
-    best, idle, share, steps = np.inf, 0, 1.0, 0
-    while True:
-        flows = channel.flows(signed)
-        residual = float(np.max(np.abs(flows.outflow)) / flows.through)
-        if residual < tolerance or steps == MOST_STEPS or not np.isfinite(residual):
-            break
-        idle += 1
-        if residual < 0.9 * best:
-            best, idle, share = residual, 0, min(1.0, 1.5 * share)
-        elif idle == PATIENCE:  # cells that flip to and fro settle in shorter steps
-            best, idle, share = residual, 0, max(0.5 * share, SHORTEST_SHARE)
-        signed = signed + share * channel.limited(signed, -_solved(flows))
-        steps += 1
+    signed, flows, residual, steps = _balanced(channel, tolerance)
     pressure, content = channel.split(signed)
     shown = np.s_[:, 0] if line else np.s_[:]
     film = FilmSolution(
@@ -150,7 +138,38 @@ def solve_film(
     return film
 
 
+def _balanced(channel: "Channel", tolerance: float) -> tuple[Field, "Flows", float, int]:
+    """Newton's steps from a film without pressure: the signed unknown, its flows, the residual, and how many steps."""
+    signed = np.zeros(channel.gap.shape)
+    best, idle, share, steps = np.inf, 0, 1.0, 0
+    while True:
+        flows = channel.flows(signed)
+        residual = float(np.max(np.abs(flows.outflow)) / flows.through)
+        if residual < tolerance or steps == MOST_STEPS or not np.isfinite(residual):
+            return signed, flows, residual, steps
+        idle += 1
+        if residual < 0.9 * best:
+            best, idle, share = residual, 0, min(1.0, 1.5 * share)
+        elif idle == PATIENCE:  # cells that flip to and fro settle in shorter steps
+            best, idle, share = residual, 0, max(0.5 * share, SHORTEST_SHARE)
+        signed = signed + share * channel.limited(signed, -_solved(flows))
+        steps += 1
+
+
 Index: TypeAlias = npt.NDArray[np.intp]
+
+
+class Cells(NamedTuple):
+    """Oil of each cell, and derivatives by the signed unknown: pressure, content, oil of a full gap, conductance."""
+
+    pressure: Field
+    d_pressure: Field
+    content: Field
+    d_content: Field
+    oil: Field
+    d_oil: Field
+    conductance: Field
+    d_conductance: Field
 
 
 class Flows(NamedTuple):
@@ -193,23 +212,26 @@ class Channel:
         longest = LONGEST_STEP / np.maximum(steep, 1e-12)
         return np.clip(change, -longest - np.abs(signed), longest + 1.0)
 
+    def _cells(self, signed: Field) -> Cells:
+        """What the oil of each cell is, with the derivatives by its unknown."""
+        pressure, content = self.split(signed)
+        full = signed >= 0.0
+        d_pressure, d_content = np.where(full, self.pressure_scale, 0.0), np.where(full, 0.0, 1.0)
+        density = self.density(pressure) / self.density.rho0
+        d_density = self.density.slope(pressure) / self.density.rho0 * d_pressure
+        conductance = density * self.gap**3 / (12.0 * self.viscosity(pressure))
+        d_conductance = conductance * (d_density / density - self.viscosity.log_slope(pressure) * d_pressure)
+        oil, d_oil = density * self.gap, d_density * self.gap
+        return Cells(pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance)
+
     def flows(self, signed: Field) -> Flows:
         """All flows and their derivatives.
 
         A face joins two half cells of one gap each, which is exact where the gap steps. Its pressure is found from
         equal flow on both sides, and where that were negative the film ruptures at the face.
         """
-        dx, u, scale = self.spacing[0], self.speed, self.pressure_scale
-        pressure, content = self.split(signed)
-        full = signed >= 0.0
-        d_pressure, d_content = np.where(full, scale, 0.0), np.where(full, 0.0, 1.0)
-        rho0 = self.density.rho0
-        density = self.density(pressure) / rho0
-        d_density = self.density.slope(pressure) / rho0 * d_pressure
-        oil, d_oil = density * self.gap, d_density * self.gap  # of a full gap
-        conductance = density * self.gap**3 / (12.0 * self.viscosity(pressure))
-        d_conductance = conductance * (d_density / density - self.viscosity.log_slope(pressure) * d_pressure)
-
+        dx, u = self.spacing[0], self.speed
+        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = self._cells(signed)
         half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
         left, right = np.s_[:-1], np.s_[1:]
         both = half[left] + half[right]
@@ -243,7 +265,7 @@ class Channel:
         by_right = np.where(ruptures, 0.0, by_right)
 
         inlet, outlet = self.ends
-        entering = u * self.inflow_content * self.density(np.array(inlet)) / rho0 * self.gap[0]
+        entering = u * self.inflow_content * self.density(np.array(inlet)) / self.density.rho0 * self.gap[0]
         entering = entering + half[0] * (inlet - pressure[0])
         d_entering = d_half[0] * (inlet - pressure[0]) - half[0] * d_pressure[0]
         leaving = u * content[-1] * oil[-1] + half[-1] * (pressure[-1] - outlet)
@@ -299,13 +321,10 @@ class Channel:
 
 def _solved(flows: Flows) -> Field:
     """Change of the signed unknown whose linear answer is the cells' loss."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
     size = flows.outflow.size
-    matrix = csc_array((flows.slopes, (flows.rows, flows.columns)), shape=(size, size))
+    matrix = scipy.sparse.csc_array((flows.slopes, (flows.rows, flows.columns)), shape=(size, size))
     try:
-        change = splu(matrix).solve(flows.outflow.ravel())
+        change = scipy.sparse.linalg.splu(matrix).solve(flows.outflow.ravel())
     except RuntimeError:  # singular: pressures at which the oil is a solid
         return np.full_like(flows.outflow, np.nan)
     return np.asarray(change).reshape(flows.outflow.shape)

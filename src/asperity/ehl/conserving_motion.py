@@ -17,12 +17,15 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import Earlier, OilBalance, Unknowns, evaluate
 from asperity.ehl.conserving_iterate import OilStep
-from asperity.ehl.conserving_solve import Climb, require_conserving, solve_conserving, unknowns_of
+from asperity.ehl.conserving_solve import Climb, require_conserving, unknowns_of
 from asperity.ehl.motion import Memory, Snapshot, Start, step_seconds
+from asperity.ehl.outcome import CONSERVING, UNIFIED, Options
+from asperity.ehl.posing import contact_problem
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.solution import CONSERVING, UNIFIED, ContactSolution, Oil, Options
-from asperity.ehl.solve import Progress, contact_problem, solve_contact
+from asperity.ehl.search import Progress
+from asperity.ehl.solution import ContactSolution, Oil
+from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import state_of
 from asperity.errors import BadInput
 from asperity.lubricant import Lubricant
@@ -94,7 +97,7 @@ def moving_conserving_contact(
     Raises
     ------
     BadInput
-        for a step of other than one cell, flattening, or a contact that `solve_conserving` refuses.
+        for a step of other than one cell, flattening, or a contact that `solve_contact` refuses.
     NotConverged
         if there is no snapshot to start from.
     """
@@ -142,7 +145,7 @@ class _Run:
         """Time 0, from a contact that has always been as it is, or from one at rest whose gaps are full of oil."""
         surface, problem = self.surfaces.at(0.0), self.problem(0)
         if standing:
-            solution = solve_conserving(
+            solution = solve_contact(
                 self.conditions, self.lubricant, surface, options=self.options, progress=self.progress
             )
             balance = evaluate(problem, unknowns_of(solution, problem, self.scales))

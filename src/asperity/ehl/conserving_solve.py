@@ -10,21 +10,14 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import Earlier, OilBalance, Unknowns, evaluate
 from asperity.ehl.conserving_iterate import OilStep, newton
+from asperity.ehl.outcome import ATTEMPTS, Convergence, Figures, Iteration, Options, SolveStatus
+from asperity.ehl.posing import contact_problem, first_guess, grid_levels, on_one_line
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.solution import ATTEMPTS, ContactSolution, Convergence, Figures, Iteration, Oil, Options, SolveStatus
-from asperity.ehl.solve import (
-    CENTRE,
-    COARSE_TOLERANCE,
-    Progress,
-    Search,
-    contact_problem,
-    first_guess,
-    grid_levels,
-    on_one_line,
-)
+from asperity.ehl.search import COARSE_TOLERANCE, Progress, Search, figures, grid_error
+from asperity.ehl.solution import ContactSolution, Oil
 from asperity.ehl.transfer import interpolated
-from asperity.errors import BadInput, NotConverged
+from asperity.errors import BadInput
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
@@ -55,7 +48,6 @@ def solve_conserving(
     options: Options,
     start: ContactSolution | None = None,
     viscosity_factor: Field | None = None,
-    strict: bool = True,
     progress: Progress | None = None,
 ) -> ContactSolution:
     """Solve the rough, lubricated line contact with no oil lost; as `solve_contact`, which calls this.
@@ -64,8 +56,6 @@ def solve_conserving(
     ------
     BadInput
         for a dry contact, or one that does not repeat across rolling.
-    NotConverged
-        when strict and the tolerance was not met; carries the unfinished solution.
     """
     began = time.perf_counter()
     require_conserving(conditions, lubricant)
@@ -81,7 +71,7 @@ def solve_conserving(
     else:
         way, step = WAYS[0], climb.settle(finest, unknowns_of(start, finest, scales), options.tolerance)
     discretisation = climb.discretisation_error if start is None else start.convergence.discretisation_error
-    solution = climb.solution(
+    return climb.solution(
         step.balance,
         conditions,
         lubricant,
@@ -91,9 +81,6 @@ def solve_conserving(
         discretisation=discretisation,
         viscosity_factor=viscosity_factor,
     )
-    if strict and not climb.settled:
-        raise NotConverged(solution, f"contact not solved: {solution.convergence.explain()}")
-    return solution
 
 
 def require_conserving(conditions: ContactConditions, lubricant: Lubricant | None) -> None:
@@ -131,18 +118,6 @@ def _prolonged(unknowns: Unknowns, cells: tuple[int, int]) -> Unknowns:
     return Unknowns(np.where(above < 0.0, np.minimum(missing, -1e-6), full), interpolated(pressure, cells), approach)
 
 
-def figures(balance: OilBalance, gap_scale: float) -> Figures:
-    """The first figures of a balance; lengths in the unit of `gap_scale`."""
-    problem, pressure, touching = balance.problem, balance.unknowns.pressure, balance.in_contact
-    gap = balance.flow.height
-    return Figures(
-        car=float(touching[problem.zone()].mean()),
-        clr=float(pressure[touching].sum() / (pressure.sum() or 1.0)),
-        h_min=float(gap.min()) * gap_scale,
-        h_central=float(gap[problem.zone(CENTRE)].mean()) * gap_scale,
-    )
-
-
 class Climb:
     """The way to the solution, all Newton steps of it on record."""
 
@@ -156,12 +131,8 @@ class Climb:
 
     @property
     def discretisation_error(self) -> Figures | None:
-        """As `Search.discretisation_error` of a rough contact."""
-        if len(self.figures) < 2:
-            return None
-        *before, coarse, fine = self.figures
-        error = fine.off(coarse).times(2.0)
-        return error.at_least(coarse.off(before[-1]).times(0.25)) if before else error
+        """From the last grids; see `grid_error`."""
+        return grid_error(self.figures, smooth=False)
 
     def up(
         self, levels: Sequence[Problem], conditions: ContactConditions, lubricant: Lubricant | None, *, grow: bool
@@ -180,7 +151,7 @@ class Climb:
             else:
                 unknowns = _prolonged(step.balance.unknowns, problem.cells)
                 step = self.settle(problem, unknowns, tolerance, rate=PROLONGED_RATE)
-            self.figures.append(figures(step.balance, self.scales.gap))
+            self.figures.append(self._figures(step))
         return step
 
     def _unified(self, problem: Problem, conditions: ContactConditions, lubricant: Lubricant | None) -> Unknowns:
@@ -263,8 +234,7 @@ class Climb:
             before = step
         self.steps_left -= step.number
         if before is not None:
-            gap = self.scales.gap
-            self.iteration_error = figures(step.balance, gap).off(figures(before.balance, gap))
+            self.iteration_error = self._figures(step).off(self._figures(before))
         return step
 
     @staticmethod
@@ -274,6 +244,11 @@ class Climb:
         balance = step.balance
         worst = max(balance.residual_rms, abs(balance.load_error), step.change)
         return worst < tolerance and balance.imbalance < BALANCED
+
+    def _figures(self, step: OilStep) -> Figures:
+        balance = step.balance
+        pressure, touching = balance.unknowns.pressure, balance.in_contact
+        return figures(balance.problem, pressure, touching, balance.flow.height, self.scales.gap)
 
     def _record(self, problem: Problem, step: OilStep) -> None:
         balance = step.balance

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 
@@ -32,21 +33,17 @@ class Deflection:
 
     def __call__(self, pressure: Field) -> Field:
         """Surface displacement V of a pressure P, both dimensionless, shape (nx, ny) and of one precision."""
-        import scipy.fft as fft
-
         (nx, ny), (long, wide) = self.cells, self.padded
-        waves = fft.fft(fft.rfft(pressure, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        waves = scipy.fft.fft(scipy.fft.rfft(pressure, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
         waves *= self.spectrum[pressure.dtype == np.float32]
-        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
+        return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
 
     def undone(self, displacement: Field) -> Field:
         """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
-        import scipy.fft as fft
-
         (nx, ny), (long, wide) = self.cells, self.padded
-        waves = fft.fft(fft.rfft(displacement, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        waves = scipy.fft.fft(scipy.fft.rfft(displacement, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
         waves /= np.abs(self.spectrum[0])  # the mean of a line contact has a sign of its own
-        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
+        return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
 
     @property
     def near(self) -> Field:
@@ -57,19 +54,17 @@ class Deflection:
 @lru_cache(maxsize=16)
 def deflection(cells: tuple[int, int], spacing: tuple[float, float], compliance: float, periodic: bool) -> Deflection:
     """Compliance of a grid; spacing in Hertz half-widths."""
-    import scipy.fft as fft
-
     nx, ny = cells
     # zero padded to no less than twice the length: the outlet must not feel the inlet
-    padded = fft.next_fast_len(2 * nx - 1), ny if periodic else fft.next_fast_len(2 * ny - 1, real=True)
+    padded = scipy.fft.next_fast_len(2 * nx - 1), ny if periodic else scipy.fft.next_fast_len(2 * ny - 1, real=True)
     if periodic:
         kernel = 2.0 * compliance * _line_kernel(cells, spacing)
-        row = fft.irfft(kernel, n=ny, axis=1)[:, 0]
-        spectrum = fft.fft(_mirrored(kernel, padded[0]), axis=0).real
+        row = scipy.fft.irfft(kernel, n=ny, axis=1)[:, 0]
+        spectrum = scipy.fft.fft(_mirrored(kernel, padded[0]), axis=0).real
     else:
         kernel = compliance * _love_kernel(cells, spacing)
         row = kernel[:, 0].copy()
-        spectrum = fft.rfft2(_mirrored(_mirrored(kernel, padded[0]).T, padded[1]).T).real
+        spectrum = scipy.fft.rfft2(_mirrored(_mirrored(kernel, padded[0]).T, padded[1]).T).real
     both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
     for array in (*both, row):
         array.flags.writeable = False
@@ -103,11 +98,9 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
 
 def _k0_over_cells(wavenumber: Field, cell: np.ndarray, dx: float) -> Field:
     """∫ K₀(q|x|) dx over each cell, shape (cells, wavenumbers)."""
-    from scipy.special import iti0k0
-
     edges = (np.arange(cell.size + 1) - 0.5) * dx
     argument = np.abs(edges)[:, None] * wavenumber
-    integral = np.where(argument < 500.0, iti0k0(np.minimum(argument, 500.0))[1], np.pi / 2.0)
+    integral = np.where(argument < 500.0, scipy.special.iti0k0(np.minimum(argument, 500.0))[1], np.pi / 2.0)
     integral[0] *= -1.0  # the first edge lies left of the origin
     return np.asarray(np.diff(integral, axis=0) / wavenumber)
 

@@ -17,6 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.solution import ContactSolution
@@ -45,13 +46,13 @@ class MovingSource:
 
     def __call__(self, heat: Field) -> Field:
         """Temperature rise [K] of a heat input [W/m^2], both (nx, ny)."""
-        import scipy.fft as fft
-
         nx, ny = self.cells
         length = ny if self.periodic else 2 * ny
-        waves = fft.fft(fft.rfft(heat, n=length, axis=1), n=2 * nx, axis=0, overwrite_x=True)
+        waves = scipy.fft.fft(scipy.fft.rfft(heat, n=length, axis=1), n=2 * nx, axis=0, overwrite_x=True)
         waves *= self.spectrum
-        return np.asarray(fft.irfft(fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=length, axis=1)[:, :ny])
+        return np.asarray(
+            scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=length, axis=1)[:, :ny]
+        )
 
 
 @lru_cache(maxsize=16)
@@ -62,8 +63,6 @@ def moving_source(
 
     `length` of a line contact [m], which repeats in y; None for heat that is bounded both ways.
     """
-    import scipy.fft as fft
-
     (nx, ny), (dx, dy) = cells, spacing
     drift = speed / solid.diffusivity
     s, weight = _times(nx, dx, dy, drift, max(nx * dx, ny * dy, length or 0.0))
@@ -75,7 +74,7 @@ def moving_source(
     share_y = _share_in_line(ny, dy, length, s) if length is not None else _share(np.arange(ny + 1) * dy, dy, s)
     kernel = 2.0 / (solid.conductivity * np.sqrt(np.pi)) * ((share_x * weight) @ share_y.T)
     mirrored = np.concatenate([kernel, kernel[:, -2:0:-1]], axis=1) if length is None else kernel
-    spectrum = fft.fft(fft.rfft(mirrored, axis=1), axis=0)
+    spectrum = scipy.fft.fft(scipy.fft.rfft(mirrored, axis=1), axis=0)
     spectrum.flags.writeable = False
     return MovingSource(cells, spectrum, float(kernel[0, 0]), length is not None)
 
@@ -99,9 +98,7 @@ def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[F
 
 def _gaussian(x: Field, s: Field) -> Field:
     """Heat that has spread by s, left of x."""
-    from scipy.special import erf
-
-    return np.asarray(0.5 * erf(x / (2.0 * s)))
+    return np.asarray(0.5 * scipy.special.erf(x / (2.0 * s)))
 
 
 def _share(y: Field, dy: float, s: Field) -> Field:
@@ -196,8 +193,6 @@ def _passed_on(
     one: MovingSource, two: MovingSource, heat: Field, resistance: Field, exchanging: Mask, warmer: float
 ) -> Field:
     """Heat that crosses the film from body 2 to body 1 [W/m^2]: resistance times it is the surfaces' difference."""
-    from scipy.sparse.linalg import LinearOperator, gmres
-
     half = 0.5 * heat
     wanted = np.asarray(np.where(exchanging, warmer + two(half) - one(half), 0.0))
     if not np.any(wanted):
@@ -210,8 +205,10 @@ def _passed_on(
         answer = resistance * crossing + both(crossing)
         return np.where(exchanging, answer, crossing / scale).ravel()
 
-    operator = LinearOperator((heat.size, heat.size), matvec=unbalanced, dtype=np.float64)
-    solved, failed = gmres(operator, wanted.ravel(), rtol=SHARING_TOLERANCE, atol=0.0, restart=80, maxiter=10)
+    operator = scipy.sparse.linalg.LinearOperator((heat.size, heat.size), matvec=unbalanced, dtype=np.float64)
+    solved, failed = scipy.sparse.linalg.gmres(
+        operator, wanted.ravel(), rtol=SHARING_TOLERANCE, atol=0.0, restart=80, maxiter=10
+    )
     if failed:
         raise AsperityError("the heat could not be shared between the bodies; is the film far thinner than a cell?")
     return np.asarray(np.where(exchanging, solved.reshape(heat.shape) * scale, 0.0))

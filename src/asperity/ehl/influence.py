@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from asperity.arrays import Field
 from asperity.grid import Grid
@@ -52,8 +53,6 @@ class Tractions:
 
     def stresses(self, depth: float, poisson_ratio: float, *, keep: bool = True) -> Field:
         """σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz [Pa] below every cell's centre, shape (6, nx, ny)."""
-        import scipy.fft as fft
-
         (nx, ny), (_, repeats) = self.grid.cells, self.grid.periodic
         influence = _kept_influence if keep and nx * ny <= CACHED_CELLS else _influence
         kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
@@ -64,17 +63,15 @@ class Tractions:
                 if traction is not None:
                     turn = np.complex64(1j ** (odd[component] + ODD_IN_Y[component]))
                     _accumulate(waves, kernel[component], odd[component], turn * traction)
-            along_x = fft.ifft(waves, axis=0, overwrite_x=True)[:nx]
-            out[:] = fft.irfft(along_x, n=ny if repeats else 2 * ny, axis=1)[:, :ny]
+            along_x = scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx]
+            out[:] = scipy.fft.irfft(along_x, n=ny if repeats else 2 * ny, axis=1)[:, :ny]
         return stresses
 
 
 def _transformed(field: Field, grid: Grid) -> Waves:
-    import scipy.fft as fft
-
     (nx, ny), (_, repeats) = grid.cells, grid.periodic
     field = field.astype(np.float32)
-    return np.asarray(fft.fft(fft.rfft(field, n=ny if repeats else 2 * ny, axis=1), n=2 * nx, axis=0))
+    return np.asarray(scipy.fft.fft(scipy.fft.rfft(field, n=ny if repeats else 2 * ny, axis=1), n=2 * nx, axis=0))
 
 
 def _accumulate(waves: Waves, kernel: Field, odd: bool, traction: Waves) -> None:
@@ -197,8 +194,6 @@ def _below_surface(cells: tuple[int, int], spacing: tuple[float, float], nu: flo
 
 def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float) -> Field:
     """Transformed kernels of a loaded cell and its three nearest images along y, shape as of `_waves`."""
-    import scipy.fft as fft
-
     (nx, ny), (dx, dy) = cells, spacing
     reach = min(nx, int(NEARBY * ny * dy / dx) + 1)
     rectangles = _rectangles((reach, 2 * ny), spacing, depth, nu)
@@ -206,7 +201,7 @@ def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, 
     for traction, component in np.ndindex(2, 6):
         given, odd = rectangles[traction, component], ODD_IN_Y[component]
         ahead, behind = given[:, :ny] + given[:, ny:-1], given[:, ny:0:-1] + given[:, :ny:-1]
-        waves = fft.rfft(ahead - behind if odd else ahead + behind, axis=1)
+        waves = scipy.fft.rfft(ahead - behind if odd else ahead + behind, axis=1)
         kernels[traction, component, : reach + 1] = waves.imag if odd else waves.real
     return _to_waves(kernels, axis=-2)
 
@@ -285,17 +280,13 @@ def _aliased(along: Field, across: Field, spacing: tuple[float, float], depth: f
 
 def _to_waves(kernels: Field, axis: int) -> Field:
     """Transform kernels at cells 0, 1, ... n to wavenumbers 0, 1, ... n of the even or odd sequence of 2n cells."""
-    import scipy.fft as fft
-
     odd_axes = ODD_IN_X if axis == -2 else (ODD_IN_Y, ODD_IN_Y)
-    return _by_parity(kernels, axis, odd_axes, fft.dct, fft.dst)
+    return _by_parity(kernels, axis, odd_axes, scipy.fft.dct, scipy.fft.dst)
 
 
 def _to_cells(waves: Field) -> Field:
     """The inverse of `_to_waves` along x."""
-    import scipy.fft as fft
-
-    return _by_parity(waves, -2, ODD_IN_X, fft.idct, fft.idst)
+    return _by_parity(waves, -2, ODD_IN_X, scipy.fft.idct, scipy.fft.idst)
 
 
 def _by_parity(

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 from asperity.ehl.problem import Balance, Past
@@ -149,15 +150,12 @@ class _Pattern(NamedTuple):
 
     def factored(self, stencil: Stencil) -> Any:
         """LU factors of the stencil's matrix."""
-        from scipy.sparse import csc_array
-        from scipy.sparse.linalg import splu
-
         count = self.order.size
         entries = np.stack([part.ravel() for part in stencil]).ravel()
         values = np.bincount(self.position, weights=entries, minlength=self.rows.size + 1)[:-1]
-        matrix = csc_array((values, self.rows, self.columns), shape=(count, count))
+        matrix = scipy.sparse.csc_array((values, self.rows, self.columns), shape=(count, count))
         # small panels: these matrices are too sparse for the dense blocks that SuperLU looks for
-        return splu(
+        return scipy.sparse.linalg.splu(
             matrix,
             permc_spec="NATURAL",
             diag_pivot_thresh=0.0,
@@ -176,9 +174,6 @@ class _Pattern(NamedTuple):
 @lru_cache(maxsize=16)
 def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     """The pattern of a grid, found once."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
     index = np.arange(cells[0] * cells[1]).reshape(cells)
     nowhere = np.full((1, cells[1]), -1)
     columns = np.stack([
@@ -191,8 +186,12 @@ def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
     rows = np.broadcast_to(index.ravel(), columns.shape)
     there = columns >= 0
     shape = (index.size, index.size)
-    model = csc_array((np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])), shape=shape)
-    fill = splu(model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    model = scipy.sparse.csc_array(
+        (np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])), shape=shape
+    )
+    fill = scipy.sparse.linalg.splu(
+        model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
     order = np.argsort(fill.perm_c)
     place = np.empty(index.size, int)
     place[order] = np.arange(index.size)

@@ -17,10 +17,13 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
+from asperity.ehl.outcome import ATTEMPTS, Options
+from asperity.ehl.posing import contact_problem
 from asperity.ehl.problem import Balance, Past, Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.solution import ATTEMPTS, ContactSolution, Options
-from asperity.ehl.solve import Progress, Search, contact_problem, solve_contact
+from asperity.ehl.search import Progress, Search
+from asperity.ehl.solution import ContactSolution
+from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import ContactState, state_of
 from asperity.errors import BadInput, require_positive
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED

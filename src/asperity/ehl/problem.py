@@ -12,6 +12,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.deflection import Deflection, deflection
+from asperity.ehl.shares import within_ellipse
 from asperity.ehl.transfer import averaged
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
@@ -126,10 +127,7 @@ class Problem:
 
     def zone(self, share: float = 1.0) -> Mask:
         """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
-        dx, dy = self.spacing
-        along = self.x / max(share, dx)
-        across = self.y / max(share * self.form.aspect, dy)
-        return np.asarray((along**2)[:, None] + across**2 <= 1.0)
+        return within_ellipse(self.x, self.y, (share, share * self.form.aspect), self.spacing)
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""

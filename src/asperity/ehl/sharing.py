@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.ehl.problem import CLOSED_WITHIN
+from asperity.ehl.shares import area_share, carried_share, hertz_zone
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.state import hertz_zone
 from asperity.errors import require_positive
 
 FILMS = (20e-9, 50e-9, 100e-9, 200e-9)  # [m]
@@ -49,7 +49,7 @@ def clr_below(solution: ContactSolution, film: float) -> float:
     """
     require_positive("film", film, "m")
     thin = solution.gap <= (1.0 + CLOSED_WITHIN) * film
-    return float(solution.pressure[thin].sum() / solution.pressure.sum())
+    return carried_share(solution.pressure, thin)
 
 
 def sharing_by_film(solution: ContactSolution) -> LoadSharing:
@@ -58,10 +58,10 @@ def sharing_by_film(solution: ContactSolution) -> LoadSharing:
     films = (solution.options.contact_film, *(film for film in FILMS if film > solution.options.contact_film))
     content = np.ones_like(solution.gap) if solution.oil is None else solution.oil.content
     return LoadSharing(
-        clr_solid=float(solution.pressure[solution.in_contact].sum() / solution.pressure.sum()),
-        car_solid=float(solution.in_contact[zone].mean()),
+        clr_solid=carried_share(solution.pressure, solution.in_contact),
+        car_solid=area_share(solution.in_contact, zone),
         films=films,
         below=tuple(clr_below(solution, film) for film in films),
-        cavitated=float(solution.cavitated[zone].mean()),
+        cavitated=area_share(solution.cavitated, zone),
         oil=float((content * solution.gap)[zone].mean()),
     )

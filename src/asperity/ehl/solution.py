@@ -1,158 +1,45 @@
-"""What a contact solve returns: fields, how it converged, and the way to disk and back."""
+"""What a contact solve returns: fields, how it converged, and its way to disk; `asperity.ehl.storage` reads it back."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from enum import StrEnum
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
-from asperity.errors import BadInput, require_positive
+from asperity.ehl.outcome import Convergence, Options
+from asperity.errors import BadInput
+from asperity.files import versions, whole_file
 from asperity.grid import Grid
-from asperity.lubricant import Lubricant
+from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.quantities import quantity
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
     import xarray
 
-
-UNIFIED, CONSERVING = MODELS = ("unified", "conserving")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
-    """How hard to solve.
-
-    Parameters
-    ----------
-    tolerance : bound on residual, load error and change, each relative
-    max_iterations : Newton steps allowed on each grid level and in each attempt
-    contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
-        some per cent per factor of ten, so it belongs beside every CLR.
-    model : "unified", which lets oil vanish where bodies touch and appear where it ruptures, or "conserving"
-    """
-
-    tolerance: float = 1e-4
-    max_iterations: int = 200
-    contact_film: float = 5e-9
-    model: str = UNIFIED
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < 0.1:
-            raise BadInput(f"tolerance must lie between 0 and 0.1, got {self.tolerance:g}; 1e-4 is the default")
-        if self.max_iterations < 1:
-            raise BadInput(f"max_iterations must be at least 1, got {self.max_iterations}")
-        require_positive("contact film", self.contact_film, "m")
-        if self.model not in MODELS:
-            raise BadInput(f"model must be {' or '.join(MODELS)}, got {self.model!r}")
-
-
-# what is tried, one after the other, until one converges
-ATTEMPTS = (
-    "coarse to fine",
-    "with the second-order wedge of rough bodies",  # smooth bodies only: they have a better one at first
-    "with the bodies held while their distance was searched",
-)
-
-
-class SolveStatus(StrEnum):
-    """How a solve ended."""
-
-    CONVERGED = "converged"
-    OUT_OF_ITERATIONS = "out of iterations"
-    STALLED = "stalled"
-
-
-@dataclass(frozen=True, slots=True)
-class Iteration:
-    """Where a Newton step led: grid cells, step number on that grid, and three relative figures that must become small.
-
-    Number 0 is the start on that grid, which no step has led to: its change is infinite.
-    """
-
-    cells: tuple[int, int]
-    number: int
-    residual: float
-    load_error: float
-    change: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Figures:
-    """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors."""
-
-    car: float
-    clr: float
-    h_min: float
-    h_central: float
-
-    def off(self, other: "Figures") -> "Figures":
-        """Absolute differences."""
-        return self._each(other, lambda mine, theirs: abs(mine - theirs))
-
-    def plus(self, other: "Figures") -> "Figures":
-        """Sums."""
-        return self._each(other, lambda mine, theirs: mine + theirs)
-
-    def at_least(self, other: "Figures") -> "Figures":
-        """The larger of each pair."""
-        return self._each(other, max)
-
-    def times(self, factor: float) -> "Figures":
-        """All of them times a factor."""
-        return self._each(self, lambda mine, _: factor * mine)
-
-    def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
-        names = ("car", "clr", "h_min", "h_central")
-        return Figures(**{name: merge(getattr(self, name), getattr(other, name)) for name in names})
-
-
-@dataclass(frozen=True, slots=True)
-class Convergence:
-    """How the solve went: status, every step on every grid level, and the time it took [s].
-
-    `attempt` is the manner that led here: the first, unless what was tried before it failed. `iteration_error` is how
-    far the last step moved the figures, `discretisation_error` what the cells' size may have done to them, from the
-    solutions on coarser grids: None on a grid too small to have a coarser one. A warm start hands on its own.
-    """
-
-    status: SolveStatus
-    history: tuple[Iteration, ...]
-    tolerance: float
-    seconds: float
-    attempt: str = ATTEMPTS[0]
-    iteration_error: Figures | None = None
-    discretisation_error: Figures | None = None
-
-    @property
-    def error(self) -> Figures | None:
-        """How far off the figures may be: iteration and discretisation error together."""
-        if self.iteration_error is None or self.discretisation_error is None:
-            return None
-        return self.iteration_error.plus(self.discretisation_error)
-
-    @property
-    def converged(self) -> bool:
-        """Whether residual, load error and change all met the tolerance on the finest grid."""
-        return self.status is SolveStatus.CONVERGED
-
-    @property
-    def iterations(self) -> int:
-        """Newton steps on all grid levels together."""
-        return sum(step.number > 0 for step in self.history)
-
-    def explain(self) -> str:
-        """One sentence on how the solve ended."""
-        last = self.history[-1]
-        tried = "" if self.attempt == ATTEMPTS[0] else f", at last {self.attempt},"
-        return (
-            f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "
-            f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change {last.change:.1e}; "
-            f"tolerance {self.tolerance:.0e}"
-        )
+FORMAT = 1  # counts up when a reader of the format before could not read the file
+LAWS: dict[str, dict[str, Any]] = {
+    "viscosity": VISCOSITY_LAWS,
+    "density": DENSITY_LAWS,
+    "rheology": RHEOLOGY_LAWS,
+    "friction": FRICTION_LAWS,
+}
+HEADINGS = ("Conventions", "title", "source", "asperity_format")  # attributes of the file, and those that hold JSON
+DESCRIBED = ("conditions", "lubricant", "options", "grid", "convergence", "versions")
+ERRORS = ("iteration_error", "discretisation_error")
+OIL = {"film_content": "content", "oil_pressure": "pressure", "plastic_growth": "growth"}  # variable: field of Oil
+STEPS = {  # variable: what it is
+    "step_number": "step number on its grid",
+    "step_cells_x": "cells of the grid along x",
+    "step_cells_y": "cells of the grid along y",
+    "step_residual": "relative residual",
+    "step_load_error": "relative load error",
+    "step_change": "relative change",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,13 +99,113 @@ class ContactSolution:
         return self.conditions.hardness
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The solution as an xarray dataset with CF attributes; all that `load_solution` needs is in it."""
-        from asperity.ehl.storage import solution_to_dataset
+        """The solution as an xarray dataset with CF attributes; all that `load_solution` needs is in it.
 
-        return solution_to_dataset(self)
+        Fields lie on (x, y), the convergence history on (step). What is not a field travels as JSON in the attributes
+        `conditions`, `lubricant`, `options`, `grid`, `convergence` and `versions`, floats in full; the solution's own
+        attributes, such as its case, stand beside them as they are.
+
+        Raises
+        ------
+        BadInput
+            if one of the solution's attributes bears a name that the format uses itself.
+        """
+        import xarray
+
+        taken = sorted({*HEADINGS, *DESCRIBED} & set(self.attributes))
+        if taken:
+            raise BadInput(f"attribute {taken[0]!r} of the solution is a name that the run file uses itself; rename it")
+        coordinates: dict[str, Any] = {
+            "x": ("x", self.grid.x, {"long_name": "position along rolling", "units": "m", "axis": "X"}),
+            "y": ("y", self.grid.y, {"long_name": "position along the contact line", "units": "m", "axis": "Y"}),
+        }
+        described = self._described()
+        attributes = {
+            "Conventions": "CF-1.11",
+            "title": "Mixed elastohydrodynamic contact",
+            "source": f"asperity {described['versions']['asperity']}",
+            "asperity_format": FORMAT,
+            **{name: json.dumps(value) for name, value in described.items()},
+            **self.attributes,
+        }
+        return xarray.Dataset({**self._maps(), **self._steps()}, coordinates, attributes)
+
+    def _maps(self) -> dict[str, Any]:
+        fields = {"pressure": self.pressure, "gap": self.gap, "surface_height": self.surface.heights}
+        if self.viscosity_factor is not None:
+            fields["viscosity_factor"] = self.viscosity_factor
+        if self.oil is not None:
+            fields |= {name: getattr(self.oil, part) for name, part in OIL.items()}
+        contact = {
+            "long_name": "asperity contact",
+            "flag_values": np.array([0, 1], np.int8),
+            "flag_meanings": "apart touching",
+        }
+        return {
+            **{name: (("x", "y"), values, quantity(name).attributes) for name, values in fields.items()},
+            "in_contact": (("x", "y"), self.in_contact.astype(np.int8), contact),
+            "rigid_approach": ((), self.rigid_approach, quantity("rigid_approach").attributes),
+        }
+
+    def _steps(self) -> dict[str, Any]:
+        rows = [
+            (step.number, *step.cells, step.residual, step.load_error, step.change) for step in self.convergence.history
+        ]
+        columns = zip(*rows, strict=True)
+        return {
+            name: (("step",), np.array(column), {"long_name": text, "units": "1"})
+            for (name, text), column in zip(STEPS.items(), columns, strict=True)
+        }
+
+    def _described(self) -> dict[str, Any]:
+        convergence = self.convergence
+        return {
+            "conditions": asdict(self.conditions),
+            "lubricant": None if self.lubricant is None else _laws_in(self.lubricant),
+            "options": asdict(self.options),
+            "grid": asdict(self.grid),
+            "convergence": {
+                "status": convergence.status.value,
+                "tolerance": convergence.tolerance,
+                "seconds": convergence.seconds,
+                "attempt": convergence.attempt,
+                **{name: getattr(convergence, name) and asdict(getattr(convergence, name)) for name in ERRORS},
+            },
+            "versions": versions(),
+        }
 
     def save(self, path: str | Path) -> Path:
-        """Write the solution as netCDF, whole or not at all, and return the path."""
-        from asperity.ehl.storage import save_solution
+        """Write the solution as netCDF, whole or not at all, and return the path; raises what `save_dataset` does."""
+        return save_dataset(self.to_dataset(), path)
 
-        return save_solution(self, Path(path))
+
+def _laws_in(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
+    described = {}
+    for family, laws in LAWS.items():
+        law = getattr(lubricant, family)
+        name = next((name for name, kind in laws.items() if type(law) is kind), None)
+        if name is None:
+            raise BadInput(f"{type(law).__name__} is not a {family} law that can be kept; add it to its table of laws")
+        described[family] = {"law": name, **asdict(law)}
+    return described
+
+
+def save_dataset(dataset: "xarray.Dataset", path: str | Path) -> Path:
+    """Write a solution's dataset, with whatever was added to it, as netCDF, whole or not at all; return the path.
+
+    Raises
+    ------
+    BadInput
+        if the folder does not exist or cannot be written to.
+    AsperityError
+        if writing fails half way, as on a full disk; nothing is left behind then.
+    """
+    path = Path(path)
+    checked = {"zlib": True, "complevel": 1, "shuffle": True}  # zlib's checksum tells a flipped bit on reading
+    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in dataset.variables}
+    for name, variable in dataset.variables.items():
+        if variable.ndim == 2:
+            encoding[str(name)] |= checked
+    with whole_file(path) as part:
+        dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
+    return path

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Mask
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import OilBalance, evaluate
 from asperity.ehl.conserving_solve import unknowns_of
+from asperity.ehl.posing import contact_problem, smooth_film
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
+from asperity.ehl.shares import CENTRE, area_share, carried_share
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.solve import CENTRE, contact_problem, smooth_film
 from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
@@ -81,10 +81,10 @@ def state_of(solution: ContactSolution, balance: Balance | OilBalance) -> Contac
         unbalanced = np.abs(balance.outflow[zone & (balance.rows.state != LUBRICATED)]).sum()
         carried = balance.film.content[zone].mean() if balance.film else np.inf
     return ContactState(
-        car=float(touching[zone].mean()),
+        car=area_share(touching, zone),
         car_domain=float(touching.mean() * _hertz_areas(solution.conditions, grid)),
-        clr=float(solution.pressure[touching].sum() / solution.pressure.sum()),
-        capped_oil_load_ratio=float(solution.pressure[capped & ~touching].sum() / solution.pressure.sum()),
+        clr=carried_share(solution.pressure, touching),
+        capped_oil_load_ratio=carried_share(solution.pressure, capped & ~touching),
         sq=sq,
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
@@ -95,15 +95,6 @@ def state_of(solution: ContactSolution, balance: Balance | OilBalance) -> Contac
         load_error=balance.load_error,
         mass_flux_imbalance=float(unbalanced * dx * dy / (carried * width)),
     )
-
-
-def hertz_zone(conditions: ContactConditions, grid: Grid) -> Mask:
-    """Cells within the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
-    a, b = conditions.hertz.half_widths
-    dx, dy = grid.spacing
-    along = np.abs(grid.x) / max(a, dx)
-    across = np.zeros(grid.cells[1]) if conditions.geometry == "line" else np.abs(grid.y) / max(b, dy)
-    return np.asarray((along**2)[:, None] + across**2 <= 1.0)
 
 
 def _hertz_areas(conditions: ContactConditions, grid: Grid) -> float:

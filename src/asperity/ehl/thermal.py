@@ -12,8 +12,10 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.flash import FlashTemperature, flash_temperature
-from asperity.ehl.solution import ContactSolution, Options, SolveStatus
-from asperity.ehl.solve import Progress, solve_contact
+from asperity.ehl.outcome import Options, SolveStatus
+from asperity.ehl.search import Progress
+from asperity.ehl.solution import ContactSolution
+from asperity.ehl.solve import solve_contact
 from asperity.ehl.traction import BOUNDARY_FRICTION, Friction, friction, warm_factor
 from asperity.errors import AsperityError, NotConverged
 from asperity.lubricant import Lubricant, Thermal

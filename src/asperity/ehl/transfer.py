@@ -4,6 +4,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 
@@ -26,22 +27,18 @@ def _moved(field: Field, along: Any, across: Any) -> Field:
 @lru_cache(maxsize=64)
 def _averaging(fine: int, coarse: int) -> Any:
     """Share of each fine cell in each coarse one, shape (coarse, fine)."""
-    from scipy.sparse import coo_array
-
     edges = np.union1d(np.arange(fine + 1) / fine, np.arange(coarse + 1) / coarse)
     middles = (edges[1:] + edges[:-1]) / 2.0
     rows, columns = (middles * coarse).astype(int), (middles * fine).astype(int)
-    return coo_array((np.diff(edges) * coarse, (rows, columns)), shape=(coarse, fine)).tocsr()
+    return scipy.sparse.coo_array((np.diff(edges) * coarse, (rows, columns)), shape=(coarse, fine)).tocsr()
 
 
 @lru_cache(maxsize=64)
 def _interpolation(coarse: int, fine: int, *, wraps: bool) -> Any:
     """Weights of the coarse centres on both sides of each fine one, shape (fine, coarse)."""
-    from scipy.sparse import coo_array
-
     place = (np.arange(fine) + 0.5) * (coarse / fine) - 0.5
     left = np.floor(place).astype(int)
     sides = np.concatenate([left, left + 1])
     sides = sides % coarse if wraps else np.clip(sides, 0, coarse - 1)
     weights = np.concatenate([1.0 - (place - left), place - left])
-    return coo_array((weights, (np.tile(np.arange(fine), 2), sides)), shape=(fine, coarse)).tocsr()
+    return scipy.sparse.coo_array((weights, (np.tile(np.arange(fine), 2), sides)), shape=(fine, coarse)).tocsr()

@@ -1,0 +1,142 @@
+"""How hard a contact is to be solved, and how its solution went."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from asperity.errors import BadInput, require_positive
+
+UNIFIED, CONSERVING = MODELS = ("unified", "conserving")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How hard to solve.
+
+    Parameters
+    ----------
+    tolerance : bound on residual, load error and change, each relative
+    max_iterations : Newton steps allowed on each grid level and in each attempt
+    contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
+        some per cent per factor of ten, so it belongs beside every CLR.
+    model : "unified", which lets oil vanish where bodies touch and appear where it ruptures, or "conserving"
+    """
+
+    tolerance: float = 1e-4
+    max_iterations: int = 200
+    contact_film: float = 5e-9
+    model: str = UNIFIED
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 0.1:
+            raise BadInput(f"tolerance must lie between 0 and 0.1, got {self.tolerance:g}; 1e-4 is the default")
+        if self.max_iterations < 1:
+            raise BadInput(f"max_iterations must be at least 1, got {self.max_iterations}")
+        require_positive("contact film", self.contact_film, "m")
+        if self.model not in MODELS:
+            raise BadInput(f"model must be {' or '.join(MODELS)}, got {self.model!r}")
+
+
+# what is tried, one after the other, until one converges
+ATTEMPTS = (
+    "coarse to fine",
+    "with the second-order wedge of rough bodies",  # smooth bodies only: they have a better one at first
+    "with the bodies held while their distance was searched",
+)
+
+
+class SolveStatus(StrEnum):
+    """How a solve ended."""
+
+    CONVERGED = "converged"
+    OUT_OF_ITERATIONS = "out of iterations"
+    STALLED = "stalled"
+
+
+@dataclass(frozen=True, slots=True)
+class Iteration:
+    """Where a Newton step led: grid cells, step number on that grid, and three relative figures that must become small.
+
+    Number 0 is the start on that grid, which no step has led to: its change is infinite.
+    """
+
+    cells: tuple[int, int]
+    number: int
+    residual: float
+    load_error: float
+    change: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors."""
+
+    car: float
+    clr: float
+    h_min: float
+    h_central: float
+
+    def off(self, other: "Figures") -> "Figures":
+        """Absolute differences."""
+        return self._each(other, lambda mine, theirs: abs(mine - theirs))
+
+    def plus(self, other: "Figures") -> "Figures":
+        """Sums."""
+        return self._each(other, lambda mine, theirs: mine + theirs)
+
+    def at_least(self, other: "Figures") -> "Figures":
+        """The larger of each pair."""
+        return self._each(other, max)
+
+    def times(self, factor: float) -> "Figures":
+        """All of them times a factor."""
+        return self._each(self, lambda mine, _: factor * mine)
+
+    def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
+        names = ("car", "clr", "h_min", "h_central")
+        return Figures(**{name: merge(getattr(self, name), getattr(other, name)) for name in names})
+
+
+@dataclass(frozen=True, slots=True)
+class Convergence:
+    """How the solve went: status, every step on every grid level, and the time it took [s].
+
+    `attempt` is the manner that led here: the first, unless what was tried before it failed. `iteration_error` is how
+    far the last step moved the figures, `discretisation_error` what the cells' size may have done to them, from the
+    solutions on coarser grids: None on a grid too small to have a coarser one. A warm start hands on its own.
+    """
+
+    status: SolveStatus
+    history: tuple[Iteration, ...]
+    tolerance: float
+    seconds: float
+    attempt: str = ATTEMPTS[0]
+    iteration_error: Figures | None = None
+    discretisation_error: Figures | None = None
+
+    @property
+    def error(self) -> Figures | None:
+        """How far off the figures may be: iteration and discretisation error together."""
+        if self.iteration_error is None or self.discretisation_error is None:
+            return None
+        return self.iteration_error.plus(self.discretisation_error)
+
+    @property
+    def converged(self) -> bool:
+        """Whether residual, load error and change all met the tolerance on the finest grid."""
+        return self.status is SolveStatus.CONVERGED
+
+    @property
+    def iterations(self) -> int:
+        """Newton steps on all grid levels together."""
+        return sum(step.number > 0 for step in self.history)
+
+    def explain(self) -> str:
+        """One sentence on how the solve ended."""
+        last = self.history[-1]
+        tried = "" if self.attempt == ATTEMPTS[0] else f", at last {self.attempt},"
+        return (
+            f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "
+            f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change {last.change:.1e}; "
+            f"tolerance {self.tolerance:.0e}"
+        )

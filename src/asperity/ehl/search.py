@@ -1,0 +1,190 @@
+"""The way from a guess on the coarsest grid to the solution on the finest, and the decision when to stop."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from asperity.arrays import Field, Mask
+from asperity.conditions import ContactConditions
+from asperity.ehl.iterate import Step, newton
+from asperity.ehl.outcome import ATTEMPTS, Convergence, Figures, Iteration, Options, SolveStatus
+from asperity.ehl.problem import Problem
+from asperity.ehl.scales import Scales
+from asperity.ehl.shares import CENTRE, area_share, carried_share
+from asperity.ehl.solution import ContactSolution
+from asperity.ehl.transfer import interpolated
+from asperity.lubricant import Lubricant
+from asperity.surface import Surface
+
+Progress = Callable[[Iteration], None]
+
+COARSE_TOLERANCE = 1e-3  # a coarse solution only has to be a good start
+MOST_COARSE_ITERATIONS = 40
+MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
+FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
+
+
+class Search:
+    """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
+
+    def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
+        self.options, self.gap_scale, self.progress = options, gap_scale, progress
+        self.history: list[Iteration] = []
+        self.figures: list[Figures] = []  # a grid each, since the last climb began
+        self.iteration_error: Figures | None = None
+        self.smooth = False
+        self.lost = False
+
+    @property
+    def discretisation_error(self) -> Figures | None:
+        """From the last grids; see `grid_error`."""
+        return grid_error(self.figures, smooth=self.smooth)
+
+    def settled(self, tolerance: float) -> bool:
+        """Whether the last step met the tolerance in residual, load and change."""
+        last = self.history[-1]
+        return last.residual < tolerance and last.load_error < tolerance and last.change < tolerance
+
+    def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
+        """Solve on grid after grid, from the last, coarsest one to the first."""
+        options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
+        for problem in reversed(levels):
+            coarsest, finest = problem is levels[-1], problem is levels[0]
+            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            if problem.cells != pressure.shape:
+                pressure = interpolated(pressure, problem.cells)
+            if held:
+                step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
+            else:
+                most = options.max_iterations if finest else min(options.max_iterations, MOST_COARSE_ITERATIONS)
+                step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
+                if coarsest and not finest and not self.settled(FAR_OFF):
+                    # a capped contact answers its approach too unevenly for Newton
+                    found = self.position(problem, pressure, approach, tolerance, from_outside=True)
+                    step = found if self.settled(FAR_OFF) else step
+            pressure, approach = step.balance.pressure, step.approach
+            self.figures.append(self._figures(step))
+        return step
+
+    def run(
+        self, problem: Problem, steps: Iterator[Step], tolerance: float, most: int, *, of_load: bool = True
+    ) -> Step:
+        """Take steps until they meet the tolerance, `of_load` too, or there have been too many."""
+        before = step = next(steps)
+        while True:
+            self._record(problem, step)
+            last = self.history[-1]
+            load_error = last.load_error if of_load else 0.0
+            self.lost = step.number > 0 and not np.isfinite(step.change)
+            if max(last.residual, load_error, last.change) < tolerance or step.number >= most or self.lost:
+                break
+            before, step = step, next(steps)
+        self.iteration_error = self._figures(step).off(self._figures(before))
+        return step
+
+    def position(
+        self, problem: Problem, pressure: Field, approach: float, tolerance: float, *, from_outside: bool
+    ) -> Step:
+        """The contact held at approach after approach until it carries the load: slower, but each is a simple problem.
+
+        The load falls as the bodies part; the approach is bracketed, then found by false position (Illinois).
+        """
+        roughness = float(np.std(problem.roughness))
+        stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
+        approach += 2.0 * roughness if from_outside else 0.0
+        bracket: dict[bool, tuple[float, float]] = {}  # by whether too much is carried: approach and load error
+        last_side, left = None, self.options.max_iterations
+        while True:
+            most = min(left, MOST_HELD_ITERATIONS)
+            step = self.run(problem, newton(problem, pressure, approach, held=True), tolerance, most, of_load=False)
+            left -= max(step.number, 1)
+            pressure, error = step.balance.pressure, step.balance.load_error
+            if left <= 0 or self.lost or self.settled(tolerance):
+                return step
+            side = error > 0.0
+            bracket[side] = approach, error
+            if len(bracket) < 2:
+                approach += stride if side else -stride
+                stride *= 1.5
+                continue
+            if side == last_side:  # the other end is standing still: give it less weight
+                bracket[not side] = bracket[not side][0], 0.5 * bracket[not side][1]
+            last_side = side
+            (near, too_much), (apart, too_little) = bracket[True], bracket[False]
+            share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
+            approach = near + share * (apart - near)
+
+    def solution(
+        self,
+        step: Step,
+        surface: Surface,
+        conditions: ContactConditions,
+        lubricant: Lubricant | None,
+        *,
+        seconds: float,
+        attempt: str = ATTEMPTS[0],
+        discretisation: Figures | None = None,
+        viscosity_factor: Field | None = None,
+    ) -> ContactSolution:
+        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all."""
+        scales, balance = Scales.of(conditions, lubricant), step.balance
+        stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
+        lines = surface.grid.cells[1] // balance.problem.cells[1]
+        pressure, gap = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.gap, lines, axis=1)
+        return ContactSolution(
+            conditions=conditions,
+            lubricant=lubricant,
+            surface=surface,
+            options=self.options,
+            pressure=pressure * scales.pressure,
+            gap=np.maximum(gap, 0.0 if lubricant is None else balance.problem.contact_gap) * scales.gap,
+            in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
+            rigid_approach=step.approach * scales.gap,
+            convergence=Convergence(
+                status=SolveStatus.CONVERGED if self.settled(self.options.tolerance) else stopped,
+                history=tuple(self.history),
+                tolerance=self.options.tolerance,
+                seconds=seconds,
+                attempt=attempt,
+                iteration_error=self.iteration_error,
+                discretisation_error=discretisation,
+            ),
+            viscosity_factor=viscosity_factor,
+        )
+
+    def _figures(self, step: Step) -> Figures:
+        balance = step.balance
+        gap = np.maximum(balance.gap, balance.problem.contact_gap)
+        touching = balance.in_contact & (balance.pressure > 0.0)
+        return figures(balance.problem, balance.pressure, touching, gap, self.gap_scale)
+
+    def _record(self, problem: Problem, step: Step) -> None:
+        balance = step.balance
+        iteration = Iteration(problem.cells, step.number, balance.residual_rms, abs(balance.load_error), step.change)
+        self.history.append(iteration)
+        if self.progress:
+            self.progress(iteration)
+
+
+def grid_error(on_grids: Sequence[Figures], *, smooth: bool) -> Figures | None:
+    """From the last grids, Roache's grid convergence index: their difference for a smooth, second-order solution.
+
+    That is three times its error. A rough one has no such order and gets twice the difference, but no less than a
+    quarter of that between the grids before, lest two grids agree by chance; None for one grid alone. Source: P. J.
+    Roache, J. Fluids Eng. 116 (1994) 405.
+    """
+    if len(on_grids) < 2:
+        return None
+    *before, coarse, fine = on_grids
+    error = fine.off(coarse).times(1.0 if smooth else 2.0)
+    return error.at_least(coarse.off(before[-1]).times(0.25)) if before else error
+
+
+def figures(problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float) -> Figures:
+    """The first figures of dimensionless fields; lengths in the unit of `gap_scale`."""
+    return Figures(
+        car=area_share(touching, problem.zone()),
+        clr=carried_share(pressure, touching),
+        h_min=float(gap.min()) * gap_scale,
+        h_central=float(gap[problem.zone(CENTRE)].mean()) * gap_scale,
+    )
