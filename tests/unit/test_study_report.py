@@ -19,11 +19,24 @@ import asperity
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.errors import BadInput
-from asperity.report import study_figures, study_page, sweep_figures, write_study_report
+from asperity.paper import is_papers_contact
+from asperity.report import study_figures, sweep_figures, write_study_report
 from asperity.report.figures import CONTACT_COLOUR
 from asperity.report.study_figures import ON_PAGE, ON_PAPER
-from asperity.report.study_page import StudyReport, papers_contact
-from asperity.study import PAPER_ANCHORS, Anchor, StudyResult, curve_of, load_study, plan_points, run_study
+from asperity.report.study_page import StudyReport
+from asperity.study import (
+    PAPER_ANCHORS,
+    Anchor,
+    StudyOverview,
+    StudyResult,
+    curve_of,
+    group_means,
+    load_study,
+    overview,
+    plan_points,
+    run_study,
+    swept_axis,
+)
 
 PAPERS = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
 SMALL = PAPERS.with_overrides({"grid.cells": "[48, 32]", "surface.correlation_length": "40 um"})
@@ -51,7 +64,7 @@ def wear(folder):
 
 @pytest.fixture(scope="module")
 def report(wear):
-    return StudyReport(wear, None, lambda _: None)
+    return StudyReport(StudyOverview(wear))
 
 
 @pytest.fixture(scope="module")
@@ -96,9 +109,9 @@ def with_knee(knee_um=2.5, *, seeds=5, scatter_hz=4.0):
 
 def without_maps(result):
     """The report of a study that was never solved, and so has no contacts to map."""
-    report = StudyReport(result, None, lambda _: None)
-    report.__dict__["mapped"] = []
-    return report
+    overview = StudyOverview(result)
+    overview.__dict__["mapped"] = []
+    return StudyReport(overview)
 
 
 def plain(text):
@@ -170,7 +183,7 @@ def test_failures_are_loud_and_left_out():
     assert "2 of 75 cases failed or did not converge" in page.text
     (row,) = [row for row in page.rows if row[0] == "failed: <b>no</b> surface"]
     assert [plain(cell) for cell in row[1:]] == ["1", "surface.sq 0.5 µm (1 of 5 surfaces)"]
-    axes = study_figures.shares(report.curve, (), ON_PAGE).axes[0]
+    axes = study_figures.shares(report.study.curve, (), ON_PAGE).axes[0]
     assert line(axes, "CLR, share of the load").get_ydata()[0] == pytest.approx(10.0)  # 0.2 a micrometre, not 900 %
     assert max(np.max(one.get_ydata()) for one in axes.get_lines()) < 100.0
 
@@ -180,7 +193,7 @@ def test_many_reasons_are_summed_up():
     table = study.table.copy()
     table.loc[:13, "status"] = "not converged"
     table.loc[:13, "reason"] = [f"stalled at a residual of {number}e-3" for number in (1, 1, *range(1, 13))]
-    reasons = without_maps(replace(study, table=table)).reasons
+    reasons = without_maps(replace(study, table=table)).study.reasons
     assert [reason.number for reason in reasons] == [3] + 9 * [1] + [2]
     assert reasons[-1].text == "2 other reasons"
 
@@ -188,11 +201,11 @@ def test_many_reasons_are_summed_up():
 def test_all_failed_is_a_page_and_nothing_computed_is_refused():
     study = with_knee()
     none = replace(study, table=study.table.assign(status="failed", reason="no oil"))
-    page = Page(StudyReport(none, None, lambda _: None).page())
+    page = Page(StudyReport(StudyOverview(none)).page())
     assert "75 OF 75 CASES FAILED" in page.text
     assert not page.images()
     with pytest.raises(BadInput, match=r"no computed case yet, of 75"):
-        StudyReport(replace(study, table=study.table[:0]), None, lambda _: None)
+        StudyReport(StudyOverview(replace(study, table=study.table[:0])))
 
 
 def test_a_case_without_vibration_has_no_resonance_to_show():
@@ -210,7 +223,7 @@ def test_a_case_without_vibration_has_no_resonance_to_show():
 def test_unfinished_study_says_so():
     study = with_knee()
     report = without_maps(replace(study, table=study.table[:60]))
-    assert report.notes == ["15 of 75 cases have not been computed yet: run the study again."]
+    assert report.study.notes == ["15 of 75 cases have not been computed yet: run the study again."]
 
 
 # The paper's figures -------------------------------------------------------------------------------------------------
@@ -280,11 +293,11 @@ def test_rings_of_the_rig_stand_beside_the_prediction():
 
 
 def test_maps_show_the_contact_of_the_study(report, wear):
-    figure = study_figures.contact_maps(report.runs, ON_PAPER)
+    figure = study_figures.contact_maps(report.study.runs, ON_PAPER)
     panels = [axes for axes in figure.axes if axes.images]
     firsts = wear.table.groupby("surface.sq").first()
     assert len(panels) == len(LEVELS_UM)
-    for axes, (sq, row), run in zip(panels, firsts.iterrows(), report.runs, strict=True):
+    for axes, (sq, row), run in zip(panels, firsts.iterrows(), report.study.runs, strict=True):
         title = axes.get_title("left")
         assert f"Sq {1e6 * sq:.3g} µm" in title
         shown = [float(share) for share in re.findall(r"([\d.]+) %", title)]
@@ -293,11 +306,11 @@ def test_maps_show_the_contact_of_the_study(report, wear):
         yellow = np.all(np.isclose(image, to_rgb(CONTACT_COLOUR)), axis=2)
         in_zone = np.abs(run.case.grid.x) <= run.case.conditions.hertz.half_widths[0]
         assert yellow[:, in_zone].mean() == pytest.approx(row["car"])  # an image's rows are y
-    assert not report.notes
+    assert not report.study.notes
 
 
 def test_surfaces_share_one_scale(report):
-    figure = study_figures.surfaces(report.runs, ON_PAPER)
+    figure = study_figures.surfaces(report.study.runs, ON_PAPER)
     images = [axes.images[0] for axes in figure.axes if axes.images]
     assert len({image.get_clim() for image in images}) == 1
     spread = [float(np.std(image.get_array())) for image in images]
@@ -307,8 +320,8 @@ def test_surfaces_share_one_scale(report):
 def test_a_map_that_differs_from_the_table_is_said(wear):
     table = wear.table.copy()
     table.loc[table["number"] == 3, "clr"] += 0.01
-    report = StudyReport(replace(wear, table=table), None, lambda _: None)
-    (note,) = report.notes
+    report = StudyReport(StudyOverview(replace(wear, table=table)))
+    (note,) = report.study.notes
     assert note.startswith("The contact mapped at Sq 1 µm, solved anew, has a CLR of")
 
 
@@ -323,14 +336,14 @@ def test_a_map_that_differs_from_the_table_is_said(wear):
     ],
 )
 def test_printed_numbers_stand_beside_the_papers_contact_only(overrides, papers):
-    assert papers_contact(PAPERS.with_overrides(overrides)) is papers
+    assert is_papers_contact(PAPERS.with_overrides(overrides)) is papers
 
 
 def test_anchors_of_ones_own_replace_the_papers(wear):
     own = (Anchor(name="CLR of my rig", quantity="clr", value=0.7, tolerance=0.1, sq=2e-6),)
-    report = StudyReport(wear, own, lambda _: None)
+    report = StudyReport(StudyOverview(wear, own))
     assert [shown.name for shown in report.figures] == ["shares", "resonance", "contact-maps", "surfaces"]
-    axes = study_figures.shares(report.curve, own, ON_PAGE).axes[0]
+    axes = study_figures.shares(report.study.curve, own, ON_PAGE).axes[0]
     assert points_of(axes, "CLR, given") == pytest.approx(np.array([[2.0, 70.0]]))
     assert [row["name"] for row in report._anchor_rows()] == ["CLR of my rig"]
 
@@ -349,7 +362,7 @@ def over_two():
 
 
 def test_means_over_two_quantities_as_a_map():
-    report = StudyReport(over_two(), None, lambda _: None)
+    report = StudyReport(StudyOverview(over_two()))
     assert [shown.name for shown in report.figures] == [
         "against-contact-load", "against-surface-correlation-length",
         "over-contact-load-and-surface-correlation-length",
@@ -366,14 +379,14 @@ def test_means_over_two_quantities_as_a_map():
 def test_what_has_no_case_has_no_colour():
     study = over_two()
     study.table.loc[study.table["point"] == 4, "status"] = "failed"
-    figure = StudyReport(study, None, lambda _: None).figures[-1].draw(ON_PAGE)
+    figure = StudyReport(StudyOverview(study)).figures[-1].draw(ON_PAGE)
     image = np.ma.filled(figure.axes[0].images[0].get_array(), np.nan)
     assert np.isnan(image[1, 1])
     assert np.isnan(image).sum() == 1
 
 
 def test_means_against_one_quantity_have_students_interval():
-    report = StudyReport(over_two(), None, lambda _: None)
+    report = StudyReport(StudyOverview(over_two()))
     axes = report.figures[0].draw(ON_PAPER).axes[0]
     at_200 = np.array([10, 20, 30, 40, 50, 60])
     (bars,) = axes.containers
@@ -385,10 +398,10 @@ def test_means_against_one_quantity_have_students_interval():
 def test_samples_are_averaged_in_groups():
     sq = np.random.default_rng(1).uniform(0.5, 3.0, 40)
     points = [{"surface.sq": f"{value:.4f} um", "lubricant.viscosity.alpha": "20 1/GPa"} for value in sq]
-    report = StudyReport(made(points, clr=sq / 4.0), None, lambda _: None)
-    (axis,) = report.axes  # alpha has one value: no axis
+    report = StudyReport(StudyOverview(made(points, clr=sq / 4.0)))
+    (axis,) = report.study.axes  # alpha has one value: no axis
     assert axis.binned
-    x, mean, low, high = sweep_figures.means(axis.values, 25.0 * axis.values, binned=True)
+    x, mean, low, high = group_means(axis.values, 25.0 * axis.values, binned=True)
     assert len(x) == 8
     assert mean == pytest.approx(25.0 * x)
     assert mean.mean() == pytest.approx(25.0 * axis.values.mean())  # groups of five
@@ -402,20 +415,20 @@ def test_samples_are_averaged_in_groups():
 )
 def test_values_that_crowd_low_get_a_logarithmic_axis(values, logarithmic):
     study = made([{"contact.slip": float(value)} for value in values], clr=np.arange(len(values)))
-    assert sweep_figures.axis_of(study.plan, study.table, "contact.slip").logarithmic is logarithmic
+    assert swept_axis(study.plan, study.table, "contact.slip").logarithmic is logarithmic
 
 
 def test_a_point_that_leaves_a_key_alone_has_the_cases_own_value():
     study = made([{"contact.load": "200 N"}, {"surface.sq": "2 um"}], clr=[0.1, 0.2])
-    assert sweep_figures.axis_of(study.plan, study.table, "contact.load").values.tolist() == [200.0, 500.0]
-    assert sweep_figures.axis_of(study.plan, study.table, "surface.sq").values.tolist() == [1.0, 2.0]
+    assert swept_axis(study.plan, study.table, "contact.load").values.tolist() == [200.0, 500.0]
+    assert swept_axis(study.plan, study.table, "surface.sq").values.tolist() == [1.0, 2.0]
 
 
 def test_many_cases_are_a_picture():
     sq = np.linspace(0.5, 3.0, 4000)
     study = made([{"surface.sq": f"{value:.6f} um"} for value in sq], clr=sq / 4.0, car=sq / 5.0)
-    axis = sweep_figures.axis_of(study.plan, study.table, "surface.sq")
-    figure = sweep_figures.against(study.table, axis, sweep_figures.outputs_of(study.table), ON_PAGE)
+    axis = swept_axis(study.plan, study.table, "surface.sq")
+    figure = sweep_figures.against(study.table, axis, StudyReport(StudyOverview(study)).outputs, ON_PAGE)
     drawing = io.BytesIO()
     figure.savefig(drawing, format="svg")
     assert drawing.tell() < 200_000  # 8000 dots as drawings take a megabyte
@@ -424,7 +437,7 @@ def test_many_cases_are_a_picture():
 def test_names_are_places_on_an_axis():
     points = [{"surface.correlation_length": pair} for pair in (["10 um", "40 um"], ["20 um", "40 um"])]
     study = made(points, clr=[0.1, 0.2])
-    axis = sweep_figures.axis_of(study.plan, study.table, "surface.correlation_length")
+    axis = swept_axis(study.plan, study.table, "surface.correlation_length")
     assert axis.names == ("10 um, 40 um", "20 um, 40 um")
     assert axis.values.tolist() == [0.0, 1.0]
 
@@ -476,7 +489,7 @@ def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, cap
 
 
 def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(wear, tmp_path, monkeypatch):
-    monkeypatch.setattr(study_page, "solve_case", lambda *_, **__: pytest.fail("solved first"))
+    monkeypatch.setattr(overview, "solve_case", lambda *_, **__: pytest.fail("solved first"))
     (tmp_path / "file").write_text("")
     with pytest.raises(BadInput, match="it is a file; name a folder"):
         write_study_report(wear, tmp_path / "page.html", figures=tmp_path / "file")

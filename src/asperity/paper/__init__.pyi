@@ -1,3 +1,7 @@
+from .contact import is_papers_contact as is_papers_contact
+from .numbers import CITATION as CITATION
+from .numbers import RIG_SPLIT_UM as RIG_SPLIT_UM
+from .numbers import Citation as Citation
 from .rig import CRF_ENDS_HZ as CRF_ENDS_HZ
 from .rig import SAMPLES_SQ_UM as SAMPLES_SQ_UM
 from .rig import SAMPLES_STD_UM as SAMPLES_STD_UM

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from asperity.errors import BadInput
 from asperity.files import require_writable, whole_file
 from asperity.history import History, HistoryVibration
+from asperity.paper import CITATION
 from asperity.report import motion_figures as figures
-from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture
+from asperity.report.page import NOT_FOUND, Picture, Tile, in_print, page_template, picture
 
 _NUMBERS = (  # column, its name, unit, scale, format
     ("clr", "Load share of asperities, CLR", "%", 100.0, ".2f"),
@@ -105,7 +106,7 @@ def render_motion_page(history: History, heard: HistoryVibration | None = None) 
                 "place": [frame.time / last if last else 0.0 for frame in history.frames],
             }
         ),
-        paper=PAPER,
+        paper=CITATION,
     )
 
 

@@ -31,21 +31,13 @@ from asperity.lubricant import (
     Lubricant,
     Newtonian,
 )
+from asperity.paper import CITATION
 from asperity.report import figures, rubbing_figures
 
 if TYPE_CHECKING:
     from asperity.results import Run
 
 NOT_FOUND = "–"
-
-PAPER = {
-    "authors": "Xu, C., Fan, Q., Zhang, Q., Tong, Y., Wang, S., & Wu, T.",
-    "year": 2025,
-    "title": "Vibration-Based Wear Evolution Characterisation of Lubricated Rolling-Sliding Contact",
-    "journal": "Lubricants",
-    "place": "13(2), 78",
-    "doi": "10.3390/lubricants13020078",
-}
 
 
 def write_report(runs: Sequence["Run"], path: str | Path, *, title: str | None = None) -> Path:
@@ -95,7 +87,7 @@ def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
         sphere=any(run.case.vibration and run.case.vibration.stiffness_law == "hertz-point" for run in runs),
         line=any(run.solution.conditions.geometry == "line" for run in runs),
         imbalance=_span([one["mass_flux_imbalance"] for one in scalars]),
-        paper=PAPER,
+        paper=CITATION,
     )
 
 

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from asperity.arrays import Field
+from asperity.paper import RIG_SPLIT_UM
 from asperity.report.figures import (
     BLUE,
     CAVITY_COLOUR,
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from asperity.study import Anchor, WearCurve
     from asperity.wear import Stages
 
-RIG_SPLIT_UM = (1.68, 1.92)  # measured, section 4.2 of the paper
 SPLIT_COLOUR, SPLIT_STRIP = "#8a5a00", "#f2e3c6"
 SPLIT_STROKES: tuple[Any, ...] = ("-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 1)))
 MOST_MARKERS = 20  # on a curve

@@ -10,50 +10,34 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from asperity.case import Case
-from asperity.errors import AsperityError, BadInput
 from asperity.files import make_folder, read_manifest, require_writable, versions, whole_file
+from asperity.paper import CITATION
 from asperity.report import study_figures, sweep_figures
 from asperity.report.figures import MICRO
-from asperity.report.page import NOT_FOUND, PAPER, Tile, in_print, page_template, picture, with_deviation
+from asperity.report.page import NOT_FOUND, Tile, in_print, page_template, picture, with_deviation
 from asperity.report.study_figures import ON_PAGE, ON_PAPER, Medium
-from asperity.report.sweep_figures import Axis, Output, axis_of, outputs_of
-from asperity.results import Run, solve_case
-from asperity.study import BOTH_PRESETS as PRESETS
+from asperity.report.sweep_figures import OUTPUTS, Output, axis_label, place_in_words
 from asperity.study import (
-    DONE,
     FORMAT,
-    PAPER_ANCHORS,
+    GROUPS,
     SEEDS,
     SPLIT,
-    SQ_KEY,
     Anchor,
+    FailureReason,
+    StudyOverview,
     StudyResult,
     WearCurve,
     as_written,
-    compare_with_anchors,
-    curve_of,
-    is_wear_study,
     rig_deviation,
-    rig_prediction,
 )
 
-if TYPE_CHECKING:
-    import pandas
-
-MOST_MAPS = 8  # the paper's Figs 5 and 6 have eight
 MOST_POINTS = 60  # in a table of the page; the csv has all
 MOST_OUTPUTS = 8  # beside each other in it
-MOST_REASONS = 10
-MOST_NAMED = 5  # failed cases named for one reason
-SHOWS = 5e-4  # a difference between shares that a map's percentages would show
-NEAR = 0.1  # of the rig's own values: the paper prints speed and radius in more than one way
-
 
 LEVEL_COLUMNS = {
     "clr": "CLR",
@@ -80,14 +64,6 @@ class Cell(NamedTuple):
 
     value: str
     below: str = ""
-
-
-class Reason(NamedTuple):
-    """Why cases failed, how many, and which."""
-
-    text: str
-    number: int
-    cases: str
 
 
 def write_study_report(
@@ -122,7 +98,7 @@ def write_study_report(
     """
     path = Path(path)
     require_writable(path)
-    report = StudyReport(result, anchors, progress or (lambda _: None))
+    report = StudyReport(StudyOverview(result, anchors, progress), progress)
     if figures is not None:
         folder = _folder(Path(figures))
     page = report.page()
@@ -132,15 +108,6 @@ def write_study_report(
     with whole_file(path) as part:
         part.write_text(page, encoding="utf-8", newline="\n")
     return path
-
-
-def papers_contact(case: Case) -> bool:
-    """Whether a case is the contact of the paper's rig, near enough for its printed numbers to belong beside it."""
-    conditions = case.conditions
-    if conditions.geometry != "line" or case.lubricant is None:
-        return False
-    rigs = {"radius_along_rolling": 5.4e-3, "length": 10e-3, "load": 500.0, "entrainment_speed": 1.91}
-    return all(abs(getattr(conditions, name) - value) <= NEAR * value for name, value in rigs.items())
 
 
 def _folder(path: Path) -> Path:
@@ -153,149 +120,36 @@ def _folder(path: Path) -> Path:
 class StudyReport:
     """What is said about a study: the page, and the figures and tables for a paper. See `write_study_report`."""
 
-    result: StudyResult
-    given: Sequence[Anchor] | None
-    tell: Callable[[str], None]
-
-    def __post_init__(self) -> None:
-        if not len(self.result.table):
-            raise BadInput(
-                f"the study has no computed case yet, of {len(self.result.plan.cases)}; run it with asperity study"
-            )
-
-    # What there is ---------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def used(self) -> "pandas.DataFrame":
-        """The rows that may be used."""
-        table = self.result.table
-        return table[table["status"] == DONE]
-
-    @cached_property
-    def curve(self) -> WearCurve | None:
-        """The wear curve of a study of Sq alone."""
-        return curve_of(self.result) if len(self.used) and is_wear_study(self.result) else None
-
-    @property
-    def papers(self) -> bool:
-        """Whether the paper's printed numbers stand beside the study's."""
-        return self.given is None and self.curve is not None and papers_contact(self.result.plan.case)
-
-    @cached_property
-    def anchors(self) -> tuple[Anchor, ...]:
-        """What the curve should meet."""
-        if self.given is not None:
-            return tuple(self.given)
-        said = {SPLIT, *self.used} if self.curve is not None and self.curve.stages else set(self.used)
-        return tuple(anchor for anchor in PAPER_ANCHORS if self.papers and anchor.quantity in said)
-
-    @cached_property
-    def axes(self) -> list[Axis]:
-        """The swept quantities over the rows that may be used; those with one value are none."""
-        keys = [key for key in self.result.plan.axes if key not in SEEDS]
-        swept = [axis_of(self.result.plan, self.used, key) for key in keys]
-        return [axis for axis in swept if axis.places.size > 1]
+    study: StudyOverview
+    progress: Callable[[str], None] | None = None
 
     @cached_property
     def outputs(self) -> list[Output]:
         """What is shown of the rows."""
-        return outputs_of(self.used)
+        return [output for output in OUTPUTS if output.column in self.study.outputs]
 
-    @cached_property
-    def mapped(self) -> list[int]:
-        """The numbers of the cases whose maps are shown: one surface of a few levels, evenly over Sq."""
-        if self.curve is None:
-            return []
-        wanted = np.linspace(self.curve.sq[0], self.curve.sq[-1], MOST_MAPS)
-        levels = {float(self.curve.sq[np.argmin(np.abs(self.curve.sq - sq))]) for sq in wanted}
-        firsts = self.used[self.used[SQ_KEY].isin(levels)].groupby(SQ_KEY, sort=True)["number"].first()
-        return [int(number) for number in firsts]
-
-    @cached_property
-    def runs(self) -> list[Run] | str:
-        """The mapped cases, solved anew with the seeds they had; or why they cannot be."""
-        from threadpoolctl import threadpool_limits
-
-        runs = []
-        for place, number in enumerate(self.mapped, 1):
-            self.tell(f"map {place} of {len(self.mapped)}")
-            try:
-                case = self.result.plan.case.with_overrides(self.result.plan.cases[number].overrides)
-                with threadpool_limits(1):  # as in the study, so that it is the same to the last bit
-                    runs.append(solve_case(case, strict=False))
-            except AsperityError as refusal:
-                return f"No maps of surface and contact: {refusal}."
-        return runs
-
-    @cached_property
-    def notes(self) -> list[str]:
-        """Sentences to read before the numbers."""
-        said = []
-        if self.result.missing:
-            said.append(
-                f"{self.result.missing} of {len(self.result.plan.cases)} cases have not been computed yet: run the "
-                "study again."
-            )
-        if self.result.plan.realisations == 1:
-            said.append("One surface a point: other seeds give other numbers, and there is no interval of them.")
-        if isinstance(self.runs, str):
-            said.append(self.runs)
-        else:
-            mapped = self.used[self.used["number"].isin(self.mapped)]
-            said += [
-                f"The contact mapped at Sq {run.state.sq * MICRO:.3g} µm, solved anew, has a CLR of "
-                f"{100.0 * run.state.clr:.1f} % and {100.0 * clr:.1f} % in the study's table: other versions made that."
-                for clr, run in zip(mapped["clr"] if len(mapped) else (), self.runs, strict=True)
-                if abs(run.state.clr - clr) > SHOWS
-            ]
-        unheard = {name: self.used[f"crf_{name}_hz"].isna().sum() for name in PRESETS if f"crf_{name}_hz" in self.used}
-        if self.curve is not None and not unheard:
-            said.append("The case has no [vibration]: there is no contact resonance to show.")
-        if any(unheard.values()):
-            counts = ", ".join(f"{count} with the vibration preset {name}" for name, count in unheard.items())
-            said.append(
-                f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); means of CRF and "
-                "CRFA leave them out."
-            )
-        return said
-
-    @cached_property
-    def reasons(self) -> list[Reason]:
-        """Why cases failed, the commonest first."""
-        found = []
-        for (status, text), rows in self.result.failures.groupby(["status", "reason"], sort=False):
-            points = rows["point"].value_counts(sort=False)
-            names = [self._point_in_words(int(str(point)), count) for point, count in points.head(MOST_NAMED).items()]
-            more = f"; and {len(points) - len(names)} more points" if len(points) > len(names) else ""
-            found.append(Reason(_printed(f"{status}: {text}"), len(rows), _printed("; ".join(names) + more)))
-        found.sort(key=lambda reason: -reason.number)
-        rest = found[MOST_REASONS:]
-        if rest:
-            others = Reason(f"{len(rest)} other reasons", sum(reason.number for reason in rest), "in failures.csv")
-            return [*found[:MOST_REASONS], others]
-        return found
-
-    def _point_in_words(self, point: int, cases: int) -> str:
-        """The swept values of a point, and how many of its surfaces are meant where it has several."""
-        values = self.result.plan.points[point]
-        words = ", ".join(f"{key} {as_written(value)}" for key, value in values.items()) or "its case"
-        several = self.result.plan.realisations
-        return words if several == 1 else f"{words} ({cases} of {several} surfaces)"
+    def _drawing(self, name: str) -> None:
+        if self.progress is not None:
+            self.progress(f"drawing {name}")
 
     # Figures ---------------------------------------------------------------------------------------------------------
 
     @cached_property
     def figures(self) -> list[Shown]:
         """Every figure, in the order of the page."""
-        if not len(self.used):
+        if not len(self.study.used):
             return []
-        return self._sweep_figures() if self.curve is None else [*self._curve_figures(self.curve), *self._maps()]
+        return (
+            self._sweep_figures()
+            if self.study.curve is None
+            else [*self._curve_figures(self.study.curve), *self._maps()]
+        )
 
     def _curve_figures(self, curve: WearCurve) -> list[Shown]:
         seeds = f"Means over {self._seeds()} a level with the 90 % interval of the mean; dots are single surfaces."
         first, last = curve.sq[0] * MICRO, curve.sq[-1] * MICRO
-        anchored = " Hollow marks: what should be met, with its tolerance." if self.anchors else ""
-        if self.papers:
+        anchored = " Hollow marks: what should be met, with its tolerance." if self.study.anchors else ""
+        if self.study.papers:
             anchored = (
                 " Diamonds: CAR as printed, which does not say of which area; crosses: CLR behind the CRF printed for "
                 "the rig's smoothest and roughest ring. Their bars are tolerances of ours."
@@ -304,7 +158,7 @@ class StudyReport:
         shown = [
             Shown(
                 "shares",
-                partial(study_figures.shares, curve, self.anchors),
+                partial(study_figures.shares, curve, self.study.anchors),
                 "Share of the load on asperities (CLR), and of the area: contact cells over all cells of the Hertz "
                 "zone (CAR of the Hertz zone), contact area of the domain over the Hertz area (CAR of the domain). "
                 f"{seeds}{anchored}",
@@ -324,7 +178,7 @@ class StudyReport:
         if not heard:
             return shown
         stages = " ".join(f"Preset {name}: {_printed(found.verdict)}" for name, found in curve.stages.items())
-        if self.papers:
+        if self.study.papers:
             off = rig_deviation(curve, f"crf_{heard[0]}_hz")
             shown.append(
                 Shown(
@@ -340,7 +194,7 @@ class StudyReport:
         shown.append(
             Shown(
                 "resonance",
-                partial(study_figures.resonance, curve, self.anchors),
+                partial(study_figures.resonance, curve, self.study.anchors),
                 "Contact resonance frequency (CRF) and its height in the spectrum (CRFA), by the two vibration presets "
                 "on the same contacts: sound, and as the paper prints it. A shaded strip is where the split lies with "
                 f"90 %. {seeds} {stages}",
@@ -350,9 +204,9 @@ class StudyReport:
         return shown
 
     def _maps(self) -> list[Shown]:
-        if not self.runs or isinstance(self.runs, str):
+        if not self.study.runs or isinstance(self.study.runs, str):
             return []
-        runs = self.runs
+        runs = self.study.runs
         each = "; ".join(
             f"Sq {run.state.sq * MICRO:.3g} µm: CLR {100 * run.state.clr:.1f} %, CAR {100 * run.state.car:.1f} % of "
             f"the Hertz zone and {100 * run.state.car_domain:.1f} % of the domain"
@@ -380,24 +234,24 @@ class StudyReport:
         if not self.outputs:
             return []
         shown = []
-        others = " over all values of the other swept quantities" if len(self.axes) > 1 else ""
-        for axis in self.axes:
-            means = f"means of {sweep_figures.BINS} groups of neighbours" if axis.binned else "means at each value"
+        others = " over all values of the other swept quantities" if len(self.study.axes) > 1 else ""
+        for axis in self.study.axes:
+            means = f"means of {GROUPS} groups of neighbours" if axis.binned else "means at each value"
             shown.append(
                 Shown(
                     f"against-{_file_name(axis.key)}",
-                    partial(sweep_figures.against, self.used, axis, self.outputs),
+                    partial(sweep_figures.against, self.study.used, axis, self.outputs),
                     f"Every output against {axis.key}: cases as dots, and {means}{others}, with the 90 % interval of "
                     "each mean.",
                     f"Outputs of the study against {axis.key}.",
                 )
             )
-        if len(self.axes) == 2 and not any(axis.binned for axis in self.axes):
-            one, other = self.axes
+        if len(self.study.axes) == 2 and not any(axis.binned for axis in self.study.axes):
+            one, other = self.study.axes
             shown.append(
                 Shown(
                     f"over-{_file_name(one.key)}-and-{_file_name(other.key)}",
-                    partial(sweep_figures.over_two, self.used, (one, other), self.outputs),
+                    partial(sweep_figures.over_two, self.study.used, (one, other), self.outputs),
                     f"Means over seeds at each pair of {one.key} and {other.key}. Hatched: no case that may be used.",
                     f"Outputs of the study over {one.key} and {other.key}.",
                 )
@@ -405,13 +259,13 @@ class StudyReport:
         return shown
 
     def _seeds(self) -> str:
-        count = self.result.plan.realisations
+        count = self.study.result.plan.realisations
         return f"{count} surfaces" if count > 1 else "one surface"
 
     def write_figures(self, folder: Path) -> None:
         """Each figure as PDF and PNG, and what to print below them."""
         for shown in self.figures:
-            self.tell(f"drawing {shown.name}")
+            self._drawing(shown.name)
             figure = shown.draw(ON_PAPER)
             with ON_PAPER.drawing():
                 with whole_file(folder / f"{shown.name}.pdf") as part:
@@ -420,37 +274,13 @@ class StudyReport:
                     figure.savefig(part, format="png", dpi=300, metadata={"Software": None})
         with whole_file(folder / "captions.md") as part:
             text = "\n\n".join(f"**{shown.name}**: {shown.caption}" for shown in self.figures)
-            part.write_text(f"{text}\n\nasperity {version('asperity')}; method: doi:{PAPER['doi']}\n", "utf-8")
+            part.write_text(f"{text}\n\nasperity {version('asperity')}; method: doi:{CITATION.doi}\n", "utf-8")
 
     # Tables ----------------------------------------------------------------------------------------------------------
 
-    @cached_property
-    def tables(self) -> "dict[str, pandas.DataFrame]":
-        """Every table by its file's name, in SI but for columns whose name has another unit."""
-        tables = {"cases": self.result.table, "failures": self.result.failures}
-        if self.curve is None:
-            return {**tables, "points": self._points()}
-        tables["levels"] = self.curve.summary()
-        if self.anchors:
-            tables["anchors"] = compare_with_anchors(self.curve, self.anchors)
-        if self.papers:
-            tables |= {f"rig-{preset}": rig_prediction(self.curve, f"crf_{preset}_hz") for preset in self.curve.stages}
-        return tables
-
-    def _points(self) -> "pandas.DataFrame":
-        """A row a point: how many cases may be used, mean and standard deviation of each output."""
-        columns = [output.column for output in self.outputs]
-        keys = [key for key in self.result.plan.axes if key in self.used]
-        groups = self.used.groupby("point", sort=True)
-        table = groups[keys].first() if keys else groups[["status"]].first()[[]]
-        table["cases"] = groups.size()
-        for column in columns:
-            table[column], table[f"{column}_std"] = groups[column].mean(), groups[column].std()
-        return table.reset_index()
-
     def write_tables(self, folder: Path) -> None:
         """Each table as csv."""
-        for name, table in self.tables.items():
+        for name, table in self.study.tables.items():
             with whole_file(folder / f"{name}.csv") as part:
                 table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
 
@@ -458,57 +288,46 @@ class StudyReport:
 
     def page(self) -> str:
         """The page as HTML text."""
-        plan = self.result.plan
+        plan = self.study.result.plan
         pictures = []
         for shown in self.figures:
-            self.tell(f"drawing {shown.name}")
+            self._drawing(shown.name)
             pictures.append(picture(shown.draw(ON_PAGE), shown.caption, shown.alt))
         return page_template("study.html.j2").render(
             title=self._title(),
             version=version("asperity"),
-            verdict=_printed(self._verdict()),
-            failed=self.result.failed,
-            total=len(self.result.table),
+            verdict=_printed(self.study.verdict()),
+            failed=self.study.result.failed,
+            total=len(self.study.result.table),
             tiles=self._tiles(),
-            notes=[in_print(note) for note in self.notes],
-            reasons=self.reasons,
+            notes=[in_print(note) for note in self.study.notes],
+            reasons=[FailureReason(_printed(why.text), why.number, _printed(why.cases)) for why in self.study.reasons],
             pictures=pictures,
-            wear=self.curve is not None,
+            wear=self.study.curve is not None,
             anchors=self._anchor_rows(),
-            printed=self.papers,
+            printed=self.study.papers,
             levels=self._level_rows(),
             points=self._point_rows(),
-            many=self.curve is None and len(plan.points) > MOST_POINTS,
+            many=self.study.curve is None and len(plan.points) > MOST_POINTS,
             facts=self._facts(),
             case_text=plan.case.text,
-            paper=PAPER,
+            paper=CITATION,
         )
 
     def _title(self) -> str:
-        if self.curve is not None:
-            first, last = self.curve.sq[0] * MICRO, self.curve.sq[-1] * MICRO
+        if self.study.curve is not None:
+            first, last = self.study.curve.sq[0] * MICRO, self.study.curve.sq[-1] * MICRO
             return f"Wear study, Sq {first:.3g} to {last:.3g} µm"
-        keys = [key for key in self.result.plan.axes if key not in SEEDS]
+        keys = [key for key in self.study.result.plan.axes if key not in SEEDS]
         return f"Study over {', '.join(keys) or 'seeds'}"
 
-    def _verdict(self) -> str:
-        if self.curve is not None:
-            return self.curve.verdict()
-        failed, total = self.result.failed, len(self.result.table)
-        sentence = f"{total} cases over {', '.join(self.result.plan.axes) or 'seeds'}"
-        ranges = [output for output in self.outputs if output.column in ("clr", "crf_sound_hz", "crf_hz")]
-        for output in ranges:
-            values = self.used[output.column] * output.scale
-            sentence += f"; {output.name} from {values.min():.4g} to {values.max():.4g} {output.unit}"
-        return f"{failed} OF {total} CASES FAILED and are left out: {sentence}." if failed else f"{sentence}."
-
     def _tiles(self) -> list[Tile]:
-        table, plan = self.result.table, self.result.plan
+        table, plan = self.study.result.table, self.study.result.plan
         tiles = [
-            Tile("Cases", f"{len(table)}", f"of {len(plan.cases)}" if self.result.missing else ""),
-            Tile("Failed or not converged", f"{self.result.failed}", f"of {len(table)}"),
+            Tile("Cases", f"{len(table)}", f"of {len(plan.cases)}" if self.study.result.missing else ""),
+            Tile("Failed or not converged", f"{self.study.result.failed}", f"of {len(table)}"),
         ]
-        if self.curve is None:
+        if self.study.curve is None:
             return tiles
         for name, label, scale, unit in (
             ("clr", "CLR", 100.0, "%"),
@@ -516,11 +335,11 @@ class StudyReport:
             ("car_domain", "CAR of the domain", 100.0, "%"),
             ("crf_sound_hz", "CRF, preset sound", 1.0, "Hz"),
         ):
-            if name in self.curve.table:
-                ends = self.curve.mean(name)[[0, -1]] * scale
+            if name in self.study.curve.table:
+                ends = self.study.curve.mean(name)[[0, -1]] * scale
                 if np.isfinite(ends).all():
                     tiles.append(Tile(label, f"{ends[0]:.0f} to {ends[1]:.0f}", unit))
-        for preset, stages in self.curve.stages.items():
+        for preset, stages in self.study.curve.stages.items():
             if stages.found:
                 low, high = stages.interval
                 tiles.append(
@@ -532,10 +351,10 @@ class StudyReport:
 
     def _anchor_rows(self) -> list[dict[str, str]]:
         """The table of anchors in display units."""
-        if self.curve is None or not self.anchors:
+        if self.study.curve is None or not self.study.anchors:
             return []
         rows = []
-        for _, row in self.tables["anchors"].iterrows():
+        for _, row in self.study.tables["anchors"].iterrows():
             shown = _display(row["quantity"])
             sense = "" if row["sense"] == "about" else f"{row['sense']} "
             rows.append(
@@ -553,9 +372,9 @@ class StudyReport:
 
     def _level_rows(self) -> list[list[Cell]]:
         """Head and rows of the table of levels: means, and the interval below each."""
-        if self.curve is None:
+        if self.study.curve is None:
             return []
-        summary, stages = self.tables["levels"], self.curve.stages.get("sound")
+        summary, stages = self.study.tables["levels"], self.study.curve.stages.get("sound")
         columns = [name for name in LEVEL_COLUMNS if name in summary]
         rows = [[Cell("Sq [µm]"), Cell("Used"), *(Cell(LEVEL_COLUMNS[name], _display(name).unit) for name in columns)]]
         staged = stages is not None and stages.found
@@ -563,7 +382,7 @@ class StudyReport:
             rows[0].append(Cell("Stage", "preset sound"))
         for level in range(len(summary)):
             row = summary.iloc[level]
-            cells = [Cell(f"{row['sq_um']:.4g}"), Cell(str(self.curve.values("clr", level).size))]
+            cells = [Cell(f"{row['sq_um']:.4g}"), Cell(str(self.study.curve.values("clr", level).size))]
             for name in columns:
                 shown = _display(name)
                 cells.append(Cell(shown.number(row[name]), shown.interval(row[f"{name}_low"], row[f"{name}_high"])))
@@ -575,14 +394,17 @@ class StudyReport:
 
     def _point_rows(self) -> list[list[Cell]]:
         """Head and rows of the table of points, where there are not too many."""
-        if self.curve is not None or len(self.result.plan.points) > MOST_POINTS or not len(self.used):
+        if self.study.curve is not None or len(self.study.result.plan.points) > MOST_POINTS or not len(self.study.used):
             return []
-        points, shown = self.tables["points"], self.outputs[:MOST_OUTPUTS]
-        head = [*(Cell(axis.label) for axis in self.axes), Cell("Used")]
+        points, shown = self.study.tables["points"], self.outputs[:MOST_OUTPUTS]
+        head = [*(Cell(axis_label(axis)) for axis in self.study.axes), Cell("Used")]
         rows = [[*head, *(Cell(output.name, output.unit) for output in shown)]]
         for _, point in points.iterrows():
-            first = int(np.argmax(self.used["point"].to_numpy() == point["point"]))
-            cells = [*(Cell(axis.written(axis.values[first])) for axis in self.axes), Cell(f"{point['cases']:.0f}")]
+            first = int(np.argmax(self.study.used["point"].to_numpy() == point["point"]))
+            cells = [
+                *(Cell(place_in_words(axis, axis.values[first])) for axis in self.study.axes),
+                Cell(f"{point['cases']:.0f}"),
+            ]
             for output in shown:
                 mean, std = (point[name] * output.scale for name in (output.column, f"{output.column}_std"))
                 cells.append(Cell(*with_deviation(mean, std)) if np.isfinite(mean) else Cell(NOT_FOUND))
@@ -591,7 +413,7 @@ class StudyReport:
 
     def _facts(self) -> list[tuple[str, str]]:
         """What the study was."""
-        plan = self.result.plan
+        plan = self.study.result.plan
         points = f"{len(plan.points)} points" if len(plan.points) > 1 else "1 point"
         rows = [
             ("Computed", {"solve": "contact and vibration", "vibrate": "the vibration model alone"}[plan.kind]),
@@ -605,15 +427,15 @@ class StudyReport:
         seeds = "surfaces' seeds given: " + ", ".join(map(str, plan.seeds)) if plan.seeds else seeding[plan.seeding]
         rows.append(("Seeds", f"{seeds}; each case's own stand in cases.csv"))
         used = versions()
-        if self.result.folder is not None:
-            used = read_manifest(self.result.folder, of="study", layout=FORMAT)["versions"]
-            rows.append(("Folder", self.result.folder.resolve().name))
+        if self.study.result.folder is not None:
+            used = read_manifest(self.study.result.folder, of="study", layout=FORMAT)["versions"]
+            rows.append(("Folder", self.study.result.folder.resolve().name))
         rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in used.items())))
         return rows
 
     def _range(self, key: str) -> str:
         """The values of a swept key in words."""
-        values = list(dict.fromkeys(as_written(point[key]) for point in self.result.plan.points if key in point))
+        values = list(dict.fromkeys(as_written(point[key]) for point in self.study.result.plan.points if key in point))
         if len(values) <= 8:
             return _printed(", ".join(values))
         return _printed(f"{len(values)} values, {values[0]} to {values[-1]}")

@@ -3,8 +3,7 @@
 Swept quantities are shown in the unit they were written in, outputs in display units.
 """
 
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,26 +14,16 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from asperity.arrays import Field
-from asperity.case import Case, split_amount
-from asperity.errors import BadInput
 from asperity.report.figures import BLUE, GREY
 from asperity.report.study_figures import Medium, stay_near
-from asperity.study import as_written
+from asperity.study import MEAN_CONFIDENCE, SweptAxis, group_means, pair_means
 
 if TYPE_CHECKING:
     import pandas
 
-    from asperity.study import StudyPlan
-
-
-LEVEL = 0.90  # of the intervals
-MOST_VALUES = 12  # of a swept quantity that has a mean each, however few cases share one
-BINS = 8  # of one with more
 MOST_DRAWN = 1500  # dots as drawings; more are a picture
 MOST_WRITTEN = 8  # values a side of a map whose cells hold their number
 ACROSS = 4
-SAME = 1e-9  # relative difference that is rounding
-CHOICES = ("law", "kind", "file")  # keys that say what a table is
 NAMES = {
     "sq": "Sq",
     "alpha": "pressure-viscosity coefficient α",
@@ -80,105 +69,22 @@ OUTPUTS = (
 )
 
 
-def outputs_of(table: "pandas.DataFrame") -> list[Output]:
-    """The outputs that a study's table holds and that vary in it; CRF and CRFA once where the presets have theirs."""
-    shown = []
-    for output in OUTPUTS:
-        if output.column in ("crf_hz", "crfa") and "crf_sound_hz" in table:
-            continue
-        if output.column in table and _varies(table[output.column].to_numpy(dtype=float)):
-            shown.append(output)
-    return shown
+def axis_label(axis: SweptAxis) -> str:
+    """What is swept, with the unit it was written in."""
+    key = axis.key.rpartition(".")[2]
+    name = NAMES.get(key, key.replace("_", " "))
+    return f"{name} [{UNITS.get(axis.unit, axis.unit)}]" if axis.unit else name
 
 
-def _varies(values: Field) -> bool:
-    """Whether numbers differ by more than their last digits."""
-    known = values[np.isfinite(values)]
-    return known.size > 0 and float(np.ptp(known)) > SAME * float(np.abs(known).max())
-
-
-@dataclass(frozen=True)
-class Axis:
-    """A swept quantity over the rows of a table: numbers, or the places of names."""
-
-    key: str
-    label: str
-    values: Field  # (rows,)
-    names: tuple[str, ...] = ()  # of the places, where it is no number
-    logarithmic: bool = False
-
-    @property
-    def places(self) -> Field:
-        """The different values, in order."""
-        return np.unique(self.values)
-
-    @property
-    def binned(self) -> bool:
-        """Whether means are those of groups of neighbours: of samples no two are alike."""
-        return self.places.size > max(MOST_VALUES, 0.5 * self.values.size)
-
-    def written(self, value: float) -> str:
-        """A value as people read it."""
-        return self.names[int(value)] if self.names else f"{value:.4g}".replace("-", "−")
-
-
-def axis_of(plan: "StudyPlan", table: "pandas.DataFrame", key: str) -> Axis:
-    """A swept key over the rows of a study's table, in the unit that its first value was written in."""
-    own = _own_value(plan.case, key)
-    written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]
-    short = key.rpartition(".")[2]
-    name = NAMES.get(short, short.replace("_", " "))
-    try:
-        numbers, unit = _numbers(written)
-    except BadInput:
-        texts = [as_written(value) for value in written]
-        shown = {text: _short(value) for text, value in zip(texts, written, strict=True)}
-        if len(set(shown.values())) < len(shown):
-            shown = {text: text for text in shown}
-        order = list(shown)
-        values = np.array([order.index(text) for text in texts], dtype=float)
-        return Axis(key, name, values, tuple(shown.values()))
-    label = f"{name} [{UNITS.get(unit, unit)}]" if unit else name
-    return Axis(key, label, numbers, logarithmic=_crowds_low(np.unique(numbers)))
-
-
-def _short(value: Any) -> str:
-    """A table by what it chooses, a file by its name."""
-    if isinstance(value, Mapping):
-        value = next((value[key] for key in CHOICES if key in value), value)
-    return as_written(value).rpartition("/")[2]
-
-
-def _own_value(case: Case, key: str) -> Any:
-    """What a case says of a key that a point leaves alone."""
-    value: Any = tomllib.loads(case.text)
-    for part in key.split("."):
-        value = value.get(part) if isinstance(value, dict) else None
-    return "not set" if value is None else value
-
-
-def _numbers(written: Sequence[Any]) -> tuple[Field, str]:
-    """Values in the first one's unit; BadInput where one is no number or an uneven pair."""
-    single = []
-    for value in written:
-        entries = list(value) if isinstance(value, list | tuple) else [value]
-        if any(entry != entries[0] for entry in entries):
-            raise BadInput(f"{value} is no single number")
-        single.append(entries[0])
-    unit = split_amount(single[0])[1]
-    return np.array([float(split_amount(value, unit)[0]) for value in single]), unit
-
-
-def _crowds_low(places: Field) -> bool:
-    """Whether most values stand near the lower end, as on a logarithmic scale."""
-    low, high = float(places[0]), float(places[-1])
-    return low > 0.0 and high >= 4.0 * low and float(np.median(places)) - low < 0.35 * (high - low)
+def place_in_words(axis: SweptAxis, value: float) -> str:
+    """A value of an axis as people read it."""
+    return axis.names[int(value)] if axis.names else f"{value:.4g}".replace("-", "−")
 
 
 # Against one quantity ------------------------------------------------------------------------------------------------
 
 
-def against(table: "pandas.DataFrame", axis: Axis, outputs: Sequence[Output], medium: Medium) -> Figure:
+def against(table: "pandas.DataFrame", axis: SweptAxis, outputs: Sequence[Output], medium: Medium) -> Figure:
     """Every output against one swept quantity: each case, and means with their intervals."""
     with medium.drawing():
         figure, panels = _sheet(len(outputs), medium, shape=0.85, key=1.6)
@@ -195,7 +101,7 @@ def against(table: "pandas.DataFrame", axis: Axis, outputs: Sequence[Output], me
                 markeredgewidth=0,
                 rasterized=values.size > MOST_DRAWN,
             )
-            x, mean, low, high = means(axis.values[known], values[known], binned=axis.binned)
+            x, mean, low, high = group_means(axis.values[known], values[known], binned=axis.binned)
             joined = "none" if axis.names else "-"
             reach = np.array([mean - low, high - mean])
             axes.errorbar(
@@ -205,37 +111,23 @@ def against(table: "pandas.DataFrame", axis: Axis, outputs: Sequence[Output], me
             stay_near(axes, values[known])
             axes.set_title(output.label, fontweight="normal", fontsize="small")
             _scale(axes, axis)
-        _name_lowest(panels, axis.label)
+        _name_lowest(panels, axis_label(axis))
         keys = [
             Line2D([], [], color=GREY, marker=".", linestyle="none", alpha=0.7, label="case"),
             Line2D(
-                [], [], color=BLUE, marker="o", markersize=3.5, label=f"mean, {LEVEL:.0%} interval".replace("%", " %")
+                [],
+                [],
+                color=BLUE,
+                marker="o",
+                markersize=3.5,
+                label=f"mean, {100 * MEAN_CONFIDENCE:.0f} % interval",
             ),
         ]
         figure.legend(handles=keys, loc="outside lower center", ncols=2)
     return figure
 
 
-def means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field, Field, Field]:
-    """Means over cases with one x, or over near ones, and Student's interval of each mean: x, mean, low, high."""
-    from scipy.stats import t
-
-    group = np.unique(x, return_inverse=True)[1]
-    if binned:
-        group = np.searchsorted(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)[1:-1]), x, side="right")
-    rows = []
-    for number in np.unique(group):
-        some = values[group == number]
-        mean = float(some.mean())
-        reach = np.nan
-        if some.size > 1:
-            reach = float(t.ppf(0.5 + LEVEL / 2.0, some.size - 1) * some.std(ddof=1) / np.sqrt(some.size))
-        rows.append((float(x[group == number].mean()), mean, mean - reach, mean + reach))
-    columns = np.array(rows).reshape(-1, 4).T
-    return columns[0], columns[1], columns[2], columns[3]
-
-
-def _scale(axes: Axes, axis: Axis) -> None:
+def _scale(axes: Axes, axis: SweptAxis) -> None:
     if axis.names:
         places = np.arange(len(axis.names))
         axes.set_xticks(places, axis.names, rotation=30 if max(map(len, axis.names)) > 6 else 0)
@@ -269,31 +161,26 @@ def _name_lowest(panels: Sequence[Axes], label: str) -> None:
 # Over two quantities -------------------------------------------------------------------------------------------------
 
 
-def over_two(table: "pandas.DataFrame", pair: tuple[Axis, Axis], outputs: Sequence[Output], medium: Medium) -> Figure:
+def over_two(
+    table: "pandas.DataFrame", pair: tuple[SweptAxis, SweptAxis], outputs: Sequence[Output], medium: Medium
+) -> Figure:
     """Means over two swept quantities as maps, a colour scale for each output; what has no value is hatched."""
     across, up = pair
-    columns, rows = across.places, up.places
     with medium.drawing():
         figure, panels = _sheet(len(outputs), medium, shape=1.15, key=1.0)
         for output, axes in zip(outputs, panels, strict=True):
-            cells = np.full((rows.size, columns.size), np.nan)
-            values = table[output.column].to_numpy(dtype=float) * output.scale
-            for j, row in enumerate(rows):
-                for i, column in enumerate(columns):
-                    here = values[(across.values == column) & (up.values == row) & np.isfinite(values)]
-                    if here.size:
-                        cells[j, i] = here.mean()
+            cells = pair_means(table[output.column].to_numpy(dtype=float) * output.scale, across, up)
             axes.patch.set(hatch="////", edgecolor="#9ca3af", facecolor="white")
             image = axes.imshow(cells, origin="lower", cmap="cividis", aspect="auto", interpolation="none")
-            if max(rows.size, columns.size) <= MOST_WRITTEN:
+            if max(cells.shape) <= MOST_WRITTEN:
                 _write_cells(axes, cells, image.norm(cells))
             _tick(axes.xaxis, across)
             _tick(axes.yaxis, up)
             axes.spines[:].set_visible(False)
             axes.set_title(output.label, fontweight="normal", fontsize="small")
             figure.colorbar(image, ax=axes, location="bottom", aspect=18, pad=0.04)
-        figure.supxlabel(across.label, fontsize="medium")
-        figure.supylabel(up.label, fontsize="medium")
+        figure.supxlabel(axis_label(across), fontsize="medium")
+        figure.supylabel(axis_label(up), fontsize="medium")
     return figure
 
 
@@ -308,8 +195,8 @@ def _write_cells(axes: Axes, cells: Field, shade: Any) -> None:
             )  # fmt: skip
 
 
-def _tick(side: Any, axis: Axis) -> None:
+def _tick(side: Any, axis: SweptAxis) -> None:
     """The values at cell centres, thinned out where they are many."""
     places = axis.places
     step = -(-places.size // 6)
-    side.set_ticks(np.arange(places.size)[::step], [axis.written(value) for value in places[::step]])
+    side.set_ticks(np.arange(places.size)[::step], [place_in_words(axis, value) for value in places[::step]])

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.files import require_writable, whole_file
+from asperity.paper import CITATION
 from asperity.report import track_figures as figures
-from asperity.report.page import NOT_FOUND, PAPER, Picture, Tile, in_print, page_template, picture, with_deviation
+from asperity.report.page import NOT_FOUND, Picture, Tile, in_print, page_template, picture, with_deviation
 from asperity.tracking import ALERT, DANGER, IN_A_ROW
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def render_track_page(track: "Track") -> str:
         alert=ALERT,
         danger=DANGER,
         in_a_row=IN_A_ROW,
-        paper=PAPER,
+        paper=CITATION,
     )
 
 

@@ -5,9 +5,16 @@ from .anchors import compare_with_anchors as compare_with_anchors
 from .anchors import load_anchors as load_anchors
 from .anchors import rig_deviation as rig_deviation
 from .anchors import rig_prediction as rig_prediction
+from .axes import GROUPS as GROUPS
+from .axes import SweptAxis as SweptAxis
+from .axes import group_means as group_means
+from .axes import pair_means as pair_means
+from .axes import swept_axis as swept_axis
+from .axes import varying_outputs as varying_outputs
 from .calibration import Calibration as Calibration
 from .calibration import Parameter as Parameter
 from .calibration import calibrate as calibrate
+from .curve import MEAN_CONFIDENCE as MEAN_CONFIDENCE
 from .curve import SQ_KEY as SQ_KEY
 from .curve import WearCurve as WearCurve
 from .curve import curve_of as curve_of
@@ -28,6 +35,8 @@ from .global_sensitivity import SQ_LEVELS as SQ_LEVELS
 from .global_sensitivity import Outcome as Outcome
 from .global_sensitivity import Sensitivity as Sensitivity
 from .global_sensitivity import sensitivity as sensitivity
+from .overview import FailureReason as FailureReason
+from .overview import StudyOverview as StudyOverview
 from .plan import SEEDS as SEEDS
 from .plan import StudyPlan as StudyPlan
 from .plan import as_written as as_written

@@ -7,6 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
+from numpy.typing import ArrayLike
 
 from asperity.arrays import Field
 from asperity.case import Case
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     import pandas
 
 SQ_KEY = "surface.sq"
-LEVEL = 0.90
+MEAN_CONFIDENCE = 0.90  # of the intervals of means
 
 
 @dataclass(frozen=True)
@@ -63,17 +65,13 @@ class WearCurve:
         """Standard deviation over seeds, of one surface against another, shape (levels,)."""
         return np.array([values.std(ddof=1) if values.size > 1 else np.nan for values in self._by_level(quantity)])
 
-    def interval(self, quantity: str, level: float = LEVEL) -> Field:
+    def interval(self, quantity: str, level: float = MEAN_CONFIDENCE) -> Field:
         """Student's interval of the mean over seeds, shape (levels, 2); nan with fewer than two seeds."""
-        from scipy.stats import t
-
         counts = np.array([values.size for values in self._by_level(quantity)])
-        reach = (
-            t.ppf(0.5 + level / 2.0, np.maximum(counts - 1, 1)) * self.std(quantity) / np.sqrt(np.maximum(counts, 1))
-        )
+        reach = student_reach(self.std(quantity), counts, level)
         return self.mean(quantity)[:, None] + np.outer(reach, (-1.0, 1.0))
 
-    def at(self, sq: float, quantity: str, level: float = LEVEL) -> tuple[float, float, float]:
+    def at(self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE) -> tuple[float, float, float]:
         """Mean at any roughness [m] and its interval, straight between levels; nan outside of them."""
         mean, reach = self.mean(quantity), np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0
         if not self.sq[0] * (1 - 1e-9) <= sq <= self.sq[-1] * (1 + 1e-9):
@@ -141,6 +139,12 @@ class WearCurve:
 
     def _by_level(self, quantity: str) -> list[Field]:
         return [self.values(quantity, level) for level in range(self.sq.size)]
+
+
+def student_reach(std: ArrayLike, counts: ArrayLike, level: float = MEAN_CONFIDENCE) -> Field:
+    """Half the width of Student's interval of a mean over `counts` values of this standard deviation."""
+    quantile = scipy.stats.t.ppf(0.5 + level / 2.0, np.maximum(np.asarray(counts) - 1, 1))
+    return np.asarray(quantile * std / np.sqrt(np.maximum(counts, 1)))
 
 
 def wear_curve(
