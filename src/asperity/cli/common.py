@@ -19,14 +19,14 @@ SILENT_FOR = 2.0  # seconds without a step of the solver, after which its compil
 
 def chosen_case(path: Path, surface: Path | None, overrides: list[str]) -> "Case":
     """The case of a case file or a run, with a measured surface and `--set KEY=VALUE` values put in."""
-    from asperity.case import load_case, relative_to
+    from asperity.case import load_case, relative_path
     from asperity.results import load_run
 
     case = load_run(path).case if path.suffix == ".nc" else load_case(path)
     if surface is not None:
         if not surface.is_file():
             raise BadInput(f"--surface {surface} does not exist; check its name")
-        case = case.with_overrides({"surface": {"file": relative_to(surface, case.folder)}})
+        case = case.with_overrides({"surface": {"file": relative_path(surface, case.folder)}})
     wanted = {}
     for override in overrides:
         key, equals, value = override.partition("=")

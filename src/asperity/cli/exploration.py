@@ -276,9 +276,9 @@ def calibrated_text(found: "Calibration", folder: Path) -> str:
 
 def _moved(case: "Case", folder: Path) -> "Case":
     """The case with its surface files named as seen from `folder`."""
-    from asperity.case import relative_to
+    from asperity.case import relative_path
     from asperity.study import stated
 
     files = {key: stated(case, key) for key in ("surface.file", "surface.second.file")}
-    moved = {key: relative_to(case.folder / name, folder) for key, name in files.items() if name is not None}
+    moved = {key: relative_path(case.folder / name, folder) for key, name in files.items() if name is not None}
     return case.with_overrides(moved) if moved else case

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from asperity.arrays import Field, Mask
-from asperity.case import Case, load_case, relative_to
+from asperity.case import Case, load_case, relative_path
 from asperity.coupling import Vibration, contact_vibration, needs_solution, oscillator
 from asperity.ehl import (
     ContactState,
@@ -555,7 +555,7 @@ def _about(case: Case, digest: str, every: int, folder: Path) -> dict[str, Any]:
         "versions": versions(),
         "source": case.source,
         "case": case.text,
-        "case_folder": relative_to(case.folder.resolve(), folder.resolve()),
+        "case_folder": relative_path(case.folder.resolve(), folder.resolve()),
         "every": every,
     }
 

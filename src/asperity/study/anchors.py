@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field as Entry
 
-from asperity.case import Length, Section, checked
+from asperity.case import Length, Section, parse_section
 from asperity.errors import BadInput, UnreadableFile
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS
 from asperity.study.curve import WearCurve
@@ -160,7 +160,7 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
         tables = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UnreadableFile(f"{path} cannot be read as TOML: {error}") from None
-    sections = checked(_AnchorFile, tables, str(path)).anchor
+    sections = parse_section(_AnchorFile, tables, str(path)).anchor
     anchors = []
     for section in sections:
         if (section.sq is None) != (section.quantity == SPLIT):

@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.case import Case, RangeSection, Section, in_si, split_amount
+from asperity.case import Case, RangeSection, Section, split_amount, to_si
 from asperity.errors import BadInput, UnreadableFile
 
 Kind = Literal["solve", "vibrate"]
@@ -88,7 +88,7 @@ class StudyPlan:
         base = int(getattr(self.case.contents.surface, "seed", None) or 0)
         number = 0
         for place, point in enumerate(self.points):
-            plain = {key: in_si(value) for key, value in point.items()}
+            plain = {key: to_si(value) for key, value in point.items()}
             shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
             seeded = [key for key in SEEDS if _has_seed(shaped, key) and not _states(point, key)]
             shared: dict[str, Any] = {}
@@ -206,9 +206,9 @@ def plan_points(
 def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[str, Any]]) -> None:
     """Refuse now what would fail in every case that has it. Of many values of a quantity, the extremes are asked."""
     for key in axes:
-        values = {json.dumps(in_si(point[key])): point[key] for point in points if key in point}
+        values = {json.dumps(to_si(point[key])): point[key] for point in points if key in point}
         chosen = list(values.values())
-        numbers = [in_si(value) for value in chosen]
+        numbers = [to_si(value) for value in chosen]
         if len(chosen) > 100 and all(isinstance(number, float | int) for number in numbers):
             order = sorted(range(len(chosen)), key=numbers.__getitem__)
             chosen = [chosen[order[0]], chosen[order[-1]]]
@@ -220,7 +220,7 @@ def _require_distinct(case: Case, points: Sequence[Mapping[str, Any]]) -> None:
     """Refuse a point that is there twice: its cases are the same, and would count as independent ones."""
     seen = set()
     for point in points:
-        plain = json.dumps({key: in_si(value) for key, value in point.items()}, sort_keys=True)
+        plain = json.dumps({key: to_si(value) for key, value in point.items()}, sort_keys=True)
         if plain in seen:
             where = ", ".join(f"{key} = {as_written(value)}" for key, value in point.items())
             raise BadInput(
@@ -389,7 +389,7 @@ def _surface_digest(case: Case) -> str | None:
 
 def _flat(section: Section) -> dict[str, Any]:
     """Every value of the case in SI by its dotted key."""
-    return {key: in_si(value) for key, value in _entries(section) if not isinstance(value, Section)}
+    return {key: to_si(value) for key, value in _entries(section) if not isinstance(value, Section)}
 
 
 def _hash(values: Mapping[str, Any]) -> str:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.arrays import Field
-from asperity.case import in_si, load_case, relative_to
+from asperity.case import load_case, relative_path, to_si
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.study.evaluate import DONE, Row
@@ -208,7 +208,7 @@ def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
         "versions": versions(),
         "source": plan.case.source,
         "case": plan.case.text,
-        "case_folder": relative_to(plan.case.folder.resolve(), folder.resolve()),
+        "case_folder": relative_path(plan.case.folder.resolve(), folder.resolve()),
         "surface_digest": plan.surface_digest,
         "kind": plan.kind,
         "seeding": plan.seeding,
@@ -281,7 +281,7 @@ def in_order(parts: Sequence["pyarrow.Table"], plan: StudyPlan) -> "pandas.DataF
         }
     )
     for key in (*plan.axes, *(seed for seed in SEEDS if seed not in plan.axes)):
-        values = [in_si(case.overrides.get(key)) for case in plan.cases]
+        values = [to_si(case.overrides.get(key)) for case in plan.cases]
         if any(value is not None for value in values):
             planned[key] = _of_one_type(values)
     for seed in SEEDS:

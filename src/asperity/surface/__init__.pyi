@@ -23,6 +23,7 @@ from .parameters import correlation_lengths as correlation_lengths
 from .parameters import describe_surface as describe_surface
 from .parameters import surface_parameters as surface_parameters
 from .prepare import CompositeSurface as CompositeSurface
+from .prepare import Fit as Fit
 from .prepare import PreparedSurface as PreparedSurface
 from .prepare import prepare_surface as prepare_surface
 from .profile import ProfileParameters as ProfileParameters

@@ -1,0 +1,204 @@
+"""Quantities with units, as a case file and the command line write them: read to SI, and written back as they stood.
+
+The only module that knows pint. Nothing deeper in the package has units other than SI.
+"""
+
+import math
+import re
+from decimal import Decimal
+from functools import cache, lru_cache, partial
+from tokenize import TokenError
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import BeforeValidator, Field, PlainValidator, PositiveInt, Strict
+
+from asperity.case.refusals import none_from_word, quoted
+from asperity.errors import BadInput
+
+if TYPE_CHECKING:
+    import pint
+
+_MEASURES = {  # SI unit -> what it measures, and how one is written
+    "m": ("a length", "5.4 mm"),
+    "N": ("a force", "500 N"),
+    "m/s": ("a speed", "2 m/s"),
+    "Pa": ("a pressure", "2 GPa"),
+    "1/Pa": ("an inverse pressure", "18.2 1/GPa"),
+    "Pa s": ("a viscosity", "0.096 Pa s"),
+    "kg/m^3": ("a density", "0.88 g/cm^3"),
+    "kg": ("a mass", "0.1 kg"),
+    "s": ("a time", "2 s"),
+    "Hz": ("a frequency", "50 kHz"),
+    "N s/m": ("a damping coefficient", "80 N s/m"),
+    "K": ("a temperature", "40 degC"),
+    "1/K": ("an inverse temperature", "0.037 1/K"),
+    "W/m/K": ("a thermal conductivity", "46 W/m/K"),
+    "J/kg/K": ("a heat capacity", "460 J/kg/K"),
+}
+_WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
+
+
+class Amount(float):
+    """A positive quantity in SI that remembers how it was written, so that a case is restated in its author's units."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> "Amount":
+        """`value` in SI, `text` with its unit."""
+        amount = super().__new__(cls, value)
+        amount.text = text
+        return amount
+
+
+class _UnusableUnit(ValueError):
+    """What is wrong with a unit, as the end of a sentence."""
+
+
+@cache
+def _units() -> "pint.UnitRegistry[Decimal]":
+    from pint import UnitRegistry
+
+    return UnitRegistry(non_int_type=Decimal)  # decimal: 5.4 mm is the float nearest to 0.0054, not a product of floats
+
+
+@lru_cache(4096)  # a case states forty quantities, and a study states most of them a thousand times over
+def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
+    """A number of `unit_text` in `unit`; None is the SI unit of its kind."""
+    import pint
+
+    try:
+        quantity = _units().Quantity(Decimal(number), unit_text)
+        return (quantity.to_base_units() if unit is None else quantity.to(unit)).magnitude
+    except pint.UndefinedUnitError:
+        raise _UnusableUnit("whose unit is not known; capitals matter") from None
+    except pint.DimensionalityError:
+        raise _UnusableUnit("which is something else") from None
+    except (pint.PintError, ValueError, TypeError, AssertionError, ArithmeticError, SyntaxError, TokenError):
+        raise _UnusableUnit("whose unit cannot be read") from None
+
+
+def _split(value: object) -> tuple[str, str] | None:
+    """Number and unit of a text, the unit "" where there is none; None for what is no quantity."""
+    written = _WRITTEN.fullmatch(value) if isinstance(value, str) else None
+    return None if written is None else (written[1], " ".join(written[2].split()))
+
+
+def parse_amount(unit: str, value: object) -> Amount:
+    """A positive quantity with its unit, in `unit`, an SI one.
+
+    Raises
+    ------
+    BadInput
+        for what is none of that kind; the message begins with what it must be.
+    """
+    measure, example = _MEASURES.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
+    expected = f'must be {measure} such as "{example}"'
+    if isinstance(value, Amount):
+        return value
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        raise BadInput(f"{expected}, got the bare number {value}; give it its unit")
+    parts = _split(value)
+    if parts is None:
+        raise BadInput(f"{expected}, got {quoted(value)}")
+    number, unit_text = parts
+    if not unit_text:
+        raise BadInput(f"{expected}, got {quoted(value)} without a unit")
+    if unit == "Hz" and "Hz" not in unit_text:  # rpm and rad/s would slip through as inverse times, a factor 2 pi off
+        raise BadInput(f"{expected}, got {quoted(value)}, which is not in hertz")
+    try:
+        si = float(_convert(number, unit_text, unit))
+    except _UnusableUnit as wrong:
+        raise BadInput(f"{expected}, got {quoted(value)}, {wrong}") from None
+    if not 0.0 < si < math.inf:
+        raise BadInput(f"must be positive and finite, got {quoted(value)}; correct its sign or value")
+    return Amount(si, f"{number} {unit_text}")
+
+
+def read_amount(name: str, unit: str, text: str) -> float:
+    """A positive quantity on the command line, such as "300 s", in `unit`, an SI one.
+
+    Raises
+    ------
+    BadInput
+        for what is none with a unit of that kind; the message begins with `name`.
+    """
+    try:
+        return float(parse_amount(unit, text))
+    except BadInput as error:
+        raise BadInput(f"{name} {error}") from None
+
+
+def read_length(name: str, text: str) -> float:
+    """A length on the command line, such as "0.25 mm", in metres; raises what `read_amount` does."""
+    return read_amount(name, "m", text)
+
+
+def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
+    """A number and its unit as written, or the number in `unit`; a bare number has the unit "".
+
+    Raises
+    ------
+    BadInput
+        for what is neither, or cannot be had in `unit`.
+    """
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        number, own = str(value), ""
+    else:
+        parts = _split(value)
+        if parts is None:
+            raise BadInput(f'must be a number, or a quantity such as "0.5 um", got {quoted(value)}')
+        number, own = parts
+    if unit is None or own == unit:
+        return Decimal(number), own
+    try:
+        if own and unit:
+            return _convert(number, own, unit), unit
+    except _UnusableUnit:
+        pass
+    raise BadInput(f"must be in {unit or 'no unit'} as the range's beginning is, got {quoted(value)}")
+
+
+def to_si(value: object) -> Any:
+    """A value of a case file as a number in SI; two equal ones as one; names as they stand."""
+    if isinstance(value, list | tuple):
+        entries = [to_si(entry) for entry in value]
+        return entries[0] if len(entries) == 2 and entries[0] == entries[1] else entries
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    parts = _split(value)
+    return value if parts is None or not parts[1] else float(_convert(*parts, None))
+
+
+def default_amount(value: float, unit: str) -> Amount:
+    """A default of the library, written out with its unit."""
+    return Amount(value, f"{value:g} {unit}" if float(f"{value:g}") == value else f"{value!r} {unit}")
+
+
+def default_pair(value: float, unit: str) -> tuple[Amount, Amount]:
+    """A default of the library for both bodies."""
+    return default_amount(value, unit), default_amount(value, unit)
+
+
+def amount_type(unit: str) -> Any:
+    """The type of a section's field that is a quantity in `unit`."""
+    return Annotated[float, PlainValidator(partial(parse_amount, unit))]
+
+
+def _paired(value: object) -> object:
+    """One value for both bodies or both directions."""
+    return value if value is None or isinstance(value, list | tuple) else (value, value)
+
+
+Length: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "m"))]
+Force: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "N"))]
+Speed: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "m/s"))]
+Pressure: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "Pa"))]
+Temperature: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "K"))]
+Conductivity: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "W/m/K"))]
+Density: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "kg/m^3"))]
+HeatCapacity: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "J/kg/K"))]
+Number: TypeAlias = Annotated[float, Strict()]
+Count: TypeAlias = Annotated[PositiveInt, Strict()]
+Seed: TypeAlias = Annotated[int, Strict(), Field(ge=0)]
+PAIRED = BeforeValidator(_paired)
+OPTIONAL = BeforeValidator(none_from_word)

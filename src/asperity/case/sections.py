@@ -1,0 +1,99 @@
+"""The sections of a case file, in the order in which it has them."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, Strict
+
+from asperity.case.amounts import (
+    OPTIONAL,
+    PAIRED,
+    Amount,
+    Count,
+    Force,
+    Length,
+    Number,
+    Pressure,
+    Speed,
+    default_amount,
+    parse_amount,
+)
+from asperity.case.laws import LubricantSection, ThermalSection, parse_lubricant
+from asperity.case.refusals import Section
+from asperity.case.surfaces import SurfaceSection, parse_surface
+from asperity.case.sweep import StudySection, parse_study
+from asperity.case.vibration import parse_vibration
+from asperity.conditions import Geometry
+from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, Options, Start
+from asperity.errors import BadInput
+
+
+def _parse_radius(value: object) -> Amount | tuple[Amount, Amount]:
+    """One radius, or [Rx, Ry] of an elliptic contact."""
+    if isinstance(value, list | tuple):
+        if len(value) != 2:
+            raise BadInput(f"must be one length or a pair [Rx, Ry], got {len(value)} values")
+        return parse_amount("m", value[0]), parse_amount("m", value[1])
+    return parse_amount("m", value)
+
+
+class ContactSection(Section):
+    """[contact]: geometry, load and motion."""
+
+    geometry: Geometry
+    radius: Annotated[float | tuple[float, float], PlainValidator(_parse_radius)]
+    length: Annotated[Length | None, OPTIONAL] = None  # of a line contact
+    load: Force
+    entrainment_speed: Speed
+    slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed
+
+
+class MaterialSection(Section):
+    """[material]: the two bodies."""
+
+    youngs_modulus: Annotated[tuple[Pressure, Pressure], PAIRED]
+    poisson_ratio: Annotated[tuple[Number, Number], PAIRED]
+    hardness: Annotated[Pressure | None, OPTIONAL] = None
+    boundary_friction: Annotated[float, Strict(), Field(ge=0.0, le=2.0)] = BOUNDARY_FRICTION
+
+
+class GridSection(Section):
+    """[grid]: cells, and corners in half-widths of the smooth dry line contact."""
+
+    cells: tuple[Annotated[int, Strict()], Annotated[int, Strict()]]
+    x: tuple[Number, Number]
+    y: tuple[Number, Number]
+
+
+class SolverSection(Section):
+    """[solver]: how hard to solve."""
+
+    tolerance: Number = Options().tolerance
+    max_iterations: Annotated[int, Strict()] = Options().max_iterations
+    contact_film: Length = default_amount(Options().contact_film, "m")
+
+
+class MotionSection(Section):
+    """[motion]: how `asperity run` lets the roughness move."""
+
+    steps: Count = 200
+    time_step: Annotated[float, Strict(), Field(gt=0.0, le=LONGEST_STEP)] = 1.0  # cells that the oil travels in one
+    rough: Literal["first", "second", "both"] = "first"  # which body carries a generated surface; both: a half each
+    start: Start = "steady"
+    track: Count = 1  # lengths of the domain after which a surface repeats
+    flattening: Annotated[bool, Strict()] = False  # what is pressed flat stays flat: running-in
+
+
+class CaseFile(Section):
+    """A whole case file. `lubricant = "none"` is a dry contact: an oil is not something to forget."""
+
+    model: Literal["unified", "conserving"] = "unified"
+    contact: ContactSection
+    material: MaterialSection
+    lubricant: Annotated[LubricantSection | None, PlainValidator(parse_lubricant)]
+    surface: Annotated[SurfaceSection, PlainValidator(parse_surface)]
+    grid: GridSection
+    solver: SolverSection = SolverSection()
+    thermal: ThermalSection = Field(default_factory=ThermalSection)
+    vibration: Annotated[Any, PlainValidator(parse_vibration)] = None
+    study: Annotated[StudySection | None, PlainValidator(parse_study)] = None
+    motion: Annotated[MotionSection | None, OPTIONAL] = None

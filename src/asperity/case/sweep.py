@@ -1,0 +1,72 @@
+"""[study] of a case file: its own keys, and the quantities that it varies, each over a list or a range."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator
+
+from asperity.case.amounts import Count, Seed
+from asperity.case.refusals import LocatedError, Section, quoted, validated
+from asperity.errors import BadInput
+
+
+def _parse_seeds(value: object) -> int | tuple[int, ...]:
+    """How many seeds, or the seeds themselves."""
+    if type(value) is int and value >= 1:
+        return value
+    if isinstance(value, list | tuple) and value and all(type(seed) is int and seed >= 0 for seed in value):
+        return tuple(value)
+    raise BadInput(f"must be 1 or more, or a list of seeds such as [1, 2, 3], got {quoted(value)}")
+
+
+class RangeSection(Section):
+    """A range in [study]: `step` from one value to the next, or `count` of them; over samples, neither."""
+
+    start: Any = Field(alias="from")
+    to: Any
+    step: Any = None
+    count: Count | None = None
+    scale: Literal["linear", "log"] = "linear"
+
+
+class StudySection(Section):
+    """[study]: what a sweep varies. Every other key names a quantity of the case."""
+
+    kind: Literal["solve", "vibrate"] = "solve"
+    axes: dict[str, tuple[Any, ...] | RangeSection]  # as written: key -> values
+    samples: Count | None = None  # a Latin hypercube of so many points in place of the product
+    sample_seed: Seed = 0
+    seeds: Annotated[int | tuple[int, ...], PlainValidator(_parse_seeds)] = 1  # how many surfaces a point, or which
+    seeding: Literal["independent", "common"] = "independent"
+
+
+def parse_study(value: object) -> StudySection | None:
+    """The plan of a study; quantities stand beside its own keys, as tables (contact.load) or by their bare names."""
+    if value is None or value == "none":
+        return None
+    if not isinstance(value, Mapping):
+        raise BadInput(f"must be a table, got {quoted(value)}")
+    known = set(StudySection.model_fields) - {"axes"}
+    own = {key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in known}
+    axes = dict(_axes({key: v for key, v in value.items() if key not in known}))
+    return validated(StudySection, {**own, "axes": axes})
+
+
+def _axes(table: Mapping[str, object], parents: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
+    for key, value in table.items():
+        keys = (*parents, key)
+        if isinstance(value, Mapping) and not {"from", "to", "step", "count"} & set(value):
+            yield from _axes(value, keys)
+        elif isinstance(value, Mapping):
+            try:
+                yield ".".join(keys), validated(RangeSection, value)
+            except LocatedError as mistake:
+                raise LocatedError(keys + mistake.keys, mistake.message) from None
+        elif isinstance(value, list) and value:
+            yield ".".join(keys), tuple(value)
+        else:
+            raise LocatedError(
+                keys,
+                f'must be a list of values or a range such as {{ from = "0.5 um", to = "4 um", step = "0.1 um" }}, '
+                f"got {quoted(value)}",
+            )

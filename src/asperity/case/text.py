@@ -1,0 +1,108 @@
+"""A case as TOML text: read, restated with every default, and with values replaced."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+from asperity.case.amounts import Amount
+from asperity.case.refusals import Section
+from asperity.case.sections import CaseFile
+from asperity.case.sweep import StudySection
+from asperity.case.vibration import preset_keys
+from asperity.errors import BadInput, UnreadableFile
+
+
+def read_text(path: Path) -> str:
+    """A case file's text.
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is missing or no text.
+    """
+    try:
+        return path.read_text("utf-8")
+    except FileNotFoundError:
+        raise UnreadableFile(f"{path} does not exist; check its name") from None
+    except UnicodeDecodeError:
+        raise UnreadableFile(f"{path} is not a text file; a case is TOML") from None
+    except OSError as error:
+        raise UnreadableFile(f"{path} cannot be read: {error.strerror}") from None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The tables of a text; `UnreadableFile` for what is no TOML."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UnreadableFile(f"{source} is not valid TOML: {error}") from None
+
+
+def restated(contents: CaseFile) -> str:
+    """A case as TOML, every default written out, quantities as they were written."""
+    import tomli_w
+
+    tables = _plain(contents)
+    if contents.lubricant is None:
+        tables["lubricant"] = "none"
+    return tomli_w.dumps(tables)
+
+
+def replaced(tables: dict[str, Any], overrides: Mapping[str, object], source: str) -> dict[str, Any]:
+    """The tables with values replaced by their dotted keys; text is read as TOML where it is TOML.
+
+    `vibration.preset` replaces all that presets choose.
+
+    Raises
+    ------
+    BadInput
+        for what is no dotted key.
+    """
+    if "vibration.preset" in overrides:  # what the old preset chose is written out, and would stand above the new
+        for choice in preset_keys():
+            tables.get("vibration", {}).pop(choice, None)
+    for path, value in overrides.items():
+        *parents, key = path.split(".")
+        if not all((*parents, key)):
+            raise BadInput(f"{source}: {path} is not a key; name one such as contact.load")
+        table = tables
+        for parent in parents:
+            if not isinstance(table.get(parent), dict):
+                table[parent] = {}
+            table = table[parent]
+        table[key] = _toml_value(value) if isinstance(value, str) else deepcopy(value)  # a later key may go into it
+    return tables
+
+
+def relative_path(file: str | Path, folder: Path) -> str:
+    """`file` as seen from `folder`, so that a case can be moved together with its surface."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(file).resolve().as_posix()
+
+
+def _toml_value(text: str) -> object:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text  # the shell took the quotes away
+
+
+def _plain(section: Section) -> dict[str, Any]:
+    """Tables of plain values, quantities as they were written; what is left out stays out."""
+    values = {entry.alias or name: getattr(section, name) for name, entry in type(section).model_fields.items()}
+    if isinstance(section, StudySection):
+        values |= values.pop("axes")
+    return {key: _plain_value(value) for key, value in values.items() if value is not None}
+
+
+def _plain_value(value: object) -> object:
+    if isinstance(value, Section):
+        return _plain(value)
+    if isinstance(value, tuple):
+        return [_plain_value(entry) for entry in value]
+    return value.text if isinstance(value, Amount) else value
