@@ -8,16 +8,8 @@ import sys
 from pathlib import Path
 
 from asperity.case import load_case
-from asperity.study import (
-    PAPER_ANCHORS,
-    WearCurve,
-    compare_with_anchors,
-    curve_of,
-    plan_study,
-    rig_deviation,
-    run_study,
-    study_executor,
-)
+from asperity.paper import PAPER_ANCHORS, compare_with_anchors, rig_deviation
+from asperity.study import WearCurve, curve_of, plan_study, run_study, study_executor
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 CASES = {"default": "paper.toml", "as printed": "paper-as-printed.toml", "calibrated": "paper-calibrated.toml"}

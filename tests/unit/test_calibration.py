@@ -15,7 +15,8 @@ import pytest
 from asperity import load_case
 from asperity.cli import main
 from asperity.errors import BadInput
-from asperity.study import Anchor, calibrate, plan_points, run_study
+from asperity.paper import Anchor
+from asperity.study import calibrate, plan_points, run_study
 from asperity.study.calibration import _levels, _Slopes
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"

@@ -8,8 +8,7 @@ import pytest
 from asperity.case import load_case
 from asperity.coupling import VibrationModel
 from asperity.errors import BadInput
-from asperity.paper import SAMPLES_SQ_UM, Disturbance, RigRecording, simulate_rig, write_rig
-from asperity.paper.rig import Tones
+from asperity.paper import SAMPLES_SQ_UM, Disturbance, RigRecording, Tones, simulate_rig, write_rig
 from asperity.signals import power_spectrum
 from asperity.vibration import FilteredNoise, acceleration
 from asperity.wear import contact_resonance, remove_lines

@@ -16,7 +16,7 @@ import asperity.study.execute as execution
 from asperity.case import load_case
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.results import solve_case
-from asperity.study import estimate, load_study, plan_points, plan_study, run_study
+from asperity.study import estimate_study, load_study, plan_points, plan_study, run_study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRY = {
@@ -245,10 +245,10 @@ def test_progress_counts_every_case_once(plan, executor):
 
 def test_a_dry_run_says_what_is_left_and_keeps_nothing(plan, executor, tmp_path):
     run_study(plan, out=tmp_path / "there", executor=executor, shard=(1, 2))
-    cost = estimate(plan, out=tmp_path / "there", workers=2)
+    cost = estimate_study(plan, out=tmp_path / "there", workers=2)
     assert (cost.cases, cost.kept, cost.tried) == (6, 3, 3)
     assert cost.seconds == pytest.approx(3 * cost.case_s / 2)
-    assert estimate(plan, out=tmp_path / "not there", workers=1).kept == 0
+    assert estimate_study(plan, out=tmp_path / "not there", workers=1).kept == 0
     assert not (tmp_path / "not there").exists()
 
 

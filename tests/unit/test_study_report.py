@@ -19,14 +19,12 @@ import asperity
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.errors import BadInput
-from asperity.paper import is_papers_contact
+from asperity.paper import PAPER_ANCHORS, Anchor, is_papers_contact
 from asperity.report import study_figures, sweep_figures, write_study_report
 from asperity.report.figures import CONTACT_COLOUR
 from asperity.report.study_figures import ON_PAGE, ON_PAPER
 from asperity.report.study_page import StudyReport
 from asperity.study import (
-    PAPER_ANCHORS,
-    Anchor,
     StudyOverview,
     StudyResult,
     curve_of,

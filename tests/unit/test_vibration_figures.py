@@ -3,8 +3,7 @@ import pytest
 
 from asperity.coupling import VibrationModel, contact_vibration, dry_full_load
 from asperity.errors import BadInput
-from asperity.paper import Table1Row
-from asperity.paper.table1 import PRINTED, papers_contact
+from asperity.paper import TABLE1_PRINTED, Table1Row, papers_contact
 from asperity.report import excitation_figure, load_trend_figure, response_figure, table1_figure, write_png
 
 PAPER = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
@@ -48,7 +47,7 @@ def test_table_1_is_drawn_with_its_printed_values(tmp_path):
             cutoff_hz=fc, height_m=um * 1e-6, load_n=load, crf_hz=crf, crfa=a, crfa_low=a / 2, crfa_high=2 * a,
             paper_crf_hz=crf, paper_crfa=a,
         )
-        for fc, um, load, crf, a in PRINTED
+        for fc, um, load, crf, a in TABLE1_PRINTED
     ]  # fmt: skip
     figure = table1_figure(rows)
     height = figure.get_axes()[1]

@@ -9,21 +9,19 @@ import pytest
 
 from asperity.case import load_case
 from asperity.errors import BadInput, UnreadableFile
-from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, TRENDS
-from asperity.results import solve_case
-from asperity.study import (
+from asperity.paper import (
+    CRF_ENDS_HZ,
     PAPER_ANCHORS,
+    SAMPLES_SQ_UM,
+    TRENDS,
     Anchor,
-    WearCurve,
     compare_with_anchors,
-    curve_of,
     load_anchors,
-    plan_points,
     rig_deviation,
     rig_prediction,
-    run_study,
-    wear_curve,
 )
+from asperity.results import solve_case
+from asperity.study import WearCurve, curve_of, plan_points, run_study, wear_curve
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

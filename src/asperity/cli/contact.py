@@ -178,8 +178,9 @@ def _report_study(
     out = out or folder / "report.html"
     require_output(out, ".html")
     from asperity.cli.study import study_scalars
+    from asperity.paper import load_anchors
     from asperity.report import write_study_report
-    from asperity.study import load_anchors, load_study
+    from asperity.study import load_study
 
     wanted = None if anchors is None else load_anchors(anchors)
     result = load_study(folder)

@@ -128,7 +128,7 @@ def calibrate(
 ) -> None:
     """Find the free quantities with which the wear curve best meets anchors, and what that leaves open."""
     from asperity.case import read_length
-    from asperity.study import PAPER_ANCHORS, load_anchors
+    from asperity.paper import PAPER_ANCHORS, load_anchors
     from asperity.study import calibrate as find
 
     wanted = PAPER_ANCHORS if anchors is None else load_anchors(anchors)
@@ -277,8 +277,8 @@ def calibrated_text(found: "Calibration", folder: Path) -> str:
 def _moved(case: "Case", folder: Path) -> "Case":
     """The case with its surface files named as seen from `folder`."""
     from asperity.case import relative_path
-    from asperity.study import stated
+    from asperity.study import stated_value
 
-    files = {key: stated(case, key) for key in ("surface.file", "surface.second.file")}
+    files = {key: stated_value(case, key) for key in ("surface.file", "surface.second.file")}
     moved = {key: relative_path(case.folder / name, folder) for key, name in files.items() if name is not None}
     return case.with_overrides(moved) if moved else case

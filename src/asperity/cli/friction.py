@@ -12,7 +12,7 @@ from asperity.errors import AsperityError
 
 if TYPE_CHECKING:
     from asperity.case import Case
-    from asperity.results import FrictionCurve, Progress
+    from asperity.results import FrictionCurve, SolverProgress
 
 CaseFile = Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a run.")]
 Override = Annotated[
@@ -41,7 +41,7 @@ def stribeck(
     """Friction over speed, from boundary lubrication to full film."""
     from asperity.results import stribeck_curve
 
-    def curve(chosen: "Case", progress: "Progress | None") -> "FrictionCurve":
+    def curve(chosen: "Case", progress: "SolverProgress | None") -> "FrictionCurve":
         return stribeck_curve(chosen, speeds=speed, progress=progress)
 
     _show(curve, _cases(case, sq, override), out, as_json=as_json, quiet=quiet)
@@ -63,7 +63,7 @@ def traction(
     """Friction over the slide-to-roll ratio, from pure rolling on."""
     from asperity.results import traction_curve
 
-    def curve(chosen: "Case", progress: "Progress | None") -> "FrictionCurve":
+    def curve(chosen: "Case", progress: "SolverProgress | None") -> "FrictionCurve":
         return traction_curve(chosen, slips=slip, progress=progress)
 
     _show(curve, _cases(case, sq, override), out, as_json=as_json, quiet=quiet)
@@ -75,7 +75,7 @@ def _cases(path: Path, roughness: Sequence[str] | None, override: Sequence[str] 
 
 
 def _show(
-    curve: "Callable[[Case, Progress | None], FrictionCurve]",
+    curve: "Callable[[Case, SolverProgress | None], FrictionCurve]",
     cases: "Sequence[Case]",
     out: Path | None,
     *,

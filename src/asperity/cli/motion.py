@@ -12,7 +12,7 @@ from asperity.cli.common import chosen_case, print_json, print_rows, require_out
 from asperity.errors import AsperityError, BadInput, NotConverged
 
 if TYPE_CHECKING:
-    from asperity.history import History, HistoryVibration, Progress
+    from asperity.history import History, HistoryProgress, HistoryVibration
 
 
 @app.command("run")
@@ -85,7 +85,7 @@ def run_case(
 
 
 @contextmanager
-def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None] | None]":
+def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[HistoryProgress], None] | None]":
     """Show the steps on a terminal."""
     if quiet:
         yield None
@@ -96,7 +96,7 @@ def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], 
     first = f"{label}: the start; after installation the first solve compiles the solver, up to a minute ..."
     with console.status(first) if console.is_terminal else nullcontext() as status:
 
-        def tell(step: "Progress") -> None:
+        def tell(step: "HistoryProgress") -> None:
             if status is not None:
                 clr = 100.0 * float(step.row["clr"])
                 status.update(f"{label}: step {step.number} of {step.steps}, {clr:.1f} % of the load on asperities")

@@ -49,7 +49,7 @@ def rig(
             duration_s=read_amount("--duration", "s", duration),
             rate_hz=read_amount("--rate", "Hz", rate),
             disturbance=Disturbance(snr_db=snr, modes=modes),
-            trend=trend,
+            trend=trend,  # type: ignore[arg-type]
             seed=seed,
             case=None if case is None else load_case(case),
         )
@@ -58,7 +58,7 @@ def rig(
             if status is not None:
                 status.update(f"{written} of {of} recordings written")
 
-        paths = write_rig(made, out, file_format=file_format, progress=tell)
+        paths = write_rig(made, out, file_format=file_format, progress=tell)  # type: ignore[arg-type]
     first, last = made.recordings[0], made.recordings[-1]
     knee = "" if made.split_sq_m is None else f", with a knee at Sq {made.split_sq_m * 1e6:g} um"
     ends = " to ".join(f"{one.crf_hz:.0f} Hz at Sq {one.sq_m * 1e6:.2f} um" for one in (first, last))

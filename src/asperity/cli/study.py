@@ -13,7 +13,7 @@ from asperity.cli.common import busy, chosen_case, print_json, print_rows, requi
 from asperity.errors import AsperityError, BadInput
 
 if TYPE_CHECKING:
-    from asperity.study import Estimate, Progress, StudyPlan, StudyResult
+    from asperity.study import StudyCost, StudyPlan, StudyProgress, StudyResult
 
 SHOWN_FAILURES = 5
 
@@ -47,7 +47,7 @@ def study(
     quiet: Quiet = False,
 ) -> None:
     """Sweep a case: every point of its [study], several surfaces each; goes on where it was stopped."""
-    from asperity.study import estimate, plan_study, run_study
+    from asperity.study import estimate_study, plan_study, run_study
 
     part = _shard(shard)
     if out is None and not dry_run:
@@ -56,7 +56,7 @@ def study(
         require_output(report, ".html", "--report")
     plan = plan_study(chosen_case(case, None, override or []))
     if dry_run:
-        _print_estimate(plan, estimate(plan, out=out, workers=workers, shard=part), as_json=as_json)
+        _print_estimate(plan, estimate_study(plan, out=out, workers=workers, shard=part), as_json=as_json)
         return
     with _executor(executor) as chosen, shown_study(case.name, quiet=quiet) as tell:
         result = run_study(
@@ -132,7 +132,7 @@ def study_scalars(result: "StudyResult") -> dict[str, Any]:
 
 
 @contextmanager
-def shown_study(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None] | None]":
+def shown_study(label: str, *, quiet: bool) -> "Iterator[Callable[[StudyProgress], None] | None]":
     """Show cases done, rate, failures and time left on a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
@@ -148,7 +148,7 @@ def shown_study(label: str, *, quiet: bool) -> "Iterator[Callable[[Progress], No
     ) as bar:
         task = bar.add_task(label, total=None, rate="starting workers ...", failed="", left="")
 
-        def tell(progress: "Progress") -> None:
+        def tell(progress: "StudyProgress") -> None:
             left = progress.seconds_left
             bar.update(
                 task,
@@ -245,7 +245,7 @@ def _print_curve(levels: Any) -> None:
     print("  mean ± standard deviation over the surfaces of a level; CRFA in (m/s^2)^2/Hz\n")
 
 
-def _print_estimate(plan: "StudyPlan", cost: "Estimate", *, as_json: bool) -> None:
+def _print_estimate(plan: "StudyPlan", cost: "StudyCost", *, as_json: bool) -> None:
     verdict = (
         f"{cost.cases} cases, {cost.kept} of them kept already: about {_time(cost.seconds)} on {cost.workers} "
         f"{'worker' if cost.workers == 1 else 'workers'}"

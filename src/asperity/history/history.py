@@ -61,7 +61,7 @@ class Frame(NamedTuple):
     in_contact: Mask
 
 
-class Progress(NamedTuple):
+class HistoryProgress(NamedTuple):
     """How far a history is: the step just taken, of how many, and its row."""
 
     number: int
@@ -245,7 +245,7 @@ def run_history(
     out: Path | None = None,
     every: int | None = None,
     strict: bool = True,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[HistoryProgress], None] | None = None,
 ) -> History:
     """Let a case's roughness move.
 
@@ -291,7 +291,7 @@ def run_history(
                 bad = strict and not row["converged"]
                 keeper.keep(snapshot, row, bad=bad)
                 if progress is not None:
-                    progress(Progress(snapshot.number, last, row))
+                    progress(HistoryProgress(snapshot.number, last, row))
                 if bad or snapshot.number >= last:
                     break
         history = keeper.history(time.perf_counter() - began, len(keeper.rows) - before)

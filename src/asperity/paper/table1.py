@@ -6,32 +6,17 @@ Where a single record decides, as in the paper, an ensemble says what that recor
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
-from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel, dry_full_load, excitation, oscillator, search_band
 from asperity.errors import BadInput
+from asperity.paper.contact import papers_contact
+from asperity.paper.numbers import DAMPING_RATIO, MASS, TABLE1_PRINTED
 from asperity.signals import power_spectrum
 from asperity.vibration import ContactOscillator, Excitation, acceleration
 from asperity.wear import contact_resonance
 
-PRINTED = (  # cut-off [Hz], height [um], load [N], CRF [Hz], CRFA [(m/s^2)^2/Hz]
-    (30.0, 2.0, 100.0, 2965.45, 2.05),
-    (30.0, 2.0, 200.0, 3322.55, 0.64),
-    (30.0, 2.0, 300.0, 3573.43, 0.31),
-    (30.0, 2.0, 400.0, 3742.52, 0.25),
-    (30.0, 1.0, 200.0, 3322.55, 0.16),
-    (30.0, 2.0, 200.0, 3322.55, 0.64),
-    (30.0, 3.0, 200.0, 3322.55, 1.45),
-    (30.0, 4.0, 200.0, 3322.55, 2.58),
-    (10.0, 2.0, 200.0, 3322.55, 0.01),
-    (20.0, 2.0, 200.0, 3322.55, 0.13),
-    (30.0, 2.0, 200.0, 3322.55, 0.64),
-    (40.0, 2.0, 200.0, 3322.55, 2.04),
-)
-# Section 4's steel: the printed 219.78 GPa as Hertz's modulus would give 4147 Hz at 200 N, half of it 3292 Hz
-PAIR = ElasticPair((207e9, 207e9), (0.3, 0.3))
-RADIUS, MASS, DAMPING_RATIO = 5.4e-3, 0.1, 0.02
 SHORTEST_TRANSFORM = 16384  # the paper's, it seems: 1.6 s at 10 kHz and the next power of two
 FEWEST_RECORDS = 20
 
@@ -78,7 +63,7 @@ def reproduce_table1(*, preset: str = "paper", records: int | None = None, seed:
         raise BadInput(f"records must be at least {FEWEST_RECORDS} for a 5 % quantile, got {records}; 200 are usual")
     read: dict[tuple[float, float, float], Field] = {}
     rows = []
-    for cutoff, height_um, load, paper_crf, paper_crfa in PRINTED:
+    for cutoff, height_um, load, paper_crf, paper_crfa in TABLE1_PRINTED:
         case = (cutoff, height_um, load)
         if case not in read:
             read[case] = _records(model, cutoff, height_um * 1e-6, load, records, seed)
@@ -98,11 +83,6 @@ def reproduce_table1(*, preset: str = "paper", records: int | None = None, seed:
             )
         )
     return rows
-
-
-def papers_contact(load: float) -> ContactConditions:
-    """Section 2's contact: a sphere on a plane that slides at the rig's 0.42 m/s."""
-    return ContactConditions(pair=PAIR, geometry="point", radius=RADIUS, load=load, surface_speeds=(2.12, 1.70))
 
 
 def riding(model: VibrationModel, cutoff_hz: float, height: float, load: float) -> tuple[ContactOscillator, Excitation]:
@@ -132,17 +112,17 @@ def _records(model: VibrationModel, cutoff: float, height: float, load: float, r
     """CRF [Hz] and CRFA of each record, shape (2, records)."""
     spring, ridden_over = riding(model, cutoff, height, load)
     samples = round(model.duration_s * model.rate_hz)
-    found = np.empty((2, records))
+    readings = np.empty((2, records))
     for number in range(records):
         profile = ridden_over.profile(samples, model.rate_hz, seed + number)
         response = acceleration(spring, profile, method=model.response, substeps=model.substeps)
         if model.method == "peak":
-            found[:, number] = highest_point(response.values, model.rate_hz)
+            readings[:, number] = highest_point(response.values, model.rate_hz)
         else:
             band = search_band(papers_contact(load), model)
             fit = contact_resonance(power_spectrum(response, window="boxcar"), band_hz=band, method=model.method)
-            found[:, number] = fit.crf_hz, fit.crfa
-    return found
+            readings[:, number] = fit.crf_hz, fit.crfa
+    return readings
 
 
 def highest_point(values: Field, rate_hz: float) -> tuple[float, float]:
@@ -150,9 +130,7 @@ def highest_point(values: Field, rate_hz: float) -> tuple[float, float]:
 
     The axis is linspace(0, rate/2, n/2), one line too long, as the printed frequencies suggest: 0.4 Hz at 3.3 kHz.
     """
-    import scipy.fft as fft
-
     length = max(SHORTEST_TRANSFORM, 1 << (values.size - 1).bit_length())
-    density = 2.0 * np.abs(fft.rfft(values, length)[: length // 2]) ** 2 / (rate_hz * values.size)
+    density = 2.0 * np.abs(scipy.fft.rfft(values, length)[: length // 2]) ** 2 / (rate_hz * values.size)
     highest = int(np.argmax(density))
     return highest * rate_hz / 2.0 / (length // 2 - 1), float(density[highest])

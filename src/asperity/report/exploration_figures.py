@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from asperity.errors import BadInput
 from asperity.files import whole_file
 from asperity.report.figures import BLUE, GREEN, GREY, MICRO, STYLE, VERMILION, styled
-from asperity.study import SEED, Calibration, Outcome, Parameter, Sensitivity
+from asperity.study import SEED_FACTOR, CalibratedParameter, Calibration, Sensitivity, SensitivityOutcome
 
 FORMATS = (".png", ".pdf")
 DARK = 0.55  # share from which a cell's number is white
@@ -35,7 +35,7 @@ FACTORS = {
     "solver.contact_film": "contact threshold",
     "vibration.cutoff_exponent": "coupling exponent q",
     "vibration.cutoff_reference": "cut-off at CAR 1",
-    SEED: "surface (seed)",
+    SEED_FACTOR: "surface (seed)",
 }
 
 
@@ -84,14 +84,14 @@ def sensitivity_figure(found: Sensitivity) -> Figure:
     return figure
 
 
-def _effect(outcome: Outcome, value: float, method: str) -> str:
+def _effect(outcome: SensitivityOutcome, value: float, method: str) -> str:
     if method == "sobol":
         return f"{value:.2f}"
     _, scale, shown = QUANTITIES[outcome.quantity]
     return f"{scale * value:{shown}}"
 
 
-def _head(axes: Axes, outcomes: tuple[Outcome, ...]) -> None:
+def _head(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> None:
     """Names of the quantities above their columns, a white line between them."""
     for quantity, (name, *_) in QUANTITIES.items():
         columns = [column for column, one in enumerate(outcomes) if one.quantity == quantity]
@@ -174,7 +174,7 @@ def _ranges(axes: Axes, found: Calibration) -> None:
     )  # fmt: skip
 
 
-def _parameter(one: Parameter) -> str:
+def _parameter(one: CalibratedParameter) -> str:
     unit = f" {one.range.unit}" if one.range.unit else ""
     text = f"{FACTORS.get(one.range.key, one.range.key)}: {one.value:.3g}{unit}"
     return f"{text}, {100 * one.learnt:.0f} % learnt"

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from asperity.arrays import Field
-from asperity.paper import RIG_SPLIT_UM
+from asperity.paper import PAPER_ANCHORS, RIG_SPLIT_UM, SPLIT_ANCHOR, rig_prediction
 from asperity.report.figures import (
     BLUE,
     CAVITY_COLOUR,
@@ -35,11 +35,11 @@ from asperity.report.figures import (
     mark_hertz_zone,
     show_map,
 )
-from asperity.study import DONE, PAPER_ANCHORS, SPLIT, rig_prediction
 
 if TYPE_CHECKING:
+    from asperity.paper import Anchor
     from asperity.results import Run
-    from asperity.study import Anchor, WearCurve
+    from asperity.study import WearCurve
     from asperity.wear import Stages
 
 SPLIT_COLOUR, SPLIT_STRIP = "#8a5a00", "#f2e3c6"
@@ -208,7 +208,7 @@ def shares(curve: "WearCurve", anchors: "Sequence[Anchor]", medium: Medium) -> F
 def resonance(curve: "WearCurve", anchors: "Sequence[Anchor]", medium: Medium) -> Figure:
     """CRF and CRFA over Sq by each vibration preset, with stages and anchors: the paper's Fig 8."""
     presets, printed = list(curve.stages), set(anchors) <= set(PAPER_ANCHORS)
-    splits = [anchor for anchor in anchors if anchor.quantity == SPLIT]
+    splits = [anchor for anchor in anchors if anchor.quantity == SPLIT_ANCHOR]
     crf, said = ("crf_sound_hz", "crf_paper_hz"), "printed " if printed else ""
     with medium.drawing():
         figure = Figure(figsize=(medium.double, 0.62 * medium.double), layout="constrained")
@@ -231,8 +231,8 @@ def resonance(curve: "WearCurve", anchors: "Sequence[Anchor]", medium: Medium) -
         grid[0, 0].set_ylabel("CRF [Hz]")
         grid[1, 0].set_ylabel("CRFA [(m/s²)²/Hz]")
         known = [anchor.value for anchor in anchors if anchor.quantity in crf]
-        stay_near(grid[0, 0], np.concatenate([known, *(_seeds(curve, f"crf_{preset}_hz")[1] for preset in presets)]))
-        stay_near(grid[1, 0], np.concatenate([_seeds(curve, f"crfa_{preset}")[1] for preset in presets]))
+        stay_near(grid[0, 0], np.concatenate([known, *(curve.by_case(f"crf_{preset}_hz")[1] for preset in presets)]))
+        stay_near(grid[1, 0], np.concatenate([curve.by_case(f"crfa_{preset}")[1] for preset in presets]))
         grid[1, 0].set_ylim(bottom=0.0)
         _key_below(figure, *grid.flat, ncols=4)
     return figure
@@ -264,7 +264,7 @@ def rig(curve: "WearCurve", medium: Medium) -> Figure:
         )  # fmt: skip
         _draw_full_load(axes, curve)
         axes.set(xlabel="Sq [µm]", ylabel="CRF [Hz]")
-        stay_near(axes, np.concatenate([_seeds(curve, f"crf_{first}_hz")[1], known["printed_hz"]]))
+        stay_near(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]]))
         medium.title(axes, "The rig's rings and our prediction")
         _key_below(figure, axes, ncols=2, seeds=False)
     return figure
@@ -284,7 +284,7 @@ def _draw_mean(
     """Mean over seeds with its interval as a band, each seed as a faint dot."""
     sq = curve.sq * MICRO
     if seeds:
-        at, each = _seeds(curve, column)
+        at, each = curve.by_case(column)
         axes.plot(at * MICRO, each * scale, ".", color=colour, alpha=0.5, markersize=4.5, markeredgewidth=0, zorder=1)
     axes.update_datalim([(end, 0.0) for end in sq[[0, -1]]], updatey=False)  # levels without a value, too
     low, high = (curve.interval(column) * scale).T
@@ -309,12 +309,6 @@ def _draw_anchors(
             anchor.sq * MICRO, anchor.value * scale, anchor.tolerance * scale, fmt=marker, color="black", markersize=5,
             capsize=2, elinewidth=0.9, markerfacecolor="white", zorder=4, label="_" if number else label,
         )  # fmt: skip
-
-
-def _seeds(curve: "WearCurve", column: str) -> tuple[Field, Field]:
-    """Sq and value of every case that may be used, where there is a value."""
-    rows = curve.table[curve.table["status"] == DONE].dropna(subset=column)
-    return rows["surface.sq"].to_numpy(dtype=float), rows[column].to_numpy(dtype=float)
 
 
 def _reach(half_widths: Field) -> Field:

@@ -15,25 +15,21 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from asperity.files import make_folder, read_manifest, require_writable, versions, whole_file
-from asperity.paper import CITATION
+from asperity.files import make_folder, require_writable, whole_file
+from asperity.paper import CITATION, SPLIT_ANCHOR, Anchor, rig_deviation
 from asperity.report import study_figures, sweep_figures
 from asperity.report.figures import MICRO
 from asperity.report.page import NOT_FOUND, Tile, in_print, page_template, picture, with_deviation
 from asperity.report.study_figures import ON_PAGE, ON_PAPER, Medium
 from asperity.report.sweep_figures import OUTPUTS, Output, axis_label, place_in_words
 from asperity.study import (
-    FORMAT,
     GROUPS,
-    SEEDS,
-    SPLIT,
-    Anchor,
+    SEED_KEYS,
     FailureReason,
     StudyOverview,
     StudyResult,
     WearCurve,
     as_written,
-    rig_deviation,
 )
 
 MOST_POINTS = 60  # in a table of the page; the csv has all
@@ -318,7 +314,7 @@ class StudyReport:
         if self.study.curve is not None:
             first, last = self.study.curve.sq[0] * MICRO, self.study.curve.sq[-1] * MICRO
             return f"Wear study, Sq {first:.3g} to {last:.3g} µm"
-        keys = [key for key in self.study.result.plan.axes if key not in SEEDS]
+        keys = [key for key in self.study.result.plan.axes if key not in SEED_KEYS]
         return f"Study over {', '.join(keys) or 'seeds'}"
 
     def _tiles(self) -> list[Tile]:
@@ -426,11 +422,9 @@ class StudyReport:
         }
         seeds = "surfaces' seeds given: " + ", ".join(map(str, plan.seeds)) if plan.seeds else seeding[plan.seeding]
         rows.append(("Seeds", f"{seeds}; each case's own stand in cases.csv"))
-        used = versions()
         if self.study.result.folder is not None:
-            used = read_manifest(self.study.result.folder, of="study", layout=FORMAT)["versions"]
             rows.append(("Folder", self.study.result.folder.resolve().name))
-        rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in used.items())))
+        rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in self.study.result.versions.items())))
         return rows
 
     def _range(self, key: str) -> str:
@@ -468,7 +462,7 @@ class _Display:
 def _display(quantity: str) -> _Display:
     if quantity in ("clr", "car", "car_domain"):
         return _Display(100.0, "%", ".1f")
-    if quantity == SPLIT:
+    if quantity == SPLIT_ANCHOR:
         return _Display(1.0, "µm", ".2f")
     if quantity.startswith("crf_"):
         return _Display(1.0, "Hz", ".0f")

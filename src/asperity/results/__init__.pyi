@@ -1,5 +1,5 @@
 from .curves import FrictionCurve as FrictionCurve
-from .curves import Progress as Progress
+from .curves import SolverProgress as SolverProgress
 from .curves import stribeck_curve as stribeck_curve
 from .curves import traction_curve as traction_curve
 from .run import Run as Run

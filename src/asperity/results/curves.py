@@ -15,7 +15,7 @@ from asperity.ehl import HOT, ContactSolution, Iteration, contact_state, frictio
 from asperity.errors import BadInput, require_positive
 from asperity.surface import Surface
 
-Progress = Callable[[Iteration], None]
+SolverProgress = Callable[[Iteration], None]
 
 SPEED_RANGE = (0.01, 10.0)  # of the case's entrainment speed
 SPEEDS = 13
@@ -98,7 +98,7 @@ class FrictionCurve:
 
 
 def stribeck_curve(
-    case: Case, *, speeds: Sequence[float] | None = None, progress: Progress | None = None
+    case: Case, *, speeds: Sequence[float] | None = None, progress: SolverProgress | None = None
 ) -> FrictionCurve:
     """Friction over entrainment speed at the case's slide-to-roll ratio.
 
@@ -128,7 +128,7 @@ def stribeck_curve(
 
 
 def traction_curve(
-    case: Case, *, slips: Sequence[float] | None = None, progress: Progress | None = None
+    case: Case, *, slips: Sequence[float] | None = None, progress: SolverProgress | None = None
 ) -> FrictionCurve:
     """Friction over the slide-to-roll ratio (u1 - u2)/u at the case's entrainment speed; above 2 the surfaces oppose.
 
@@ -168,7 +168,7 @@ def _curve(case: Case, kind: Literal["stribeck", "traction"], points: list[Frict
 
 
 def _solved(
-    case: Case, surface: Surface, wanted: Sequence[ContactConditions], progress: Progress | None
+    case: Case, surface: Surface, wanted: Sequence[ContactConditions], progress: SolverProgress | None
 ) -> list[FrictionPoint]:
     points: list[FrictionPoint] = []
     start: ContactSolution | None = None
@@ -186,7 +186,7 @@ def _solve(
     surface: Surface,
     conditions: ContactConditions,
     start: ContactSolution | None,
-    progress: Progress | None,
+    progress: SolverProgress | None,
 ) -> ContactSolution:
     return solve_thermal_contact(
         conditions,

@@ -20,10 +20,10 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import AsperityError, BadInput, require_positive
-from asperity.study.anchors import PAPER_ANCHORS, SPLIT, Anchor, compare_with_anchors
+from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anchors
 from asperity.study.curve import SQ_KEY, WearCurve
 from asperity.study.evaluate import DONE
-from asperity.study.execute import Progress, run_study, study_executor
+from asperity.study.execute import StudyProgress, run_study, study_executor
 from asperity.study.plan import plan_points
 from asperity.study.ranges import (
     OPEN_RANGES,
@@ -34,7 +34,7 @@ from asperity.study.ranges import (
     overrides_at,
     parse_range,
     require_ranges,
-    stated,
+    stated_value,
 )
 from asperity.study.silence import with_silence
 
@@ -62,7 +62,7 @@ RESERVED = {
 }
 
 
-class Parameter(NamedTuple):
+class CalibratedParameter(NamedTuple):
     """A quantity that was free: what was found, and how well the anchors determine it.
 
     `low` and `high` are one standard deviation either way, the range searched counting as what was known before, and
@@ -132,7 +132,7 @@ class Calibration:
     case: Case
     calibrated: Case
     anchors: tuple[Anchor, ...]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[CalibratedParameter, ...]
     correlation: Field
     directions: tuple[Direction, ...]
     trade_offs: tuple[TradeOff, ...]
@@ -234,7 +234,7 @@ def calibrate(
     out: str | Path | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
 ) -> Calibration:
     """Find the values of free quantities with which a case's wear curve best meets anchors.
 
@@ -309,7 +309,7 @@ def _aimed_at(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
     if not aimed:
         raise BadInput("calibration needs an anchor to aim at, got none; leave out fitted = false")
     for anchor in aimed:
-        if anchor.quantity == SPLIT:
+        if anchor.quantity == SPLIT_ANCHOR:
             raise BadInput(f"anchor {anchor.name!r} is a split, which moves in jumps; set fitted = false for it")
         if case.vibration is None and anchor.quantity.startswith("crf"):
             raise BadInput(f"{case.source}: anchor {anchor.name!r} needs a vibration; add [vibration]")
@@ -352,7 +352,7 @@ class _Bench:
         seeds: int,
         out: Path | None,
         executor: Executor,
-        progress: Callable[[Progress], None] | None,
+        progress: Callable[[StudyProgress], None] | None,
     ) -> None:
         self.case, self.ranges, self.aimed, self.sq, self.seeds = case, ranges, aimed, sq, seeds
         self.out, self.executor, self.progress = out, executor, progress
@@ -592,14 +592,16 @@ def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Ca
     return case.with_overrides(found)
 
 
-def _parameters(case: Case, ranges: Sequence[ParameterRange], best: Field, deviations: Field) -> list[Parameter]:
+def _parameters(
+    case: Case, ranges: Sequence[ParameterRange], best: Field, deviations: Field
+) -> list[CalibratedParameter]:
     found = []
     for entry, share, std in zip(ranges, best, deviations, strict=True):
         learnt = float(1.0 - std**2 / PRIOR_VARIANCE)
         reach = (share - std, share + std) if learnt >= LEARNT_FROM else (0.0, 1.0)
         low, high = (entry.value(min(max(end, 0.0), 1.0)) for end in reach)
         found.append(
-            Parameter(
+            CalibratedParameter(
                 range=entry,
                 start=_start(case, entry),
                 value=entry.value(float(share)),
@@ -617,7 +619,7 @@ def _start(case: Case, entry: ParameterRange) -> float | None:
     """What the case itself has, in the range's unit; of a pair in which both are free as one, the first."""
     from asperity.case import split_amount
 
-    value = stated(case, entry.key)
+    value = stated_value(case, entry.key)
     if isinstance(value, list) and entry_of(entry.key)[1] is None:
         value = value[0]
     return None if value is None else float(split_amount(value, entry.unit)[0])

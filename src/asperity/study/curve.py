@@ -14,7 +14,7 @@ from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import BadInput, require_positive
 from asperity.study.evaluate import BOTH_PRESETS, DONE
-from asperity.study.execute import Progress, StudyResult, run_study
+from asperity.study.execute import StudyProgress, StudyResult, run_study
 from asperity.study.plan import plan_points
 from asperity.wear import Stages, split_stages
 
@@ -56,6 +56,11 @@ class WearCurve:
         rows = self.table[(self.table["status"] == DONE) & (self.table[SQ_KEY] == self.sq[level])]
         values = rows[quantity].to_numpy(dtype=float)
         return np.asarray(values[np.isfinite(values)])
+
+    def by_case(self, quantity: str) -> tuple[Field, Field]:
+        """Sq [m] and value of every case that may be used and has a value, each (cases,)."""
+        rows = self.table[self.table["status"] == DONE].dropna(subset=quantity)
+        return rows[SQ_KEY].to_numpy(dtype=float), rows[quantity].to_numpy(dtype=float)
 
     def mean(self, quantity: str) -> Field:
         """Mean over seeds, shape (levels,); nan where no seed has a value."""
@@ -154,7 +159,7 @@ def wear_curve(
     seeds: int | Sequence[int],
     executor: Executor | None = None,
     workers: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
 ) -> WearCurve:
     """Solve a case at several roughnesses, several surfaces each, and listen to all of them.
 

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
-from asperity.files import MANIFEST
+from asperity.files import MANIFEST, versions
 from asperity.processes import cores
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker
 from asperity.study.plan import StudyCase, StudyPlan
@@ -35,6 +35,7 @@ from asperity.study.store import (
     Store,
     failed,
     in_order,
+    kept_versions,
     open_read,
     open_store,
     read_plan,
@@ -53,7 +54,7 @@ DASK_WAIT_S = 10.0
 
 
 @dataclass(frozen=True)
-class Progress:
+class StudyProgress:
     """How far a study is: `kept` were finished before, `rate` counts cases a second since."""
 
     total: int
@@ -99,6 +100,11 @@ class StudyResult:
         """Cases of the plan that nobody has computed yet."""
         return len(self.plan.cases) - len(self.table)
 
+    @property
+    def versions(self) -> dict[str, str]:
+        """Of asperity and what it stands on, when the folder was begun; in memory, those of now."""
+        return versions() if self.folder is None else kept_versions(self.folder)
+
 
 def run_study(
     plan: StudyPlan,
@@ -110,7 +116,7 @@ def run_study(
     retry_failed: bool = False,
     fields: Sequence[str] = (),
     merge_from: Sequence[str | Path] = (),
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
 ) -> StudyResult:
     """Compute what is missing of a study.
 
@@ -237,7 +243,7 @@ class _Work:
         retry_failed: bool,
         fields: tuple[str, ...],
         begun: float,
-        progress: Callable[[Progress], None] | None,
+        progress: Callable[[StudyProgress], None] | None,
     ) -> None:
         known = {} if store is None else store.finished()
         self.plan, self.store, self.fields, self.begun, self.progress = plan, store, fields, begun, progress
@@ -284,7 +290,7 @@ class _Work:
         """Report how far the study is."""
         if self.progress is not None:
             seconds = time.perf_counter() - self.begun
-            self.progress(Progress(self.total, self.kept, self.done, self.failures, seconds))
+            self.progress(StudyProgress(self.total, self.kept, self.done, self.failures, seconds))
 
     def bury(self, batches: Sequence[Sequence[StudyCase]], *, certain: bool) -> None:
         """Take back the cases whose process died; where it is `certain` that one killed it, that case has failed."""
@@ -391,7 +397,7 @@ def _workers_of(executor: Executor) -> int:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class StudyCost:
     """What a study will cost, from a few of its cases computed and thrown away."""
 
     cases: int  # of this shard
@@ -406,9 +412,9 @@ class Estimate:
         return (self.cases - self.kept) * self.case_s / self.workers
 
 
-def estimate(
+def estimate_study(
     plan: StudyPlan, *, out: str | Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
-) -> Estimate:
+) -> StudyCost:
     """Time three cases of a study, from its beginning, middle and end; nothing is kept.
 
     Raises
@@ -422,8 +428,8 @@ def estimate(
         kept = sum(case.id in known for case in plan.cases if case.number % shard[1] == shard[0] - 1)
     share = [case for case in plan.cases if case.number % shard[1] == shard[0] - 1]
     if not share:
-        return Estimate(0, 0, 0.0, 0, workers or cores())
+        return StudyCost(0, 0, 0.0, 0, workers or cores())
     chosen = [share[round(part * (len(share) - 1))] for part in (0.0, 0.5, 1.0)]
     evaluate_batch(plan.case, plan.kind, [chosen[1].overrides])  # loads and compiles
     _, seconds = _timed(plan.case, plan.kind, [case.overrides for case in chosen])
-    return Estimate(len(share), kept, seconds / len(chosen), len(chosen), workers or cores())
+    return StudyCost(len(share), kept, seconds / len(chosen), len(chosen), workers or cores())

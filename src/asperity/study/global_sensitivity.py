@@ -17,8 +17,8 @@ from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.study.evaluate import DONE
-from asperity.study.execute import Progress, StudyResult, run_study
-from asperity.study.plan import SEEDS, StudyPlan, plan_points
+from asperity.study.execute import StudyProgress, StudyResult, run_study
+from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 from asperity.study.ranges import (
     ParameterRange,
     at_cells,
@@ -26,7 +26,7 @@ from asperity.study.ranges import (
     overrides_at,
     parse_range,
     require_ranges,
-    stated,
+    stated_value,
 )
 from asperity.study.silence import silent, with_silence
 from asperity.wear import FEWEST_PLACES, split_stages
@@ -40,7 +40,7 @@ LEVELS = 4  # places a factor of Morris' design can take
 SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
 CELLS = 128
-SEED = "seed"  # the factor's name
+SEED_FACTOR = "seed"  # the factor's name
 CONFIDENCE = 0.95  # of SALib's intervals
 RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
 ROUNDING = 1e-9  # relative difference that nothing has made
@@ -63,7 +63,7 @@ class Design(NamedTuple):
     block: int
 
 
-class Outcome(NamedTuple):
+class SensitivityOutcome(NamedTuple):
     """A number that a point of the design gives: a quantity at one Sq [m], or of the whole curve (Sq is nan)."""
 
     name: str
@@ -97,7 +97,7 @@ class Sensitivity:
     method: Method
     ranges: tuple[ParameterRange, ...]
     factors: tuple[str, ...]
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[SensitivityOutcome, ...]
     effects: "pandas.DataFrame"
     values: "pandas.DataFrame"
     left_out: int
@@ -207,7 +207,7 @@ def sensitivity(
     out: str | Path | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
 ) -> Sensitivity:
     """Find what moves the curves over Sq most.
 
@@ -239,13 +239,13 @@ def sensitivity(
     if seeds < 1:
         raise BadInput(f"seeds must be 1 or more, got {seeds}")
     case = at_cells(case, cells)
-    if stated(case, "surface.kind") == "flat":
+    if stated_value(case, "surface.kind") == "flat":
         raise BadInput(f"{case.source}: surface is flat and has no Sq to vary; take a rough one")
     curve = _curve_levels(sq, levels)
     ranges = open_ranges(case) if vary is None else tuple(parse_range(r) if isinstance(r, str) else r for r in vary)
     require_ranges(case, ranges, RESERVED)
-    seeded = [key for key in SEEDS if stated(case, key) is not None]
-    factors = (*(entry.key for entry in ranges), *([SEED] if seeded else []))
+    seeded = [key for key in SEED_KEYS if stated_value(case, key) is not None]
+    factors = (*(entry.key for entry in ranges), *([SEED_FACTOR] if seeded else []))
     design = sample_design(method, len(factors), size or SIZES[method], sample_seed)
     plan = _plan(case, ranges, seeded, design, curve, seeds, sample_seed)
     result = run_study(
@@ -375,8 +375,8 @@ def _seeds(seeded: Sequence[str], design: Design, number: int, share: float, sur
     along the seed is a change of surface drawn anew.
     """
     trajectory = number // design.block if design.method == "morris" else 0
-    drawn = np.random.SeedSequence([seed, trajectory, round(share * 2**31), surface]).generate_state(len(SEEDS))
-    return {key: int(word) for key, word in zip(SEEDS, drawn, strict=True) if key in seeded}
+    drawn = np.random.SeedSequence([seed, trajectory, round(share * 2**31), surface]).generate_state(len(SEED_KEYS))
+    return {key: int(word) for key, word in zip(SEED_KEYS, drawn, strict=True) if key in seeded}
 
 
 def _analysed(
@@ -457,15 +457,15 @@ def _curves(result: StudyResult, shape: tuple[int, int, int]) -> tuple[dict[str,
 
 def _outcomes(
     curves: dict[str, Field], sq: Sequence[float], curve: Sequence[float]
-) -> tuple[list[Outcome], list[Field]]:
+) -> tuple[list[SensitivityOutcome], list[Field]]:
     outcomes, columns = [], []
     places = {level: place for place, level in enumerate(curve)}
     for quantity, values in curves.items():
         for level in sq:
-            outcomes.append(Outcome(f"{quantity} at {1e6 * level:g} um", quantity, level))
+            outcomes.append(SensitivityOutcome(f"{quantity} at {1e6 * level:g} um", quantity, level))
             columns.append(values[:, places[float(f"{level:.6g}")]])
     if "crf_hz" in curves and len(curve) >= FEWEST_PLACES:
-        outcomes.append(Outcome("knee", "knee_m", math.nan))
+        outcomes.append(SensitivityOutcome("knee", "knee_m", math.nan))
         columns.append(np.array([knee(np.array(curve), crf) for crf in curves["crf_hz"]]))
     return outcomes, columns
 

@@ -9,21 +9,21 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from asperity.errors import AsperityError, BadInput
-from asperity.paper import is_papers_contact
-from asperity.quantities import quantity
-from asperity.results import Run, solve_case
-from asperity.study.anchors import (
+from asperity.paper import (
     PAPER_ANCHORS,
-    SPLIT,
+    SPLIT_ANCHOR,
     Anchor,
     compare_with_anchors,
+    is_papers_contact,
     rig_prediction,
 )
+from asperity.quantities import quantity
+from asperity.results import Run, solve_case
 from asperity.study.axes import SweptAxis, swept_axis, varying_outputs
 from asperity.study.curve import SQ_KEY, WearCurve, curve_of, is_wear_study
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyResult
-from asperity.study.plan import SEEDS, as_written
+from asperity.study.plan import SEED_KEYS, as_written
 
 if TYPE_CHECKING:
     import pandas
@@ -84,13 +84,13 @@ class StudyOverview:
         """What the curve should meet."""
         if self.stated_anchors is not None:
             return tuple(self.stated_anchors)
-        known = {SPLIT, *self.used} if self.curve is not None and self.curve.stages else set(self.used)
+        known = {SPLIT_ANCHOR, *self.used} if self.curve is not None and self.curve.stages else set(self.used)
         return tuple(anchor for anchor in PAPER_ANCHORS if self.papers and anchor.quantity in known)
 
     @cached_property
     def axes(self) -> list[SweptAxis]:
         """The swept quantities over the rows that may be used; those with one value are none."""
-        keys = [key for key in self.result.plan.axes if key not in SEEDS]
+        keys = [key for key in self.result.plan.axes if key not in SEED_KEYS]
         swept = [swept_axis(self.result.plan, self.used, key) for key in keys]
         return [axis for axis in swept if axis.places.size > 1]
 

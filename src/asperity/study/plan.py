@@ -21,7 +21,7 @@ from asperity.errors import BadInput, UnreadableFile
 
 Kind = Literal["solve", "vibrate"]
 Seeding = Literal["independent", "common"]
-SEEDS = ("surface.seed", "vibration.seed")
+SEED_KEYS = ("surface.seed", "vibration.seed")
 MOST_CASES = 10_000_000
 DIGITS = 9  # of a sampled value
 FOR_RUNS = "motion"  # the section that only `asperity run` reads
@@ -90,7 +90,7 @@ class StudyPlan:
         for place, point in enumerate(self.points):
             plain = {key: to_si(value) for key, value in point.items()}
             shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
-            seeded = [key for key in SEEDS if _has_seed(shaped, key) and not _states(point, key)]
+            seeded = [key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)]
             shared: dict[str, Any] = {}
             if self.ids is None:
                 shared = {**self._fixed, **plain}
@@ -103,7 +103,7 @@ class StudyPlan:
                 else:
                     own = self.seeds[realisation]
                     drawn = np.array([own, np.random.SeedSequence([own, *words]).generate_state(1)[0]])
-                chosen = {key: int(seed) for key, seed in zip(SEEDS, drawn, strict=True) if key in seeded}
+                chosen = {key: int(seed) for key, seed in zip(SEED_KEYS, drawn, strict=True) if key in seeded}
                 name = _hash({**shared, **chosen})[:16] if self.ids is None else self.ids[number]
                 yield StudyCase(number, place, realisation, {**point, **chosen}, name)
                 number += 1

@@ -155,7 +155,7 @@ def entry_of(key: str) -> tuple[str, int | None]:
     return (found["key"], int(found["place"])) if found else (key, None)
 
 
-def stated(case: Case, key: str) -> Any:
+def stated_value(case: Case, key: str) -> Any:
     """What the case states for a dotted key, as a case file writes it; None where it states nothing."""
     name, place = entry_of(key)
     value: Any = tomllib.loads(case.text)
@@ -178,7 +178,7 @@ def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Sequence[
         if place is None:
             found[key] = entry.written(share)
         else:
-            whole = found.get(key, stated(case, key))
+            whole = found.get(key, stated_value(case, key))
             found[key] = [entry.written(share) if i == place else value for i, value in enumerate(whole)]
     cells = list(case.grid.cells)
     for axis, key in enumerate(("grid.x", "grid.y")):
@@ -192,7 +192,7 @@ def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Sequence[
 
 
 def _widest(case: Case, ranges: Sequence[ParameterRange], key: str) -> float:
-    low, high = (float(value) for value in stated(case, key))
+    low, high = (float(value) for value in stated_value(case, key))
     for entry in ranges:
         name, place = entry_of(entry.key)
         if name == key and place is not None:
@@ -216,7 +216,7 @@ def require_ranges(case: Case, ranges: Sequence[ParameterRange], reserved: Mappi
             raise BadInput(f"{key} cannot be varied: {reserved[key]}")
         if keys.count(key) > 1:
             raise BadInput(f"{key} is varied twice; name it once")
-        if entry_of(key)[1] is not None and stated(case, key) is None:
+        if entry_of(key)[1] is not None and stated_value(case, key) is None:
             raise BadInput(f"{case.source}: {key} is no entry of the case; name one such as grid.x[0]")
     for number in range(len(ranges)):
         for end in (0.0, 1.0):

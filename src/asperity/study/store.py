@@ -19,7 +19,7 @@ from asperity.case import load_case, relative_path, to_si
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.study.evaluate import DONE, Row
-from asperity.study.plan import SEEDS, StudyPlan, plan_points
+from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
 if TYPE_CHECKING:
     import pandas
@@ -200,6 +200,12 @@ def read_plan(folder: Path) -> StudyPlan:
         raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
 
 
+def kept_versions(folder: Path) -> dict[str, str]:
+    """What a study's folder was begun with."""
+    found: dict[str, str] = read_manifest(folder, of="study", layout=FORMAT)["versions"]
+    return found
+
+
 def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
     return {
         "of": "study",
@@ -280,11 +286,11 @@ def in_order(parts: Sequence["pyarrow.Table"], plan: StudyPlan) -> "pandas.DataF
             "realisation": [case.realisation for case in plan.cases],
         }
     )
-    for key in (*plan.axes, *(seed for seed in SEEDS if seed not in plan.axes)):
+    for key in (*plan.axes, *(seed for seed in SEED_KEYS if seed not in plan.axes)):
         values = [to_si(case.overrides.get(key)) for case in plan.cases]
         if any(value is not None for value in values):
             planned[key] = _of_one_type(values)
-    for seed in SEEDS:
+    for seed in SEED_KEYS:
         if seed in planned:
             planned[seed] = planned[seed].astype("int64" if planned[seed].notna().all() else "Int64")
     if parts:

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
-from asperity.case import Case, load_case
+from asperity.case import Case
 from asperity.coupling import BAND_MARGIN, VibrationModel, search_band
 from asperity.errors import BadInput, require_positive
+from asperity.paper import papers_case
 
 USUAL_DAMPING = 0.02  # the paper's, where no case states one
 
@@ -40,7 +41,7 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
     if case is None and band_hz is not None:
         source = f"{low:.0f} to {high:.0f} Hz, as given"
         return Target(band_hz=(low, high), width_hz=2.0 * USUAL_DAMPING * low, full_load_crf_hz=None, source=source)
-    chosen = case if case is not None else paper_case()
+    chosen = case if case is not None else papers_case()
     if chosen.vibration is None:
         raise BadInput(
             f"{chosen.source}: vibration is left out; add [vibration] with mass and damping_ratio, or a band"
@@ -64,11 +65,3 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
         source=source,
         assumed=case is None and band_hz is None,
     )
-
-
-def paper_case() -> Case:
-    """The paper's contact, as the package brings it along."""
-    from importlib.resources import files
-
-    text = files("asperity.paper").joinpath("paper.toml").read_text("utf-8")
-    return load_case(text, name="paper.toml")

@@ -1,24 +1,36 @@
 """What is known from elsewhere about a wear curve, the paper's printed numbers above all, and how a curve meets it."""
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 import numpy as np
 from pydantic import Field as Entry
 
 from asperity.case import Length, Section, parse_section
 from asperity.errors import BadInput, UnreadableFile
-from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS
-from asperity.study.curve import WearCurve
+from asperity.paper.numbers import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
+from asperity.paper.rig import TRENDS
+from asperity.wear import Stages
 
 if TYPE_CHECKING:
     import pandas
 
-Sense = Literal["about", "at least", "at most"]
-SPLIT = "split"
+AnchorSense = Literal["about", "at least", "at most"]
+SPLIT_ANCHOR = "split"  # the quantity of an anchor that is a break between stages
+
+
+class CurveOverSq(Protocol):
+    """What anchors are compared with: a study's wear curve."""
+
+    @property
+    def stages(self) -> Mapping[str, Stages]:
+        """Along Sq in micrometres, by vibration preset."""
+
+    def at(self, sq: float, quantity: str) -> tuple[float, float, float]:
+        """Mean at a roughness [m] and its interval; nan where the curve does not reach."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,13 +55,13 @@ class Anchor:
     tolerance: float
     sq: float | None = None
     since: float | None = None
-    sense: Sense = "about"
+    sense: AnchorSense = "about"
     source: str = ""
     fitted: bool = True
 
-    def of(self, curve: WearCurve) -> tuple[float, float, float]:
+    def of(self, curve: CurveOverSq) -> tuple[float, float, float]:
         """What the curve has in its place, and the interval over seeds; nan where the curve does not reach."""
-        if self.quantity == SPLIT:
+        if self.quantity == SPLIT_ANCHOR:
             stages = curve.stages.get("sound")
             return (np.nan,) * 3 if stages is None or not stages.found else (stages.split, *stages.interval)
         assert self.sq is not None
@@ -69,7 +81,7 @@ class Anchor:
         return max(off, 0.0) if self.sense == "at most" else off
 
 
-def compare_with_anchors(curve: WearCurve, anchors: Sequence[Anchor] | None = None) -> "pandas.DataFrame":
+def compare_with_anchors(curve: CurveOverSq, anchors: Sequence[Anchor] | None = None) -> "pandas.DataFrame":
     """A row an anchor, the paper's unless given: what is printed, ours with its 90 % interval, the miss, whether met.
 
     `met` is True where the miss is within the tolerance, and `possible` where some value of the interval would be.
@@ -104,7 +116,7 @@ def compare_with_anchors(curve: WearCurve, anchors: Sequence[Anchor] | None = No
     return pandas.DataFrame(rows)
 
 
-def rig_prediction(curve: WearCurve, quantity: str = "crf_sound_hz") -> "pandas.DataFrame":
+def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> "pandas.DataFrame":
     """Our CRF at the rig's twelve Sq values with the spread over seeds, beside what is printed: the two ends."""
     import pandas
 
@@ -116,7 +128,7 @@ def rig_prediction(curve: WearCurve, quantity: str = "crf_sound_hz") -> "pandas.
     return pandas.DataFrame(rows)
 
 
-def rig_deviation(curve: WearCurve, quantity: str = "crf_sound_hz") -> dict[str, float]:
+def rig_deviation(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> dict[str, float]:
     """Root mean square of our CRF less the rig's [Hz]; nan where the curve does not reach over all of its Sq.
 
     "ends": over the two values that are printed. "knee", "smooth": over all twelve Sq, between those ends along a bent
@@ -136,7 +148,7 @@ class _AnchorSection(Section):
     tolerance: Annotated[float, Entry(gt=0.0)]
     sq: Length | None = None
     since: Length | None = None
-    sense: Sense = "about"
+    sense: AnchorSense = "about"
     source: str = ""
     fitted: bool = True
 
@@ -163,7 +175,7 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
     sections = parse_section(_AnchorFile, tables, str(path)).anchor
     anchors = []
     for section in sections:
-        if (section.sq is None) != (section.quantity == SPLIT):
+        if (section.sq is None) != (section.quantity == SPLIT_ANCHOR):
             raise BadInput(f"{path}: anchor {section.name!r} needs sq, a length; only a split has none")
         values = {name: getattr(section, name) for name in type(section).model_fields}
         lengths = {name: None if values[name] is None else float(values[name]) for name in ("sq", "since")}
@@ -171,4 +183,4 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
     return tuple(anchors)
 
 
-PAPER_ANCHORS = load_anchors(Path(__file__).with_name("paper_anchors.toml"))
+PAPER_ANCHORS = load_anchors(Path(__file__).with_name("anchors.toml"))

@@ -1,0 +1,297 @@
+"""A recording of the simulated rig: the contact's line, all that an accelerometer picks up besides, records of both."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from asperity.arrays import Field
+from asperity.conditions import ContactConditions
+from asperity.coupling import VibrationModel, excitation, oscillator
+from asperity.ehl import ContactState
+from asperity.errors import BadInput
+from asperity.paper.numbers import RING_HZ, ROLLER_HZ
+from asperity.signals import Signal, Spectrum, power_spectrum
+
+MAINS_HZ = 50.0
+RING_HARMONICS, MAINS_HARMONICS = 40, 20
+LOWPASS = 0.45  # corner of the anti-aliasing filter over the sampling rate
+MOUNTED_HZ, MOUNTED_DAMPING = 46e3, 0.02  # resonance of the accelerometer on its stud: + 5 % at 10 kHz, as printed
+FLAT_BELOW_HZ = 100.0  # machine noise, which falls with frequency above
+GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten times as wide
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """What the accelerometer hears besides the contact.
+
+    `snr_db`: power of the contact's line over that of everything else, both within the contact's search band, in the
+    mean over recordings. `modes` structural modes share most of that band with it. `gain_db` is the standard
+    deviation of the level of everything else from recording to recording, `mode_gain_db` that of each mode beside it,
+    `mode_drift` that of the modes' frequencies (all together, relative), `speed_drift` that of the shafts' speeds.
+    """
+
+    snr_db: float = 10.0
+    modes: int = 4
+    gain_db: float = 1.0
+    mode_gain_db: float = 0.1
+    mode_drift: float = 1e-4
+    speed_drift: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if not -60.0 <= self.snr_db <= 60.0:
+            raise BadInput(f"SNR must lie between -60 and 60 dB, got {self.snr_db:g} dB; 10 dB is the default")
+        if not 0 <= self.modes <= 20:
+            raise BadInput(f"structural modes must be 0 to 20, got {self.modes}; 4 is the default")
+        for name in ("gain_db", "mode_gain_db", "mode_drift", "speed_drift"):
+            if not getattr(self, name) >= 0.0:
+                raise BadInput(f"{name.replace('_', ' ')} must be 0 or more, got {getattr(self, name):g}")
+
+
+class Tones(NamedTuple):
+    """Lines of shafts and mains: frequencies [Hz] and amplitudes [m/s^2], shape (tones,)."""
+
+    frequency_hz: Field
+    amplitude: Field
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigRecording:
+    """One test of one ring: the truth, and records and spectra of it.
+
+    `sq_m` with `sq_std_m` is what a profilometer says, `true_sq_m` what the ring has; `crf_hz`, `crfa` and
+    `damping_ratio` are the contact line's true ones, the accelerometer's response included in `crfa`.
+    `contact_density` and `other_density` are one-sided [(m/s^2)^2/Hz] on `frequency_hz`.
+    """
+
+    sample: int
+    repeat: int
+    sq_m: float
+    sq_std_m: float
+    true_sq_m: float
+    clr: float
+    crf_hz: float
+    crfa: float
+    damping_ratio: float
+    snr_db: float
+    rate_hz: float
+    duration_s: float
+    frequency_hz: Field
+    contact_density: Field
+    other_density: Field
+    tones: Tones
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Such as "sample-07-test-3"."""
+        return f"sample-{self.sample:02d}-test-{self.repeat}"
+
+    def signal(self) -> Signal:
+        """The record [m/s^2]: Gaussian, with exactly these densities, and the tones; one seed, one record."""
+        samples = round(self.duration_s * self.rate_hz)
+        length = scipy.fft.next_fast_len(samples + samples // 64, real=True)  # cut off: no end meets the beginning
+        frequency = np.arange(length // 2 + 1) * (self.rate_hz / length)
+        scale = self.rate_hz * length / 4.0
+        rng = np.random.default_rng(self.seed)
+        waves = rng.standard_normal(2 * frequency.size).view(complex)
+        waves *= np.sqrt(scale * np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density))
+        turns = np.exp(2j * np.pi * rng.random(self.tones.amplitude.size))
+        at = np.rint(self.tones.frequency_hz * (length / self.rate_hz)).astype(int)
+        np.add.at(waves, at, 0.5 * length * self.tones.amplitude * turns)
+        waves[0] = 0.0
+        return Signal(
+            np.ascontiguousarray(scipy.fft.irfft(waves, length, overwrite_x=True)[:samples]), self.rate_hz, "m/s^2"
+        )
+
+    def spectrum(self, segment: int) -> Spectrum:
+        """A Hann-tapered averaged spectrum, drawn without a record: mean and covariance of lines as records have them.
+
+        Raises BadInput for a segment longer than the record or shorter than 8 samples.
+        """
+        samples = round(self.duration_s * self.rate_hz)
+        if not 8 <= segment <= samples:
+            raise BadInput(f"a spectrum's segment must have 8 to {samples} samples (the record), got {segment}")
+        taper = scipy.signal.get_window("hann", segment)
+        spacing = self.rate_hz / segment
+        frequency = np.arange(segment // 2 + 1) * spacing
+        smooth = np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
+        averages = _averages_of(segment, samples)
+        rng = np.random.default_rng(self.seed)
+        # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as those behind a Hann taper do
+        drawn = rng.gamma(averages, 1.0 / averages, frequency.size + 2)
+        scatter = (drawn[:-2] + 4.0 * drawn[1:-1] + drawn[2:]) / 6.0
+        mean_square = 2.0 / (self.rate_hz * float(np.sum(taper**2)))
+        tonal = np.zeros(frequency.size)
+        nearest = np.rint(self.tones.frequency_hz / spacing).astype(int)
+        for shift in range(-3, 4):
+            at = nearest + shift
+            inside = (at >= 0) & (at < frequency.size)
+            away = (at - self.tones.frequency_hz / spacing)[inside]
+            amplitude = 0.5 * self.tones.amplitude[inside] * segment * np.abs(_hann_transform(away))
+            np.add.at(tonal, at[inside], mean_square * amplitude**2)
+        mixed = 2.0 * np.sqrt(np.maximum(tonal * smooth, 0.0)) * rng.standard_normal(frequency.size)
+        density = np.abs(smooth * scatter + tonal + mixed / np.sqrt(2.0 * averages))
+        density[0] = 0.0
+        return Spectrum(
+            frequency_hz=frequency,
+            density=density,
+            unit="(m/s^2)^2/Hz",
+            duration_s=self.duration_s,
+            segment=segment,
+            window="hann",
+            resolution_hz=float(self.rate_hz * np.sum(taper**2) / np.sum(taper) ** 2),
+            averages=averages,
+        )
+
+
+def _hann_transform(away: Field) -> Field:
+    """Of a Hann window of length 1 at `away` cycles from its centre, relative to a boxcar's peak."""
+    return np.asarray(0.5 * np.sinc(away) + 0.25 * (np.sinc(away - 1.0) + np.sinc(away + 1.0)))
+
+
+@cache
+def _averages_of(segment: int, samples: int) -> float:
+    """Independent ordinates a line is worth, `signals.power_spectrum`'s own count."""
+    return power_spectrum(Signal(np.zeros(samples), 1.0, "m/s^2"), segment=segment).averages
+
+
+class RigTest(NamedTuple):
+    """Which test of which ring, and how it is recorded."""
+
+    sample: int
+    repeat: int
+    sq_m: float
+    sq_std_m: float
+    rate_hz: float
+    duration_s: float
+
+
+class ContactLine(NamedTuple):
+    """The contact's line: truth, and density on the grid as the accelerometer shows it."""
+
+    sq_m: float
+    clr: float
+    crf_hz: float
+    crfa: float
+    damping_ratio: float
+    density: Field
+
+
+def contact_line(
+    state: ContactState, conditions: ContactConditions, model: VibrationModel, frequency: Field, rate_hz: float
+) -> ContactLine:
+    """|H|^2 of the oscillator times the spectrum of what it rides over."""
+    spring = oscillator(state, conditions, model)
+    ridden_over = excitation(state, conditions, model)
+    f0 = spring.natural_frequency_hz
+
+    def density(at: Field) -> Field:
+        return np.asarray(spring.gain(at) * ridden_over.density(at, rate_hz) * _accelerometer(at, rate_hz))
+
+    measured = np.zeros(frequency.size)
+    measured[1:] = density(frequency[1:])
+    return ContactLine(state.sq, state.clr, f0, float(density(np.array(f0))), spring.damping_ratio, measured)
+
+
+def _accelerometer(frequency: Field, rate_hz: float) -> Field:
+    """Power response: flat, towards its mounted resonance rising, cut by the anti-aliasing filter."""
+    x = frequency / MOUNTED_HZ
+    mounted = 1.0 / ((1.0 - x**2) ** 2 + (2.0 * MOUNTED_DAMPING * x) ** 2)
+    return np.asarray(mounted / (1.0 + (frequency / (LOWPASS * rate_hz)) ** 16))
+
+
+class Background(NamedTuple):
+    """What is common to all recordings of a rig; powers within the band, 1 in all."""
+
+    frequency: Field
+    mode_hz: Field
+    mode_damping: Field
+    mode_power: Field
+    floor: Field  # on the grid
+    order: Field  # tones: multiples of their source's frequency,
+    source: Field  # 0 roller, 1 ring, 2 mains,
+    power: Field  # and mean squares
+
+
+def draw_background(
+    frequency: Field, band_hz: tuple[float, float], disturbance: Disturbance, rng: np.random.Generator
+) -> Background:
+    """Modes, noise and tones, drawn: their shares of the power in the band 0.6, 0.3 and 0.1, give or take."""
+    low, high = band_hz
+    outside = disturbance.modes  # as many below and above the band as within it
+    mode_hz = np.concatenate(
+        [
+            rng.uniform(low, high, disturbance.modes),
+            rng.uniform(0.2 * low, 0.95 * low, outside),
+            rng.uniform(1.05 * high, max(0.9 * frequency[-1], 1.1 * high), outside),
+        ]
+    )
+    damping = np.exp(rng.uniform(np.log(0.004), np.log(0.03), mode_hz.size))
+    shares = rng.gamma([6.0 if disturbance.modes else 1e-9, 3.0, 1.0])
+    shares /= np.sum(shares)
+    heights = 10.0 ** rng.uniform(-1.2, 0.0, mode_hz.size)  # of the peaks, 12 dB between the lowest and the highest
+    power = heights * damping * mode_hz
+    power *= shares[0] / max(float(np.sum(power[: disturbance.modes])), np.finfo(float).tiny)
+    inside = (frequency >= low) & (frequency <= high)
+    floor = (1.0 + (frequency / FLAT_BELOW_HZ) ** 2) ** (-0.5 * rng.uniform(0.0, 1.5))
+    floor *= shares[1] / (float(np.sum(floor[inside])) * GRID_HZ)
+
+    roller = np.arange(1.0, np.floor(0.8 * frequency[-1] / ROLLER_HZ))
+    order = np.concatenate([roller, np.arange(1.0, RING_HARMONICS), np.arange(1.0, MAINS_HARMONICS)])
+    source = np.repeat([0, 1, 2], [roller.size, RING_HARMONICS - 1, MAINS_HARMONICS - 1])
+    tone_power = rng.exponential(1.0, order.size) / order
+    in_band = (source == 0) & (order * ROLLER_HZ > low) & (order * ROLLER_HZ < high)
+    tone_power *= shares[2] / float(np.sum(tone_power[in_band]))
+    return Background(frequency, mode_hz, damping, power, floor, order, source, tone_power)
+
+
+def draw_recording(
+    test: RigTest,
+    contact: ContactLine,
+    background: Background,
+    disturbance: Disturbance,
+    band_hz: tuple[float, float],
+    rng: np.random.Generator,
+) -> RigRecording:
+    """The background as loud as the SNR says, a little louder or softer each time, with its modes moved a little."""
+    frequency = background.frequency
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    power = float(np.sum(contact.density[inside])) * GRID_HZ
+    wanted = power / 10.0 ** (disturbance.snr_db / 10.0)
+    level = wanted * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
+    gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(background.mode_hz.size) / 10.0)
+    mode_hz = background.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
+    other = background.floor.copy()
+    for f0, damping, loud in zip(mode_hz, background.mode_damping, background.mode_power * gains, strict=True):
+        # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
+        x2 = (frequency / f0) ** 2
+        other += loud * 4.0 * damping / (np.pi * f0) * x2**2 / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
+    sources = np.array([ROLLER_HZ, RING_HZ, MAINS_HZ])
+    sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
+    at = background.order * sources[background.source]
+    response = _accelerometer(at, test.rate_hz)
+    measured_other = level * other * _accelerometer(frequency, test.rate_hz)
+    in_band = (at >= band_hz[0]) & (at <= band_hz[1])
+    tonal = level * float(np.sum((background.power * response)[in_band]))
+    return RigRecording(
+        sample=test.sample,
+        repeat=test.repeat,
+        sq_m=test.sq_m,
+        sq_std_m=test.sq_std_m,
+        true_sq_m=contact.sq_m,
+        clr=contact.clr,
+        crf_hz=contact.crf_hz,
+        crfa=contact.crfa,
+        damping_ratio=contact.damping_ratio,
+        snr_db=float(10.0 * np.log10(power / (np.sum(measured_other[inside]) * GRID_HZ + tonal))),
+        rate_hz=test.rate_hz,
+        duration_s=test.duration_s,
+        frequency_hz=frequency,
+        contact_density=contact.density,
+        other_density=measured_other,
+        tones=Tones(at, np.sqrt(2.0 * level * background.power * response)),
+        seed=int(rng.integers(2**63)),
+    )
