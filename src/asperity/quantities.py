@@ -16,7 +16,8 @@ NO_VALUE = "–"
 DIMENSIONLESS = "1"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
-_FACTORS |= {"N/µm": 1e-6, "mJ": 1e3}  # display units over their SI unit; any other display unit is the SI unit itself
+_FACTORS |= {"N/µm": 1e-6, "mJ": 1e3, "1/GPa": 1e9}  # display over SI unit; any other is the SI unit itself
+_DISPLAYS = {"Pa": "MPa", "1/Pa": "1/GPa", "kg/m^3": "kg/m³"}  # of laws' parameters, where it is not the SI unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,6 +148,13 @@ class Parameter:
 
     unit: str = ""
     symbol: str = ""
+
+    def text(self, value: object) -> str:
+        """A value in SI as people read it, with its unit: "18.2 1/GPa"; what is no number as it stands."""
+        if isinstance(value, bool | str) or not isinstance(value, int | float):
+            return str(value)
+        display = _DISPLAYS.get(self.unit, self.unit)
+        return f"{value * _FACTORS.get(display, 1.0):.4g} {display}".rstrip()
 
 
 def parameters(law: type) -> Iterator[tuple[str, Parameter]]:

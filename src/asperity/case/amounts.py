@@ -174,14 +174,9 @@ def default_amount(value: float, unit: str) -> Amount:
     return Amount(value, f"{value:g} {unit}" if float(f"{value:g}") == value else f"{value!r} {unit}")
 
 
-def default_pair(value: float, unit: str) -> tuple[Amount, Amount]:
-    """A default of the library for both bodies."""
-    return default_amount(value, unit), default_amount(value, unit)
-
-
-def amount_type(unit: str) -> Any:
-    """The type of a section's field that is a quantity in `unit`."""
-    return Annotated[float, PlainValidator(partial(parse_amount, unit))]
+def amount_in(unit: str) -> PlainValidator:
+    """What reads a section's field that is a quantity in `unit`."""
+    return PlainValidator(partial(parse_amount, unit))
 
 
 def _paired(value: object) -> object:
@@ -189,14 +184,10 @@ def _paired(value: object) -> object:
     return value if value is None or isinstance(value, list | tuple) else (value, value)
 
 
-Length: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "m"))]
-Force: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "N"))]
-Speed: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "m/s"))]
-Pressure: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "Pa"))]
-Temperature: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "K"))]
-Conductivity: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "W/m/K"))]
-Density: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "kg/m^3"))]
-HeatCapacity: TypeAlias = Annotated[float, PlainValidator(partial(parse_amount, "J/kg/K"))]
+Length: TypeAlias = Annotated[float, amount_in("m")]
+Force: TypeAlias = Annotated[float, amount_in("N")]
+Speed: TypeAlias = Annotated[float, amount_in("m/s")]
+Pressure: TypeAlias = Annotated[float, amount_in("Pa")]
 Number: TypeAlias = Annotated[float, Strict()]
 Count: TypeAlias = Annotated[PositiveInt, Strict()]
 Seed: TypeAlias = Annotated[int, Strict(), Field(ge=0)]

@@ -7,62 +7,31 @@ a law needs nothing here.
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from functools import cache, partial
-from typing import Annotated, Any, cast, get_type_hints
+from typing import Annotated, Any, TypeAlias, cast, get_type_hints
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
 from asperity.case.amounts import (
     OPTIONAL,
     PAIRED,
-    Conductivity,
-    Density,
-    HeatCapacity,
-    Temperature,
-    amount_type,
+    Amount,
+    amount_in,
     default_amount,
-    default_pair,
 )
 from asperity.case.refusals import Section, choose, validated
-from asperity.lubricant import (
-    DENSITY_LAWS,
-    FRICTION_LAWS,
-    RHEOLOGY_LAWS,
-    VISCOSITY_LAWS,
-    WARMTH_LAWS,
-    Lubricant,
-    Solid,
-    Thermal,
-)
-
-# parameters of laws that are not listed are plain numbers
-_LAW_UNITS = {
-    "eta0": "Pa s",
-    "alpha": "1/Pa",
-    "p0": "Pa",
-    "rho0": "kg/m^3",
-    "tau0": "Pa",
-    "floor": "Pa",
-    "tau_l0": "Pa",
-    "softening": "1/K",
-    "beta": "1/K",
-}
-LAWS: dict[str, Mapping[str, type]] = {
-    "viscosity": VISCOSITY_LAWS,
-    "density": DENSITY_LAWS,
-    "rheology": RHEOLOGY_LAWS,
-    "friction": FRICTION_LAWS,
-    "warmth": WARMTH_LAWS,
-}
+from asperity.lubricant import LAWS, LawFamily, Lubricant, Solid, Thermal, make_law, make_lubricant
+from asperity.quantities import parameters
 
 
-def section_fields(law: type, units: Mapping[str, str]) -> dict[str, Any]:
+def section_fields(law: type, units: Mapping[str, str] | None = None) -> dict[str, Any]:
     """A dataclass's fields as fields of a section: quantities where they have a unit, else as annotated."""
     types = get_type_hints(law)
+    units = units or {name: parameter.unit for name, parameter in parameters(law)}
     section: dict[str, Any] = {}
     for entry in fields(law):
         unit = units.get(entry.name)
         default: Any = ... if entry.default is MISSING else entry.default
-        kind = amount_type(unit) if unit else Annotated[types[entry.name], Strict()]
+        kind = Annotated[float, amount_in(unit)] if unit else Annotated[types[entry.name], Strict()]
         if default is None:
             kind = Annotated[kind | None, OPTIONAL]
         written = default_amount(default, unit) if unit and isinstance(default, float) else default
@@ -72,21 +41,20 @@ def section_fields(law: type, units: Mapping[str, str]) -> dict[str, Any]:
 
 @cache
 def _law_section(name: str, law: type) -> type[Section]:
-    return create_model(name, __base__=Section, law=(str, ...), **section_fields(law, _LAW_UNITS))
+    return create_model(name, __base__=Section, law=(str, ...), **section_fields(law))
 
 
-def _law_sections(family: str) -> dict[str, type[Section]]:
+def _law_sections(family: LawFamily) -> dict[str, type[Section]]:
     return {name: _law_section(name, law) for name, law in LAWS[family].items()}
 
 
-def _one_of(family: str) -> PlainValidator:
+def _one_of(family: LawFamily) -> PlainValidator:
     return PlainValidator(partial(choose, "law", partial(_law_sections, family)))
 
 
-def _law(family: str, section: Section) -> Any:
+def _description(section: Section) -> dict[str, Any]:
     values = {name: getattr(section, name) for name in type(section).model_fields}
-    law = LAWS[family][values.pop("law")]
-    return law(**{name: float(value) if isinstance(value, float) else value for name, value in values.items()})
+    return {name: float(value) if isinstance(value, float) else value for name, value in values.items()}
 
 
 class LubricantSection(Section):
@@ -99,7 +67,7 @@ class LubricantSection(Section):
 
     def lubricant(self) -> Lubricant:
         """The oil."""
-        return Lubricant(**{family: _law(family, getattr(self, family)) for family in type(self).model_fields})
+        return make_lubricant({family: _description(getattr(self, family)) for family in type(self).model_fields})
 
 
 def parse_lubricant(value: object) -> LubricantSection | None:
@@ -107,15 +75,30 @@ def parse_lubricant(value: object) -> LubricantSection | None:
     return None if value == "none" else validated(LubricantSection, value)
 
 
+def _unit(law: type, name: str) -> str:
+    return dict(parameters(law))[name].unit
+
+
+def _default(law: type, name: str) -> Amount:
+    return default_amount(getattr(law(), name), _unit(law, name))
+
+
+_Temperature: TypeAlias = Annotated[float, amount_in(_unit(Thermal, "ambient"))]
+_OilConductivity: TypeAlias = Annotated[float, amount_in(_unit(Thermal, "oil_conductivity"))]
+_Conductivity: TypeAlias = Annotated[float, amount_in(_unit(Solid, "conductivity"))]
+_Density: TypeAlias = Annotated[float, amount_in(_unit(Solid, "density"))]
+_HeatCapacity: TypeAlias = Annotated[float, amount_in(_unit(Solid, "heat_capacity"))]
+
+
 class ThermalSection(Section):
     """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
 
-    ambient: Temperature = default_amount(Thermal().ambient, "K")
-    bulk: Annotated[tuple[Temperature, Temperature] | None, PAIRED, OPTIONAL] = None  # of the bodies
-    conductivity: Annotated[tuple[Conductivity, Conductivity], PAIRED] = default_pair(Solid().conductivity, "W/m/K")
-    density: Annotated[tuple[Density, Density], PAIRED] = default_pair(Solid().density, "kg/m^3")
-    heat_capacity: Annotated[tuple[HeatCapacity, HeatCapacity], PAIRED] = default_pair(Solid().heat_capacity, "J/kg/K")
-    oil_conductivity: Conductivity = default_amount(Thermal().oil_conductivity, "W/m/K")
+    ambient: _Temperature = _default(Thermal, "ambient")
+    bulk: Annotated[tuple[_Temperature, _Temperature] | None, PAIRED, OPTIONAL] = None  # of the bodies
+    conductivity: Annotated[tuple[_Conductivity, _Conductivity], PAIRED] = 2 * (_default(Solid, "conductivity"),)
+    density: Annotated[tuple[_Density, _Density], PAIRED] = 2 * (_default(Solid, "density"),)
+    heat_capacity: Annotated[tuple[_HeatCapacity, _HeatCapacity], PAIRED] = 2 * (_default(Solid, "heat_capacity"),)
+    oil_conductivity: _OilConductivity = _default(Thermal, "oil_conductivity")
     warmth: Annotated[Section, _one_of("warmth"), Field(validate_default=True)] = cast(Section, "exponential")
     feedback: Annotated[bool, Strict()] = Thermal().feedback
 
@@ -129,7 +112,7 @@ class ThermalSection(Section):
             ambient=float(self.ambient),
             bulk=None if self.bulk is None else (float(self.bulk[0]), float(self.bulk[1])),
             oil_conductivity=float(self.oil_conductivity),
-            warmth=_law("warmth", self.warmth),
+            warmth=make_law("warmth", _description(self.warmth)),
             solids=(first, second),
             feedback=self.feedback,
         )

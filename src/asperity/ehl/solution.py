@@ -14,7 +14,7 @@ from asperity.ehl.outcome import Convergence, Options
 from asperity.errors import BadInput
 from asperity.files import versions, whole_file
 from asperity.grid import Grid
-from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS, Lubricant
+from asperity.lubricant import Lubricant, describe_lubricant
 from asperity.quantities import quantity
 from asperity.surface import Surface
 
@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     import xarray
 
 FORMAT = 1  # counts up when a reader of the format before could not read the file
-LAWS: dict[str, dict[str, Any]] = {
-    "viscosity": VISCOSITY_LAWS,
-    "density": DENSITY_LAWS,
-    "rheology": RHEOLOGY_LAWS,
-    "friction": FRICTION_LAWS,
-}
 HEADINGS = ("Conventions", "title", "source", "asperity_format")  # attributes of the file, and those that hold JSON
 DESCRIBED = ("conditions", "lubricant", "options", "grid", "convergence", "versions")
 ERRORS = ("iteration_error", "discretisation_error")
@@ -161,7 +155,7 @@ class ContactSolution:
         convergence = self.convergence
         return {
             "conditions": asdict(self.conditions),
-            "lubricant": None if self.lubricant is None else _laws_in(self.lubricant),
+            "lubricant": None if self.lubricant is None else describe_lubricant(self.lubricant),
             "options": asdict(self.options),
             "grid": asdict(self.grid),
             "convergence": {
@@ -177,17 +171,6 @@ class ContactSolution:
     def save(self, path: str | Path) -> Path:
         """Write the solution as netCDF, whole or not at all, and return the path; raises what `save_dataset` does."""
         return save_dataset(self.to_dataset(), path)
-
-
-def _laws_in(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
-    described = {}
-    for family, laws in LAWS.items():
-        law = getattr(lubricant, family)
-        name = next((name for name, kind in laws.items() if type(law) is kind), None)
-        if name is None:
-            raise BadInput(f"{type(law).__name__} is not a {family} law that can be kept; add it to its table of laws")
-        described[family] = {"law": name, **asdict(law)}
-    return described
 
 
 def save_dataset(dataset: "xarray.Dataset", path: str | Path) -> Path:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl.outcome import Convergence, Figures, Iteration, Options, SolveStatus
-from asperity.ehl.solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, LAWS, OIL, STEPS, ContactSolution, Oil
+from asperity.ehl.solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, OIL, STEPS, ContactSolution, Oil
 from asperity.errors import UnreadableFile
 from asperity.grid import Grid
-from asperity.lubricant import Lubricant
+from asperity.lubricant import make_lubricant
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
@@ -45,11 +45,6 @@ def load_solution(path: str | Path) -> ContactSolution:
         raise UnreadableFile(f"{path} is damaged or not a run of asperity; solve its case again") from None
 
 
-def _law(family: str, described: dict[str, Any]) -> Any:
-    parameters = dict(described)
-    return LAWS[family][parameters.pop("law")](**parameters)
-
-
 def _solution(dataset: "xarray.Dataset") -> ContactSolution:
     described = {name: json.loads(dataset.attrs[name]) for name in DESCRIBED}
     conditions, lubricant, grid = described["conditions"], described["lubricant"], described["grid"]
@@ -63,9 +58,7 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
     pressure, gap, heights = (dataset[name].values for name in ("pressure", "gap", "surface_height"))
     return ContactSolution(
         conditions=ContactConditions(pair=pair, **conditions),
-        lubricant=None
-        if lubricant is None
-        else Lubricant(**{name: _law(name, law) for name, law in lubricant.items()}),
+        lubricant=None if lubricant is None else make_lubricant(lubricant),
         surface=Surface(heights, Grid(**{name: tuple(value) for name, value in grid.items()})),
         options=Options(**described["options"]),
         pressure=pressure,

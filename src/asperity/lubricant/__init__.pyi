@@ -9,7 +9,13 @@ from .friction import FrictionLaw as FrictionLaw
 from .friction import LinearBairWiner as LinearBairWiner
 from .friction import NewtonianShear as NewtonianShear
 from .friction import ShearedFilm as ShearedFilm
+from .laws import LAWS as LAWS
+from .laws import LawFamily as LawFamily
+from .laws import law_name as law_name
+from .laws import make_law as make_law
 from .model import Lubricant as Lubricant
+from .model import describe_lubricant as describe_lubricant
+from .model import make_lubricant as make_lubricant
 from .rheology import RHEOLOGY_LAWS as RHEOLOGY_LAWS
 from .rheology import Newtonian as Newtonian
 from .rheology import ReeEyring as ReeEyring

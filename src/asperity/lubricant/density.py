@@ -1,12 +1,13 @@
 """How density grows with pressure: one frozen, callable law a class."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import require_positive
+from asperity.quantities import Parameter
 
 
 class DensityLaw(Protocol):
@@ -30,7 +31,7 @@ class DensityLaw(Protocol):
 class DowsonHigginson:
     """Density that levels off at high pressure: ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8."""
 
-    rho0: float  # density at ambient pressure [kg/m^3]
+    rho0: Annotated[float, Parameter("kg/m^3", "ρ₀")]  # density at ambient pressure
 
     def __post_init__(self) -> None:
         require_positive("density rho0", self.rho0, "kg/m^3")
@@ -48,7 +49,7 @@ class DowsonHigginson:
 class Incompressible:
     """Density that does not change: ρ = ρ₀."""
 
-    rho0: float  # density [kg/m^3]
+    rho0: Annotated[float, Parameter("kg/m^3", "ρ₀")]  # density
 
     def __post_init__(self) -> None:
         require_positive("density rho0", self.rho0, "kg/m^3")
@@ -62,7 +63,4 @@ class Incompressible:
         return np.zeros_like(pressure)
 
 
-DENSITY_LAWS: dict[str, type[DowsonHigginson] | type[Incompressible]] = {
-    "dowson-higginson": DowsonHigginson,
-    "incompressible": Incompressible,
-}
+DENSITY_LAWS: dict[str, type[DensityLaw]] = {"dowson-higginson": DowsonHigginson, "incompressible": Incompressible}

@@ -5,12 +5,13 @@ friction (Eq 14).
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import require_positive
+from asperity.quantities import Parameter
 
 FREEZING = 273.15  # of water [K]
 
@@ -51,7 +52,7 @@ class NewtonianShear:
 class EyringShear:
     """Shear stress that grows with the logarithm of the rate: τ = τ₀ asinh(η γ'/τ₀)."""
 
-    tau0: float  # Eyring stress [Pa]
+    tau0: Annotated[float, Parameter("Pa", "τ₀")]  # Eyring stress
 
     def __post_init__(self) -> None:
         require_positive("Eyring stress tau0", self.tau0, "Pa")
@@ -71,8 +72,8 @@ class BairWiner:
     266 (1970) 1, as used by Zhu and Hu, Tribol. Trans. 44 (2001) 383; recollected, not checked against either.
     """
 
-    floor: float = 2e6  # least τ_L [Pa]: measured limits of mineral oils at ambient pressure are 1 to 5 MPa
-    ratio: float = 0.25  # τ_L over G
+    floor: Annotated[float, Parameter("Pa", "least limit")] = 2e6  # τ_L of mineral oils at ambient: 1 to 5 MPa
+    ratio: Annotated[float, Parameter("", "τ_L/G")] = 0.25
 
     def __post_init__(self) -> None:
         require_positive("floor of the limiting stress", self.floor, "Pa")
@@ -96,10 +97,10 @@ class LinearBairWiner:
     For measured limits: ξ of mineral oils lies between 0.03 and 0.1.
     """
 
-    tau_l0: float  # limiting stress at ambient pressure [Pa]
-    slope: float  # ξ
-    softening: float | None = None  # b [1/K]; None: 0
-    ratio: float = 0.25  # τ_L over G
+    tau_l0: Annotated[float, Parameter("Pa", "τ_L0")]  # limiting stress at ambient pressure
+    slope: Annotated[float, Parameter("", "ξ")]
+    softening: Annotated[float | None, Parameter("1/K", "b")] = None  # None: 0
+    ratio: Annotated[float, Parameter("", "τ_L/G")] = 0.25
 
     def __post_init__(self) -> None:
         require_positive("limiting stress tau_l0", self.tau_l0, "Pa")
@@ -127,7 +128,7 @@ def _carried(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
     return stress
 
 
-FRICTION_LAWS: dict[str, type[BairWiner] | type[LinearBairWiner] | type[EyringShear] | type[NewtonianShear]] = {
+FRICTION_LAWS: dict[str, type[FrictionLaw]] = {
     "bair-winer": BairWiner,
     "bair-winer-linear": LinearBairWiner,
     "ree-eyring": EyringShear,

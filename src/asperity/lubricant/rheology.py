@@ -1,12 +1,13 @@
 """How shear thins the oil: one frozen law a class."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import require_positive
+from asperity.quantities import Parameter
 
 
 class RheologyLaw(Protocol):
@@ -34,7 +35,7 @@ class ReeEyring:
     pressure gradient is left out, so that η* = η asinh(S)/S with S = η Δu/(τ₀ h). In pure rolling the oil is Newtonian.
     """
 
-    tau0: float  # Eyring stress, where thinning sets in [Pa]
+    tau0: Annotated[float, Parameter("Pa", "τ₀")]  # Eyring stress, where thinning sets in
 
     def __post_init__(self) -> None:
         require_positive("Eyring stress tau0", self.tau0, "Pa")
@@ -46,4 +47,4 @@ class ReeEyring:
         return stress / ratio, ratio / (np.sqrt(1.0 + ratio**2) * stress) - 1.0
 
 
-RHEOLOGY_LAWS: dict[str, type[Newtonian] | type[ReeEyring]] = {"newtonian": Newtonian, "ree-eyring": ReeEyring}
+RHEOLOGY_LAWS: dict[str, type[RheologyLaw]] = {"newtonian": Newtonian, "ree-eyring": ReeEyring}

@@ -4,12 +4,13 @@ Every default has its reason in docs/case-file.md.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
+from asperity.quantities import Parameter
 
 AMBIENT = 313.15  # 40 °C [K]
 ROELANDS_ZERO = 138.0  # temperature that Roelands counts from [K]
@@ -30,7 +31,7 @@ class ExponentialWarmth:
     An ISO VG 100 mineral oil falls from 100 to 11 mm²/s between 40 and 100 °C: ln(100/11)/60 K = 0.037/K.
     """
 
-    beta: float = 0.037  # [1/K]
+    beta: Annotated[float, Parameter("1/K", "β")] = 0.037
 
     def __post_init__(self) -> None:
         require_positive("temperature coefficient beta", self.beta, "1/K")
@@ -47,7 +48,7 @@ class RoelandsWarmth:
     Source: Roelands (1966). S₀ of mineral oils lies between 1 and 1.5.
     """
 
-    s0: float  # S₀
+    s0: Annotated[float, Parameter("", "S₀")]
 
     def __post_init__(self) -> None:
         require_positive("Roelands' exponent s0", self.s0)
@@ -58,22 +59,19 @@ class RoelandsWarmth:
         return np.asarray(np.exp((np.log(viscosity) + 9.67) * (warmer**-self.s0 - 1.0)))
 
 
-WARMTH_LAWS: dict[str, type[ExponentialWarmth] | type[RoelandsWarmth]] = {
-    "exponential": ExponentialWarmth,
-    "roelands": RoelandsWarmth,
-}
+WARMTH_LAWS: dict[str, type[WarmthLaw]] = {"exponential": ExponentialWarmth, "roelands": RoelandsWarmth}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solid:
-    """A body that takes up heat: conductivity [W/m/K], density [kg/m^3], heat capacity [J/kg/K]; default 45 steel.
+    """A body that takes up heat: conductivity, density and heat capacity; default 45 steel.
 
     Density is the paper's; the others are handbook values of plain carbon steels, which lie within 10 % of them.
     """
 
-    conductivity: float = 46.0
-    density: float = 7800.0
-    heat_capacity: float = 460.0
+    conductivity: Annotated[float, Parameter("W/m/K", "k")] = 46.0
+    density: Annotated[float, Parameter("kg/m^3", "ρ")] = 7800.0
+    heat_capacity: Annotated[float, Parameter("J/kg/K", "c")] = 460.0
 
     def __post_init__(self) -> None:
         require_positive("thermal conductivity", self.conductivity, "W/m/K")
@@ -92,9 +90,9 @@ class Thermal:
 
     Parameters
     ----------
-    ambient : temperature of the oil where its viscosity and rheology are stated, and of the supply [K]
-    bulk : temperatures of the two bodies away from the contact [K]; None: ambient
-    oil_conductivity : of the film [W/m/K]
+    ambient : temperature of the oil where its viscosity and rheology are stated, and of the supply
+    bulk : temperatures of the two bodies away from the contact; None: ambient
+    oil_conductivity : of the film
     warmth : how temperature thins the oil
     solids : the two bodies
     feedback : whether the film's temperature acts back on viscosity, friction and film (thermal mixed lubrication)
@@ -105,9 +103,9 @@ class Thermal:
         for a temperature below -60 °C or above 500 °C, or a conductivity that is not positive.
     """
 
-    ambient: float = AMBIENT
-    bulk: tuple[float, float] | None = None
-    oil_conductivity: float = 0.14
+    ambient: Annotated[float, Parameter("K", "T₀")] = AMBIENT
+    bulk: Annotated[tuple[float, float] | None, Parameter("K")] = None
+    oil_conductivity: Annotated[float, Parameter("W/m/K")] = 0.14
     warmth: WarmthLaw = ExponentialWarmth()
     solids: tuple[Solid, Solid] = (Solid(), Solid())
     feedback: bool = False

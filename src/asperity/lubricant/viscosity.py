@@ -1,12 +1,13 @@
 """How viscosity grows with pressure: one frozen, callable law a class."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import require_positive
+from asperity.quantities import Parameter
 
 LARGEST_EXPONENT = 400.0  # of an exponential law: glass long before, and e^709 is no longer a number
 
@@ -32,8 +33,8 @@ class ViscosityLaw(Protocol):
 class Barus:
     """Viscosity that grows exponentially with pressure: η = η₀ exp(α p). Source: the paper's Eq 10."""
 
-    eta0: float  # viscosity at ambient pressure [Pa s]
-    alpha: float  # pressure-viscosity coefficient [1/Pa]
+    eta0: Annotated[float, Parameter("Pa s", "η₀")]  # viscosity at ambient pressure
+    alpha: Annotated[float, Parameter("1/Pa", "α")]  # pressure-viscosity coefficient
 
     def __post_init__(self) -> None:
         require_positive("viscosity eta0", self.eta0, "Pa s")
@@ -55,9 +56,9 @@ class Roelands:
     Source: Roelands (1966), isothermal form with α matched at ambient pressure.
     """
 
-    eta0: float  # viscosity at ambient pressure [Pa s]
-    alpha: float  # pressure-viscosity coefficient at ambient pressure [1/Pa]
-    p0: float = 1.96e8  # Roelands' reference pressure [Pa]
+    eta0: Annotated[float, Parameter("Pa s", "η₀")]  # viscosity at ambient pressure
+    alpha: Annotated[float, Parameter("1/Pa", "α")]  # pressure-viscosity coefficient at ambient pressure
+    p0: Annotated[float, Parameter("Pa", "p₀")] = 1.96e8  # Roelands' reference pressure
 
     def __post_init__(self) -> None:
         require_positive("viscosity eta0", self.eta0, "Pa s")
@@ -83,4 +84,4 @@ class Roelands:
         return self.alpha * (1.0 + pressure / self.p0) ** (self.exponent - 1.0)
 
 
-VISCOSITY_LAWS: dict[str, type[Barus] | type[Roelands]] = {"barus": Barus, "roelands": Roelands}
+VISCOSITY_LAWS: dict[str, type[ViscosityLaw]] = {"barus": Barus, "roelands": Roelands}

@@ -7,7 +7,7 @@ The page is self-contained and loads nothing. Numbers are those of `Run.scalars`
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib.metadata import version
 from math import floor, log10
 from pathlib import Path
@@ -22,16 +22,9 @@ from asperity.coupling import VibrationModel
 from asperity.ehl import ContactSolution
 from asperity.errors import BadInput
 from asperity.files import require_writable, whole_file
-from asperity.lubricant import (
-    DENSITY_LAWS,
-    FRICTION_LAWS,
-    RHEOLOGY_LAWS,
-    VISCOSITY_LAWS,
-    WARMTH_LAWS,
-    Lubricant,
-    Newtonian,
-)
+from asperity.lubricant import LawFamily, Lubricant, Newtonian, Solid, law_name
 from asperity.paper import CITATION
+from asperity.quantities import parameters
 from asperity.report import figures, rubbing_figures
 
 if TYPE_CHECKING:
@@ -533,36 +526,20 @@ def _friction_overview(scalars: Sequence[Mapping[str, Any]]) -> list[Picture]:
 
 # Conditions ----------------------------------------------------------------------------------------------------------
 
-LAW_FIELDS = {
-    "eta0": ("η₀", 1.0, "Pa s"),
-    "alpha": ("α", 1e9, "1/GPa"),
-    "p0": ("p₀", 1e-6, "MPa"),
-    "rho0": ("ρ₀", 1.0, "kg/m³"),
-    "tau0": ("τ₀", 1e-6, "MPa"),
-    "floor": ("least limit", 1e-6, "MPa"),
-    "ratio": ("τ_L/G", 1.0, ""),
-    "tau_l0": ("τ_L0", 1e-6, "MPa"),
-    "slope": ("ξ", 1.0, ""),
-    "softening": ("b", 1.0, "1/K"),
-    "beta": ("β", 1.0, "1/K"),
-    "s0": ("S₀", 1.0, ""),
-}
 
-
-def _law(law: object, table: Mapping[str, type]) -> str:
-    name = next(name for name, kind in table.items() if type(law) is kind)
-    values = []
-    for field in fields(law):  # type: ignore[arg-type]
-        symbol, scale, unit = LAW_FIELDS[field.name]
-        value = getattr(law, field.name)
-        if value is not None:
-            values.append(f"{symbol} = {value * scale:.4g} {unit}".rstrip())
-    return ", ".join([name, *values])
+def _law(family: LawFamily, law: object) -> str:
+    values = ((name, mark, getattr(law, name)) for name, mark in parameters(type(law)))
+    stated = (f"{mark.symbol or name} = {mark.text(value)}" for name, mark, value in values if value is not None)
+    return ", ".join([law_name(family, law), *stated])
 
 
 def _pair(values: tuple[float, float], unit: str = "", scale: float = 1.0) -> str:
-    texts = dict.fromkeys(f"{value * scale:.4g} {unit}".rstrip() for value in values)
-    return " and ".join(texts) if len(texts) > 1 else f"{next(iter(texts))} (both)"
+    return _both([f"{value * scale:.4g} {unit}".rstrip() for value in values])
+
+
+def _both(texts: Sequence[str]) -> str:
+    different = list(dict.fromkeys(texts))
+    return " and ".join(different) if len(different) > 1 else f"{different[0]} (both)"
 
 
 def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
@@ -596,21 +573,19 @@ def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:
     if lubricant is None:
         return {"Lubricant": "none: dry contact"}
     return {
-        "Viscosity law": _law(lubricant.viscosity, VISCOSITY_LAWS),
-        "Density law": _law(lubricant.density, DENSITY_LAWS),
-        "Rheology": _law(lubricant.rheology, RHEOLOGY_LAWS),
-        "Friction of the film": _law(lubricant.friction, FRICTION_LAWS),
+        "Viscosity law": _law("viscosity", lubricant.viscosity),
+        "Density law": _law("density", lubricant.density),
+        "Rheology": _law("rheology", lubricant.rheology),
+        "Friction of the film": _law("friction", lubricant.friction),
     }
 
 
 def _thermal_rows(run: "Run") -> dict[str, str]:
     thermal = run.case.thermal
     bulk = "" if thermal.bulk is None else f", bodies at {_pair(thermal.bulk, 'K')}"
-    names = {"conductivity": ("W/m/K", 1.0), "density": ("kg/m³", 1.0), "heat_capacity": ("J/kg/K", 1.0)}
     solids = [
-        f"{name.replace('_', ' ')} {_pair((getattr(first, name), getattr(second, name)), unit, scale)}"
-        for first, second in [thermal.solids]
-        for name, (unit, scale) in names.items()
+        f"{name.replace('_', ' ')} {_both([mark.text(getattr(solid, name)) for solid in thermal.solids])}"
+        for name, mark in parameters(Solid)
     ]
     rows = {"Boundary friction": f"{run.case.boundary_friction:g}", "Bodies": ", ".join(solids)}
     if run.solution.lubricant is None:
@@ -620,7 +595,7 @@ def _thermal_rows(run: "Run") -> dict[str, str]:
         **rows,
         "Temperature": f"{thermal.ambient:.4g} K ambient{bulk}; {feedback}",
         "Oil and heat": f"conductivity {thermal.oil_conductivity:g} W/m/K, viscosity falls by the law "
-        f"{_law(thermal.warmth, WARMTH_LAWS)}",
+        f"{_law('warmth', thermal.warmth)}",
     }
 
 
