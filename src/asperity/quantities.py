@@ -6,7 +6,7 @@ Parameters of laws say their unit and symbol beside the parameter, as `Parameter
 
 import csv
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.resources import files
@@ -26,7 +26,8 @@ class Quantity:
 
     `unit` is that of the stored number (SI, as netCDF writes it), `display` the one people read, `form` a format
     specification for the number in it. `deviation` is the key that holds the standard deviation or error bar.
-    `group` is the table it belongs to; `source` the attribute of a solved case that it is read from; `detail` keeps it
+    `group` is the table it belongs to; `source` the attribute that it is
+    read from, of a solved case or of what else the group is about; `detail` keeps it
     out of short tables. `standard_name` is CF's, where CF has one.
     """
 
@@ -68,6 +69,14 @@ class Quantity:
         """What netCDF says of it, by the CF conventions."""
         known = {"long_name": self.title, "units": self.unit, "standard_name": self.standard_name}
         return {name: text for name, text in known.items() if text}
+
+    def at(self, owner: Any) -> Any:
+        """What stands at `source` in its owner; None where something on the way is None."""
+        for name in self.source.split("."):
+            if owner is None:
+                return None
+            owner = owner[name] if isinstance(owner, dict) else getattr(owner, name)
+        return owner
 
     def number(self, value: Any, deviation: float | None = None) -> str:
         """A stored value as people read it, without its unit: "84.0 ± 2.4"; `NO_VALUE` for None and nan."""
@@ -135,11 +144,23 @@ def quantity(key: str) -> Quantity:
     raise KeyError(f"{key} is not in the catalogue of quantities; add it to quantities.csv")
 
 
+def lines(*groups: str) -> list[Quantity]:
+    """Every quantity of these groups, deviations and details too."""
+    return [entry for entry in catalogue().values() if entry.group in groups]
+
+
+def read(owner: object, entries: Iterable[Quantity]) -> dict[str, Any]:
+    """Numbers by key, each at the `source` that its line names in the owner; None where there is none or it is nan."""
+    numbers = {entry.key: entry.at(owner) for entry in entries if entry.source}
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in numbers.items()
+    }
+
+
 def select(*groups: str, detail: bool = False) -> list[Quantity]:
     """The quantities of these groups, deviations left out; those in `detail` too where asked."""
-    known = catalogue().values()
-    deviations = {entry.deviation for entry in known}
-    return [q for q in known if q.group in groups and q.key not in deviations and (detail or not q.detail)]
+    deviations = {entry.deviation for entry in catalogue().values()}
+    return [entry for entry in lines(*groups) if entry.key not in deviations and (detail or not entry.detail)]
 
 
 @dataclass(frozen=True, slots=True)

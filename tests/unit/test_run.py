@@ -9,6 +9,7 @@ import xarray
 import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
 from asperity.cli.contact import _friction_rows, _print_run
+from asperity.quantities import quantity
 
 SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
 
@@ -63,6 +64,10 @@ def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
             assert kept[name].attrs["units"] in ("Pa", "K", "m")
         np.testing.assert_allclose(kept["von_mises_section"].max(), run.stress.largest.max(), rtol=1e-6)
         np.testing.assert_array_equal(kept["depth"], run.stress.depths)
+        for key, value in run.scalars().items():
+            if isinstance(value, float):
+                assert float(kept[key]) == value
+                assert kept[key].attrs["units"] == quantity(key).unit
     assert load_run(full).scalars() == load_run(bare).scalars() == run.scalars()
 
 

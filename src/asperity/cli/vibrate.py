@@ -51,11 +51,11 @@ def vibrate(
 
 
 def _vibrate(case: "Case", figures: Path | None, *, as_json: bool, quiet: bool) -> None:
-    from asperity.results import vibrate_case, vibration_scalars, vibration_verdict
+    from asperity.results import vibrate_case
 
     with shown_progress(case.source, quiet=quiet) as report_step:
-        heard, state = vibrate_case(case, progress=report_step)
-    scalars = vibration_scalars(heard, state, case)
+        vibrated = vibrate_case(case, progress=report_step)
+    heard = vibrated.vibration
     drawn: list[Path] = []
     if figures is not None and heard.oscillator is not None and case.vibration is not None:
         from asperity.report import excitation_figure, response_figure, write_png
@@ -65,9 +65,9 @@ def _vibrate(case: "Case", figures: Path | None, *, as_json: bool, quiet: bool) 
             write_png(response_figure(heard, case.vibration), figures / "response.png"),
         ]
     if as_json:
-        print_json(scalars | {"figures": [str(path) for path in drawn]})
+        print_json(vibrated.scalars() | {"figures": [str(path) for path in drawn]})
         return
-    print(vibration_verdict(heard, state, case))
+    print(vibrated.verdict())
     if quiet:
         return
     print()

@@ -1,10 +1,11 @@
 from .curves import FrictionCurve as FrictionCurve
+from .curves import FrictionPoint as FrictionPoint
 from .curves import SolverProgress as SolverProgress
 from .curves import stribeck_curve as stribeck_curve
 from .curves import traction_curve as traction_curve
 from .run import Run as Run
+from .run import Scalar as Scalar
 from .run import load_run as load_run
 from .run import solve_case as solve_case
-from .run import vibrate_case as vibrate_case
-from .run import vibration_scalars as vibration_scalars
-from .run import vibration_verdict as vibration_verdict
+from .vibration import VibratedCase as VibratedCase
+from .vibration import vibrate_case as vibrate_case

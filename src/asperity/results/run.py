@@ -9,18 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.case import Case, load_case
 from asperity.coupling import (
-    LINEAR_UP_TO,
     Vibration,
     contact_vibration,
-    dry_full_load,
-    needs_solution,
     require_sampling,
 )
 from asperity.ehl import (
@@ -43,7 +40,7 @@ from asperity.ehl import (
     subsurface_stress,
 )
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
-from asperity.quantities import catalogue
+from asperity.quantities import lines, quantity, read
 from asperity.surface import Surface
 from asperity.wear import Resonance
 
@@ -54,6 +51,8 @@ FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
 Scalar = float | int | bool | None
+RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "solver", "resonance")
+MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2", "film_temperature")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,21 +131,22 @@ class Run:
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its key in the catalogue of quantities, SI; None where there is none."""
-        return {entry.key: _read(self, entry.source) for entry in catalogue().values() if entry.source}
+        return read(self, lines(*RUN_GROUPS))
 
     def verdict(self) -> str:
         """One sentence on the state of the contact.
 
         Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more; mixed between.
         """
-        clr, car = self.state.clr, self.state.car
+        clr = self.state.clr
         if self.solution.lubricant is None:
             regime = "Dry contact"
         elif clr < FULL_FILM_BELOW:
             regime = "Full film"
         else:
             regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
-        sentence = f"{regime}: asperities carry {100 * clr:.1f} % of the load on {100 * car:.1f} % of the Hertz zone"
+        load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", self.state.car)))
+        sentence = f"{regime}: asperities carry {load} of the load on {area} of the Hertz zone"
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
         return f"{sentence}; {self.resonance_in_words()}."
@@ -158,36 +158,30 @@ class Run:
         resonance = self.vibration.resonance
         if not resonance.found:
             return f"no contact resonance ({resonance.reason.rstrip('.')})"
-        deviation = _finite(resonance.crf_std_hz)
-        if deviation is None:
+        deviation = resonance.crf_std_hz
+        if not math.isfinite(deviation):
             return f"contact resonance at {resonance.crf_hz:.0f} Hz"
         decimals = 1 if deviation < 2.0 else 0
         return f"contact resonance at {resonance.crf_hz:.{decimals}f} ± {deviation:.{decimals}f} Hz"
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The solution's dataset, with maps of traction, temperature and von Mises stress in single precision.
+        """The solution's dataset, with every number of the run and maps of traction, temperature and von Mises stress.
 
-        A run that is loaded takes nothing from these maps: they are worked out anew.
+        A run that is loaded takes nothing from these: they are worked out anew. Maps are in single precision.
         """
         dataset, stress = self.solution.to_dataset(), self.stress
-        depth = {"long_name": "depth below the surface of body 1", "units": "m", "axis": "Z", "positive": "down"}
-        dataset = dataset.assign_coords(depth=("depth", stress.depths, depth))
-        where = f"largest below the surface of body 1, Poisson's ratio {stress.poisson_ratio:g}"
-        maps: dict[str, tuple[Field, str, str]] = {
-            "von_mises": (stress.largest, f"von Mises stress, {where}", "Pa"),
-            "von_mises_depth": (stress.depth_of_largest, "depth of the largest von Mises stress", "m"),
-        }
-        if self.friction is not None and self.heat is not None:
-            maps |= {
-                "shear": (self.friction.shear, "traction along rolling on body 1", "Pa"),
-                "temperature_1": (self.heat.surface_1, "temperature of surface 1 above ambient", "K"),
-                "temperature_2": (self.heat.surface_2, "temperature of surface 2 above ambient", "K"),
-                "film_temperature": (self.heat.film, "mean temperature across the film above ambient", "K"),
-            }
-        for name, (values, text, unit) in maps.items():
-            dataset[name] = (("x", "y"), values.astype(np.float32), {"long_name": text, "units": unit})
-        section = {"long_name": f"von Mises stress in the plane y = {stress.peak.y:g} m", "units": "Pa"}
+        axis = {"axis": "Z", "positive": "down"}
+        dataset = dataset.assign_coords(depth=("depth", stress.depths, quantity("depth").attributes | axis))
+        for entry in map(quantity, MAPS):
+            values: Field | None = entry.at(self)
+            if values is not None:
+                dataset[entry.key] = (("x", "y"), values.astype(np.float32), entry.attributes)
+        dataset["von_mises"].attrs["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"
+        section = quantity("von_mises_section").attributes | {"comment": f"in the plane y = {stress.peak.y:g} m"}
         dataset["von_mises_section"] = (("x", "depth"), stress.von_mises[:, stress.row].astype(np.float32), section)
+        for key, value in self.scalars().items():
+            if value is not None and not isinstance(value, bool):
+                dataset[key] = ((), value, quantity(key).attributes)
         return dataset
 
     def save(self, path: str | Path) -> Path:
@@ -247,79 +241,6 @@ def solve_case(
     return _run(case, replace(solution, attributes=kept), notes)
 
 
-def vibrate_case(case: Case, *, progress: Callable[[Iteration], None] | None = None) -> tuple[Vibration, ContactState]:
-    """The vibration model alone: what the case sounds like, and the contact that was listened to.
-
-    That is the paper's section 2, dry and with all load on asperities of the case's Sq; or the solved contact, where
-    the case's stiffness law or excitation needs one.
-
-    Raises
-    ------
-    BadInput
-        for a case without [vibration], or one that `contact_vibration` refuses.
-    NotConverged
-        if the contact is needed and cannot be solved.
-    """
-    model = case.vibration
-    if model is None:
-        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
-    if needs_solution(model):
-        run = solve_case(case, progress=progress)
-        assert run.vibration is not None  # the case has a model
-        return run.vibration, run.state
-    state = dry_full_load(case.conditions, case.surface().sq)
-    with case.naming("vibration"):
-        return contact_vibration(state, case.conditions, model), state
-
-
-def vibration_scalars(heard: Vibration, state: ContactState, case: Case) -> dict[str, Any]:
-    """Every number of `asperity vibrate --json` by its name, SI; None where there is none."""
-    found, spring = heard.resonance, heard.oscillator
-    return {
-        "verdict": vibration_verdict(heard, state, case),
-        "crf_hz": _finite(found.crf_hz),
-        "crfa": _finite(found.crfa),
-        "crf_std_hz": _finite(found.crf_std_hz),
-        "crfa_std": _finite(found.crfa_std),
-        "found": found.found,
-        "reason": found.reason,
-        "band_hz": list(heard.band_hz),
-        "full_load_crf_hz": heard.full_load_crf_hz,
-        "natural_frequency_hz": None if spring is None else spring.natural_frequency_hz,
-        "stiffness_n_per_m": None if spring is None else spring.stiffness,
-        "damping_ratio": None if spring is None else spring.damping_ratio,
-        "expected_crfa": heard.expected_crfa,
-        "dynamic_load": heard.dynamic_load,
-        "contact_loss": heard.contact_loss,
-        "clr": state.clr,
-        "car": state.car,
-        "sq_m": state.sq,
-        "load_n": case.conditions.load,
-    }
-
-
-def vibration_verdict(heard: Vibration, state: ContactState, case: Case) -> str:
-    """One sentence: the resonance, of which contact, and whether its spring may be taken as linear."""
-    found, model = heard.resonance, case.vibration
-    solved = model is not None and needs_solution(model)
-    contact = (
-        f"solved contact, {100 * state.clr:.0f} % of {case.conditions.load:g} N on asperities"
-        if solved
-        else f"dry contact, all {case.conditions.load:g} N on asperities"
-    )
-    if not found.found:
-        return f"No contact resonance ({found.reason.rstrip('.')}): {contact}."
-    deviation = f" ± {found.crf_std_hz:.1f}" if _finite(found.crf_std_hz) is not None else ""
-    sentence = f"Contact resonance at {found.crf_hz:.1f}{deviation} Hz, CRFA {found.crfa:.3g} (m/s^2)^2/Hz: {contact}"
-    linear = model is not None and model.response != "nonlinear"
-    if linear and heard.dynamic_load is not None and heard.dynamic_load > LINEAR_UP_TO:
-        sentence += (
-            f"; but the dynamic force is {100 * heard.dynamic_load:.0f} % of the load, too much for a linear spring: "
-            "take vibration.response = nonlinear"
-        )
-    return f"{sentence}."
-
-
 def load_run(path: str | Path) -> Run:
     """Read a run back: its fields as they were solved, everything else worked out from them anew.
 
@@ -364,17 +285,3 @@ def _threshold(solution: ContactSolution) -> str:
         "Model conserving: CLR and CAR count cells whose elastic bodies touch, though oil at the cap may have parted "
         f"them since; by film, the load lies on {shares}. The share at the contact film depends on the grid."
     )
-
-
-def _read(run: Run, source: str) -> Scalar:
-    """A number of a run by the attributes that lead to it; None where one of them is None or the number is nan."""
-    value: Any = run
-    for name in source.split("."):
-        if value is None:
-            return None
-        value = value[name] if isinstance(value, dict) else getattr(value, name)
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -17,7 +17,7 @@ from asperity.case import Case
 from asperity.coupling import contact_vibration
 from asperity.errors import AsperityError
 from asperity.processes import leave_interrupts_to_the_parent
-from asperity.results import Run, solve_case, vibrate_case, vibration_scalars
+from asperity.results import Run, solve_case, vibrate_case
 from asperity.wear import Resonance
 
 DONE, NOT_CONVERGED, FAILED = "done", "not converged", "failed"
@@ -74,8 +74,7 @@ def _solved(case: Case, wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]
 
 
 def _vibrated(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
-    heard, state = vibrate_case(case)
-    return {"status": DONE, "reason": "", **vibration_scalars(heard, state, case)}, {}
+    return {"status": DONE, "reason": "", **vibrate_case(case).scalars()}, {}
 
 
 EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Field]]]] = {

@@ -1,0 +1,80 @@
+"""The vibration model of a case alone: what an accelerometer would measure, without a solution where none is needed."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.case import Case
+from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load, needs_solution
+from asperity.ehl import ContactState, Iteration
+from asperity.errors import BadInput
+from asperity.quantities import lines, quantity, read
+from asperity.results.run import solve_case
+from asperity.wear import Resonance
+
+KEYS = ("crf_hz", "crfa", "crf_std_hz", "crfa_std", "clr", "car", "sq_m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VibratedCase:
+    """A case's vibration, and the contact that it is of."""
+
+    case: Case
+    state: ContactState
+    vibration: Vibration
+
+    @property
+    def resonance(self) -> Resonance:
+        """What was looked for in the record, found or not."""
+        return self.vibration.resonance
+
+    def scalars(self) -> dict[str, Any]:
+        """Every number of `asperity vibrate --json` by its key, SI; None where there is none."""
+        numbers = read(self, (*map(quantity, KEYS), *lines("vibration")))
+        found = {"found": self.resonance.found, "reason": self.resonance.reason}
+        return {"verdict": self.verdict(), **numbers, **found, "band_hz": list(self.vibration.band_hz)}
+
+    def verdict(self) -> str:
+        """One sentence: the resonance, of which contact, and whether its spring may be taken as linear."""
+        resonance, model, force = self.resonance, self.case.vibration, self.vibration.dynamic_load
+        load = f"{self.case.conditions.load:g} N on asperities"
+        solved = model is not None and needs_solution(model)
+        contact = f"solved contact, {100 * self.state.clr:.0f} % of {load}" if solved else f"dry contact, all {load}"
+        if not resonance.found:
+            return f"No contact resonance ({resonance.reason.rstrip('.')}): {contact}."
+        deviation = f" ± {resonance.crf_std_hz:.1f}" if math.isfinite(resonance.crf_std_hz) else ""
+        sentence = f"Contact resonance at {resonance.crf_hz:.1f}{deviation} Hz"
+        sentence += f", CRFA {resonance.crfa:.3g} (m/s^2)^2/Hz: {contact}"
+        linear = model is not None and model.response != "nonlinear"
+        if linear and force is not None and force > LINEAR_UP_TO:
+            sentence += (
+                f"; but the dynamic force is {100 * force:.0f} % of the load, too much for a linear spring: "
+                "take vibration.response = nonlinear"
+            )
+        return f"{sentence}."
+
+
+def vibrate_case(case: Case, *, progress: Callable[[Iteration], None] | None = None) -> VibratedCase:
+    """The vibration model of a case, and the contact it is of.
+
+    That is the paper's section 2, dry and with all load on asperities of the case's Sq; or the solved contact, where
+    the case's stiffness law or excitation needs one.
+
+    Raises
+    ------
+    BadInput
+        for a case without [vibration], or one that `contact_vibration` refuses.
+    NotConverged
+        if the contact is needed and cannot be solved.
+    """
+    model = case.vibration
+    if model is None:
+        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+    if needs_solution(model):
+        run = solve_case(case, progress=progress)
+        assert run.vibration is not None  # the case has a model
+        return VibratedCase(case=case, state=run.state, vibration=run.vibration)
+    state = dry_full_load(case.conditions, case.surface().sq)
+    with case.naming("vibration"):
+        return VibratedCase(case=case, state=state, vibration=contact_vibration(state, case.conditions, model))
