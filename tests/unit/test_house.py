@@ -1,4 +1,4 @@
-"""The measures of the house: how long a file and a function may be, how deep a folder, and what a face must hand out."""
+"""The measures of the house: how long files and functions may be, how deep folders, and what a face must hand out."""
 
 import ast
 
