@@ -7,5 +7,9 @@ from .case import Case as Case
 from .case import load_case as load_case
 from .refusals import Section as Section
 from .refusals import parse_section as parse_section
+from .sections import CaseFile as CaseFile
+from .sections import MotionSection as MotionSection
 from .sweep import RangeSection as RangeSection
+from .sweep import Seeding as Seeding
+from .sweep import StudyKind as StudyKind
 from .text import relative_path as relative_path

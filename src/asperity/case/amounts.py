@@ -159,14 +159,19 @@ def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
 
 
 def to_si(value: object) -> Any:
-    """A value of a case file as a number in SI; two equal ones as one; names as they stand."""
+    """A value of a case file as a number in SI; two equal ones as one; what is no quantity as it stands."""
     if isinstance(value, list | tuple):
         entries = [to_si(entry) for entry in value]
         return entries[0] if len(entries) == 2 and entries[0] == entries[1] else entries
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     parts = _split(value)
-    return value if parts is None or not parts[1] else float(_convert(*parts, None))
+    if parts is None or not parts[1]:
+        return value
+    try:
+        return float(_convert(*parts, None))
+    except _UnusableUnit:
+        return value
 
 
 def default_amount(value: float, unit: str) -> Amount:

@@ -1,6 +1,6 @@
 """The sections of a case file, in the order in which it has them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, Strict
 
@@ -19,11 +19,11 @@ from asperity.case.amounts import (
 )
 from asperity.case.laws import LubricantSection, ThermalSection, parse_lubricant
 from asperity.case.refusals import Section
-from asperity.case.surfaces import SurfaceSection, parse_surface
+from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.sweep import StudySection, parse_study
 from asperity.case.vibration import parse_vibration
 from asperity.conditions import Geometry
-from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, Options, Start
+from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, ContactModel, Options, Start
 from asperity.errors import BadInput
 
 
@@ -77,7 +77,7 @@ class MotionSection(Section):
 
     steps: Count = 200
     time_step: Annotated[float, Strict(), Field(gt=0.0, le=LONGEST_STEP)] = 1.0  # cells that the oil travels in one
-    rough: Literal["first", "second", "both"] = "first"  # which body carries a generated surface; both: a half each
+    rough: RoughBody = "first"  # which body carries a generated surface; both: a half each
     start: Start = "steady"
     track: Count = 1  # lengths of the domain after which a surface repeats
     flattening: Annotated[bool, Strict()] = False  # what is pressed flat stays flat: running-in
@@ -86,7 +86,7 @@ class MotionSection(Section):
 class CaseFile(Section):
     """A whole case file. `lubricant = "none"` is a dry contact: an oil is not something to forget."""
 
-    model: Literal["unified", "conserving"] = "unified"
+    model: ContactModel = "unified"
     contact: ContactSection
     material: MaterialSection
     lubricant: Annotated[LubricantSection | None, PlainValidator(parse_lubricant)]

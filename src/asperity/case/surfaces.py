@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import Strict
@@ -40,7 +40,7 @@ from asperity.surface import (
 
 SAMPLE_DEVIATION = 0.05  # of a generated surface's correlation lengths, beyond which the notes say so
 
-Body = Literal["first", "second", "both"]
+RoughBody = Literal["first", "second", "both"]
 
 
 class SurfaceSection(Section):
@@ -181,13 +181,16 @@ class FlatSection(GeneratedSection):
 
 
 GENERATED_SECTIONS: dict[str, type[GeneratedSection]] = {
-    "gaussian": GaussianSection,
-    "non-gaussian": NonGaussianSection,
-    "self-affine": SelfAffineSection,
-    "ground": GroundSection,
-    "sandblasted": SandblastedSection,
-    "run-in": RunInSection,
-    "flat": FlatSection,
+    get_args(section.model_fields["kind"].annotation)[0]: section
+    for section in (
+        GaussianSection,
+        NonGaussianSection,
+        SelfAffineSection,
+        GroundSection,
+        SandblastedSection,
+        RunInSection,
+        FlatSection,
+    )
 }
 
 
@@ -297,7 +300,7 @@ def composite_roughness(
 
 
 def moving_roughness(
-    section: SurfaceSection, rough: Body, track: Grid, folder: Path, speeds: tuple[float, float], grid: Grid
+    section: SurfaceSection, rough: RoughBody, track: Grid, folder: Path, speeds: tuple[float, float], grid: Grid
 ) -> MovingSurfaces:
     """The roughness of both bodies on their tracks, seen through the contact's `grid`; see `Case.moving_surfaces`."""
     apart = two_bodies(section, track, folder, speeds)

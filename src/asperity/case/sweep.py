@@ -19,6 +19,10 @@ def _parse_seeds(value: object) -> int | tuple[int, ...]:
     raise BadInput(f"must be 1 or more, or a list of seeds such as [1, 2, 3], got {quoted(value)}")
 
 
+StudyKind = Literal["solve", "vibrate"]
+Seeding = Literal["independent", "common"]
+
+
 class RangeSection(Section):
     """A range in [study]: `step` from one value to the next, or `count` of them; over samples, neither."""
 
@@ -32,12 +36,12 @@ class RangeSection(Section):
 class StudySection(Section):
     """[study]: what a sweep varies. Every other key names a quantity of the case."""
 
-    kind: Literal["solve", "vibrate"] = "solve"
+    kind: StudyKind = "solve"
     axes: dict[str, tuple[Any, ...] | RangeSection]  # as written: key -> values
     samples: Count | None = None  # a Latin hypercube of so many points in place of the product
     sample_seed: Seed = 0
     seeds: Annotated[int | tuple[int, ...], PlainValidator(_parse_seeds)] = 1  # how many surfaces a point, or which
-    seeding: Literal["independent", "common"] = "independent"
+    seeding: Seeding = "independent"
 
 
 def parse_study(value: object) -> StudySection | None:

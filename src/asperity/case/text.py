@@ -7,6 +7,8 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from asperity.case.amounts import Amount
 from asperity.case.refusals import Section
 from asperity.case.sections import CaseFile
@@ -43,8 +45,6 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
 
 def restated(contents: CaseFile) -> str:
     """A case as TOML, every default written out, quantities as they were written."""
-    import tomli_w
-
     tables = _plain(contents)
     if contents.lubricant is None:
         tables["lubricant"] = "none"

@@ -10,6 +10,7 @@ from .motion import Start as Start
 from .motion import Steps as Steps
 from .motion import moving_contact as moving_contact
 from .motion import step_seconds as step_seconds
+from .outcome import ContactModel as ContactModel
 from .outcome import Convergence as Convergence
 from .outcome import Iteration as Iteration
 from .outcome import Options as Options

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal, get_args
 
 from asperity.errors import BadInput, require_positive
 
-UNIFIED, CONSERVING = MODELS = ("unified", "conserving")
+ContactModel = Literal["unified", "conserving"]
+UNIFIED, CONSERVING = MODELS = get_args(ContactModel)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +27,7 @@ class Options:
     tolerance: float = 1e-4
     max_iterations: int = 200
     contact_film: float = 5e-9
-    model: str = UNIFIED
+    model: ContactModel = "unified"
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 0.1:

@@ -12,15 +12,13 @@ from decimal import Decimal
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import product
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.case import Case, RangeSection, Section, split_amount, to_si
+from asperity.case import Case, RangeSection, Section, Seeding, StudyKind, split_amount, to_si
 from asperity.errors import BadInput, UnreadableFile
 
-Kind = Literal["solve", "vibrate"]
-Seeding = Literal["independent", "common"]
 SEED_KEYS = ("surface.seed", "vibration.seed")
 MOST_CASES = 10_000_000
 DIGITS = 9  # of a sampled value
@@ -60,7 +58,7 @@ class StudyPlan:
     axes: tuple[str, ...]
     points: tuple[Mapping[str, Any], ...]
     realisations: int = 1
-    kind: Kind = "solve"
+    kind: StudyKind = "solve"
     seeding: Seeding = "independent"
     seeds: tuple[int, ...] | None = None
     ids: tuple[str, ...] | None = field(default=None, repr=False)
@@ -170,7 +168,7 @@ def plan_points(
     *,
     axes: Sequence[str] | None = None,
     seeds: int | Sequence[int] = 1,
-    kind: Kind = "solve",
+    kind: StudyKind = "solve",
     seeding: Seeding = "independent",
 ) -> StudyPlan:
     """A plan of points of one's own.
