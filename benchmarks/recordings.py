@@ -20,7 +20,7 @@ from asperity.errors import BadInput
 from asperity.paper import simulate_rig, write_rig
 from asperity.recording import check_recording, open_channels, read_recording
 from asperity.tracking import search_target, track_recordings
-from asperity.tracking.listen import FINEST_HZ, Asked, listen
+from asperity.tracking.reading import FINEST_HZ, ReadOptions, read_spectrum
 from asperity.wear import contact_resonance, remove_lines
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
@@ -94,9 +94,9 @@ def one_file(path: Path) -> str:
     times, processor = [], []
     for _ in range(5):
         began, worked = time.perf_counter(), time.process_time()
-        heard = listen(path, Asked(), target, FINEST_HZ)
-        assert heard.spectrum is not None
-        found = contact_resonance(remove_lines(heard.spectrum).spectrum, band_hz=target.band_hz)
+        reading = read_spectrum(path, ReadOptions(), target, FINEST_HZ)
+        assert reading.spectrum is not None
+        found = contact_resonance(remove_lines(reading.spectrum).spectrum, band_hz=target.band_hz)
         times.append(time.perf_counter() - began)
         processor.append(time.process_time() - worked)
     return (
@@ -178,8 +178,8 @@ def false_finds() -> Iterator[str]:
         running += [(path, given | {"channel": one.channel.name}) for one in open_channels(path, **given)]
     for name, method in alone.items():
         tracks = [track_recordings([path], method=method, **given) for path, given in running]
-        usable = [track for track in tracks if track.recordings[0].heard.usable]
-        found = sum(track.found for track in usable)
+        usable = [track for track in tracks if track.recordings[0].reading.usable]
+        found = sum(track.resonance_count for track in usable)
         yield f"| MFPT and IMS channels one by one (the machine runs) | {name} | {found} | {len(usable)} |"
     with tempfile.TemporaryDirectory() as folder:
         found = total = 0
@@ -190,8 +190,8 @@ def false_finds() -> Iterator[str]:
                 names.append(Path(folder, f"{path.stem}-{number}.npz"))
                 np.savez(names[-1], acc=piece, fs=recording.rate_hz, unit="m/s^2")
             track = track_recordings(names)
-            found, total = found + track.found, total + len(names)
+            found, total = found + track.resonance_count, total + len(names)
         yield f"| MFPT, each record in 8 pieces as a series | none given (joint) | {found} | {total} |"
         every = sorted(Path(folder).iterdir())
-        track = track_recordings(every)
-        yield f"| MFPT, all pieces of all four as one series | none given (joint) | {track.found} | {len(every)} |"
+        count = track_recordings(every).resonance_count
+        yield f"| MFPT, all pieces of all four as one series | none given (joint) | {count} | {len(every)} |"

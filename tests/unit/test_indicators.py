@@ -5,7 +5,7 @@ from asperity.errors import BadInput
 from asperity.signals import Signal, Spectrum, power_spectrum, smooth
 from asperity.vibration import ContactOscillator
 from asperity.wear import contact_resonance
-from asperity.wear.indicators import line_and_slopes, line_shape
+from asperity.wear.resonance import line_and_slopes, line_shape
 
 BAND = (2500.0, 4000.0)
 FREQUENCY = np.arange(0.0, 10_000.0, 1.25)

@@ -6,8 +6,9 @@ import pytest
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear import series_resonances
-from asperity.wear.indicators import line_shape
-from asperity.wear.series import _Blocks, _cost, _Line, _objection, _Parameters, _point
+from asperity.wear.resonance import line_shape
+from asperity.wear.separation import Blocks, Parameters, _costs, _point
+from asperity.wear.series import _Line, _objection
 
 BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 6000.0, 1.0)
@@ -66,23 +67,22 @@ def test_the_fit_scatters_as_it_says():
 def test_the_score_is_the_slope_of_the_cost():
     rng = np.random.default_rng(4)
     centre = np.linspace(2000.0, 4000.0, 50)
-    blocks = _Blocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
+    blocks = Blocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
     own = np.column_stack(
         [rng.normal(0, 1, 7), np.log(rng.uniform(2500, 3500, 7)), rng.normal(-4, 0.3, 7), rng.normal(0, 1, 7)]
     )
-    at = _Parameters(own, rng.normal(0.0, 0.5, 50), 0.3)
+    at = Parameters(own, rng.normal(0.0, 0.5, 50), 0.3)
     point, d = _point(blocks, at), 1e-6
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
         shift = np.zeros_like(own)
         shift[row, column] = d
-        slope = (_cost(blocks, at._replace(own=own + shift)) - _cost(blocks, at._replace(own=own - shift))) / (2 * d)
+        up, down = (np.sum(_costs(blocks, at._replace(own=own + side * shift))) for side in (1.0, -1.0))
+        slope = (up - down) / (2 * d)
         assert point.own_score[row, column] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
     shift = np.zeros(50)
     shift[20] = d
-    slope = (_cost(blocks, at._replace(base=at.base + shift)) - _cost(blocks, at._replace(base=at.base - shift))) / (
-        2 * d
-    )
-    assert point.base_score[20] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
+    up, down = (np.sum(_costs(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0))
+    assert point.base_score[20] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
 
 
 def test_a_recording_without_the_contact_is_said_to_have_none():

@@ -1,8 +1,12 @@
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from asperity.errors import BadInput
-from asperity.wear import split_stages
+from asperity.wear import Detector, IndicatorMethod, split_stages
+from asperity.wear.indicators import INDICATOR_METHODS
+from asperity.wear.stages import STAGE_DETECTORS
 
 SQ = np.array([0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49])  # the paper's samples [um]
 SQ_STD = np.array([0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06])
@@ -137,3 +141,8 @@ def test_what_cannot_be_meant_is_refused(changes, named):
     arguments = {"x": SQ, "crf_hz": knee(SQ), **changes}
     with pytest.raises(BadInput, match=named):
         split_stages(arguments.pop("x"), arguments.pop("crf_hz"), **arguments)
+
+
+def test_the_tables_have_the_names_that_signatures_promise():
+    assert set(STAGE_DETECTORS) == set(get_args(Detector))
+    assert set(INDICATOR_METHODS) == set(get_args(IndicatorMethod))

@@ -12,7 +12,14 @@ from asperity.coupling import search_band
 from asperity.errors import BadInput, UnreadableFile
 from asperity.tracking import recordings_in, search_target, track_recordings
 from asperity.tracking.files import read_table
-from asperity.tracking.listen import Asked, common_spacing, keep, kept, listen, segment
+from asperity.tracking.reading import (
+    ReadOptions,
+    common_spacing,
+    load_reading,
+    read_spectrum,
+    save_reading,
+    segment_length,
+)
 from asperity.tracking.track import judge
 
 RATE = 20e3
@@ -69,33 +76,33 @@ def test_the_band_is_the_contacts_and_its_origin_is_said():
     assert (given.band_hz, given.full_load_crf_hz, given.assumed) == ((2e3, 3e3), None, False)
     nobody = search_target()
     assert nobody.assumed
-    assert "--case or --band" in nobody.source
+    assert "give case or band_hz" in nobody.source
     assert search_target(CASE, (2e3, 3e3)).full_load_crf_hz == TARGET.full_load_crf_hz
 
 
 def test_lines_are_as_fine_as_the_records_are_long(tmp_path):
     short, long = (record(tmp_path / f"{s}.npz", 1, seconds=s) for s in (2.0, 40.0))
-    assert common_spacing([long], Asked(), TARGET) == 0.5
-    assert common_spacing([short], Asked(), TARGET) == 4.0
-    assert segment(RATE, 0.5) == 40_000
+    assert common_spacing([long], ReadOptions(), TARGET) == 0.5
+    assert common_spacing([short], ReadOptions(), TARGET) == 4.0
+    assert segment_length(RATE, 0.5) == 40_000
 
 
-def test_what_was_heard_is_kept_in_full(tmp_path):
-    heard = listen(record(tmp_path / "a.npz", 1), Asked(), TARGET, 4.0)
-    keep(heard, tmp_path / "kept")
-    again = kept(tmp_path / "kept")
-    assert np.array_equal(again.spectrum.density, heard.spectrum.density)
-    assert np.array_equal(again.spectrum.frequency_hz, heard.spectrum.frequency_hz)
-    assert replace(again, spectrum=None) == replace(heard, spectrum=None)
+def test_a_reading_is_kept_in_full(tmp_path):
+    readings = read_spectrum(record(tmp_path / "a.npz", 1), ReadOptions(), TARGET, 4.0)
+    save_reading(readings, tmp_path / "kept")
+    again = load_reading(tmp_path / "kept")
+    assert np.array_equal(again.spectrum.density, readings.spectrum.density)
+    assert np.array_equal(again.spectrum.frequency_hz, readings.spectrum.frequency_hz)
+    assert replace(again, spectrum=None) == replace(readings, spectrum=None)
     (tmp_path / "kept").write_bytes((tmp_path / "kept").read_bytes()[:500])
     with pytest.raises(UnreadableFile, match="delete it"):
-        kept(tmp_path / "kept")
+        load_reading(tmp_path / "kept")
 
 
-def test_processes_hear_what_one_alone_hears(tmp_path, monkeypatch):
+def test_processes_read_what_one_alone_reads(tmp_path, monkeypatch):
     files = [record(tmp_path / f"{k}.npz", k, f0=2500.0 + 100.0 * k) for k in range(7)]
     alone = track_recordings(files, case=CASE)
-    monkeypatch.setattr("asperity.tracking.listen.WORTH_A_POOL", 0)
+    monkeypatch.setattr("asperity.tracking.reading.WORTH_A_POOL", 0)
     together = track_recordings(files, case=CASE, workers=2)
     assert together.scalars() == alone.scalars()
 
@@ -118,21 +125,21 @@ def test_another_sampling_rate_is_left_out_and_said(tmp_path):
 def test_rates_that_differ_by_a_clocks_drift_are_one_series(tmp_path):
     files = [record(tmp_path / f"{k}.npz", k, rate=RATE + 0.01 * k) for k in range(7)]
     track = track_recordings(files, case=CASE, method="likelihood")
-    assert track.found == 7
+    assert track.resonance_count == 7
 
 
 def test_time_is_the_place_where_all_recordings_know_theirs(tmp_path):
-    heard = [listen(record(tmp_path / f"{k}.npz", k), Asked(), TARGET, 4.0) for k in range(3)]
-    timed = [replace(one, started=f"2024-01-0{3 - k}T12:00:00") for k, one in enumerate(heard)]
+    readings = [read_spectrum(record(tmp_path / f"{k}.npz", k), ReadOptions(), TARGET, 4.0) for k in range(3)]
+    timed = [replace(one, started=f"2024-01-0{3 - k}T12:00:00") for k, one in enumerate(readings)]
     track = judge(timed, TARGET)
     assert (track.x_name, [one.x for one in track.recordings]) == ("time_h", [0.0, 24.0, 48.0])
     assert Path(track.recordings[0].file).name == "2.npz"
-    assert judge([timed[0], heard[1]], TARGET).x_name == "recording"
+    assert judge([timed[0], readings[1]], TARGET).x_name == "recording"
 
 
 def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
-    assert (track.method, track.found) == ("modes", 0)
+    assert (track.method, track.resonance_count) == ("modes", 0)
     assert re.search(r"a line at (2\d|30)\d\d Hz stands out, but one spectrum cannot tell", track.verdict())
     assert any("needs 6 recordings and has 1" in note for note in track.notes)
     trusted = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").recordings[0].resonance

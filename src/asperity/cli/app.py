@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from asperity.cli.flags import with_flags
 from asperity.errors import AsperityError, BadInput
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
@@ -29,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if code == INTERRUPTED:
             code = _complain("interrupted; nothing half written was left behind", 1)
     except BadInput as error:
-        code = _complain(str(error), 2)
+        code = _complain(with_flags(str(error)), 2)
     except AsperityError as error:
         code = _complain(str(error), 1)
     except typer.TyperException as error:  # usage

@@ -4,20 +4,21 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from asperity.cli.app import AsJson, Quiet, app
 from asperity.cli.common import print_json, print_rows
+from asperity.cli.flags import with_flags
 from asperity.errors import BadInput
 from asperity.files import make_folder
 
 if TYPE_CHECKING:
     from asperity.case import Case
     from asperity.recording import OpenRecording, Quality
-    from asperity.tracking import Heard, Track
-    from asperity.wear import Resonance
+    from asperity.tracking import Reading, Track
+    from asperity.wear import Resonance, SeriesMethod
 
 ALARM = 3
 IN_FULL = 4  # recordings that `check` shows with every fact
@@ -100,7 +101,7 @@ def check(
     elif checked:
         print(_check_verdict(checked, refused))
         if not quiet:
-            print(f"  for a resonance {target.width_hz:.0f} Hz wide in {target.source}")
+            print(f"  for a resonance {target.width_hz:.0f} Hz wide in {with_flags(target.source)}")
             _print_checks(checked)
     if refused:
         raise BadInput("; ".join(dict.fromkeys(reason for _, reason in refused)))
@@ -223,7 +224,7 @@ def track(
             scale=scale,
             table=table,
             shaft_hz=shaft or None,
-            method=method,
+            method=cast("SeriesMethod | None", method),
             workers=workers or cores(),
             progress=told,
         )
@@ -286,7 +287,7 @@ def watch(
             scale=scale,
             table=table,
             shaft_hz=shaft or None,
-            method=method,
+            method=cast("SeriesMethod | None", method),
             once=once,
             every_s=every,
             settle_s=settle,
@@ -308,7 +309,7 @@ def watch(
 
 
 def _tell(
-    new: "Sequence[Heard]", tracked: "Track | None", waiting: int, results: Path, *, as_json: bool, quiet: bool
+    new: "Sequence[Reading]", tracked: "Track | None", waiting: int, results: Path, *, as_json: bool, quiet: bool
 ) -> None:
     """One update of a watch: a JSON object a line, or a verdict with what is new."""
     import json
@@ -344,7 +345,7 @@ def _print_track(tracked: "Track") -> None:
     name = max(10, *(len(Path(one.file).name) for one in tracked.recordings))
     print(f"  {'recording':{name}}  {tracked.x_name:>10}  {'CRF [Hz]':>16}  {'CRFA':>9}  {'severe':>6}")
     for one in tracked.recordings:
-        probability = "" if one.severe != one.severe else f"{one.severe:.2f}"
+        probability = "" if one.severe_probability != one.severe_probability else f"{one.severe_probability:.2f}"
         amplitude = f"{one.resonance.crfa:.3g}" if one.resonance.found else ""
         shown = _with_deviation(one.resonance) if one.resonance.found else "not found"
         reason = "" if one.resonance.found else f"  {one.resonance.reason}"
@@ -354,14 +355,18 @@ def _print_track(tracked: "Track") -> None:
     rows = [("searched", f"{low:.0f} to {high:.0f} Hz"), ("method", tracked.method), ("alarm", tracked.alarm.verdict)]
     print_rows(rows)
     for sentence in (*tracked.problems, *tracked.notes):
-        print(f"  note: {sentence}")
+        print(f"  note: {with_flags(sentence)}")
 
 
 def _found(one: Any) -> str:
     resonance = one.resonance
     if not resonance.found:
         return f"no contact resonance: {resonance.reason}"
-    stage = "" if one.severe != one.severe else f", severe with probability {one.severe:.2f}"
+    stage = (
+        ""
+        if one.severe_probability != one.severe_probability
+        else f", severe with probability {one.severe_probability:.2f}"
+    )
     return f"CRF {_with_deviation(resonance)} Hz{stage}"
 
 
@@ -377,7 +382,9 @@ def _case(path: Path | None) -> "Case | None":
 
 
 @contextmanager
-def _shown_files(*, quiet: bool, waiting: str = "reading recordings ...") -> "Iterator[Callable[[Heard], None] | None]":
+def _shown_files(
+    *, quiet: bool, waiting: str = "reading recordings ..."
+) -> "Iterator[Callable[[Reading], None] | None]":
     """Count files on a terminal as they are read."""
     from rich.console import Console
 
@@ -388,7 +395,7 @@ def _shown_files(*, quiet: bool, waiting: str = "reading recordings ...") -> "It
     count = 0
     with console.status(waiting) as status:
 
-        def told(heard: "Heard") -> None:
+        def told(heard: "Reading") -> None:
             nonlocal count
             count += 1
             status.update(f"{count} read, last {Path(heard.file).name}")

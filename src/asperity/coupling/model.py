@@ -6,7 +6,7 @@ place of the paper's laws, the alternatives in the tables below. `PRESETS` are t
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from asperity.vibration import (
     require_damping_ratio,
     require_filter,
 )
-from asperity.wear import INDICATOR_METHODS, Resonance, contact_resonance, no_resonance
+from asperity.wear import INDICATOR_METHODS, IndicatorMethod, Resonance, contact_resonance, no_resonance
 
 SMALLEST_SHARE = 0.01  # CLR at the lower end of the search band: below it the film is full and nothing resonates
 BAND_MARGIN = 0.05
@@ -491,7 +491,7 @@ def contact_vibration(
         response=response,
         spectrum=spectrum,
         expected=expected_spectrum(spring, replace(spectrum, density=heights, unit="m^2/Hz"), rate_hz=model.rate_hz),
-        resonance=contact_resonance(spectrum, band_hz=band_hz, method=model.method),
+        resonance=contact_resonance(spectrum, band_hz=band_hz, method=cast(IndicatorMethod, model.method)),
         band_hz=band_hz,
         full_load_crf_hz=full_load_crf_hz,
         expected_crfa=float(spring.gain(f0) * ridden_over.density(f0, model.rate_hz)),

@@ -7,7 +7,7 @@ sphere's stiffness from CLR; the paper's way stands beside it, on the same histo
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from asperity.history.history import History
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
-from asperity.wear import FEWEST_LINES, Resonance, contact_resonance, no_resonance
+from asperity.wear import FEWEST_LINES, IndicatorMethod, Resonance, contact_resonance, no_resonance
 
 MOMENTS = 5  # of the settled steps, at which the tangent stiffness is taken
 WAVES = 0.4  # of a passage's steps: the shortest wave that is told has two and a half steps
@@ -273,7 +273,7 @@ def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonanc
             band,
             model.method,
         )
-    return contact_resonance(spectrum, band_hz=band, method=model.method)
+    return contact_resonance(spectrum, band_hz=band, method=cast(IndicatorMethod, model.method))
 
 
 def _number(value: float) -> float | None:

@@ -4,6 +4,7 @@ Where a single record decides, as in the paper, an ensemble says what that recor
 """
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import scipy
@@ -15,7 +16,7 @@ from asperity.paper.contact import papers_contact
 from asperity.paper.numbers import DAMPING_RATIO, MASS, TABLE1_PRINTED
 from asperity.signals import power_spectrum
 from asperity.vibration import ContactOscillator, Excitation, acceleration
-from asperity.wear import contact_resonance
+from asperity.wear import IndicatorMethod, contact_resonance
 
 SHORTEST_TRANSFORM = 16384  # the paper's, it seems: 1.6 s at 10 kHz and the next power of two
 FEWEST_RECORDS = 20
@@ -120,7 +121,8 @@ def _records(model: VibrationModel, cutoff: float, height: float, load: float, r
             readings[:, number] = highest_point(response.values, model.rate_hz)
         else:
             band = search_band(papers_contact(load), model)
-            fit = contact_resonance(power_spectrum(response, window="boxcar"), band_hz=band, method=model.method)
+            spectrum = power_spectrum(response, window="boxcar")
+            fit = contact_resonance(spectrum, band_hz=band, method=cast(IndicatorMethod, model.method))
             readings[:, number] = fit.crf_hz, fit.crfa
     return readings
 

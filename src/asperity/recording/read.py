@@ -244,8 +244,8 @@ def _rate(path: Path, one: Channel, given: float | None, sidecar: tuple[float | 
         return Fact(float(one.rate_hz), one.rate_source)
     if rate is None:
         raise BadInput(
-            f"{path.name} states no sampling rate{one.rate_hint}; give it with --rate (rate_hz in Python), "
-            f"or as rate_hz in {path.name}.toml beside it"
+            f"{path.name} states no sampling rate{one.rate_hint}; give rate_hz, "
+            f"or state it as rate_hz in {path.name}.toml beside it"
         )
     return Fact(float(rate), source)
 
@@ -257,7 +257,7 @@ def _unit(path: Path, one: Channel, given: str | None, sidecar: tuple[str | None
         if unit is not None and not scaled:
             raise BadInput(
                 f"{path.name} holds shares of full scale, so a unit needs its scale; "
-                f"give --scale (scale in Python), the {unit} at full scale"
+                f"give scale, the {unit} at full scale"
             )
         return Fact(unit or FULL_SCALE, source or "file (integer samples)")
     if one.unit is not None and unit is not None and not scaled and not _same_unit(one.unit, unit):

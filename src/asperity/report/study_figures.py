@@ -344,7 +344,7 @@ def _mark_stages(axes: Axes, curve: "WearCurve", preset: str, *, named: bool) ->
     """The split with its interval, and the names of the stages; where there is none, that."""
     stages = curve.stages[preset]
     low, high = curve.sq[[0, -1]] * MICRO
-    names = {stages.kind: 0.5 * (low + high)}
+    names: dict[str, Any] = {stages.kind: 0.5 * (low + high)}
     if stages.found:
         axes.axvspan(*stages.interval, color=SPLIT_STRIP, linewidth=0, zorder=0, label="split, 90 %")
         axes.axvline(stages.split, color=SPLIT_COLOUR, linewidth=1.0, zorder=0)

@@ -14,7 +14,7 @@ from asperity.tracking import ALERT, DANGER
 from asperity.wear import INTERVAL
 
 if TYPE_CHECKING:
-    from asperity.tracking import Track, Tracked
+    from asperity.tracking import Track, TrackedRecording
 
 MOST_ROWS = 400  # of a waterfall; more recordings are thinned out
 SEVERITY = LinearSegmentedColormap.from_list("severity", ["#0072b2", "#e69f00", "#d55e00"])
@@ -56,7 +56,7 @@ def trend(track: "Track") -> Figure:
         )  # fmt: skip
     above.set(ylabel="CRF [Hz]", title="Contact resonance frequency")
     _mark_break(below, track, labelled=False)
-    severe = [(one.x, one.severe) for one in track.recordings if np.isfinite(one.severe)]
+    severe = [(one.x, one.severe_probability) for one in track.recordings if np.isfinite(one.severe_probability)]
     below.plot([x for x, _ in severe], [p for _, p in severe], "o", color=VERMILION, markersize=4)
     for threshold, name in ((ALERT, "alert"), (DANGER, "alarm")):
         below.axhline(threshold, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
@@ -68,7 +68,7 @@ def trend(track: "Track") -> Figure:
     return figure
 
 
-def _draw_crf(axes: Axes, found: "list[Tracked]") -> None:
+def _draw_crf(axes: Axes, found: "list[TrackedRecording]") -> None:
     x = np.array([one.x for one in found])
     crf = np.array([one.resonance.crf_hz for one in found])
     reach = INTERVAL * np.array([one.resonance.crf_std for one in found])
@@ -77,7 +77,7 @@ def _draw_crf(axes: Axes, found: "list[Tracked]") -> None:
         x, crf, yerr=np.where(np.isfinite(reach), reach, 0.0), xerr=sideways if sideways.any() else None, fmt="none",
         ecolor=GREY, elinewidth=0.9, capsize=2, zorder=1, label="90 % interval",
     )  # fmt: skip
-    colours = [SEVERITY(0.0 if np.isnan(one.severe) else one.severe) for one in found]
+    colours = [SEVERITY(0.0 if np.isnan(one.severe_probability) else one.severe_probability) for one in found]
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label="CRF")
 
 
@@ -174,7 +174,7 @@ def waterfall(track: "Track") -> Figure:
 
 
 @styled()
-def spectrum_with_fit(track: "Track", one: "Tracked") -> Figure:
+def spectrum_with_fit(track: "Track", one: "TrackedRecording") -> Figure:
     """One recording's spectrum around the band: the fit, its CRF, and the lines of shafts and mains taken out.
 
     Raises
@@ -182,13 +182,13 @@ def spectrum_with_fit(track: "Track", one: "Tracked") -> Figure:
     BadInput
         for a recording without a spectrum.
     """
-    if one.clean is None or one.heard.spectrum is None:
+    if one.clean is None or one.reading.spectrum is None:
         raise BadInput(f"{one.file} has no spectrum to draw: {one.resonance.reason}")
     frequency, inside = _around(track)
     low, high = track.target.band_hz
     together = max(1, int(np.count_nonzero(inside)) // 700)
     shown = mean_of_neighbours(frequency[inside], together)
-    original = _largest_of_neighbours(one.heard.spectrum.density[inside], together)
+    original = _largest_of_neighbours(one.reading.spectrum.density[inside], together)
     clean = mean_of_neighbours(one.clean.spectrum.density[inside], together)
     figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
     axes = figure.add_subplot()
@@ -208,7 +208,7 @@ def spectrum_with_fit(track: "Track", one: "Tracked") -> Figure:
     if one.resonance.found:
         axes.axvline(one.resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label="CRF")
         title = f"CRF {one.resonance.crf_hz:.1f} Hz"
-    unit = "(m/s²)²/Hz" if track.comparable else one.heard.spectrum.unit
+    unit = "(m/s²)²/Hz" if track.comparable else one.reading.spectrum.unit
     axes.set(xlabel="frequency [Hz]", ylabel=f"density [{unit}]", title=f"One spectrum: {title}")
     axes.set_xlim(shown[0], shown[-1])
     figure.legend(loc="outside lower center", ncols=2)
@@ -217,7 +217,7 @@ def spectrum_with_fit(track: "Track", one: "Tracked") -> Figure:
 
 def _around(track: "Track") -> tuple[Field, Any]:
     """The frequencies of the series, and which of them lie in the band or near it."""
-    first = next(one.heard.spectrum for one in track.recordings if one.clean is not None)
+    first = next(one.reading.spectrum for one in track.recordings if one.clean is not None)
     assert first is not None
     low, high = track.target.band_hz
     margin = 0.3 * (high - low)

@@ -18,7 +18,7 @@ from asperity.report.page import NOT_FOUND, Picture, Tile, in_print, page_templa
 from asperity.tracking import ALERT, DANGER, IN_A_ROW
 
 if TYPE_CHECKING:
-    from asperity.tracking import Track, Tracked
+    from asperity.tracking import Track, TrackedRecording
 
 METHODS = {
     "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
@@ -92,7 +92,7 @@ def _title(track: "Track") -> str:
 
 def _tiles(track: "Track") -> list[Tile]:
     total, stages = len(track.recordings), track.stages
-    tiles = [Tile("Resonance found", f"{track.found}", f"of {total}")]
+    tiles = [Tile("Resonance found", f"{track.resonance_count}", f"of {total}")]
     if stages is not None and stages.found:
         low, high = stages.interval
         tiles.append(
@@ -102,12 +102,12 @@ def _tiles(track: "Track") -> list[Tile]:
     if last is not None:
         value, deviation = with_deviation(last.resonance.crf_hz, last.resonance.crf_std)
         tiles.append(Tile("Last CRF", value, f"{deviation} Hz".strip()))
-        if np.isfinite(last.severe):
-            tiles.append(Tile("Severe, last recording", f"{100.0 * last.severe:.0f} %", "probability"))
+        if np.isfinite(last.severe_probability):
+            tiles.append(Tile("Severe, last recording", f"{100.0 * last.severe_probability:.0f} %", "probability"))
         if np.isfinite(last.clr):
             ends = [100.0 * end for end in last.clr_interval]
             tiles.append(Tile("Load share, last", f"{100.0 * last.clr:.0f} %", f"90 %: {ends[0]:.0f} to {ends[1]:.0f}"))
-    unusable = sum(not one.heard.usable for one in track.recordings)
+    unusable = sum(not one.reading.usable for one in track.recordings)
     tiles.append(Tile("Not usable", f"{unusable}", f"of {total}"))
     return tiles
 
@@ -115,7 +115,7 @@ def _tiles(track: "Track") -> list[Tile]:
 def _pictures(track: "Track") -> dict[str, list[Picture]]:
     shown: dict[str, list[Picture]] = {"trend": [], "more": []}
     split = track.stages is not None and track.stages.found
-    if track.found:
+    if track.resonance_count:
         shown["trend"].append(
             picture(
                 figures.trend(track),
@@ -161,7 +161,7 @@ def _pictures(track: "Track") -> dict[str, list[Picture]]:
     return shown
 
 
-def _typical(track: "Track") -> "Tracked":
+def _typical(track: "Track") -> "TrackedRecording":
     """The recording whose CRF is known as well as most; of a series without any, the first that could be used."""
     found = sorted((one for one in track.recordings if one.resonance.found), key=lambda one: one.resonance.crf_std)
     if found:
@@ -169,7 +169,7 @@ def _typical(track: "Track") -> "Tracked":
     return next(one for one in track.recordings if one.clean is not None)
 
 
-def _row(one: "Tracked") -> dict[str, str]:
+def _row(one: "TrackedRecording") -> dict[str, str]:
     """A line of the table of recordings."""
     found = one.resonance
     return {
@@ -178,7 +178,7 @@ def _row(one: "Tracked") -> dict[str, str]:
         "crf": " ".join(with_deviation(found.crf_hz, found.crf_std)).rstrip() if found.found else NOT_FOUND,
         "crfa": " ".join(with_deviation(found.crfa, found.crfa_std)).rstrip() if found.found else NOT_FOUND,
         "clr": f"{100.0 * one.clr:.0f}" if np.isfinite(one.clr) else NOT_FOUND,
-        "severe": f"{one.severe:.2f}" if np.isfinite(one.severe) else NOT_FOUND,
+        "severe": f"{one.severe_probability:.2f}" if np.isfinite(one.severe_probability) else NOT_FOUND,
         "label": one.label,
         "reason": in_print("" if found.found else found.reason),
     }
@@ -189,10 +189,10 @@ def _remarks(track: "Track") -> list[tuple[str, str]]:
     said: dict[str, list[str]] = {}
     for one in track.recordings:
         name = Path(one.file).name
-        for sentence in one.heard.quality.remarks if one.heard.quality is not None else ():
+        for sentence in one.reading.quality.remarks if one.reading.quality is not None else ():
             said.setdefault(sentence, []).append(name)
-        if one.heard.reason:
-            said.setdefault(f"Not used: {one.heard.reason}", []).append(name)
+        if one.reading.reason:
+            said.setdefault(f"Not used: {one.reading.reason}", []).append(name)
     total = len(track.recordings)
 
     def holders(names: list[str]) -> str:
@@ -207,20 +207,20 @@ def _facts(track: "Track") -> list[tuple[str, str, str]]:
     """Name, value and source of each fact; where recordings differ, the commonest and how many there are."""
     rows = []
     for name in ("rate", "unit", "channel", "scale", "format"):
-        seen = Counter(one.heard.facts[name] for one in track.recordings if name in one.heard.facts)
+        seen = Counter(one.reading.facts[name] for one in track.recordings if name in one.reading.facts)
         if seen:
             ((value, source), count), *others = seen.most_common()
             more = f"; others in {seen.total() - count} recordings" if others else ""
             rows.append((name.capitalize(), f"{value} Hz{more}" if name == "rate" else value + more, source))
-    lengths = [one.heard.quality.duration_s for one in track.recordings if one.heard.quality is not None]
+    lengths = [one.reading.quality.duration_s for one in track.recordings if one.reading.quality is not None]
     if lengths:
         same = f"{min(lengths):.4g} s"
         length = same if min(lengths) == max(lengths) else f"{same} to {max(lengths):.4g} s"
         rows.append(("Length", length, "its samples"))
-    started = sorted(one.heard.started for one in track.recordings if one.heard.started)
+    started = sorted(one.reading.started for one in track.recordings if one.reading.started)
     if started:
         first, last = started[0].replace("T", " "), started[-1].replace("T", " ")
-        source = next(one.heard.facts["started"][1] for one in track.recordings if one.heard.started)
+        source = next(one.reading.facts["started"][1] for one in track.recordings if one.reading.started)
         rows.append(("Started", first if first == last else f"{first} to {last}", source))
     return rows
 
@@ -245,7 +245,7 @@ def _evidence(track: "Track") -> list[tuple[str, str]]:
 
 
 def _resolution(track: "Track") -> str:
-    spectrum = next((one.heard.spectrum for one in track.recordings if one.clean is not None), None)
+    spectrum = next((one.reading.spectrum for one in track.recordings if one.clean is not None), None)
     if spectrum is None:
         return "no spectrum"
     return (

@@ -149,7 +149,7 @@ def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str |
     if unit is None or lateral_unit is None:
         raise BadInput(
             f"{name} names no units; give unit (of the heights) and lateral_unit, such as "
-            "--unit um --lateral-unit mm, or surface.unit in a case"
+            "um and mm, or surface.unit in a case"
         )
     return metres(unit), metres(lateral_unit)
 

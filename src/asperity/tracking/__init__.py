@@ -1,4 +1,4 @@
-"""Series of recordings: listened to, put in order, judged, and watched as they grow."""
+"""Series of recordings: read, put in order, judged, and watched as they grow."""
 
 import lazy_loader
 

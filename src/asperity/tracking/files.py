@@ -40,10 +40,10 @@ class Table:
         BadInput
             for a recording that is not in the table.
         """
-        found = self.places.get(path.name) or self.places.get(path.stem)
-        if found is None:
+        place = self.places.get(path.name) or self.places.get(path.stem)
+        if place is None:
             raise BadInput(f"{self.name} has no row for {path.name}; add one, or leave that recording out")
-        return found
+        return place
 
 
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
@@ -56,18 +56,18 @@ def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
     BadInput
         for a path that does not exist, or a folder with nothing left.
     """
-    found: list[Path] = []
+    recordings: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
-            inside = [one for one in path.iterdir() if may_be_recording(one)]
+            inside = [file for file in path.iterdir() if may_be_recording(file)]
             if not inside:
                 raise BadInput(f"{path} holds no recordings; name files, or the folder they lie in")
-            found += sorted(inside, key=lambda one: _natural(one.name))
+            recordings += sorted(inside, key=lambda file: _natural(file.name))
         elif path.exists():
-            found.append(path)
+            recordings.append(path)
         else:
             raise BadInput(f"{path} does not exist; check its name")
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(recordings))
 
 
 def may_be_recording(path: Path) -> bool:
@@ -112,16 +112,16 @@ def read_table(path: str | Path) -> Table:
             continue
 
         def value(column: str, row: dict[str, str] = row, number: int = number) -> float | None:
-            said = (row.get(column) or "").strip()
-            if not said:
+            text = (row.get(column) or "").strip()
+            if not text:
                 return None
             try:
-                found = float(said.replace(",", ".") if delimiter == ";" else said)
+                number_read = float(text.replace(",", ".") if delimiter == ";" else text)
             except ValueError:
-                found = float("nan")
-            if not abs(found) < float("inf"):
-                raise BadInput(f"{path}, line {number}: {column} must be a number, got {said!r}")
-            return found
+                number_read = float("nan")
+            if not abs(number_read) < float("inf"):
+                raise BadInput(f"{path}, line {number}: {column} must be a number, got {text!r}")
+            return number_read
 
         x = value(x_name)
         if x is None:
@@ -139,7 +139,7 @@ def _heading(path: Path) -> list[str]:
             first = file.readline(1 << 12).decode("utf-8-sig", errors="replace")
     except OSError:
         return []
-    return [one.strip().strip('"') for one in re.split(r"[,;\t]", first.strip())]
+    return [field.strip().strip('"') for field in re.split(r"[,;\t]", first.strip())]
 
 
 def _natural(name: str) -> list[tuple[int, int | str]]:

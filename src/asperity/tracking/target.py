@@ -41,26 +41,26 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
     if case is None and band_hz is not None:
         source = f"{low:.0f} to {high:.0f} Hz, as given"
         return Target(band_hz=(low, high), width_hz=2.0 * USUAL_DAMPING * low, full_load_crf_hz=None, source=source)
-    chosen = case if case is not None else papers_case()
-    if chosen.vibration is None:
+    contact = case if case is not None else papers_case()
+    if contact.vibration is None:
         raise BadInput(
-            f"{chosen.source}: vibration is left out; add [vibration] with mass and damping_ratio, or a band"
+            f"{contact.source}: vibration is left out; add [vibration] with mass and damping_ratio, or a band"
         )
-    model: VibrationModel = chosen.vibration
-    found = search_band(chosen.conditions, model)
-    full_load = None if case is None else found[1] / (1.0 + BAND_MARGIN)
+    model: VibrationModel = contact.vibration
+    searched = search_band(contact.conditions, model)
+    full_load = None if case is None else searched[1] / (1.0 + BAND_MARGIN)
     if band_hz is not None:
-        found, source = (low, high), f"{low:.0f} to {high:.0f} Hz, as given"
+        searched, source = (low, high), f"{low:.0f} to {high:.0f} Hz, as given"
     elif case is not None:
-        source = f"{found[0]:.0f} to {found[1]:.0f} Hz, from the contact of {case.source}"
+        source = f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}"
     else:
         source = (
-            f"{found[0]:.0f} to {found[1]:.0f} Hz, that of the paper's contact, because neither a case nor a band was "
-            "given; give --case or --band"
+            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because neither a case nor a "
+            "band was given; give case or band_hz"
         )
     return Target(
-        band_hz=found,
-        width_hz=2.0 * model.damping_ratio * found[0],
+        band_hz=searched,
+        width_hz=2.0 * model.damping_ratio * searched[0],
         full_load_crf_hz=full_load,
         source=source,
         assumed=case is None and band_hz is None,

@@ -1,5 +1,6 @@
 from .alarm import INTERVAL as INTERVAL
 from .alarm import Alarm as Alarm
+from .alarm import AlarmLevel as AlarmLevel
 from .alarm import LoadShare as LoadShare
 from .alarm import RecordingFacts as RecordingFacts
 from .alarm import asperity_load_share as asperity_load_share
@@ -7,14 +8,17 @@ from .alarm import comparability as comparability
 from .alarm import trend_alarm as trend_alarm
 from .indicators import FEWEST_LINES as FEWEST_LINES
 from .indicators import INDICATOR_METHODS as INDICATOR_METHODS
-from .indicators import Resonance as Resonance
+from .indicators import IndicatorMethod as IndicatorMethod
 from .indicators import contact_resonance as contact_resonance
-from .indicators import no_resonance as no_resonance
 from .lines import CleanSpectrum as CleanSpectrum
 from .lines import Line as Line
 from .lines import remove_lines as remove_lines
+from .resonance import Resonance as Resonance
+from .resonance import no_resonance as no_resonance
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
+from .series import SeriesMethod as SeriesMethod
 from .series import series_resonances as series_resonances
 from .stages import FEWEST_PLACES as FEWEST_PLACES
+from .stages import Detector as Detector
 from .stages import Stages as Stages
 from .stages import split_stages as split_stages

@@ -5,6 +5,7 @@ Knows neither files nor machines: what is known of each recording comes in as `R
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from asperity.errors import BadInput, require_positive
 
 SAME = 0.01  # relative difference of rate, speed or load up to which recordings count as alike
 INTERVAL = 1.6449  # standard deviations to either side: 90 %
-LEVELS = ("none", "alert", "alarm")
+AlarmLevel = Literal["none", "alert", "alarm"]
+LEVELS: tuple[AlarmLevel, ...] = get_args(AlarmLevel)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,8 +111,8 @@ def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
     ):
         seen = {word: facts.name for word, facts in zip(reversed(words), reversed(series), strict=True)}
         if len(seen) > 1:
-            told = ", ".join(f"{word or 'none'} ({name})" for word, name in reversed(seen.items()))
-            problems.append(f"The {thing} differs between recordings: {told}; {remedy}.")
+            listed = ", ".join(f"{word or 'none'} ({name})" for word, name in reversed(seen.items()))
+            problems.append(f"The {thing} differs between recordings: {listed}; {remedy}.")
     return tuple(problems)
 
 
@@ -118,12 +120,12 @@ def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
 class Alarm:
     """Where a two-level alarm stands at the end of a series, and when it was first raised.
 
-    `level` is "none", "alert" or "alarm"; `levels` that at each recording; `since` the index of the recording that
+    `levels` is the level at each recording; `since` the index of the recording that
     completed the row behind the present level, None without one.
     """
 
-    level: str
-    levels: tuple[str, ...]
+    level: AlarmLevel
+    levels: tuple[AlarmLevel, ...]
     since: int | None
     verdict: str
 

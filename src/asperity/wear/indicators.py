@@ -4,15 +4,20 @@ The default is a Whittle (maximum-likelihood) fit of one oscillator line over a 
 highest point is kept beside it. Where to look, the band, is the caller's to say: `asperity.coupling` knows it.
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum, smooth
+from asperity.wear.resonance import Resonance, fitted_resonance, line_and_slopes, line_shape, no_resonance
+from asperity.wear.scoring import Bounds, Data, Fit, Model, fit_spectrum, whittle_cost
+
+IndicatorMethod = Literal["likelihood", "modes", "peak"]
 
 FEWEST_LINES = 20  # five parameters from fewer lines would be an interpolation, not a fit
 STRONG_EVIDENCE = 10.0  # BIC difference, "very strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
@@ -24,82 +29,10 @@ AMBIGUOUS = 0.5  # a second line with more than this share of the strongest's po
 START_DAMPINGS = (0.002, 0.007, 0.02, 0.06)
 MOST_BLOCKS = 512  # for the search of a start only
 
-Model = Callable[
-    [Field], tuple[Field, Field]
-]  # parameters -> expected density (lines,), its slopes (lines, parameters)
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Resonance:
-    """A contact resonance, or the reason why there is none.
-
-    `crf_hz` is the oscillator's natural frequency f0 [Hz]; `crfa` the fitted line at f0 without the floor below it
-    [(m/s^2)^2/Hz]; `crf_std`, `crfa_std` their standard deviations from the Fisher information. `damping_ratio` with
-    its `damping_ratio_std`, and `floor`, the density at the lower and upper end of `band_hz`, complete the fitted
-    curve; where more than a floor was fitted, `background` in its place: frequencies and densities. `evidence` is how
-    much better, by BIC, a line and the rest explain the band than the rest alone (found needs 10, very strong). All of
-    a line's figures are nan when it was not `found`; `reason` then says why.
-    The paper's peak has no standard deviation, damping, floor or evidence: nan.
-    """
-
-    crf_hz: float
-    crfa: float
-    crf_std: float
-    crfa_std: float
-    found: bool
-    reason: str
-    band_hz: tuple[float, float]
-    method: str
-    damping_ratio: float = np.nan
-    damping_ratio_std: float = np.nan
-    floor: tuple[float, float] = (np.nan, np.nan)
-    evidence: float = np.nan
-    background: tuple[Field, Field] | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def crf_std_hz(self) -> float:
-        """`crf_std`, under the name that tables and JSON give it [Hz]."""
-        return self.crf_std
-
-    def curve(self, frequency_hz: Field) -> Field:
-        """Fitted density at `frequency_hz` (any shape): line and floor; the floor alone when nothing was found.
-
-        nan everywhere for a method that fits no curve.
-        """
-        low, high = self.band_hz
-        if self.background is None:
-            share = (frequency_hz - low) / (high - low)
-            curve = self.floor[0] * (1.0 - share) + self.floor[1] * share
-        else:
-            curve = np.interp(frequency_hz, *self.background)
-        if self.found:
-            curve = curve + self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
-        return curve
-
-
-def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float) -> Field:
-    """Acceleration line of an oscillator that rides over white base acceleration, 1 at f = f0.
-
-    T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 + 4ζ^2)/(4ζ^2). Roughness
-    whose spectrum falls as f^-4 (a second-order low pass, far above its cut-off) is white base acceleration.
-    """
-    return line_and_slopes(frequency_hz, f0_hz, damping_ratio)[0]
-
-
-def line_and_slopes(
-    frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
-) -> tuple[Field, Field, Field]:
-    """The line L, dL/d(ln f0) and dL/d(ln ζ); shapes broadcast."""
-    x2 = (frequency_hz / f0_hz) ** 2
-    squared = 4.0 * damping_ratio**2
-    top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
-    line = squared / (1.0 + squared) * top / bottom
-    by_f0 = line * ((2.0 * squared * x2 - 4.0 * x2 * (1.0 - x2)) / bottom - 2.0 * squared * x2 / top)
-    by_damping = line * (2.0 * squared * x2 * (1.0 / top - 1.0 / bottom) + 2.0 / (1.0 + squared))
-    return line, by_f0, by_damping
-
-
-def contact_resonance(spectrum: Spectrum, *, band_hz: tuple[float, float], method: str = "likelihood") -> Resonance:
+def contact_resonance(
+    spectrum: Spectrum, *, band_hz: tuple[float, float], method: IndicatorMethod = "likelihood"
+) -> Resonance:
     """Find the contact resonance between the two ends of `band_hz` [Hz].
 
     Parameters
@@ -162,11 +95,16 @@ def _highest_point(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float
 class _Band(NamedTuple):
     """What a fit works on: ordinates over their mean, the band's lines, the floor's two columns."""
 
-    data: "_Data"
+    data: Data
     scale: float
     frequency: Field
     floors: Field
-    floor_only: "_Fit"
+    floor_only: Fit
+
+    @property
+    def scales(self) -> Field:
+        """Of a line's height, f0 and damping ratio."""
+        return np.array([self.scale, 1.0, 1.0])
 
 
 def _band(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> _Band | None:
@@ -181,11 +119,11 @@ def _band(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> _Ba
     scale = float(np.mean(spectrum.density[inside]))
     if scale <= 0.0:
         return None
-    data = _Data(spectrum.density[inside] / scale, spectrum.averages)
+    data = Data(spectrum.density[inside] / scale, spectrum.averages)
     share = (frequency - low) / (high - low)
     floors = np.stack([1.0 - share, share], axis=1)
-    any_floor = _Bounds(np.zeros(2), np.full(2, np.inf))
-    floor_only = _scoring(lambda theta: (floors @ theta, floors), np.ones(2), any_floor, data)
+    any_floor = Bounds(np.zeros(2), np.full(2, np.inf))
+    floor_only = fit_spectrum(lambda theta: (floors @ theta, floors), np.ones(2), any_floor, data)
     return _Band(data, scale, frequency, floors, floor_only)
 
 
@@ -213,10 +151,10 @@ def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     low, high = band_hz
     fit = _fit_line(band.frequency, band.floors, band.data, spectrum, band_hz)
     independent = spectrum.averages * band.frequency.size
-    evidence = 2.0 * (band.floor_only.cost - fit.cost) - 3.0 * float(np.log(max(independent, np.e)))
-    level, f0, zeta = (float(value) for value in np.exp(fit.parameters[:3]))
-    level_std, f0_std, zeta_std = (float(std) for std in fit.std[:3] * [level, f0, zeta])
-    width = 2.0 * zeta * f0
+    evidence = 2.0 * (band.floor_only.cost - fit.cost) - 3.0 * float(np.log(max(independent, math.e)))
+    line = np.exp(fit.parameters[:3])
+    std = fit.std[:3] * line
+    _, f0, zeta = (float(value) for value in line)
     if evidence < STRONG_EVIDENCE:
         objection: str | None = (
             f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {evidence:+.1f})"
@@ -224,20 +162,15 @@ def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     elif not fit.settled:
         objection = "the fit did not settle"
     else:
-        objection = _objection(f0, f0_std, zeta, spectrum, band_hz)
+        objection = _objection(f0, float(std[1]), zeta, spectrum, band_hz)
     if objection is not None:
         return no_resonance(objection, band_hz, "likelihood", _ends(band, band.floor_only.parameters), evidence)
-    return Resonance(
-        crf_hz=f0,
-        crfa=band.scale * level,
-        crf_std=f0_std,
-        crfa_std=band.scale * level_std,
-        found=True,
-        reason=f"a line {width:.0f} Hz wide stands out of the floor (BIC {evidence:+.0f})",
+    return fitted_resonance(
+        line * band.scales,
+        std * band.scales,
+        reason=f"a line {2.0 * zeta * f0:.0f} Hz wide stands out of the floor (BIC {evidence:+.0f})",
         band_hz=band_hz,
         method="likelihood",
-        damping_ratio=zeta,
-        damping_ratio_std=zeta_std,
         floor=_ends(band, fit.parameters[3:]),
         evidence=evidence,
     )
@@ -261,7 +194,7 @@ def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     count = (fit.parameters.size - 2) // 3
     floor = _ends(band, fit.parameters[3 * count :])
     independent = band.data.weight * band.frequency.size
-    price = 3.0 * float(np.log(max(independent, np.e)))
+    price = 3.0 * float(np.log(max(independent, math.e)))
     if count == 0:
         better = 2.0 * (band.floor_only.cost - fit.cost)
         reason = f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {better - price:+.1f})"
@@ -271,15 +204,18 @@ def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     power = np.prod(lines, axis=1)  # A ζ f0, but for a factor the line's mean square
     order = np.argsort(power)[::-1]
     strongest = int(order[0])
-    level, f0, zeta = (float(value) for value in lines[strongest])
-    level_std, f0_std, zeta_std = (float(std) for std in deviations[strongest])
+    _, f0, zeta = (float(value) for value in lines[strongest])
     others = np.delete(np.arange(count), strongest)
     beside = floor[0] + (floor[1] - floor[0]) * (band.frequency - low) / (high - low)
     for number in others:
         beside = beside + band.scale * lines[number, 0] * line_shape(band.frequency, *lines[number, 1:])
-    without = _cost(beside / band.scale, band.data)
+    without = whittle_cost(beside / band.scale, band.data)
     evidence = 2.0 * (without - fit.cost) - price
-    objection = "the fit did not settle" if not fit.settled else _objection(f0, f0_std, zeta, spectrum, band_hz)
+    objection = (
+        "the fit did not settle"
+        if not fit.settled
+        else _objection(f0, float(deviations[strongest, 1]), zeta, spectrum, band_hz)
+    )
     if objection is None and count > 1 and power[order[1]] > AMBIGUOUS * power[strongest]:
         rivals = [number for number in order if power[number] > AMBIGUOUS * power[strongest]]
         places = ", ".join(f"{place:.0f}" for place in sorted(lines[rivals, 1]))
@@ -287,17 +223,12 @@ def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     if objection is not None:
         return no_resonance(objection, band_hz, "modes", floor, evidence)
     rest = f"; {count - 1} weaker beside it" if count > 1 else ""
-    return Resonance(
-        crf_hz=f0,
-        crfa=band.scale * level,
-        crf_std=f0_std,
-        crfa_std=band.scale * level_std,
-        found=True,
+    return fitted_resonance(
+        lines[strongest] * band.scales,
+        deviations[strongest] * band.scales,
         reason=f"the strongest of {count} resonances, {2.0 * zeta * f0:.0f} Hz wide{rest}",
         band_hz=band_hz,
         method="modes",
-        damping_ratio=zeta,
-        damping_ratio_std=zeta_std,
         floor=floor,
         evidence=evidence,
         background=(band.frequency, beside),
@@ -311,36 +242,34 @@ def _averaged(band: _Band, size: int) -> _Band:
     def mean(values: Field) -> Field:
         return np.asarray(values[: count * size].reshape(count, size, -1).mean(axis=1))
 
-    data = _Data(mean(band.data.density)[:, 0], band.data.weight * size)
+    data = Data(mean(band.data.density)[:, 0], band.data.weight * size)
     floors = mean(band.floors)
-    start, bounds = band.floor_only.parameters, _Bounds(np.zeros(2), np.full(2, np.inf))
-    floor_only = _scoring(lambda theta: (floors @ theta, floors), start, bounds, data)
+    start, bounds = band.floor_only.parameters, Bounds(np.zeros(2), np.full(2, np.inf))
+    floor_only = fit_spectrum(lambda theta: (floors @ theta, floors), start, bounds, data)
     return _Band(data, band.scale, mean(band.frequency)[:, 0], floors, floor_only)
 
 
-def _fit_modes(band: _Band, band_hz: tuple[float, float], leakage: Field) -> "_Fit":
+def _fit_modes(band: _Band, band_hz: tuple[float, float], leakage: Field) -> Fit:
     """Lines added one by one where the spectrum is farthest above the fit, all fitted anew, while BIC says so."""
-    from scipy.ndimage import uniform_filter1d
-
     low, high = band_hz
     best = band.floor_only
-    price = 3.0 * float(np.log(max(band.data.weight * band.frequency.size, np.e))) + STRONG_EVIDENCE
+    price = 3.0 * float(np.log(max(band.data.weight * band.frequency.size, math.e))) + STRONG_EVIDENCE
     spacing = (band.frequency[-1] - band.frequency[0]) / (band.frequency.size - 1)
     for count in range(1, MOST_MODES + 1):
         expected = _lines_model(band.frequency, band.floors, leakage)(best.parameters)[0]
         trials = []
         for zeta in START_DAMPINGS:
             width = min(max(1, round(2.0 * zeta * 0.5 * (low + high) / spacing)), band.frequency.size // 4)
-            excess = uniform_filter1d(band.data.density / expected, width, mode="nearest") - 1.0
+            excess = scipy.ndimage.uniform_filter1d(band.data.density / expected, width, mode="nearest") - 1.0
             at = int(np.argmax(excess * np.sqrt(width)))
             level = max(float(excess[at] * expected[at]), 1e-3)
             added = np.array([np.log(level), np.log(band.frequency[at]), np.log(zeta)])
             start = np.concatenate([best.parameters[:-2], added, best.parameters[-2:]])
-            bounds = _Bounds(
+            bounds = Bounds(
                 np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING)] * count + [0.0, 0.0]),
                 np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING)] * count + [np.inf, np.inf]),
             )
-            trials.append(_scoring(_lines_model(band.frequency, band.floors, leakage), start, bounds, band.data))
+            trials.append(fit_spectrum(_lines_model(band.frequency, band.floors, leakage), start, bounds, band.data))
         trial = min(trials, key=lambda fit: fit.cost)
         if 2.0 * (best.cost - trial.cost) < price:
             break
@@ -366,91 +295,43 @@ def _lines_model(frequency: Field, floors: Field, leakage: Field) -> Model:
     return model
 
 
-INDICATOR_METHODS: dict[str, Callable[[Spectrum, Mask, tuple[float, float]], Resonance]] = {
+INDICATOR_METHODS: dict[IndicatorMethod, Callable[[Spectrum, Mask, tuple[float, float]], Resonance]] = {
     "likelihood": _likeliest_line,
     "modes": _strongest_mode,
     "peak": _highest_point,
 }
 
 
-def no_resonance(
-    reason: str,
-    band_hz: tuple[float, float],
-    method: str,
-    floor: tuple[float, float] = (np.nan, np.nan),
-    evidence: float = np.nan,
-) -> Resonance:
-    """A resonance that is not there, or that could not even be looked for, and why."""
-    return Resonance(
-        crf_hz=np.nan,
-        crfa=np.nan,
-        crf_std=np.nan,
-        crfa_std=np.nan,
-        found=False,
-        reason=reason,
-        band_hz=band_hz,
-        method=method,
-        floor=floor,
-        evidence=evidence,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Data:
-    """Ordinates (lines,) and how many independent ones each is worth."""
-
-    density: Field
-    weight: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    """Where the scoring ended: parameters, their standard deviations, -log likelihood (up to a constant), settled."""
-
-    parameters: Field
-    std: Field
-    cost: float
-    settled: bool
-
-
-@dataclass(frozen=True, slots=True)
-class _Bounds:
-    lower: Field
-    upper: Field
-
-
-def _fit_line(frequency: Field, floors: Field, data: _Data, spectrum: Spectrum, band_hz: tuple[float, float]) -> _Fit:
+def _fit_line(frequency: Field, floors: Field, data: Data, spectrum: Spectrum, band_hz: tuple[float, float]) -> Fit:
     """Line and floor, parameters (ln level, ln f0, ln ζ, floor at the band's low end, at its high end).
 
     Started from blocks of the spectrum at several widths: the likelihood has a side maximum at every scatter peak.
     """
     low, high = band_hz
-    bounds = _Bounds(
+    bounds = Bounds(
         np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING), 0.0, 0.0]),
         np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING), np.inf, np.inf]),
     )
     size = -(-frequency.size // MOST_BLOCKS)
     count = frequency.size // size
-    blocks = _Data(data.density[: count * size].reshape(count, size).mean(axis=1), data.weight * size)
+    blocks = Data(data.density[: count * size].reshape(count, size).mean(axis=1), data.weight * size)
     centres = frequency[: count * size].reshape(count, size).mean(axis=1)
     block_floors = floors[: count * size].reshape(count, size, 2).mean(axis=1)
     coarse = [
-        _scoring(_lines_model(centres, block_floors, np.ones(1)), start, bounds, blocks)
+        fit_spectrum(_lines_model(centres, block_floors, np.ones(1)), start, bounds, blocks)
         for start in _starts(centres, blocks.density)
     ]
     best = min(coarse, key=lambda fit: fit.cost)
-    return _scoring(_lines_model(frequency, floors, _leakage(spectrum)), best.parameters, bounds, data)
+    return fit_spectrum(_lines_model(frequency, floors, _leakage(spectrum)), best.parameters, bounds, data)
 
 
 def _starts(frequency: Field, density: Field) -> list[Field]:
     """One start for each of several widths: the highest place of the spectrum averaged over that width."""
-    from scipy.ndimage import uniform_filter1d
-
     spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
     starts = []
     for zeta in START_DAMPINGS:
         width = max(1, round(2.0 * zeta * float(np.mean(frequency)) / spacing))
-        averaged = uniform_filter1d(density, min(width, density.size // 4), mode="nearest")
+        averaged = scipy.ndimage.uniform_filter1d(density, min(width, density.size // 4), mode="nearest")
         floor = float(np.quantile(averaged, 0.2)) / 2.0
         highest = int(np.argmax(averaged))
         level = np.log(max(averaged[highest] - floor, 1e-3))
@@ -460,56 +341,9 @@ def _starts(frequency: Field, density: Field) -> list[Field]:
 
 def _leakage(spectrum: Spectrum) -> Field:
     """What the window spreads over the lines around one; sums to 1. Exact for a spectrum smooth between lines."""
-    from scipy.signal import get_window
-
-    power = np.abs(np.fft.fft(get_window(spectrum.window, spectrum.segment))) ** 2
+    power = np.abs(np.fft.fft(scipy.signal.get_window(spectrum.window, spectrum.segment))) ** 2
     half = min(8, (spectrum.segment - 1) // 2)
     near = np.concatenate([power[-half:], power[: half + 1]]) / power.sum()
     reach = int(np.flatnonzero(near[half:] > 1e-4)[-1])
     near = near[half - reach : half + reach + 1]
     return np.asarray(near / near.sum())
-
-
-def _scoring(model: Model, start: Field, bounds: _Bounds, data: _Data) -> _Fit:
-    """Damped Fisher scoring for exponential ordinates: minimise sum w (ln P + I/P) within bounds.
-
-    The information F = sum w dP dPᵀ/P^2 stands in for the curvature, with Marquardt's damping; a parameter that pushes
-    against its bound rests there. Source: Whittle (1953); Levin, IEEE Trans. Inf. Theory 11 (1965).
-    """
-    theta = np.clip(start, bounds.lower, bounds.upper)
-    expected, slopes = model(theta)
-    cost = _cost(expected, data)
-    damping = 1e-3
-    settled = False
-    for _ in range(200):
-        relative = slopes / expected[:, None]
-        score = data.weight * relative.T @ (data.density / expected - 1.0)
-        information = data.weight * relative.T @ relative
-        free = ~(((theta <= bounds.lower) & (score <= 0.0)) | ((theta >= bounds.upper) & (score >= 0.0)))
-        inner = information[np.ix_(free, free)]
-        diagonal = np.diag(np.diag(inner) + 1e-12 * np.trace(inner))
-        step = np.zeros_like(theta)
-        step[free] = np.linalg.solve(inner + damping * diagonal, score[free])
-        if np.sum(score[free] ** 2 / np.diag(diagonal)) < 1e-8:  # in units of ln likelihood, whatever the damping
-            settled = True
-            break
-        trial = np.clip(theta + step, bounds.lower, bounds.upper)
-        trial_expected, trial_slopes = model(trial)
-        trial_cost = _cost(trial_expected, data)
-        if trial_cost < cost:
-            theta, expected, slopes, cost = trial, trial_expected, trial_slopes, trial_cost
-            damping = max(damping / 5.0, 1e-9)
-        elif damping > 1e8:  # no way down that rounding can see
-            settled = True
-            break
-        else:
-            damping *= 4.0
-    std = np.zeros_like(theta)
-    std[free] = np.sqrt(np.abs(np.diag(np.linalg.pinv(inner, hermitian=True))))
-    return _Fit(theta, std, cost, settled)
-
-
-def _cost(expected: Field, data: _Data) -> float:
-    if not np.all(expected > 0.0):
-        return float("inf")
-    return float(data.weight * np.sum(np.log(expected) + data.density / expected))

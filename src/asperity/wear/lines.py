@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, require_positive
@@ -120,20 +121,15 @@ def _shape(spectrum: Spectrum) -> float:
 
 def _level(spectrum: Spectrum) -> Field:
     """Mean density beside each line: the running median, and what the median of a gamma distribution lacks."""
-    from scipy.ndimage import median_filter
-    from scipy.stats import gamma
-
     shape = _shape(spectrum)
-    middle = median_filter(spectrum.density, 2 * NEIGHBOURS + 1, mode="nearest")
-    return np.asarray(middle / float(gamma.ppf(0.5, shape) / shape))
+    middle = scipy.ndimage.median_filter(spectrum.density, 2 * NEIGHBOURS + 1, mode="nearest")
+    return np.asarray(middle / float(scipy.stats.gamma.ppf(0.5, shape) / shape))
 
 
 def _bound(spectrum: Spectrum, chance: float) -> float:
     """How far above its neighbours a line may stand by chance; the level itself is known to 1.25/sqrt(41) of that."""
-    from scipy.stats import gamma
-
     shape = _shape(spectrum)
-    return float(gamma.isf(chance, shape) / shape * (1.0 + 0.6 / np.sqrt(shape)))
+    return float(scipy.stats.gamma.isf(chance, shape) / shape * (1.0 + 0.6 / np.sqrt(shape)))
 
 
 def _peaks(rise: Field, bound: float) -> Field:
@@ -221,13 +217,11 @@ def _put_right(tones: Field, speed: float, spectrum: Spectrum) -> float:
 
 def _evidence(tones: Field, speed: float, spectrum: Spectrum) -> float:
     """-ln of the chance that so many of the tones would lie on a comb by themselves (binomial)."""
-    from scipy.stats import binom
-
     count = int(np.count_nonzero(_on_comb(tones, speed, spectrum)))
     if count < FEWEST_HARMONICS:
         return 0.0
     by_chance = min(1.5 * spectrum.spacing_hz / speed, 1.0)
-    return float(-binom.logsf(count - 1, tones.size, by_chance))
+    return float(-scipy.stats.binom.logsf(count - 1, tones.size, by_chance))
 
 
 def _weak_harmonics(spectrum: Spectrum, rise: Field, combs: Sequence[float], peaks: Field) -> Field:

@@ -6,13 +6,17 @@ stick alone reports a precise false knee. Knows nothing of recordings; docs/theo
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
+
+Detector = Literal["bayesian"]
+Kind = Literal["severe", "running-in", "no distinct stage", "no change", "too few"]
 
 FEWEST_PLACES = 7  # different x: three on either side of a break, and one to contradict
 STRONG_EVIDENCE = 6.0  # BIC difference, "strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
@@ -41,7 +45,7 @@ class Stages:
     verdict : all of this in one sentence
     """
 
-    kind: str
+    kind: Kind
     split: float
     interval: tuple[float, float]
     probability: Field
@@ -64,7 +68,7 @@ def split_stages(
     *,
     crf_std_hz: ArrayLike | None = None,
     x_std: ArrayLike | None = None,
-    detector: str = "bayesian",
+    detector: Detector = "bayesian",
     unit: str = "",
 ) -> Stages:
     """Find the break between normal and severe wear along `x`, if there is one.
@@ -146,65 +150,43 @@ def _bayesian(x: Field, crf: Field, crfa: Field | None, crf_std: Field, x_std: F
     """Broken stick against saturating curves, a straight line and a constant, by BIC."""
     start, reach = float(np.min(x)), max(float(np.ptp(x)), np.finfo(float).tiny)
     x, x_std = (x - start) / reach, x_std / reach  # so that no unit of x is too small for the algebra
-
-    def given(position: float) -> float:
-        return start + reach * position
-
     known = np.isfinite(crf)
     places = _places(x[known], crf[known], crf_std[known], x_std[known])
-    count = places.x.size
-    if count < FEWEST_PLACES:
-        verdict = f"Too few to tell: a stage needs CRFs at {FEWEST_PLACES} different places, got {count}."
+    if places.x.size < FEWEST_PLACES:
+        verdict = f"Too few to tell: a stage needs CRFs at {FEWEST_PLACES} different places, got {places.x.size}."
         return _without_stage("too few", verdict, x.size, {}, np.full(x.size, np.nan), np.nan)
-    candidates = _candidates(places)
-    scatters = _scatters(places)
-    fits = {candidate.name: _fit(candidate, places, scatters) for candidate in candidates}
-    bic = {
-        candidate.name: -2.0 * fits[candidate.name].best + (candidate.parameters + 1) * float(np.log(count))
-        for candidate in candidates
-    }
-    least = min(bic.values())
-    evidence = {name: value - least for name, value in bic.items()}
-    weights = {name: float(np.exp(-0.5 * value)) for name, value in evidence.items()}
-    share = weights["broken stick"] / sum(weights.values())
-
-    breaks = candidates[0].bends
-    stick = fits["broken stick"]
+    compared = _compared(places)
+    evidence, stick = compared.evidence, compared.fits["broken stick"]
     log_break = _log_sum(stick.marginal)
     if crfa is not None:
-        log_break = log_break + _sudden_bend(x, crfa, x_std, breaks)
+        log_break = log_break + _sudden_bend(x, crfa, x_std, compared.breaks)
     density = np.exp(log_break - np.max(log_break))
     density /= np.sum(density)
-    after = _after(x, x_std, breaks, density)
-    low, split, high = _quantiles(breaks, density, (0.05, 0.5, 0.95))
-    nearest = int(np.argmin(np.abs(breaks - split)))
+    after = _after(x, x_std, compared.breaks, density)
+    low, split, high = _quantiles(compared.breaks, density, (0.05, 0.5, 0.95))
+    nearest = int(np.argmin(np.abs(compared.breaks - split)))
     _, before_slope, change = stick.linear[nearest, int(np.argmax(stick.marginal[nearest]))]
     slopes = (float(before_slope), float(before_slope + change))
-    travelled = slopes[0] * (split - places.x[0]) + slopes[1] * (places.x[-1] - split)
-    before, behind = (f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope) / reach:.3g}" for slope in slopes)
-    best = fits[min(evidence, key=lambda name: evidence[name])]
-    scatter = float(scatters[int(np.argmax(np.max(best.marginal, axis=0)))])
+    rising = slopes[0] * (split - places.x[0]) + slopes[1] * (places.x[-1] - split) > 0.0
 
     smooth = min(value for name, value in evidence.items() if name not in ("broken stick", "no change"))
-    changing = min(smooth, evidence["broken stick"])
-    over = f"{given(places.x[0]):.4g} to {given(places.x[-1]):.4g} {unit}".rstrip()
-    severe = after * share if travelled > 0.0 else np.zeros(x.size)
-    if evidence["no change"] - changing < STRONG_EVIDENCE:
-        mean, error = _mean_of(places)
+    over = f"{start + reach * places.x[0]:.4g} to {start + reach * places.x[-1]:.4g} {unit}".rstrip()
+    severe = after * compared.share if rising else np.zeros(x.size)
+    if evidence["no change"] - min(smooth, evidence["broken stick"]) < STRONG_EVIDENCE:
+        mean, error = float(np.mean(places.y)), float(np.std(places.y, ddof=1))
         verdict = f"No change: CRF holds at {mean:.0f} ± {error:.0f} Hz over {over}."
-        return _without_stage("no change", verdict, x.size, evidence, severe, scatter)
+        return _without_stage("no change", verdict, x.size, evidence, severe, compared.scatter)
     if smooth - evidence["broken stick"] < STRONG_EVIDENCE:
         verdict = (
             f"No distinct stage: CRF changes over {over}, but a smooth curve explains it "
             f"{'better' if smooth < evidence['broken stick'] else 'as well'} (BIC of a break "
             f"{evidence['broken stick'] - smooth:+.1f} against it, {-STRONG_EVIDENCE:.0f} needed)."
         )
-        return _without_stage("no distinct stage", verdict, x.size, evidence, severe, scatter)
-    rising = travelled > 0.0
+        return _without_stage("no distinct stage", verdict, x.size, evidence, severe, compared.scatter)
     names = ("normal", "severe") if rising else ("running-in", "steady")
     per = f" Hz per {unit}" if unit else " Hz per unit of x"
-    moves = f"CRF {before}{per} before and {behind} after"
-    low, split, high = given(low), given(split), given(high)
+    before, behind = (f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope) / reach:.3g}" for slope in slopes)
+    low, split, high = (start + reach * place for place in (low, split, high))
     where = f"{split:.4g} ({low:.4g} to {high:.4g}, 90 %)" + (f" {unit}" if unit else "")
     return Stages(
         kind="severe" if rising else "running-in",
@@ -214,16 +196,50 @@ def _bayesian(x: Field, crf: Field, crfa: Field | None, crf_std: Field, x_std: F
         labels=tuple(names[int(p >= SEVERE_FROM)] for p in after),
         evidence=evidence,
         slopes=(slopes[0] / reach, slopes[1] / reach),
-        scatter_hz=scatter,
-        verdict=f"{'Severe wear from' if rising else 'Running-in until'} {where}: {moves}.",
+        scatter_hz=compared.scatter,
+        verdict=f"{'Severe wear from' if rising else 'Running-in until'} {where}: "
+        f"CRF {before}{per} before and {behind} after.",
     )
 
 
-STAGE_DETECTORS: dict[str, Callable[[Field, Field, Field | None, Field, Field, str], Stages]] = {"bayesian": _bayesian}
+class _Compared(NamedTuple):
+    """Candidates fitted to the places; `share` of the broken stick among them, `scatter` [Hz] of the best."""
+
+    breaks: Field
+    fits: dict[str, _Fitted]
+    evidence: dict[str, float]
+    share: float
+    scatter: float
+
+
+def _compared(places: _Places) -> _Compared:
+    candidates = _candidates(places)
+    scatters = _scatters(places)
+    fits = {candidate.name: _fit(candidate, places, scatters) for candidate in candidates}
+    bic = {
+        candidate.name: -2.0 * fits[candidate.name].best + (candidate.parameters + 1) * float(np.log(places.x.size))
+        for candidate in candidates
+    }
+    least = min(bic.values())
+    evidence = {name: value - least for name, value in bic.items()}
+    weights = {name: float(np.exp(-0.5 * value)) for name, value in evidence.items()}
+    best = fits[min(evidence, key=lambda name: evidence[name])]
+    return _Compared(
+        breaks=candidates[0].bends,
+        fits=fits,
+        evidence=evidence,
+        share=weights["broken stick"] / sum(weights.values()),
+        scatter=float(scatters[int(np.argmax(np.max(best.marginal, axis=0)))]),
+    )
+
+
+STAGE_DETECTORS: dict[Detector, Callable[[Field, Field, Field | None, Field, Field, str], Stages]] = {
+    "bayesian": _bayesian
+}
 
 
 def _without_stage(
-    kind: str, verdict: str, recordings: int, evidence: dict[str, float], probability: Field, scatter: float
+    kind: Kind, verdict: str, recordings: int, evidence: dict[str, float], probability: Field, scatter: float
 ) -> Stages:
     return Stages(
         kind=kind,
@@ -236,11 +252,6 @@ def _without_stage(
         scatter_hz=scatter,
         verdict=verdict,
     )
-
-
-def _mean_of(places: _Places) -> tuple[float, float]:
-    """Mean CRF and the scatter of places about it."""
-    return float(np.mean(places.y)), float(np.std(places.y, ddof=1))
 
 
 def _places(x: Field, y: Field, y_std: Field, x_std: Field) -> _Places:
@@ -294,12 +305,10 @@ def _stick(k: Field, at: _Places) -> Field:
 
 def _over(k: Field, at: _Places) -> tuple[Field, Field]:
     """P(true x > k), and the mean hinge, shape (breaks, places)."""
-    from scipy.special import ndtr
-
     ahead = at.x[None, :] - k[:, None]
     blur = np.maximum(at.x_std, 1e-12)[None, :]
     z = ahead / blur
-    over = ndtr(z)
+    over = scipy.special.ndtr(z)
     return over, ahead * over + blur * np.exp(-0.5 * np.minimum(z**2, 1400.0)) / np.sqrt(2.0 * np.pi)
 
 
@@ -379,10 +388,8 @@ def _sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
 
 def _after(x: Field, x_std: Field, breaks: Field, density: Field) -> Field:
     """Probability that each recording's true x lies beyond the break."""
-    from scipy.special import ndtr
-
     blur = np.maximum(x_std, 1e-12)
-    return np.asarray(ndtr((x[:, None] - breaks[None, :]) / blur[:, None]) @ density)
+    return np.asarray(scipy.special.ndtr((x[:, None] - breaks[None, :]) / blur[:, None]) @ density)
 
 
 def _log_sum(marginal: Field) -> Field:

@@ -14,6 +14,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+import scipy
 
 from asperity.errors import BadInput, UnreadableFile
 from asperity.processes import leave_interrupts_to_the_parent
@@ -29,7 +30,7 @@ WORTH_A_POOL = 32 << 20  # bytes in all; starting processes takes a second
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class ReadOptions:
     """What the caller states about all recordings alike; None leaves it to the files."""
 
     rate_hz: float | None = None
@@ -39,8 +40,8 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Heard:
-    """What listening to one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
+class Reading:
+    """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
     `facts` are texts by name, each with its source; `started` is in ISO form or empty.
     """
@@ -65,13 +66,13 @@ class Heard:
         return datetime.fromisoformat(self.started) if self.started else None
 
 
-def listen(path: Path, asked: Asked, target: Target, spacing_hz: float) -> Heard:
+def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: float) -> Reading:
     """Read a file once: its facts, its quality, its averaged spectrum. What is wrong with it becomes the reason."""
-    nothing = Heard(
+    nothing = Reading(
         file=str(path), spectrum=None, quality=None, rate_hz=np.nan, unit="", facts={}, started="", reason=""
     )
     try:
-        opened = open_recording(path, **asdict(asked))
+        opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
         return replace(nothing, reason=str(refusal))
     known = replace(
@@ -87,7 +88,7 @@ def listen(path: Path, asked: Asked, target: Target, spacing_hz: float) -> Heard
             gauge.watch(opened.blocks()),
             opened.rate_hz,
             opened.unit,
-            segment=segment(opened.rate_hz, spacing_hz),
+            segment=segment_length(opened.rate_hz, spacing_hz),
             window=WINDOW,
         )
         failed = ""
@@ -103,19 +104,17 @@ def _text(value: object) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def segment(rate_hz: float, spacing_hz: float) -> int:
+def segment_length(rate_hz: float, spacing_hz: float) -> int:
     """Samples of a piece whose lines are about `spacing_hz` apart, a length that transforms fast."""
-    from scipy.fft import next_fast_len
-
-    return int(next_fast_len(max(8, round(rate_hz / spacing_hz)), real=True))
+    return int(scipy.fft.next_fast_len(max(8, round(rate_hz / spacing_hz)), real=True))
 
 
-def common_spacing(paths: Sequence[Path], asked: Asked, target: Target) -> float:
+def common_spacing(paths: Sequence[Path], options: ReadOptions, target: Target) -> float:
     """Distance of the lines [Hz] that suits a whole series, from the length of its first, middle and last recording."""
     lengths = []
     for path in {paths[0], paths[len(paths) // 2], paths[-1]}:
         try:
-            opened = open_recording(path, **asdict(asked))
+            opened = open_recording(path, **asdict(options))
         except BadInput:
             continue
         if opened.samples is not None:
@@ -125,32 +124,32 @@ def common_spacing(paths: Sequence[Path], asked: Asked, target: Target) -> float
     return max(FINEST_HZ, min(PIECES / median(lengths), target.width_hz / LINES_IN_WIDTH))
 
 
-def listen_to_all(
+def read_spectra(
     paths: Sequence[Path],
-    asked: Asked,
+    options: ReadOptions,
     target: Target,
     spacing_hz: float,
     *,
     workers: int = 1,
-    progress: Callable[[Heard], None] | None = None,
-) -> Iterator[tuple[int, Heard]]:
+    progress: Callable[[Reading], None] | None = None,
+) -> Iterator[tuple[int, Reading]]:
     """Number and result of each file, as they are done; in processes of their own where that is worth it."""
-    jobs = [(path, asked, target, spacing_hz) for path in paths]
+    jobs = [(path, options, target, spacing_hz) for path in paths]
     if min(workers, len(paths)) < 2 or sum(_size(path) for path in paths) < WORTH_A_POOL:
         for number, job in enumerate(jobs):
-            heard = listen(*job)
+            reading = read_spectrum(*job)
             if progress is not None:
-                progress(heard)
-            yield number, heard
+                progress(reading)
+            yield number, reading
         return
     pool = ProcessPoolExecutor(min(workers, len(paths)), get_context("spawn"), leave_interrupts_to_the_parent)
     try:
-        waiting = {pool.submit(listen, *job): number for number, job in enumerate(jobs)}
+        waiting = {pool.submit(read_spectrum, *job): number for number, job in enumerate(jobs)}
         for done in as_completed(waiting):
-            heard = done.result()
+            reading = done.result()
             if progress is not None:
-                progress(heard)
-            yield waiting[done], heard
+                progress(reading)
+            yield waiting[done], reading
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
@@ -162,21 +161,21 @@ def _size(path: Path) -> int:
 # Kept between runs ---------------------------------------------------------------------------------------------------
 
 
-def keep(heard: Heard, path: Path) -> None:
-    """Write what was heard, to be read by `kept`; the caller sees to it that it is written whole."""
-    density = np.empty(0) if heard.spectrum is None else heard.spectrum.density
-    told: dict[str, Any] = asdict(replace(heard, spectrum=None))
-    if heard.spectrum is not None:
-        told["spectrum"] = {
-            name: getattr(heard.spectrum, name)
+def save_reading(reading: Reading, path: Path) -> None:
+    """Write a reading, to be read by `load_reading`; the caller sees to it that it is written whole."""
+    density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
+    content: dict[str, Any] = asdict(replace(reading, spectrum=None))
+    if reading.spectrum is not None:
+        content["spectrum"] = {
+            name: getattr(reading.spectrum, name)
             for name in ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
         }
     with path.open("wb") as file:
-        np.savez(file, density=density, told=json.dumps(told))
+        np.savez(file, density=density, told=json.dumps(content))
 
 
-def kept(path: Path) -> Heard:
-    """What `keep` wrote.
+def load_reading(path: Path) -> Reading:
+    """What `save_reading` wrote.
 
     Raises
     ------
@@ -184,16 +183,16 @@ def kept(path: Path) -> Heard:
         for anything else.
     """
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
-            density, told = content["density"], json.loads(str(content["told"]))
-        quality = told.pop("quality")
-        spectrum = told.pop("spectrum")
-        told["facts"] = {name: (value, source) for name, (value, source) in told["facts"].items()}
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            density, content = stored["density"], json.loads(str(stored["told"]))
+        quality = content.pop("quality")
+        spectrum = content.pop("spectrum")
+        content["facts"] = {name: (value, source) for name, (value, source) in content["facts"].items()}
         if spectrum is not None:
-            lines = np.arange(density.size) * (told["rate_hz"] / spectrum["segment"])
+            lines = np.arange(density.size) * (content["rate_hz"] / spectrum["segment"])
             spectrum = Spectrum(frequency_hz=lines, density=density, **spectrum)
         if quality is not None:
             quality = Quality(**quality | {name: tuple(quality[name]) for name in ("faults", "remarks")})
-        return Heard(spectrum=spectrum, quality=quality, **told)
+        return Reading(spectrum=spectrum, quality=quality, **content)
     except Exception as error:
         raise UnreadableFile(f"{path} is damaged; delete it, and its recording is read again") from error

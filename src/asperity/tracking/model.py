@@ -1,0 +1,236 @@
+"""What a track is: recordings in their order with resonance, stage and alarm, as table, JSON and dataset."""
+
+import json
+import re
+from collections import Counter
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity.arrays import finite_or_none
+from asperity.errors import BadInput
+from asperity.files import whole_file
+from asperity.quantities import quantity
+from asperity.tracking.reading import Reading
+from asperity.tracking.target import Target
+from asperity.wear import Alarm, AlarmLevel, CleanSpectrum, Resonance, Stages
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crfa", "crfa_std", "clr", "clr_low", "clr_high",
+           "severe_probability", "duration_s", "rate_hz")  # fmt: skip
+TEXTS = ("file", "reason", "label", "started")
+ENDINGS = (".csv", ".parquet", ".nc")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackedRecording:
+    """One recording of a series.
+
+    `resonance` is not found, with its reason, for a recording that could not be used. `clr` and its 90 % interval are
+    the contact model's reading of the CRF, nan without one. `label` is the stage's name; `level` that of the alarm.
+    """
+
+    file: str
+    x: float
+    x_std: float
+    reading: Reading
+    clean: CleanSpectrum | None
+    resonance: Resonance
+    load_n: float | None = None
+    speed_hz: float | None = None
+    clr: float = np.nan
+    clr_interval: tuple[float, float] = (np.nan, np.nan)
+    severe_probability: float = np.nan
+    label: str = "none"
+    level: AlarmLevel = "none"
+
+    def row(self) -> dict[str, Any]:
+        """Its line of the table, by the names of `asperity track --json`; None where there is nothing."""
+        resonance, quality = self.resonance, self.reading.quality
+        return {
+            "file": self.file,
+            "x": finite_or_none(self.x),
+            "x_std": finite_or_none(self.x_std),
+            "crf_hz": finite_or_none(resonance.crf_hz),
+            "crf_std_hz": finite_or_none(resonance.crf_std_hz),
+            "crfa": finite_or_none(resonance.crfa),
+            "crfa_std": finite_or_none(resonance.crfa_std),
+            "found": resonance.found,
+            "reason": resonance.reason,
+            "clr": finite_or_none(self.clr),
+            "clr_low": finite_or_none(self.clr_interval[0]),
+            "clr_high": finite_or_none(self.clr_interval[1]),
+            "severe_probability": finite_or_none(self.severe_probability),
+            "label": self.label,
+            "level": self.level,
+            "started": self.reading.started or None,
+            "rate_hz": finite_or_none(self.reading.rate_hz),
+            "unit": self.reading.unit or None,
+            "duration_s": None if quality is None else quality.duration_s,
+            "rms": None if quality is None else finite_or_none(quality.rms),
+            "load_n": self.load_n,
+            "speed_hz": self.speed_hz,
+            "remarks": "; ".join(quality.remarks) if quality is not None else "",
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Track:
+    """A series of recordings, judged.
+
+    `recordings` in the order of `x`; `x_name` says what that is. `stages` is None where no resonance was found at all.
+    `problems` are sentences for which recordings should not be compared; `notes` say what was chosen for the user.
+    """
+
+    recordings: tuple[TrackedRecording, ...]
+    x_name: str
+    target: Target
+    method: str
+    stages: Stages | None
+    alarm: Alarm
+    comparable: bool
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def resonance_count(self) -> int:
+        """In how many recordings a contact resonance was found."""
+        return sum(recording.resonance.found for recording in self.recordings)
+
+    @property
+    def alarmed(self) -> bool:
+        """Whether the verdict is an alarm."""
+        return self.alarm.level == "alarm"
+
+    def verdict(self) -> str:
+        """One sentence: the stage with its confidence, or that these recordings cannot tell, and why."""
+        total = len(self.recordings)
+        several = f"{total} recordings" if total != 1 else "1 recording"
+        if self.stages is None:
+            reasons = [recording.resonance.reason for recording in self.recordings]
+            (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
+            reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
+            share = f"{count} of {total}: " if count < total else ""
+            return f"These recordings cannot tell: no contact resonance found in {several} ({share}{reason})."
+        level = {"alarm": "ALARM: ", "alert": "Alert: "}.get(self.alarm.level, "")
+        resonances = f"contact resonance found in {self.resonance_count} of {several}"
+        return f"{level}{self.stages.verdict.rstrip('.')}; {resonances}."
+
+    def scalars(self) -> dict[str, Any]:
+        """Everything that `asperity track --json` prints."""
+        stages = self.stages
+        return {
+            "verdict": self.verdict(),
+            "recordings": [recording.row() for recording in self.recordings],
+            "stages": {
+                "kind": None if stages is None else stages.kind,
+                "split": None if stages is None else finite_or_none(stages.split),
+                "interval": list(stages.interval)
+                if stages is not None and np.isfinite(stages.interval).all()
+                else None,
+                "probability": [finite_or_none(recording.severe_probability) for recording in self.recordings],
+                "labels": [recording.label for recording in self.recordings],
+                "evidence": {} if stages is None else {k: finite_or_none(v) for k, v in stages.evidence.items()},
+            },
+            "alarm": {"level": self.alarm.level, "verdict": self.alarm.verdict},
+            "x": self.x_name,
+            "band_hz": list(self.target.band_hz),
+            "band_source": self.target.source,
+            "full_load_crf_hz": self.target.full_load_crf_hz,
+            "method": self.method,
+            "crfa_comparable": self.comparable,
+            "problems": list(self.problems),
+            "notes": list(self.notes),
+        }
+
+    @property
+    def table(self) -> "pandas.DataFrame":
+        """One row a recording, in the order of x."""
+        import pandas
+
+        return pandas.DataFrame([recording.row() for recording in self.recordings])
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """Indicators on (recording), spectra on (recording, frequency), with CF attributes."""
+        import xarray
+
+        rows = [recording.row() for recording in self.recordings]
+        variables: dict[str, Any] = {}
+        for key in NUMBERS:
+            values = np.array([np.nan if row[key] is None else row[key] for row in rows], dtype=float)
+            variables[key] = (("recording",), values, quantity(key).attributes)
+        for key in TEXTS:
+            variables[key] = (("recording",), np.array([row[key] or "" for row in rows], dtype=object))
+        variables["found"] = (("recording",), np.array([row["found"] for row in rows], dtype=np.int8))
+        spectra, coordinates = self._spectra()
+        stated = {key: value for key, value in self.scalars().items() if key not in ("recordings", "verdict")}
+        attributes = {
+            "Conventions": "CF-1.11",
+            "title": "Contact resonance of a series of recordings",
+            "source": f"asperity {version('asperity')}",
+            "verdict": self.verdict(),
+            "track": json.dumps(stated),
+        }
+        return xarray.Dataset(variables | spectra, coordinates, attributes)
+
+    def _spectra(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Variables and coordinates of the spectra; none where no recording has one."""
+        first = next((recording.reading.spectrum for recording in self.recordings if recording.clean), None)
+        if first is None:
+            return {}, {}
+        density = np.full((len(self.recordings), first.density.size), np.nan, np.float32)
+        kept = np.zeros(density.shape, np.int8)
+        for number, recording in enumerate(self.recordings):
+            if recording.clean is not None:
+                density[number], kept[number] = recording.clean.spectrum.density, recording.clean.kept
+        spectral = {"long_name": "averaged power spectral density", "units": first.unit}
+        flags = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "removed kept"}
+        variables = {
+            "density": (("recording", "frequency"), density, spectral),
+            "kept": (("recording", "frequency"), kept, {"long_name": "line of the spectrum counts", **flags}),
+        }
+        axis = {"long_name": "frequency", "units": "Hz"}
+        return variables, {"frequency": ("frequency", first.frequency_hz, axis)}
+
+    def save(self, path: str | Path) -> Path:
+        """Write the series whole or not at all: .csv or .parquet the table, .nc the spectra too.
+
+        Raises
+        ------
+        BadInput
+            for another ending, or a path that cannot be written to.
+        """
+        path = Path(path)
+        suffix = path.suffix.lower()
+        if suffix not in ENDINGS:
+            raise BadInput(f"a track is kept as .csv, .parquet or .nc, got {path.name}; change its ending")
+        with whole_file(path) as part:
+            if suffix == ".csv":
+                self.table.to_csv(part, index=False, lineterminator="\n")
+            elif suffix == ".parquet":
+                _require_pyarrow(path)
+                self.table.to_parquet(part, index=False)
+            else:
+                packed = {"zlib": True, "complevel": 1, "shuffle": True}
+                dataset = self.to_dataset()
+                encoding = {name: packed for name in ("density", "kept") if name in dataset}
+                dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
+        return path
+
+
+def _without_numbers(reason: str) -> str:
+    """A reason without its numbers, so that equal ones can be counted."""
+    return re.sub(r"[-+]?\d[\d.]*", "#", reason)
+
+
+def _require_pyarrow(path: Path) -> None:
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        raise BadInput(f"{path.name} needs pyarrow; pip install 'asperity[recordings]', or write a .csv") from None

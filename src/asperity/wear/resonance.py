@@ -1,0 +1,116 @@
+"""What a contact resonance is: an oscillator's line in a spectrum with its deviations, or why there is none."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from asperity.arrays import Field
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resonance:
+    """A contact resonance, or the reason why there is none.
+
+    `crf_hz` is the oscillator's natural frequency f0 [Hz]; `crfa` the fitted line at f0 without the floor below it
+    [(m/s^2)^2/Hz]; `crf_std`, `crfa_std` their standard deviations from the Fisher information. `damping_ratio` with
+    its `damping_ratio_std`, and `floor`, the density at the lower and upper end of `band_hz`, complete the fitted
+    curve; where more than a floor was fitted, `background` in its place: frequencies and densities. `evidence` is how
+    much better, by BIC, a line and the rest explain the band than the rest alone (found needs 10, very strong). All of
+    a line's figures are nan when it was not `found`; `reason` then says why.
+    The paper's peak has no standard deviation, damping, floor or evidence: nan.
+    """
+
+    crf_hz: float
+    crfa: float
+    crf_std: float
+    crfa_std: float
+    found: bool
+    reason: str
+    band_hz: tuple[float, float]
+    method: str
+    damping_ratio: float = np.nan
+    damping_ratio_std: float = np.nan
+    floor: tuple[float, float] = (np.nan, np.nan)
+    evidence: float = np.nan
+    background: tuple[Field, Field] | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def crf_std_hz(self) -> float:
+        """`crf_std`, under the name that tables and JSON give it [Hz]."""
+        return self.crf_std
+
+    def curve(self, frequency_hz: Field) -> Field:
+        """Fitted density at `frequency_hz` (any shape): line and floor; the floor alone when nothing was found.
+
+        nan everywhere for a method that fits no curve.
+        """
+        low, high = self.band_hz
+        if self.background is None:
+            share = (frequency_hz - low) / (high - low)
+            curve = self.floor[0] * (1.0 - share) + self.floor[1] * share
+        else:
+            curve = np.interp(frequency_hz, *self.background)
+        if self.found:
+            curve = curve + self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
+        return curve
+
+
+def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float) -> Field:
+    """Acceleration line of an oscillator that rides over white base acceleration, 1 at f = f0.
+
+    T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 + 4ζ^2)/(4ζ^2). Roughness
+    whose spectrum falls as f^-4 (a second-order low pass, far above its cut-off) is white base acceleration.
+    """
+    return line_and_slopes(frequency_hz, f0_hz, damping_ratio)[0]
+
+
+def line_and_slopes(
+    frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
+) -> tuple[Field, Field, Field]:
+    """The line L, dL/d(ln f0) and dL/d(ln ζ); shapes broadcast."""
+    x2 = (frequency_hz / f0_hz) ** 2
+    squared = 4.0 * damping_ratio**2
+    top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
+    line = squared / (1.0 + squared) * top / bottom
+    by_f0 = line * ((2.0 * squared * x2 - 4.0 * x2 * (1.0 - x2)) / bottom - 2.0 * squared * x2 / top)
+    by_damping = line * (2.0 * squared * x2 * (1.0 / top - 1.0 / bottom) + 2.0 / (1.0 + squared))
+    return line, by_f0, by_damping
+
+
+def no_resonance(
+    reason: str,
+    band_hz: tuple[float, float],
+    method: str,
+    floor: tuple[float, float] = (np.nan, np.nan),
+    evidence: float = np.nan,
+) -> Resonance:
+    """A resonance that is not there, or that could not even be looked for, and why."""
+    return Resonance(
+        crf_hz=np.nan,
+        crfa=np.nan,
+        crf_std=np.nan,
+        crfa_std=np.nan,
+        found=False,
+        reason=reason,
+        band_hz=band_hz,
+        method=method,
+        floor=floor,
+        evidence=evidence,
+    )
+
+
+def fitted_resonance(line: Field, std: Field, **known: Any) -> Resonance:
+    """The resonance of a fitted line: height, f0 and damping ratio with their deviations; the rest by field."""
+    level, f0, zeta = (float(value) for value in line)
+    level_std, f0_std, zeta_std = (float(value) for value in std)
+    return Resonance(
+        crf_hz=f0,
+        crfa=level,
+        crf_std=f0_std,
+        crfa_std=level_std,
+        found=True,
+        damping_ratio=zeta,
+        damping_ratio_std=zeta_std,
+        **known,
+    )

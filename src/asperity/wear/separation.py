@@ -1,0 +1,345 @@
+"""The joint separation: what all spectra of a series share, and one line beside it in each.
+
+P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) (f/f_i)^t is fitted to all spectra at once, B free in every block of lines.
+docs/theory/indicators.md has the equations.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Field, Mask
+from asperity.wear.resonance import line_and_slopes, line_shape
+from asperity.wear.scoring import damped_scoring
+
+MOST_TOGETHER = 100  # recordings of a longer series that settle what all of them share
+COARSE_BLOCKS = 160
+DAMPINGS = np.geomspace(0.006, 0.08, 6)  # of the search
+USUAL_DAMPING, DAMPING_SPREAD = 0.02, 1.0  # prior of ln ζ: centre, and a factor e either way as standard deviation
+LEVELS = np.geomspace(0.03, 3e3, 21)  # of the search: a line's height over the base below it
+STARTS = (0.1, 0.3, 0.5)  # quantiles over the recordings, as first guesses of what is common to them
+LEAST_DAMPING, MOST_DAMPING = 1e-3, 0.3
+LONGEST_STEP = np.array([1.0, 0.03, 0.5, 1.0])  # of ln A, ln f, ln ζ, ln g
+MOST_STEPS = 60
+SETTLED = 1e-3  # ln likelihood that the next step promises
+LOOSE = 1e-4  # information of everything before the data, so that a line of no height has a defined place
+SLOPE_STEP, STEEPEST = 0.1, 2.0
+
+
+class Blocks(NamedTuple):
+    """Spectra averaged over blocks of lines: density and independent ordinates (recordings, blocks)."""
+
+    centre: Field  # (blocks,)
+    density: Field
+    weight: Field
+
+
+class Parameters(NamedTuple):
+    """A_i, f_i, ζ_i, g_i as logarithms (recordings, 4), ln B (blocks,), and the slope t of what excites the lines."""
+
+    own: Field
+    base: Field
+    slope: float = 0.0
+
+
+class Joint(NamedTuple):
+    """Where the joint fit ended: parameters, -ln likelihood, and standard deviations of the recordings' own."""
+
+    parameters: Parameters
+    cost: float
+    std: Field  # (recordings, 4)
+
+
+class Templates(NamedTuple):
+    """Lines to look for: their resonance, damping, and shape on the blocks (templates, blocks)."""
+
+    f0: Field
+    damping: Field
+    shape: Field
+
+
+class Separation(NamedTuple):
+    """The joint fit; -ln likelihood (recordings, templates) of a line at each template; who settled what is shared."""
+
+    joint: Joint
+    templates: Templates
+    elsewhere: Field
+    witnesses: list[int]
+
+
+def _coarser(blocks: Blocks) -> Blocks:
+    size = -(-blocks.centre.size // COARSE_BLOCKS)
+    count = blocks.centre.size // size
+    shape = (-1, count, size)
+    weight = blocks.weight[:, : count * size].reshape(shape)
+    density = blocks.density[:, : count * size].reshape(shape)
+    total = weight.sum(axis=2)
+    mean = np.where(total > 0.0, (weight * density).sum(axis=2) / np.maximum(total, 1e-300), density.mean(axis=2))
+    return Blocks(blocks.centre[: count * size].reshape(count, size).mean(axis=1), mean, total)
+
+
+def _templates(centre: Field) -> Templates:
+    f0, damping = (part.ravel() for part in np.meshgrid(centre, DAMPINGS, indexing="ij"))
+    return Templates(f0, damping, line_shape(centre, f0[:, None], damping[:, None]))
+
+
+def _search(blocks: Blocks, base: Field, templates: Templates) -> tuple[Field, Field]:
+    """-ln likelihood of each recording for a line at each template, gain and height at their best, and ln of those.
+
+    Shapes (recordings, templates) and (recordings, templates, 2): ln A, ln g. With P = g B M, M = 1 + a L B(f0)/B, the
+    best gain is the mean of D/(B M); what remains are two matrix products.
+    """
+    nearest = np.searchsorted(blocks.centre, templates.f0).clip(0, base.size - 1)
+    rise = templates.shape * (base[nearest][:, None] / base)
+    relative = blocks.weight * blocks.density / base
+    total = blocks.weight.sum(axis=1)[:, None]
+    constant = (blocks.weight @ np.log(base))[:, None]
+    least = np.full((blocks.density.shape[0], templates.f0.size), np.inf)
+    values = np.zeros((*least.shape, 2))
+    prior = 0.5 * (np.log(templates.damping / USUAL_DAMPING) / DAMPING_SPREAD) ** 2
+    for height in LEVELS:
+        model = 1.0 + height * rise
+        gain = relative @ (1.0 / model).T / total
+        cost = blocks.weight @ np.log(model).T + total * (np.log(gain) + 1.0) + constant + prior
+        better = cost < least
+        least = np.where(better, cost, least)
+        logarithms = np.stack([np.log(height * base[nearest]) + np.log(gain), np.log(gain)], axis=-1)
+        values = np.where(better[..., None], logarithms, values)
+    return least, values
+
+
+def _tracks(blocks: Blocks, base: Field, templates: Templates) -> Field:
+    """The best line in each recording, given the base: ln A, ln f, ln ζ, ln g, shape (recordings, 4)."""
+    cost, values = _search(blocks, base, templates)
+    best = np.argmin(cost, axis=1)
+    rows = np.arange(best.size)
+    level, gain = values[rows, best].T
+    return np.stack([level, np.log(templates.f0[best]), np.log(templates.damping[best]), gain], axis=1)
+
+
+def lines_and_slopes(centre: Field, at: Parameters) -> tuple[Field, Field, Field]:
+    """A L (f/f_i)^t, and its derivatives by ln f_i and ln ζ_i, (recordings, blocks)."""
+    level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
+    line, by_f0, by_damping = line_and_slopes(centre[None, :], f0, damping)
+    tilt = level * (centre[None, :] / f0) ** at.slope
+    return tilt * line, tilt * (by_f0 - at.slope * line), tilt * by_damping
+
+
+def _settled_base(blocks: Blocks, own: Field, base: Field) -> Field:
+    """The base that fits best beside given lines and gains: Fisher scoring in ln B, each block by itself."""
+    line = lines_and_slopes(blocks.centre, Parameters(own, base))[0]
+    gain = np.exp(own[:, 3, None])
+    log_base = np.log(base)
+    for _ in range(12):
+        part = gain * np.exp(log_base)
+        expected = part + line
+        relative = part / expected
+        score = np.sum(blocks.weight * relative * (blocks.density / expected - 1.0), axis=0)
+        information = np.sum(blocks.weight * relative**2, axis=0)
+        step = score / np.maximum(information, 1e-9 * np.max(information))
+        log_base = log_base + np.clip(step, -1.0, 1.0)
+    return np.asarray(np.exp(log_base))
+
+
+def _first_base(blocks: Blocks, quantile: float) -> Field:
+    """A quantile over the recordings, their levels evened out."""
+    middle = np.exp(np.mean(np.log(np.maximum(blocks.density, 1e-300)), axis=0))
+    gain = np.median(blocks.density / middle, axis=1)
+    return np.asarray(np.quantile(blocks.density / gain[:, None], quantile, axis=0))
+
+
+def separate(blocks: Blocks) -> Separation:
+    """What all recordings share from all of them, or of a long series from some, evenly chosen; then every line."""
+    coarse = _coarser(blocks)
+    templates = _templates(coarse.centre)
+    recordings = blocks.density.shape[0]
+    chosen = list(range(recordings))
+    if recordings > MOST_TOGETHER:
+        chosen = [round(place) for place in np.linspace(0.0, recordings - 1.0, MOST_TOGETHER)]
+    joint = _together(_rows(blocks, chosen), _rows(coarse, chosen), templates)
+    if recordings > len(chosen):
+        shared = joint.parameters
+        own = _tracks(coarse, np.exp(np.interp(coarse.centre, blocks.centre, shared.base)), templates)
+        own[chosen] = shared.own
+        joint = _each(blocks, shared._replace(own=own))
+    elsewhere, _ = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base)), templates)
+    return Separation(joint, templates, elsewhere, chosen)
+
+
+def _rows(blocks: Blocks, chosen: list[int]) -> Blocks:
+    return Blocks(blocks.centre, blocks.density[chosen], blocks.weight[chosen])
+
+
+def _together(blocks: Blocks, coarse: Blocks, templates: Templates) -> Joint:
+    """From several first guesses of what is common, the separation of the greatest likelihood."""
+    best: Joint | None = None
+    for quantile in STARTS:
+        base = _first_base(coarse, quantile)
+        for _ in range(8):
+            own = _tracks(coarse, base, templates)
+            base = _settled_base(coarse, own, base)
+        joint = _scored(coarse, Parameters(own, np.log(base)))
+        if best is None or joint.cost < best.cost:
+            best = joint
+    assert best is not None  # there are starts
+    for _ in range(3):  # a recording caught in a side maximum is moved to the best place
+        own = _tracks(coarse, np.exp(best.parameters.base), templates)
+        moved = np.abs(own[:, 1] - best.parameters.own[:, 1]) > 0.01
+        joint = _scored(coarse, Parameters(np.where(moved[:, None], own, best.parameters.own), best.parameters.base))
+        if not np.any(moved) or joint.cost >= best.cost - 1e-3:
+            break
+        best = joint
+    base = np.exp(np.interp(blocks.centre, coarse.centre, best.parameters.base))
+    base = _settled_base(blocks, best.parameters.own, base)
+    return _sloped(blocks, _scored(blocks, Parameters(best.parameters.own, np.log(base))))
+
+
+class _Point(NamedTuple):
+    """Where a scoring step stands: cost, score and information, the base's part apart."""
+
+    cost: float
+    own_score: Field  # (recordings, 4)
+    own_information: Field  # (recordings, 4, 4)
+    base_score: Field  # (blocks,)
+    base_information: Field  # (blocks,)
+    coupling: Field  # (recordings, 4, blocks)
+
+
+def expected_density(blocks: Blocks, at: Parameters) -> Field:
+    """What the parameters say of each block, (recordings, blocks)."""
+    return np.asarray(lines_and_slopes(blocks.centre, at)[0] + np.exp(at.own[:, 3, None] + at.base))
+
+
+def _costs(blocks: Blocks, at: Parameters) -> Field:
+    """-ln likelihood of each recording, its prior included."""
+    expected = expected_density(blocks, at)
+    return np.asarray(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1) + _prior(at.own))
+
+
+def _prior(own: Field) -> Field:
+    return np.asarray(0.5 * ((own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD) ** 2)
+
+
+def _point(blocks: Blocks, at: Parameters) -> _Point:
+    line, by_f0, by_damping = lines_and_slopes(blocks.centre, at)
+    common = np.exp(at.own[:, 3, None] + at.base)
+    expected = line + common
+    relative = np.stack([line, by_f0, by_damping, common], axis=1) / expected[:, None]
+    off = blocks.weight * (blocks.density / expected - 1.0)
+    weighted = relative * blocks.weight[:, None]
+    own_score = np.einsum("npb,nb->np", relative, off)
+    own_score[:, 2] -= (at.own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD**2
+    own_information = np.einsum("npb,nqb->npq", weighted, relative, optimize=True)
+    own_information[:, 2, 2] += DAMPING_SPREAD**-2
+    base_part = relative[:, 3]
+    return _Point(
+        cost=float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own))),
+        own_score=own_score,
+        own_information=own_information + LOOSE * np.eye(4),
+        base_score=np.sum(base_part * off, axis=0),
+        base_information=np.sum(blocks.weight * base_part**2, axis=0) + LOOSE,
+        coupling=weighted * base_part[:, None],
+    )
+
+
+def _reduced(point: _Point, damping: Field | float) -> tuple[Field, Field]:
+    """Information of the recordings' own parameters once the base is eliminated, and that of the base; both damped.
+
+    Levels of g and B are fixed against one another by Σ ln g = 0.
+    """
+    recordings, own, _ = point.own_information.shape
+    base_information = point.base_information * (1.0 + damping)
+    flat = point.coupling.reshape(recordings * own, -1)
+    reduced = -(flat / base_information) @ flat.T
+    diagonal = np.einsum("npp->np", point.own_information)
+    for i in range(recordings):
+        at = slice(i * own, (i + 1) * own)
+        reduced[at, at] += point.own_information[i] + damping * np.diag(diagonal[i])
+    gauge = np.tile([0.0, 0.0, 0.0, 1.0], recordings)
+    reduced += float(np.mean(diagonal[:, 3])) * np.outer(gauge, gauge) / recordings
+    return reduced, base_information
+
+
+def _bounds(blocks: Blocks) -> tuple[Field, Field]:
+    """Least and greatest ln A, ln f, ln ζ, ln g."""
+    low, high = np.log(0.97 * blocks.centre[0]), np.log(1.03 * blocks.centre[-1])
+    return np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0]), np.array([60.0, high, np.log(MOST_DAMPING), 60.0])
+
+
+def _scored(blocks: Blocks, start: Parameters) -> Joint:
+    """Damped Fisher scoring of everything at once; the base, whose blocks do not couple, is eliminated first."""
+    lower, upper = _bounds(blocks)
+
+    def placed(at: Parameters) -> tuple[Parameters, _Point]:
+        return at, _point(blocks, at)
+
+    def propose(
+        state: tuple[Parameters, _Point], damping: Field
+    ) -> tuple[Mask, Callable[[Mask], tuple[Parameters, _Point]]] | None:
+        at, point = state
+        reduced, base_information = _reduced(point, damping)
+        flat = point.coupling.reshape(reduced.shape[0], -1)
+        right = point.own_score.ravel() - flat @ (point.base_score / base_information)
+        step = np.linalg.solve(reduced, right)
+        base_step = (point.base_score - flat.T @ step) / base_information
+        promised = 0.5 * float(step @ point.own_score.ravel() + base_step @ point.base_score)
+        if promised < SETTLED:
+            return None
+        step = np.clip(step.reshape(at.own.shape), -LONGEST_STEP, LONGEST_STEP)
+        trial = at._replace(own=np.clip(at.own + step, lower, upper), base=at.base + np.clip(base_step, -2.0, 2.0))
+        return np.array([np.sum(_costs(blocks, trial)) < point.cost]), lambda _: placed(trial)
+
+    start = start._replace(own=np.clip(start.own, lower, upper))
+    (at, point), _ = damped_scoring(placed(start), propose, steps=MOST_STEPS, least=1e-7, most=1e6)
+    reduced, _ = _reduced(point, 0.0)
+    std = np.sqrt(np.diag(np.linalg.inv(reduced))).reshape(at.own.shape)
+    return Joint(at, point.cost, std)
+
+
+def _each(blocks: Blocks, start: Parameters) -> Joint:
+    """Damped Fisher scoring of every recording's own parameters beside a base that is known."""
+    lower, upper = _bounds(blocks)
+
+    def placed(own: Field, costs: Field) -> tuple[Field, Field, _Point]:
+        return own, costs, _point(blocks, start._replace(own=own))
+
+    def propose(
+        state: tuple[Field, Field, _Point], damping: Field
+    ) -> tuple[Mask, Callable[[Mask], tuple[Field, Field, _Point]]] | None:
+        own, costs, point = state
+        diagonal = np.einsum("npp->np", point.own_information)
+        damped = point.own_information + (damping[:, None] * diagonal)[:, :, None] * np.eye(4)
+        step = np.linalg.solve(damped, point.own_score[..., None])[..., 0]
+        if np.max(np.sum(step * point.own_score, axis=1)) < 2.0 * SETTLED:
+            return None
+        trial = np.clip(own + np.clip(step, -LONGEST_STEP, LONGEST_STEP), lower, upper)
+        trial_costs = _costs(blocks, start._replace(own=trial))
+        return trial_costs < costs, lambda better: placed(
+            np.where(better[:, None], trial, own), np.where(better, trial_costs, costs)
+        )
+
+    own = np.clip(start.own, lower, upper)
+    state = placed(own, _costs(blocks, start._replace(own=own)))
+    (own, costs, point), _ = damped_scoring(state, propose, steps=MOST_STEPS, least=1e-7, most=1e6, fits=own.shape[0])
+    std = np.sqrt(np.einsum("npp->np", np.linalg.inv(point.own_information)))
+    return Joint(start._replace(own=own), float(np.sum(costs)), std)
+
+
+def _sloped(blocks: Blocks, joint: Joint) -> Joint:
+    """The separation with the likeliest slope t, by parabolas through three of them; its error counts in all others."""
+    for _ in range(3):
+        slope = joint.parameters.slope
+        below, above = (
+            _scored(blocks, joint.parameters._replace(slope=slope + step)) for step in (-SLOPE_STEP, SLOPE_STEP)
+        )
+        bend = below.cost - 2.0 * joint.cost + above.cost
+        if bend <= 0.0:
+            return joint
+        change = 0.5 * SLOPE_STEP * (below.cost - above.cost) / bend
+        change = min(max(change, -STEEPEST - slope), STEEPEST - slope)
+        joint = _scored(blocks, joint.parameters._replace(slope=slope + change))
+        if abs(change) < SLOPE_STEP:
+            break
+    dragged = (above.parameters.own - below.parameters.own) / (2.0 * np.sqrt(bend))  # by one deviation of t
+    return joint._replace(std=np.hypot(joint.std, dragged))
