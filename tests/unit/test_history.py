@@ -19,7 +19,7 @@ from asperity.ehl import SolveStatus, moving_contact
 from asperity.errors import BadInput, NotConverged, UnreadableFile
 from asperity.grid import Grid
 from asperity.history import load_history, run_history
-from asperity.history.history import MODELS
+from asperity.history.run import MODELS
 from asperity.report.motion_page import render_motion_page
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, flat_surface, gaussian_surface, track_grid
 
@@ -225,12 +225,12 @@ def test_a_history_goes_on_bit_for_bit(history, tmp_path):
 def test_a_history_killed_at_any_moment_goes_on_bit_for_bit(history, tmp_path):
     folder = tmp_path / "killed"
     script = f"""
-import asperity.history as histories
 from asperity.case import load_case
+from asperity.history import run_history, store
 from pathlib import Path
-histories.KEPT_EVERY_S = 0.0
+store.KEPT_EVERY_S = 0.0
 case = load_case("examples/paper.toml").with_overrides({SMALL!r})
-histories.run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
+run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
 """
     running = subprocess.Popen([sys.executable, "-c", script])
     for _ in range(600):
