@@ -50,6 +50,13 @@ class Amount(float):
         return amount
 
 
+def plain(value: Any) -> Any:
+    """Numbers in SI without the text that they were written in, of a pair both; anything else as it stands."""
+    if isinstance(value, tuple):
+        return tuple(map(plain, value))
+    return float(value) if isinstance(value, float) else value
+
+
 class _UnusableUnit(ValueError):
     """What is wrong with a unit, as the end of a sentence."""
 

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from asperity.case.amounts import plain
 from asperity.case.refusals import parse_section
 from asperity.case.sections import CaseFile, MotionSection
 from asperity.case.surfaces import composite_roughness, moving_roughness, two_bodies
@@ -69,16 +70,15 @@ class Case:
     def conditions(self) -> ContactConditions:
         """Bodies, load and motion."""
         contact, material = self.contents.contact, self.contents.material
-        first, second = (float(modulus) for modulus in material.youngs_modulus)
-        speed = float(contact.entrainment_speed)
+        speed = plain(contact.entrainment_speed)
         return ContactConditions(
-            pair=ElasticPair((first, second), material.poisson_ratio),
+            pair=ElasticPair(plain(material.youngs_modulus), material.poisson_ratio),
             geometry=contact.geometry,
-            radius=_plain_radius(contact.radius),
-            length=None if contact.length is None else float(contact.length),
-            load=float(contact.load),
+            radius=plain(contact.radius),
+            length=plain(contact.length),
+            load=plain(contact.load),
             surface_speeds=(speed * (1.0 + contact.slip / 2.0), speed * (1.0 - contact.slip / 2.0)),
-            hardness=None if material.hardness is None else float(material.hardness),
+            hardness=plain(material.hardness),
         )
 
     @cached_property
@@ -121,7 +121,7 @@ class Case:
         return Options(
             tolerance=section.tolerance,
             max_iterations=section.max_iterations,
-            contact_film=float(section.contact_film),
+            contact_film=plain(section.contact_film),
             model=self.contents.model,
         )
 
@@ -251,7 +251,3 @@ def _case(tables: dict[str, Any], folder: Path, source: str, stored: Surface | N
 
 def _case_again(text: str, folder: Path, source: str, stored: Surface | None, stored_notes: tuple[str, ...]) -> Case:
     return replace(load_case(text, folder=folder, name=source, stored=stored), stored_notes=stored_notes)
-
-
-def _plain_radius(radius: float | tuple[float, float]) -> float | tuple[float, float]:
-    return (float(radius[0]), float(radius[1])) if isinstance(radius, tuple) else float(radius)

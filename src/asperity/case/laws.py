@@ -17,6 +17,7 @@ from asperity.case.amounts import (
     Amount,
     amount_in,
     default_amount,
+    plain,
 )
 from asperity.case.refusals import Section, choose, validated
 from asperity.lubricant import LAWS, LawFamily, Lubricant, Solid, Thermal, make_law, make_lubricant
@@ -53,8 +54,7 @@ def _one_of(family: LawFamily) -> PlainValidator:
 
 
 def _description(section: Section) -> dict[str, Any]:
-    values = {name: getattr(section, name) for name in type(section).model_fields}
-    return {name: float(value) if isinstance(value, float) else value for name, value in values.items()}
+    return {name: plain(getattr(section, name)) for name in type(section).model_fields}
 
 
 class LubricantSection(Section):
@@ -105,13 +105,13 @@ class ThermalSection(Section):
     def thermal(self) -> Thermal:
         """The thermal side of the contact."""
         first, second = (
-            Solid(conductivity=float(k), density=float(rho), heat_capacity=float(c))
+            Solid(conductivity=plain(k), density=plain(rho), heat_capacity=plain(c))
             for k, rho, c in zip(self.conductivity, self.density, self.heat_capacity, strict=True)
         )
         return Thermal(
-            ambient=float(self.ambient),
-            bulk=None if self.bulk is None else (float(self.bulk[0]), float(self.bulk[1])),
-            oil_conductivity=float(self.oil_conductivity),
+            ambient=plain(self.ambient),
+            bulk=plain(self.bulk),
+            oil_conductivity=plain(self.oil_conductivity),
             warmth=make_law("warmth", _description(self.warmth)),
             solids=(first, second),
             feedback=self.feedback,

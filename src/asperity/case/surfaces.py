@@ -1,18 +1,18 @@
 """[surface] of a case file: roughness made from numbers or read from a file, at rest on the grid and on moving tracks.
 
-A section of generated roughness says itself how its surface is made; `GENERATED_SECTIONS` lists them by `kind`.
+A section of generated roughness says itself what makes its surface; `GENERATED_SECTIONS` lists them by `kind`.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from pydantic import Strict
 
-from asperity.case.amounts import OPTIONAL, PAIRED, Length, Number, Seed
+from asperity.case.amounts import OPTIONAL, PAIRED, Length, Number, Seed, plain
 from asperity.case.refusals import Section, choose, validated
 from asperity.errors import BadInput
 from asperity.grid import Grid
@@ -48,43 +48,59 @@ class SurfaceSection(Section):
 
 
 class GeneratedSection(SurfaceSection):
-    """Roughness made from numbers; a field `seed` draws it where chance is involved."""
+    """Roughness made from numbers: the fields are keywords of `generator`; a `seed` draws it where it is random."""
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """The surface on a grid."""
-        raise NotImplementedError
+    generator: ClassVar[Callable[..., Surface]]  # of the grid, the fields and an rng
+
+    def arguments(self) -> dict[str, Any]:
+        """The fields as the generator takes them: SI, an angle in radians."""
+        names = [name for name in type(self).model_fields if name not in ("kind", "seed")]
+        values = {name: plain(getattr(self, name)) for name in names}
+        if "direction_deg" in values:
+            values["direction"] = math.radians(values.pop("direction_deg"))
+        return values
+
+    def make(self, grid: Grid, *stream: int) -> Surface:
+        """The surface on a grid; another `stream` of the seed is an independent one."""
+        seed: int = getattr(self, "seed", 0)
+        rng = np.random.default_rng([seed, *stream] if stream else seed)
+        return type(self).generator(grid, **self.arguments(), rng=rng)
 
     def notes(self, surface: Surface) -> tuple[str, ...]:  # noqa: ARG002
         """Where a surface made so strays from what the section states."""
         return ()
 
-    def draw(self, grid: Grid, *stream: int) -> Surface:
-        """The surface of the section's seed; another `stream` of it is an independent one."""
-        seed: int = getattr(self, "seed", 0)
-        return self.make(grid, np.random.default_rng([seed, *stream] if stream else seed))
+
+class CorrelatedSection(GeneratedSection):
+    """Roughness with correlation lengths, which a sample of it need not have."""
+
+    def notes(self, surface: Surface) -> tuple[str, ...]:
+        """How far the sample's correlation lengths stray."""
+        arguments = self.arguments()
+        stated, lengths = arguments["correlation_length"], correlation_lengths(surface, arguments["direction"])
+        if all(abs(sample / mean - 1.0) <= SAMPLE_DEVIATION for sample, mean in zip(lengths, stated, strict=True)):
+            return ()
+        return (
+            f"This sample's autocorrelation falls to 1/e over {area_text(lengths)}, where {area_text(stated)} "
+            "was asked for: the domain holds few correlation lengths, so seeds scatter.",
+        )
 
 
-class GaussianSection(GeneratedSection):
+class GaussianSection(CorrelatedSection):
     """[surface] kind = "gaussian"."""
 
+    generator = staticmethod(gaussian_surface)
     kind: Literal["gaussian"]
     sq: Length
     correlation_length: Annotated[tuple[Length, Length], PAIRED]
     direction_deg: Number = 0.0  # of the first correlation length, from x towards y
     seed: Seed = 0
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """Filtered noise."""
-        return gaussian_surface(grid, **_filter(self), rng=rng)
 
-    def notes(self, surface: Surface) -> tuple[str, ...]:
-        """How far the sample's correlation lengths stray."""
-        return _sample_notes(self, surface)
-
-
-class NonGaussianSection(GeneratedSection):
+class NonGaussianSection(CorrelatedSection):
     """[surface] kind = "non-gaussian"."""
 
+    generator = staticmethod(non_gaussian_surface)
     kind: Literal["non-gaussian"]
     sq: Length
     skewness: Number
@@ -93,34 +109,22 @@ class NonGaussianSection(GeneratedSection):
     direction_deg: Number = 0.0
     seed: Seed = 0
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """Filtered noise of these moments."""
-        return non_gaussian_surface(grid, skewness=self.skewness, kurtosis=self.kurtosis, **_filter(self), rng=rng)
-
-    def notes(self, surface: Surface) -> tuple[str, ...]:
-        """How far the sample's correlation lengths stray."""
-        return _sample_notes(self, surface)
-
 
 class SelfAffineSection(GeneratedSection):
     """[surface] kind = "self-affine"."""
 
+    generator = staticmethod(self_affine_surface)
     kind: Literal["self-affine"]
     sq: Length
     hurst: Number
     cutoffs: tuple[Length, Length]  # shortest and longest wavelength
     seed: Seed = 0
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """Noise with a power law for a spectrum."""
-        shortest, longest = self.cutoffs
-        cutoffs = (float(shortest), float(longest))
-        return self_affine_surface(grid, sq=float(self.sq), hurst=self.hurst, cutoffs=cutoffs, rng=rng)
-
 
 class GroundSection(GeneratedSection):
     """[surface] kind = "ground"."""
 
+    generator = staticmethod(ground_surface)
     kind: Literal["ground"]
     sq: Length
     groove_width: Length
@@ -128,34 +132,21 @@ class GroundSection(GeneratedSection):
     direction_deg: Number = 0.0  # of the lay, from x towards y
     seed: Seed = 0
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """Grooves of grains."""
-        return ground_surface(
-            grid,
-            sq=float(self.sq),
-            groove_width=float(self.groove_width),
-            groove_length=float(self.groove_length),
-            direction=math.radians(self.direction_deg),
-            rng=rng,
-        )
-
 
 class SandblastedSection(GeneratedSection):
     """[surface] kind = "sandblasted"."""
 
+    generator = staticmethod(sandblasted_surface)
     kind: Literal["sandblasted"]
     sq: Length
     crater_radius: Length
     seed: Seed = 0
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """Craters."""
-        return sandblasted_surface(grid, sq=float(self.sq), crater_radius=float(self.crater_radius), rng=rng)
-
 
 class RunInSection(GeneratedSection):
     """[surface] kind = "run-in"."""
 
+    generator = staticmethod(run_in_surface)
     kind: Literal["run-in"]
     sq: Length
     correlation_length: Annotated[tuple[Length, Length], PAIRED]
@@ -164,20 +155,12 @@ class RunInSection(GeneratedSection):
     direction_deg: Number = 0.0
     seed: Seed = 0
 
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:
-        """Filtered noise with its peaks worn to a plateau."""
-        share, roughness = self.plateau_share, self.plateau_roughness
-        return run_in_surface(grid, plateau_share=share, plateau_roughness=roughness, **_filter(self), rng=rng)
-
 
 class FlatSection(GeneratedSection):
     """[surface] kind = "flat", or surface = "flat"."""
 
+    generator = staticmethod(lambda grid, rng: flat_surface(grid))  # noqa: ARG005
     kind: Literal["flat"]
-
-    def make(self, grid: Grid, rng: np.random.Generator) -> Surface:  # noqa: ARG002
-        """No roughness."""
-        return flat_surface(grid)
 
 
 GENERATED_SECTIONS: dict[str, type[GeneratedSection]] = {
@@ -192,26 +175,6 @@ GENERATED_SECTIONS: dict[str, type[GeneratedSection]] = {
         FlatSection,
     )
 }
-
-
-def _filter(section: GaussianSection | NonGaussianSection | RunInSection) -> dict[str, Any]:
-    lx, ly = section.correlation_length
-    return {
-        "sq": float(section.sq),
-        "correlation_length": (float(lx), float(ly)),
-        "direction": math.radians(section.direction_deg),
-    }
-
-
-def _sample_notes(section: GaussianSection | NonGaussianSection, surface: Surface) -> tuple[str, ...]:
-    stated = _filter(section)["correlation_length"]
-    lengths = correlation_lengths(surface, math.radians(section.direction_deg))
-    if all(abs(sample / mean - 1.0) <= SAMPLE_DEVIATION for sample, mean in zip(lengths, stated, strict=True)):
-        return ()
-    return (
-        f"This sample's autocorrelation falls to 1/e over {area_text(lengths)}, where {area_text(stated)} "
-        "was asked for: the domain holds few correlation lengths, so seeds scatter.",
-    )
 
 
 class FileSection(SurfaceSection):
@@ -231,18 +194,19 @@ class FileSection(SurfaceSection):
 
     def prepare(self, grid: Grid, folder: Path) -> PreparedSurface:
         """The file's map on a grid; `folder` is where the file is looked for."""
-        pixel = None if self.pixel is None else (float(self.pixel[0]), float(self.pixel[1]))
-        measured = read_surface(folder / self.file, unit=self.unit, lateral_unit=self.lateral_unit, pixel=pixel)
+        measured = read_surface(
+            folder / self.file, unit=self.unit, lateral_unit=self.lateral_unit, pixel=plain(self.pixel)
+        )
         prepared = prepare_surface(
             measured,
             grid,
-            sq=_metres(self.sq),
+            sq=plain(self.sq),
             form=self.form,
             fit=self.fit,
             turn=self.turn,
             outliers=self.outliers,
-            s_filter=_metres(self.s_filter),
-            l_filter=_metres(self.l_filter),
+            s_filter=plain(self.s_filter),
+            l_filter=plain(self.l_filter),
         )
         return replace(prepared, steps=(*measured.notes, *prepared.steps))
 
@@ -264,10 +228,6 @@ def parse_surface(value: object) -> SurfaceSection:
     return choose("kind", lambda: GENERATED_SECTIONS, value)
 
 
-def _metres(length: float | None) -> float | None:
-    return None if length is None else float(length)
-
-
 def two_bodies(
     section: SurfaceSection, grid: Grid, folder: Path, speeds: tuple[float, float]
 ) -> CompositeSurface | None:
@@ -283,7 +243,7 @@ def composite_roughness(
 ) -> tuple[Surface, tuple[str, ...]]:
     """The roughness of both bodies together on the grid, and what was done to get it, a sentence each."""
     if isinstance(section, GeneratedSection):
-        surface = section.draw(grid)
+        surface = section.make(grid)
         return surface, section.notes(surface)
     assert isinstance(section, FileSection)
     first = section.prepare(grid, folder)
@@ -312,9 +272,9 @@ def moving_roughness(
         surface = section.prepare(track, folder).surface
     else:
         assert isinstance(section, GeneratedSection)
-        surface = section.draw(track)
+        surface = section.make(track)
         if rough == "both":
-            samples = (surface, section.draw(track, 2))
+            samples = (surface, section.make(track, 2))
             first, second = (Surface(sample.heights / math.sqrt(2.0), track) for sample in samples)
             return MovingSurfaces(first, second, speeds, grid)
     return MovingSurfaces.one_rough(surface, speeds, grid, first=rough == "first")
