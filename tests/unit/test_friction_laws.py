@@ -92,11 +92,11 @@ def test_carried_oil_follows_the_equation(rate):
 
     times = (X - X[0]) * A / speed
     exact = solve_ivp(slope, (0.0, times[-1]), [VISCOSITY[0] * rate], "LSODA", times, rtol=1e-9, atol=1.0).y[0]
-    found = law(film(rate))[:, 0]
+    stress = law(film(rate))[:, 0]
     steady = -limit * np.expm1(-VISCOSITY * rate / limit)
     assert np.max(np.abs(steady - exact)) > 0.2 * exact.max()  # the memory matters here ...
-    assert np.max(np.abs(found - exact)) < 0.03 * exact.max()
-    assert found.mean() == pytest.approx(exact.mean(), rel=0.005)  # ... and friction has it to half a per cent
+    assert np.max(np.abs(stress - exact)) < 0.03 * exact.max()
+    assert stress.mean() == pytest.approx(exact.mean(), rel=0.005)  # ... and friction has it to half a per cent
 
 
 def test_the_kernel_agrees_with_its_twin():

@@ -46,7 +46,7 @@ def test_density_levels_off_a_third_higher():
 
 
 @pytest.mark.parametrize(
-    ("build", "said"),
+    ("build", "message"),
     [
         (lambda: Barus(0.0, 1e-8), "viscosity eta0 must be positive"),
         (lambda: Barus(0.1, -1e-8), "alpha must be positive and finite, got -1e-08"),
@@ -56,6 +56,6 @@ def test_density_levels_off_a_third_higher():
         (lambda: Incompressible(float("inf")), "density rho0"),
     ],
 )
-def test_an_oil_that_cannot_be_is_refused(build, said):
-    with pytest.raises(BadInput, match=said):
+def test_an_oil_that_cannot_be_is_refused(build, message):
+    with pytest.raises(BadInput, match=message):
         build()

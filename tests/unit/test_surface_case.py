@@ -85,7 +85,7 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("surface", "said"),
+    ("surface", "message"),
     [
         ({"kind": "grund"}, 'did you mean "ground"'),
         ({"kind": "ground", "sq": "1 um", "groove_width": "30 um"}, "groove_length is missing"),
@@ -108,6 +108,6 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         ),
     ],
 )
-def test_what_cannot_be_meant_is_refused(paper, surface, said):
-    with pytest.raises(BadInput, match=said):
+def test_what_cannot_be_meant_is_refused(paper, surface, message):
+    with pytest.raises(BadInput, match=message):
         paper.with_overrides({"surface": surface}).surface()
