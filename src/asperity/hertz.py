@@ -7,6 +7,7 @@ Source: K. L. Johnson, Contact Mechanics (1985), chapter 4 and appendix 3.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 
@@ -49,9 +50,7 @@ def elliptic_contact(load: float, radii: tuple[float, float], reduced_modulus: f
 
     The ellipse is longer along the axis with the larger radius.
     """
-    from scipy.optimize import brentq
-    from scipy.special import ellipe, ellipk
-
+    ellipe, ellipk = scipy.special.ellipe, scipy.special.ellipk
     r_large, r_small = max(radii), min(radii)
     if np.isclose(r_large, r_small, rtol=3e-9, atol=0.0):  # the root below loses its digits, or its bracket
         return point_contact(load, r_small, reduced_modulus)
@@ -61,7 +60,7 @@ def elliptic_contact(load: float, radii: tuple[float, float], reduced_modulus: f
         m = 1.0 - k**2
         return float((ellipe(m) / k**2 - ellipk(m)) / (ellipk(m) - ellipe(m)) - r_large / r_small)
 
-    k = float(np.exp(brentq(curvature_ratio, np.log(1e-6), np.log(1.0 - 1e-9), xtol=1e-15, rtol=1e-14)))
+    k = float(np.exp(scipy.optimize.brentq(curvature_ratio, np.log(1e-6), np.log(1.0 - 1e-9), xtol=1e-15, rtol=1e-14)))
     m = 1.0 - k**2
     # 1/R_small = 2 p0 k c (E/k^2 - K)/(E* m c^2) for the long semi-axis c, with p0 = 3F/(2 pi k c^2)
     long_axis = float(np.cbrt(3.0 * load * r_small * (ellipe(m) / k**2 - ellipk(m)) / (np.pi * reduced_modulus * m)))

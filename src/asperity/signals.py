@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, require_positive
@@ -108,41 +109,16 @@ def averaged_spectrum(
     BadInput
         for a record without a single whole piece, a piece shorter than 8 samples, an unknown window.
     """
-    from scipy.fft import rfft
-    from scipy.signal import get_window
-
     require_positive("sampling rate", rate_hz, "Hz")
     if segment < 8:
         raise BadInput(f"a spectrum's segment must have at least 8 samples, got {segment}; change it")
     try:
-        taper = get_window(window, segment)
+        taper = scipy.signal.get_window(window, segment)
     except ValueError as error:
         raise BadInput(f"spectrum window {window!r} is unknown ({error}); try hann or boxcar") from None
 
     step = segment if window == "boxcar" else segment - segment // 2
-    many = max(1, SAMPLES_AT_ONCE // segment)
-    work = np.empty((many, segment))  # used again and again: fresh memory costs more than the arithmetic
-    total = np.zeros(segment // 2 + 1)
-    kept: list[Mask] = []
-    samples = 0
-    waiting: Field = np.empty(0)
-    for block in blocks:
-        samples += block.size
-        waiting = np.concatenate([waiting, block]) if waiting.size else block
-        whole = (waiting.size - segment) // step + 1 if waiting.size >= segment else 0
-        pieces = np.lib.stride_tricks.sliding_window_view(waiting, segment)[::step] if whole else waiting[:0, None]
-        for first in range(0, whole, many):
-            group = pieces[first : min(first + many, whole)]
-            means = group.mean(axis=1, keepdims=True)
-            finite = np.isfinite(means[:, 0])
-            if not finite.all():
-                group, means = group[finite], means[finite]
-            tapered = np.subtract(group, means, out=work[: group.shape[0]])
-            tapered *= taper
-            lines = rfft(tapered, axis=1)
-            total += np.einsum("ij,ij->j", lines.real, lines.real) + np.einsum("ij,ij->j", lines.imag, lines.imag)
-            kept.append(finite)
-        waiting = waiting[whole * step :]
+    total, kept, samples = _summed_periodograms(blocks, taper, step)
     complete = np.concatenate(kept) if kept else np.zeros(0, bool)
     if not complete.any():
         gaps = " without a gap" if complete.size else ""
@@ -166,6 +142,35 @@ def averaged_spectrum(
     )
 
 
+def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tuple[Field, list[Mask], int]:
+    """Sum over the pieces of |rfft|^2, which of the pieces were whole, and how many samples there were."""
+    segment = taper.size
+    many = max(1, SAMPLES_AT_ONCE // segment)
+    work = np.empty((many, segment))  # used again and again: fresh memory costs more than the arithmetic
+    total = np.zeros(segment // 2 + 1)
+    kept: list[Mask] = []
+    samples = 0
+    waiting: Field = np.empty(0)
+    for block in blocks:
+        samples += block.size
+        waiting = np.concatenate([waiting, block]) if waiting.size else block
+        whole = (waiting.size - segment) // step + 1 if waiting.size >= segment else 0
+        pieces = np.lib.stride_tricks.sliding_window_view(waiting, segment)[::step] if whole else waiting[:0, None]
+        for first in range(0, whole, many):
+            group = pieces[first : min(first + many, whole)]
+            means = group.mean(axis=1, keepdims=True)
+            finite = np.isfinite(means[:, 0])
+            if not finite.all():
+                group, means = group[finite], means[finite]
+            tapered = np.subtract(group, means, out=work[: group.shape[0]])
+            tapered *= taper
+            lines = scipy.fft.rfft(tapered, axis=1)
+            total += np.einsum("ij,ij->j", lines.real, lines.real) + np.einsum("ij,ij->j", lines.imag, lines.imag)
+            kept.append(finite)
+        waiting = waiting[whole * step :]
+    return total, kept, samples
+
+
 def _averages(taper: Field, kept: Mask, step: int) -> float:
     """How many independent ordinates a line is worth: 1 / (n sum w_t^2), w_t the share of sample t in the estimate.
 
@@ -186,8 +191,6 @@ def smooth(spectrum: Spectrum, passes: int) -> Spectrum:
 
     Raises BadInput for fewer than one pass or fewer than 5 lines.
     """
-    from scipy.signal import savgol_coeffs, savgol_filter
-
     if passes < 1:
         raise BadInput(f"smoothing needs at least 1 pass, got {passes}; leave it out for none")
     if spectrum.density.size < 5:
@@ -195,8 +198,8 @@ def smooth(spectrum: Spectrum, passes: int) -> Spectrum:
     density = spectrum.density
     reach = np.ones(1)
     for _ in range(passes):
-        density = savgol_filter(density, 5, 3, mode="interp")
-        reach = np.convolve(reach, savgol_coeffs(5, 3))
+        density = scipy.signal.savgol_filter(density, 5, 3, mode="interp")
+        reach = np.convolve(reach, scipy.signal.savgol_coeffs(5, 3))
     return replace(
         spectrum,
         density=density,

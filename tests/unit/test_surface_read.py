@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from asperity.errors import BadInput, UnreadableFile
+from asperity.quiet import quietly
 from asperity.surface import read_surface
-from asperity.surface.read import _quietly, library
+from asperity.surface.read import surface_topography
 
 
 def xyz(path, cells=(20, 12), pixel=(2.0, 3.0)):
@@ -228,11 +229,11 @@ def test_heights_as_steep_as_walls_are_questioned(tmp_path):
 
 
 def test_the_library_stays_quiet_about_mpi():
-    assert library().__name__ == "SurfaceTopography"
+    assert surface_topography().__name__ == "SurfaceTopography"
 
 
 def test_what_a_reader_logs_does_not_reach_the_terminal(caplog):
-    with _quietly() as notes:
+    with quietly() as notes:
         logging.getLogger("reader").error("could not reshape")
         warnings.warn("odd header", UserWarning, stacklevel=1)
     assert caplog.records == []

@@ -6,7 +6,7 @@ import pytest
 from asperity.grid import Grid
 from asperity.surface import MeasuredSurface, Surface, flat_surface, gaussian_surface, self_affine_surface
 from asperity.surface import surface_parameters as parameters
-from asperity.surface.read import library
+from asperity.surface.read import surface_topography
 
 BOTH, NEITHER = (True, True), (False, False)
 
@@ -85,7 +85,7 @@ def test_the_slope_agrees_with_surfacetopography(periodic):
     heights = gaussian(5).heights[:200, :120]
     g = grid((200, 120), (300e-6, 120e-6), periodic)
     found = parameters(Surface(heights, g))
-    twin = library().Topography(heights - heights.mean(), (300e-6, 120e-6), periodic=periodic[0])
+    twin = surface_topography().Topography(heights - heights.mean(), (300e-6, 120e-6), periodic=periodic[0])
     assert found.sdq == pytest.approx(twin.rms_gradient(), rel=0.01)
 
 

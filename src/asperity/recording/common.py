@@ -8,6 +8,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
+from asperity.quiet import first_line
 from asperity.recording.model import Channel
 from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_NAMES, stated
 
@@ -114,7 +115,7 @@ def sliced(read: Reader, samples: int, notes: list[str], name: str) -> Callable[
                 block = np.asarray(read(first, min(first + size, samples)), dtype=np.float64).reshape(-1)
             except Exception as error:
                 if first == 0:
-                    raise UnreadableFile(f"{name} cannot be read ({why(error)}); {REMEDY}") from error
+                    raise UnreadableFile(f"{name} cannot be read ({first_line(error)}); {REMEDY}") from error
                 notes.append(f"damaged after sample {first} of {samples}; what comes before was read")
                 return
             yield block
@@ -155,13 +156,6 @@ def columns(
             return array[i:j, k] if along == 0 else array[k, i:j]
 
         yield Channel(name=label, blocks=sliced(read_one, max(shape), notes, label), samples=max(shape), **facts)
-
-
-def why(reason: Any) -> str:
-    """The first line of what a library complains about, short enough for a sentence."""
-    text = next((line.strip() for line in str(reason).splitlines() if line.strip()), type(reason).__name__)
-    printable = "".join(c for c in text if c.isprintable()).rstrip(".;")
-    return printable if len(printable) <= 100 else printable[:97] + "..."
 
 
 def numeric(array: Any) -> bool:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, only, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, only
 from asperity.recording.model import Channel, Contents
 
 _DEEPEST = 8  # groups in groups
@@ -29,14 +30,14 @@ def read(path: Path) -> Contents:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        raise UnreadableFile(f"{path.name} is no readable HDF5 file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable HDF5 file ({first_line(error)}); {REMEDY}") from error
     try:
         channels = list(_channels(path, file, "", {}, notes))
         matlab = any(str(key).startswith("MATLAB") for key in _every_attribute(file))
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is a damaged HDF5 file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is a damaged HDF5 file ({first_line(error)}); {REMEDY}") from error
     finally:
         file.close()
     return Contents(format="mat v7.3" if matlab else "hdf5", channels=only(channels, path.name), notes=notes)

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, only, sliced, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, only, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -43,7 +44,7 @@ def read(path: Path) -> Contents:
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable IDE recording ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable IDE recording ({first_line(error)}); {REMEDY}") from error
     return Contents(format="enDAQ ide", channels=only(channels, path.name), notes=notes)
 
 

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, only, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, only
 from asperity.recording.model import Channel, Contents
 
 _DEEPEST = 8
@@ -27,17 +29,15 @@ def is_matlab(head: bytes) -> bool:
 
 def read(path: Path) -> Contents:
     """Channels named by variable and field: bearing.gs."""
-    from scipy.io import loadmat
-
     notes: list[str] = []
     try:
-        held = loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+        held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
         held = {key: value for key, value in held.items() if not key.startswith("__")}
         channels = list(_channels(path.name, held, "", {}, notes))
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable MATLAB file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable MATLAB file ({first_line(error)}); {REMEDY}") from error
     return Contents(format="mat v5", channels=only(channels, path.name), notes=notes)
 
 

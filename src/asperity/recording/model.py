@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
-from asperity.recording.quiet import quietly
+from asperity.quiet import quietly
 from asperity.signals import Signal
 
 ACCELERATION = "m/s^2"

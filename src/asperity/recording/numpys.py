@@ -10,7 +10,8 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, columns, facts_in, only, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, columns, facts_in, only
 from asperity.recording.model import Channel, Contents
 
 _SMALL = 64  # samples: what is shorter describes the others
@@ -45,7 +46,7 @@ def read_npy(path: Path) -> Contents:
     except UnreadableFile:
         raise
     except (OSError, ValueError, TypeError, OverflowError, MemoryError, AttributeError, SyntaxError) as error:
-        raise UnreadableFile(f"{path.name} is no readable .npy file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable .npy file ({first_line(error)}); {REMEDY}") from error
     return Contents(format="npy", channels=only(_of_array(path, array, notes), path.name), notes=notes)
 
 
@@ -96,7 +97,7 @@ def read_npz(path: Path) -> Contents:
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable .npz file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable .npz file ({first_line(error)}); {REMEDY}") from error
     facts = facts_in(path.name, {key: value.item() if value.size == 1 else value for key, value in around.items()})
     channels: list[Channel] = []
     for member, shape, fortran, dtype in arrays:
@@ -156,7 +157,7 @@ def _unpacked(
                     yield (values if stride == 1 else values[first::stride]).astype(np.float64)
         except (zipfile.BadZipFile, OSError, ValueError, EOFError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
             if done == 0:
-                raise UnreadableFile(f"{path.name} cannot be unpacked ({why(error)}); {REMEDY}") from error
+                raise UnreadableFile(f"{path.name} cannot be unpacked ({first_line(error)}); {REMEDY}") from error
         if done < samples:
             notes.append(f"damaged after sample {done} of {samples}; what comes before was read")
 

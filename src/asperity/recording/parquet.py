@@ -8,7 +8,8 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, facts_in, only, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, facts_in, only
 from asperity.recording.model import Channel, Contents
 from asperity.recording.timing import Clock, is_time
 from asperity.recording.units import name_and_unit
@@ -44,7 +45,7 @@ def read(path: Path) -> Contents:
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable parquet file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable parquet file ({first_line(error)}); {REMEDY}") from error
     channels = (
         Channel(name=name, blocks=_column(path, label, notes), samples=rows, **known)
         for (label, name, _), known in zip(labels, facts, strict=True)
@@ -74,7 +75,7 @@ def _column(path: Path, label: str, notes: list[str]) -> Callable[[int], Iterato
                     yield values
         except Exception as error:
             if done == 0:
-                raise UnreadableFile(f"{path.name} cannot be read ({why(error)}); {REMEDY}") from error
+                raise UnreadableFile(f"{path.name} cannot be read ({first_line(error)}); {REMEDY}") from error
             notes.append(f"damaged after sample {done}; what comes before was read")
 
     return blocks

@@ -3,14 +3,16 @@
 Nothing is guessed: what neither the file, nor a sidecar beside it, nor the caller states is asked for.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from asperity.errors import BadInput, UnreadableFile, require_positive
+from asperity.quiet import first_line, quietly
 from asperity.recording import hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
-from asperity.recording.common import REMEDY, when, why
+from asperity.recording.common import REMEDY, when
 from asperity.recording.model import (
     ACCELERATION,
     FULL_SCALE,
@@ -21,7 +23,6 @@ from asperity.recording.model import (
     OpenRecording,
     Recording,
 )
-from asperity.recording.quiet import quietly
 from asperity.recording.sidecar import beside
 from asperity.recording.units import acceleration_scale
 
@@ -147,7 +148,7 @@ def read_contents(path: Path) -> Contents:
     except MemoryError:
         raise UnreadableFile(f"{path.name} claims more data than fits into memory; {REMEDY}") from None
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is damaged ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is damaged ({first_line(error)}); {REMEDY}") from error
 
 
 def _chosen(
@@ -276,8 +277,6 @@ def _same_unit(one: str, other: str) -> bool:
 
 def _is_force(name: str, unit: str) -> bool:
     """Friction testers write forces in g: not an acceleration where the channel is called a force."""
-    import re
-
     last = name.split("/")[-1].split(".")[-1]
     return unit == "g" and re.fullmatch(r"(?i)F[xyznfrt]?|.*(force|load|kraft).*", last) is not None
 

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, Reader, facts_in, only, sliced, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, Reader, facts_in, only, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -37,7 +38,7 @@ def read(path: Path) -> Contents:
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable TDMS file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable TDMS file ({first_line(error)}); {REMEDY}") from error
     return Contents(format="tdms", channels=only(channels, path.name), notes=notes)
 
 

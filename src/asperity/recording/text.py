@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from asperity.arrays import Field
+from asperity.dialect import MISSING, Dialect, sniff_dialect
 from asperity.errors import UnreadableFile
 from asperity.recording.common import MOST_CHANNELS, facts_in, only, when
 from asperity.recording.model import Channel, Contents
@@ -22,8 +23,6 @@ from asperity.recording.timing import Clock, from_stamps, is_time
 from asperity.recording.units import known_unit, name_and_unit
 
 SUFFIXES = {"", "txt", "csv", "tsv", "asc", "dat", "lvm", "prn"}
-_MISSING = {"", "nan", "na", "n/a", "null", "none", "bad", "***", "-", "--", "---", "inf", "-inf", "#n/a", "overload"}
-_COMMAS_BETWEEN_BLANKS = re.compile(r"\s*-?\d+(,\d+)?([eE][+-]?\d+)?(\s+-?\d+(,\d+)?([eE][+-]?\d+)?)*\s*")
 _LARGE = 64 << 20  # bytes, from which a file is read piece by piece
 _HEAD = 1 << 18  # bytes, in which the header and the first rows must lie
 _CHUNK = 1 << 22
@@ -33,18 +32,12 @@ _FEWEST_ROWS = 8  # of a block; fewer are a table in a header
 _GAP = 1.5  # steps between two times, from which samples are missing
 
 
-@dataclass(frozen=True, slots=True)
-class _Dialect:
-    separator: str | None  # None: blanks
-    comma: bool
-
-
 @dataclass(slots=True)
 class _Table:
     """One block of rows: where it begins, what its header says, and, unless the file is large, its numbers."""
 
     offset: int
-    dialect: _Dialect
+    dialect: Dialect
     columns: int
     names: list[str]
     units: list[str | None]
@@ -117,13 +110,13 @@ def _header(stream: BinaryIO, at: int) -> _Table | None:
     whole = head if len(head) < _HEAD else head[: head.rfind(b"\n") + 1 or None]
     lines = whole.splitlines(keepends=True)
     texts = [_decoded(line) for line in lines]
-    dialect = _dialect([text for text in texts if re.search(r"\d", text)][:400][-100:])
+    dialect = sniff_dialect([text for text in texts if re.search(r"\d", text)][:400][-100:])
     for number, text in enumerate(texts[:_LONGEST_HEADER]):
-        fields = _fields(text, dialect)
+        fields = dialect.fields(text)
         row, stamped = _row(fields, dialect)
         if row is None:
             continue
-        following = next((_fields(later, dialect) for later in texts[number + 1 :] if later.strip()), None)
+        following = next((dialect.fields(later) for later in texts[number + 1 :] if later.strip()), None)
         if following is not None and (len(following) != len(fields) or _row(following, dialect)[0] is None):
             continue
         if len(row) > MOST_CHANNELS:
@@ -150,54 +143,9 @@ def _decoded(line: bytes) -> str:
         return line.decode("cp1252", errors="replace").strip("\r\n")
 
 
-def _dialect(sample: list[str]) -> _Dialect:
-    """What stands between the numbers, and whether their decimals follow a comma."""
-    text = "\n".join(sample)
-    rows = [line for line in sample if re.fullmatch(r"[\s\d.,;+\-eE\"]+", line)] or sample
-    for separator in (";", "\t"):
-        if sum(separator in line for line in rows) > len(rows) / 2:
-            numbers = "\n".join(rows)
-            return _Dialect(separator, "," in numbers and not re.search(r"\d\.\d", numbers))
-    numbers = "\n".join(rows)
-    if '"' in numbers:
-        return _Dialect(",", bool(re.search(r'"[^"\n]*,[^"\n]*"', numbers)) and "." not in numbers)
-    if "," not in text:
-        return _Dialect(None, False)
-    if "." not in numbers and all(_COMMAS_BETWEEN_BLANKS.fullmatch(one) for one in rows):
-        return _Dialect(None, True)  # 0,5 1,25, or 0,5 alone: two columns of whole numbers would look the same
-    return _Dialect("," if sum("," in line for line in rows) > len(rows) / 2 else None, False)
-
-
-def _fields(line: str, dialect: _Dialect) -> list[str]:
-    if dialect.separator is None:
-        return line.split()
-    if '"' in line:
-        import csv
-
-        try:
-            parts = next(csv.reader([line], delimiter=dialect.separator))
-        except (csv.Error, StopIteration):
-            parts = line.split(dialect.separator)
-    else:
-        parts = line.split(dialect.separator)
-    if len(parts) > 1 and not parts[-1].strip():
-        parts.pop()  # a separator at the end of the line
-    return parts
-
-
-def _value(text: str, comma: bool) -> float | None:
-    text = text.strip().strip('"').strip()
-    if text.lower() in _MISSING:
-        return np.nan
-    try:
-        return float(text.replace(",", ".") if comma else text) if "_" not in text else None
-    except ValueError:
-        return None
-
-
-def _row(fields: list[str], dialect: _Dialect) -> tuple[list[float] | None, bool]:
+def _row(fields: list[str], dialect: Dialect) -> tuple[list[float] | None, bool]:
     """The numbers of a line, or None; and whether its first field is a date."""
-    values = [_value(one, dialect.comma) for one in fields]
+    values = [dialect.number(field) for field in fields]
     stamped = len(values) > 1 and values[0] is None and when(fields[0].strip().strip('"')) is not None
     if stamped:
         values[0] = np.nan
@@ -207,13 +155,13 @@ def _row(fields: list[str], dialect: _Dialect) -> tuple[list[float] | None, bool
     return numbers, stamped
 
 
-def _labels(header: list[str], count: int, dialect: _Dialect) -> tuple[list[str], list[str | None]]:
+def _labels(header: list[str], count: int, dialect: Dialect) -> tuple[list[str], list[str | None]]:
     """Names and units of the columns, from the last one or two header lines with as many fields."""
     fitting = []
     for line in [line for line in header if line.strip()][-3:]:
         bare = line.lstrip("#%/ ")
         alone = count == 1 and not re.search("[:=]", bare)  # a blank in the label of an only column separates nothing
-        fields = [one.strip().strip('"') for one in ([bare] if alone else _fields(bare, dialect))]
+        fields = [one.strip().strip('"') for one in ([bare] if alone else dialect.fields(bare))]
         if len(fields) + (line.rstrip().endswith(dialect.separator or "\0")) in (count, count + 1):
             fitting.append((fields + [""] * count)[:count])
     if not fitting:
@@ -223,7 +171,7 @@ def _labels(header: list[str], count: int, dialect: _Dialect) -> tuple[list[str]
     if len(fitting) > 1 and any(are_units) and all(known_unit(one) or len(one) < 9 for one in below):
         names = [name or str(k + 1) for k, name in enumerate(fitting[-2])]
         return names, [one if known else None for one, known in zip(below, are_units, strict=True)]
-    if any(_value(one, dialect.comma) is not None for one in below if one):
+    if any(dialect.number(label) is not None for label in below if label):
         return [str(number + 1) for number in range(count)], [None] * count
     pairs = [name_and_unit(one) for one in below]
     return [name or str(k + 1) for k, (name, _) in enumerate(pairs)], [unit for _, unit in pairs]
@@ -277,7 +225,7 @@ def _parsed(chunk: bytes, table: _Table, column: int | None = None) -> Field | N
             names=range(table.columns + (table.dialect.separator is not None)),  # one for a separator at the end
             usecols=wanted,
             dtype=np.float64,
-            na_values=sorted(_MISSING),
+            na_values=sorted(MISSING),
             encoding="latin-1",
             engine="c",
             index_col=False,
@@ -319,8 +267,8 @@ def _line_by_line(chunk: bytes, table: _Table, at: int, column: int | None) -> t
     for line in chunk.splitlines(keepends=True):
         text = _decoded(line)
         if text.strip():
-            fields = _fields(text, table.dialect)
-            values = [_value(one, table.dialect.comma) for one in fields]
+            fields = table.dialect.fields(text)
+            values = [table.dialect.number(field) for field in fields]
             if table.stamped and values and values[0] is None:
                 stamp = when(fields[0].strip().strip('"'))
                 if stamp is not None:

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import UnreadableFile
-from asperity.recording.common import REMEDY, only, sliced, when, whole_rate, why
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, only, sliced, when, whole_rate
 from asperity.recording.model import Channel, Contents
 
 TIME_RESPONSE = 1
@@ -34,7 +35,7 @@ def read(path: Path) -> Contents:
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable universal file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable universal file ({first_line(error)}); {REMEDY}") from error
     if not sets:
         raise UnreadableFile(f"{path.name} holds data sets {sorted(set(kinds))} and no 58; export the time record")
     channels: list[Channel] = []
@@ -46,7 +47,7 @@ def read(path: Path) -> Contents:
             else:
                 channels.append(_channel(path, one, notes, taken=[channel.name for channel in channels]))
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-            raise UnreadableFile(f"{path.name} is a damaged universal file ({why(error)}); {REMEDY}") from error
+            raise UnreadableFile(f"{path.name} is a damaged universal file ({first_line(error)}); {REMEDY}") from error
     if not channels:
         raise UnreadableFile(
             f"{path.name} holds {' and '.join(dict.fromkeys(others))}, not a time record; "

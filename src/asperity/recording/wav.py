@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.recording.common import REMEDY, only, why
+from asperity.errors import UnreadableFile
+from asperity.quiet import first_line
+from asperity.recording.common import REMEDY, only
 from asperity.recording.model import Channel, Contents
 
 
@@ -20,14 +22,12 @@ def read(path: Path) -> Contents:
     """Channels "1", "2" ...; integer samples are shares of full scale, as the format gives them no unit."""
     import soundfile
 
-    from asperity.errors import UnreadableFile
-
     notes: list[str] = []
     try:
         with soundfile.SoundFile(path) as opened:
             rate, count, frames, kind = opened.samplerate, opened.channels, opened.frames, opened.subtype
     except (soundfile.SoundFileError, RuntimeError, TypeError) as error:
-        raise UnreadableFile(f"{path.name} is no readable sound file ({why(error)}); {REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable sound file ({first_line(error)}); {REMEDY}") from error
     if rate <= 0 or not 0 < count <= 64:
         raise UnreadableFile(f"{path.name} states {rate} Hz and {count} channels, which cannot be; {REMEDY}")
     whole = _stated_frames(path)

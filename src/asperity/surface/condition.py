@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, require_positive
@@ -145,8 +146,6 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     Across its axis, at distance w from it, the height is z0 + t v - sqrt(1 + t^2) (R - sqrt(R^2 - w^2)), where v runs
     along the axis in the plane and t is its tilt.
     """
-    from scipy.optimize import least_squares
-
     grid = measured.grid
     scale = max(grid.extent) / 2.0
     x, y = np.meshgrid(grid.x / scale, grid.y / scale, indexing="ij")
@@ -188,7 +187,7 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     def misfit(freed: Field) -> Field:
         return np.asarray(shape(parameters(freed), at_x, at_y) - z)
 
-    nearest = least_squares(misfit, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    nearest = scipy.optimize.least_squares(misfit, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
     best = parameters(nearest.x)
     curvature = float(best[4])
     return scale * shape(best, x, y), scale / curvature if curvature else np.inf
@@ -196,26 +195,23 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
 
 def find_outliers(measured: MeasuredSurface) -> Mask:
     """Cells whose height is far off the median of their neighbours, in robust deviations of all such differences."""
-    from scipy.ndimage import median_filter
-
     known = np.isfinite(measured.heights)
     heights = np.where(known, measured.heights, np.nanmedian(measured.heights))
     size = [1 if axis == measured.uniform else _NEIGHBOURS for axis in range(2)]
-    off = np.abs(measured.heights - median_filter(heights, size=size, mode="nearest"))
+    off = np.abs(measured.heights - scipy.ndimage.median_filter(heights, size=size, mode="nearest"))
     deviation = 1.4826 * float(np.nanmedian(off))
     return np.asarray(known & (np.nan_to_num(off) > _OUTLYING * deviation)) if deviation > 0.0 else known & False
 
 
 def _low_pass(measured: MeasuredSurface, cutoff: float) -> Field:
     """The waviness: a Gaussian mean over the cells that are known, at the edges over those inside."""
-    from scipy.ndimage import gaussian_filter1d
-
     known = np.isfinite(measured.heights)
     weighted, weights = np.where(known, measured.heights, 0.0), known.astype(np.float64)
     for axis, pixel in enumerate(measured.grid.spacing):
         if axis != measured.uniform:
             sigma = SIGMA_OVER_CUTOFF * cutoff / pixel
             weighted, weights = (
-                gaussian_filter1d(field, sigma, axis=axis, mode="constant") for field in (weighted, weights)
+                scipy.ndimage.gaussian_filter1d(field, sigma, axis=axis, mode="constant")
+                for field in (weighted, weights)
             )
     return np.where(known, weighted / np.where(known, weights, 1.0), np.nan)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 
@@ -49,7 +50,6 @@ def _nearest(
     family: Callable[[Field, float, float], Field], z: Field, shares: Field, wanted: Field
 ) -> tuple[float, float, float]:
     """Misfit, spread and shift of the family's best curve: the best of a coarse net, refined."""
-    from scipy.optimize import least_squares
 
     def misfit(parameters: Field) -> Field:
         found = _moments(family(z, float(np.exp(parameters[0])), float(parameters[1])), shares)
@@ -57,7 +57,7 @@ def _nearest(
 
     net = [np.array([d, s]) for d in np.linspace(-1.5, 3.5, 11) for s in np.linspace(0.0, 5.0, 9)]
     start = min(net, key=lambda parameters: float(np.sum(misfit(parameters) ** 2)))
-    found = least_squares(misfit, start, bounds=([-3.0, -1.0], [6.0, 20.0]))
+    found = scipy.optimize.least_squares(misfit, start, bounds=([-3.0, -1.0], [6.0, 20.0]))
     return float(found.cost), float(np.exp(found.x[0])), float(found.x[1])
 
 
@@ -67,8 +67,6 @@ def stretch(skewness: float, kurtosis: float) -> float:
 
     The translated heights correlate as sum c_n^2 rho^n / sum c_n^2, c_n the curve's Hermite coefficients.
     """
-    from scipy.optimize import brentq
-
     nodes, weights = np.polynomial.hermite_e.hermegauss(120)
     weights = weights / weights.sum()
     z = np.linspace(-6.0, 6.0, _BINS)
@@ -81,7 +79,7 @@ def stretch(skewness: float, kurtosis: float) -> float:
     powers = np.array([np.sum(weights * heights * p) ** 2 for p in polynomials[1:]])
     powers /= powers.sum()
     orders = np.arange(1, powers.size + 1)
-    rho = float(brentq(lambda r: float(np.sum(powers * r**orders)) - np.exp(-1.0), 1e-6, 1.0))
+    rho = float(scipy.optimize.brentq(lambda r: float(np.sum(powers * r**orders)) - np.exp(-1.0), 1e-6, 1.0))
     return float(1.0 / np.sqrt(-np.log(rho)))
 
 

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
@@ -123,9 +124,7 @@ class MovingSurfaces:
 
     @cached_property
     def _spectra(self) -> tuple[Spectrum, Spectrum]:
-        import scipy.fft as fft
-
-        return fft.rfft(self.first.heights, axis=0), fft.rfft(self.second.heights, axis=0)
+        return scipy.fft.rfft(self.first.heights, axis=0), scipy.fft.rfft(self.second.heights, axis=0)
 
 
 def moved(heights: Field, cells: float, spectrum: Spectrum) -> Field:
@@ -133,14 +132,12 @@ def moved(heights: Field, cells: float, spectrum: Spectrum) -> Field:
     whole = round(cells)
     if abs(cells - whole) < WHOLE:
         return np.roll(heights, whole, axis=0)
-    import scipy.fft as fft
-
     count = heights.shape[0]
     wave = np.arange(spectrum.shape[0])
     phase = np.exp(-2j * np.pi * np.mod(wave * (cells / count), 1.0))
     if count % 2 == 0:
         phase[-1] = np.cos(np.pi * cells)  # the shortest wave is known at its crests only
-    return np.asarray(fft.irfft(spectrum * phase[:, None], n=count, axis=0))
+    return np.asarray(scipy.fft.irfft(spectrum * phase[:, None], n=count, axis=0))
 
 
 def track_grid(grid: Grid, lengths: int = 1) -> Grid:

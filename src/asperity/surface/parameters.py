@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 from asperity.grid import Grid
@@ -194,16 +195,14 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
 
     Each lag is the mean over the pairs of cells that are both known; an axis that repeats is not padded.
     """
-    from scipy.fft import irfft2, next_fast_len, rfft2
-
     reach = (grid.cells[0] // 2, grid.cells[1] // 2)
     shape = [
-        n if repeats else next_fast_len(n + m, real=True)
+        n if repeats else scipy.fft.next_fast_len(n + m, real=True)
         for n, m, repeats in zip(grid.cells, reach, grid.periodic, strict=True)
     ]
     known = np.isfinite(heights)
-    sums = irfft2(np.abs(rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape)
-    pairs = np.rint(irfft2(np.abs(rfft2(known.astype(float), shape)) ** 2, shape))
+    sums = scipy.fft.irfft2(np.abs(scipy.fft.rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape)
+    pairs = np.rint(scipy.fft.irfft2(np.abs(scipy.fft.rfft2(known.astype(float), shape)) ** 2, shape))
     lags = np.ix_(*(np.arange(-m, m + 1) % size for m, size in zip(reach, shape, strict=True)))
     means = np.divide(sums[lags], pairs[lags], out=np.zeros_like(sums[lags]), where=pairs[lags] > 0)
     return means / means[reach], reach
@@ -224,13 +223,11 @@ def _decay(
     correlation: Field, middle: tuple[int, int], grid: Grid, angles: Field, threshold: float
 ) -> tuple[Field, Field]:
     """Where the autocorrelation falls below the threshold along rays, NaN where it does not; and where they end."""
-    from scipy.ndimage import map_coordinates
-
     cosines, sines = np.cos(angles)[:, None] / grid.spacing[0], np.sin(angles)[:, None] / grid.spacing[1]
     # the ray ends where it leaves the known lags; its samples are half a cell apart, at most
     ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
     radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * ends
-    along = map_coordinates(
+    along = scipy.ndimage.map_coordinates(
         correlation, [middle[0] + radii * cosines, middle[1] + radii * sines], order=3, mode="nearest"
     )
     below = along < threshold

@@ -14,7 +14,7 @@ from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
 from asperity.surface.condition import Form, Outliers, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface, area_text, length_text
-from asperity.surface.read import library
+from asperity.surface.read import surface_topography
 
 Fit = Literal["crop", "tile"]
 
@@ -183,7 +183,7 @@ def _fill(heights: Field, measured: MeasuredSurface, most_missing: float) -> tup
             f"{100.0 * most_missing:g} % that are filled; measure it again or use another part"
         )
     sizes = (float(heights.shape[0]), float(heights.shape[1]))
-    filled = library().Topography(np.ma.masked_array(heights, missing), sizes).interpolate_undefined_data()
+    filled = surface_topography().Topography(np.ma.masked_array(heights, missing), sizes).interpolate_undefined_data()
     return np.ma.filled(
         filled.heights(), np.nan
     ), f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"

@@ -4,21 +4,21 @@ SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that i
 tables. Nothing is corrected here: levelling, filling and resampling are left to `asperity.surface.prepare`.
 """
 
-import logging
 import warnings
+import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import BadInput, UnreadableFile, require_positive
 from asperity.grid import FEWEST_CELLS, Grid
+from asperity.quiet import first_line, quietly
 from asperity.surface.model import MeasuredSurface, length_text
 from asperity.surface.text import SUFFIXES as TABLES
 from asperity.surface.text import read_table
@@ -33,8 +33,8 @@ _REMEDY = "export it again, as standard x3p or SDF if need be"
 
 
 @dataclass(frozen=True, slots=True)
-class _Map:
-    """What a reader found: `heights` (nx, ny) and `pixel` in the units named, None where the file names none.
+class RawMap:
+    """What a file holds: `heights` (nx, ny) and `pixel` in the units named, None where the file names none.
 
     Heights of shape (n, 1) are a profile. `pixel` is None where the caller gives it, in metres.
     """
@@ -76,26 +76,15 @@ def read_surface(
     sizes = None if pixel is None else pixel if isinstance(pixel, tuple) else (pixel, pixel)
     for size in sizes or ():
         require_positive("pixel", size, "m")
-    found = _read(path, matrix=sizes is not None)
-    if found.pixel is None and sizes is None:
-        raise BadInput(f"{path.name} holds heights without a pixel size; give pixel, their distance")
-    if found.pixel is not None and sizes is not None:
-        raise BadInput(f"{path.name} states its own pixel size; leave out pixel")
-    if found.pixel is None and lateral_unit is not None:
-        raise BadInput(f"{path.name} holds bare heights, whose pixel is given in metres; leave out lateral_unit")
-    if found.pixel is None and found.unit is None:
-        lateral_unit = "m"
-    height_scale, lateral_scale = _scales(path.name, found.unit, unit, lateral_unit)
-    if found.pixel is not None:
-        sizes = (found.pixel[0] * lateral_scale, found.pixel[1] * lateral_scale)
-    assert sizes is not None
-    heights = np.where(np.isfinite(found.heights), found.heights, np.nan) * height_scale
+    raw = _read(path, matrix=sizes is not None)
+    height_scale, sizes = _sizes(path.name, raw, unit, lateral_unit, sizes)
+    heights = np.where(np.isfinite(raw.heights), raw.heights, np.nan) * height_scale
     if np.isnan(heights).all():
         raise UnreadableFile(f"{path.name} holds no valid height among its {heights.size}; measure it again")
     if not all(_POSSIBLE[0] < size < _POSSIBLE[1] for size in sizes):
         raise UnreadableFile(f"{path.name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
     impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE[1]
-    notes = found.notes
+    notes = raw.notes
     if impossible.any():
         heights[impossible] = np.nan
         count = int(np.count_nonzero(impossible))
@@ -105,18 +94,30 @@ def read_surface(
         heights, sizes = np.repeat(heights, FEWEST_CELLS, axis=1), (sizes[0], sizes[0])
     if min(heights.shape) < FEWEST_CELLS:
         raise UnreadableFile(
-            f"{path.name} holds {heights.shape[0]} x {found.heights.shape[1]} heights, too few for a map; "
+            f"{path.name} holds {heights.shape[0]} x {raw.heights.shape[1]} heights, too few for a map; "
             f"give a measurement of at least {FEWEST_CELLS} x {FEWEST_CELLS}"
         )
-    half = tuple(n * d / 2.0 for n, d in zip(heights.shape, sizes, strict=True))
-    grid = Grid(
-        cells=(heights.shape[0], heights.shape[1]),
-        lower=(-half[0], -half[1]),
-        upper=(half[0], half[1]),
-        periodic=(False, False),
-    )
+    nx, ny = heights.shape
+    half = (nx * sizes[0] / 2.0, ny * sizes[1] / 2.0)
+    grid = Grid(cells=(nx, ny), lower=(-half[0], -half[1]), upper=half, periodic=(False, False))
     notes += tuple(_oddities(sizes, heights))
-    return MeasuredSurface(heights, grid, path.name, found.format, notes, uniform)
+    return MeasuredSurface(heights, grid, path.name, raw.format, notes, uniform)
+
+
+def _sizes(
+    name: str, raw: RawMap, unit: str | None, lateral_unit: str | None, pixel: tuple[float, float] | None
+) -> tuple[float, tuple[float, float]]:
+    """Metres in one unit of height, and the pixel [m]: from the file, or else from the caller."""
+    if raw.pixel is not None:
+        if pixel is not None:
+            raise BadInput(f"{name} states its own pixel size; leave out pixel")
+        height, lateral = _scales(name, raw.unit, unit, lateral_unit)
+        return height, (raw.pixel[0] * lateral, raw.pixel[1] * lateral)
+    if pixel is None:
+        raise BadInput(f"{name} holds heights without a pixel size; give pixel, their distance")
+    if lateral_unit is not None:
+        raise BadInput(f"{name} holds bare heights, whose pixel is given in metres; leave out lateral_unit")
+    return _scales(name, raw.unit, unit, "m" if raw.unit is None else None)[0], pixel
 
 
 def _oddities(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
@@ -134,7 +135,7 @@ def _oddities(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
 
 def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str | None) -> tuple[float, float]:
     """Metres in one unit of height and in one unit of length, from the file or else from the caller."""
-    convert = library().Support.UnitConversion.get_unit_conversion_factor
+    convert = surface_topography().Support.UnitConversion.get_unit_conversion_factor
 
     def metres(given: str) -> float:
         try:
@@ -154,7 +155,7 @@ def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str |
     return metres(unit), metres(lateral_unit)
 
 
-def _read(path: Path, *, matrix: bool) -> _Map:
+def _read(path: Path, *, matrix: bool) -> RawMap:
     """The map in the file, by the readers that its suffix names; without a telling suffix, by its content."""
     name, suffix = path.name, path.suffix.lower().removeprefix(".")
     try:
@@ -170,8 +171,8 @@ def _read(path: Path, *, matrix: bool) -> _Map:
     if suffix == "npy":
         return _array(path)
     if matrix and suffix in TABLES:
-        return _Map(_x_first(read_table(path)[::-1]), None, "text", None)
-    suffixes = {reader.format(): set(reader.file_extensions()) for reader in library().IO.readers}
+        return RawMap(_x_first(read_table(path)[::-1]), None, "text", None)
+    suffixes = {reader.format(): set(reader.file_extensions()) for reader in surface_topography().IO.readers}
     formats = [form for form, known in suffixes.items() if suffix in known]
     if not formats and suffix not in TABLES:
         return _read_by_content(path)
@@ -185,7 +186,7 @@ def _read(path: Path, *, matrix: bool) -> _Map:
             raise
         except Exception as error:  # noqa: BLE001 - the readers of forty formats raise whatever they stumble over
             reason = reason or error
-            if isinstance(error, library().Exceptions.CorruptFile):
+            if isinstance(error, surface_topography().Exceptions.CorruptFile):
                 break  # recognised but damaged: the next reader would only misread it
     if suffix in _LAST_RESORTS:
         try:
@@ -201,7 +202,7 @@ def _read(path: Path, *, matrix: bool) -> _Map:
     raise UnreadableFile(f"{name} is no readable .{suffix} file ({_why(reason)}); {_REMEDY}") from reason
 
 
-def _read_by_content(path: Path) -> _Map:
+def _read_by_content(path: Path) -> RawMap:
     try:
         return _topography(path, None)
     except UnreadableFile:
@@ -212,15 +213,15 @@ def _read_by_content(path: Path) -> _Map:
 
 def _format_of(path: Path) -> str | None:
     """What the content is, as far as it bears a mark of its own."""
-    with _quietly():
+    with quietly():
         try:
-            form = str(library().open_topography(str(path)).format())
+            form = str(surface_topography().open_topography(str(path)).format())
         except Exception:  # noqa: BLE001 - as above
             form = next((known for known in ("x3p", "sdf") if _readable(_LAST_RESORTS[known], path)), "")
     return form if form and form not in _UNMARKED | _TEXT else None
 
 
-def _readable(read: Callable[[Path], _Map], path: Path) -> bool:
+def _readable(read: Callable[[Path], RawMap], path: Path) -> bool:
     try:
         read(path)
     except Exception:  # noqa: BLE001 - as above
@@ -228,9 +229,9 @@ def _readable(read: Callable[[Path], _Map], path: Path) -> bool:
     return True
 
 
-def _topography(path: Path, form: str | None) -> _Map:
-    with _quietly() as notes:
-        reader = library().open_topography(str(path), format=form)
+def _topography(path: Path, form: str | None) -> RawMap:
+    with quietly() as notes:
+        reader = surface_topography().open_topography(str(path), format=form)
         if form is None and reader.format() in _UNMARKED:
             raise UnreadableFile(f"{path.name} is in no format that can be read; {_REMEDY}")
         channel = reader.default_channel
@@ -250,10 +251,10 @@ def _topography(path: Path, form: str | None) -> _Map:
     maps = [other.name for other in reader.channels if other.dim == 2]
     if len(maps) > 1:
         notes.append(f"of the {len(maps)} maps in the file, the first, {channel.name!r}, was read")
-    return _Map(heights, pixel, str(reader.format()), unit, tuple(notes))
+    return RawMap(heights, pixel, str(reader.format()), unit, tuple(notes))
 
 
-def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> _Map:
+def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> RawMap:
     """A profile on even steps; steps that differ are interpolated onto their mean, which is noted."""
     steps = np.diff(x)
     if x.size < FEWEST_CELLS or not (steps > 0.0).all():
@@ -264,10 +265,10 @@ def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> _Ma
     if np.max(np.abs(steps - step)) > _EVEN * step:
         notes = ("the profile's points are not evenly spaced; they were interpolated onto even steps",)
         z = np.interp(x[0] + step * np.arange(x.size), x, z)
-    return _Map(z[:, None], (step, step), form, unit, notes)
+    return RawMap(z[:, None], (step, step), form, unit, notes)
 
 
-def _table(path: Path) -> _Map:
+def _table(path: Path) -> RawMap:
     """Two columns are a profile; a list of points is SurfaceTopography's to read, a matrix wants its pixel."""
     numbers = read_table(path)
     if numbers.shape[1] == 2:
@@ -277,21 +278,21 @@ def _table(path: Path) -> _Map:
             f"{path.name} holds {numbers.shape[0]} rows of {numbers.shape[1]} numbers; "
             "give a profile (x, z), points on a regular grid (x, y, z) or a matrix of heights"
         )
-    return _Map(_x_first(numbers[::-1]), None, "text", None)
+    return RawMap(_x_first(numbers[::-1]), None, "text", None)
 
 
-def _array(path: Path) -> _Map:
+def _array(path: Path) -> RawMap:
     """Heights of shape (nx, ny) as NumPy saves them; SurfaceTopography would leave the file open."""
     try:
         heights = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable .npy file ({_first_line(error)}); {_REMEDY}") from error
+        raise UnreadableFile(f"{path.name} is no readable .npy file ({first_line(error)}); {_REMEDY}") from error
     if heights.ndim != 2:
         raise UnreadableFile(f"{path.name} holds an array of {heights.ndim} axes; give heights along x and y")
-    return _Map(heights, None, "npy", None)
+    return RawMap(heights, None, "npy", None)
 
 
-def _x3p(path: Path) -> _Map:
+def _x3p(path: Path) -> RawMap:
     import x3pio
 
     try:
@@ -305,26 +306,23 @@ def _x3p(path: Path) -> _Map:
         kind = type(content).__name__.lower()
         raise UnreadableFile(f"{path.name} holds a {kind}, not a map on a regular grid; give an areal map")
     pixel = (float(content.header.x.increment), float(content.header.y.increment))
-    return _Map(_x_first(content.layers[0].z), pixel, "x3p", "m")
+    return RawMap(_x_first(content.layers[0].z), pixel, "x3p", "m")
 
 
-def _loose_x3p(path: Path) -> _Map | None:
+def _loose_x3p(path: Path) -> RawMap | None:
     """An x3p map whose archive strays from the standard: in a folder of its own, or with elements unknown to it.
 
     Damage is none of these: the archive's checksums find it. None for what is no map on a regular grid.
     """
-    import zipfile
-    from xml.etree import ElementTree
-
     try:
         with zipfile.ZipFile(path) as archive:
             mains = [name for name in archive.namelist() if name.split("/")[-1] == "main.xml"]
             root = ElementTree.fromstring(archive.read(mains[0]))
-            said = {element.tag.split("}")[-1]: (element.text or "").strip() for element in root.iter()}
+            elements = {element.tag.split("}")[-1]: (element.text or "").strip() for element in root.iter()}
             steps = [float(root.findtext(f".//{{*}}{axis}/{{*}}Increment") or "nan") for axis in ("CX", "CY", "CZ")]
-            data = archive.read(mains[0].removesuffix("main.xml") + said["PointDataLink"])
+            data = archive.read(mains[0].removesuffix("main.xml") + elements["PointDataLink"])
         kind = {"D": "<f8", "F": "<f4"}[root.findtext(".//{*}CZ/{*}DataType") or ""]
-        cells = int(said["SizeX"]), int(said["SizeY"])
+        cells = int(elements["SizeX"]), int(elements["SizeY"])
         rows = np.frombuffer(data, dtype=kind).reshape(cells[1], cells[0]) * steps[2]
     except (
         zipfile.BadZipFile,
@@ -336,19 +334,19 @@ def _loose_x3p(path: Path) -> _Map | None:
         zlib.error,
     ):
         return None
-    return _Map(
+    return RawMap(
         _x_first(rows), (steps[0], steps[1]), "x3p", "m", ("the x3p archive strays from the standard, yet holds a map",)
     )
 
 
-def _sdf(path: Path) -> _Map:
+def _sdf(path: Path) -> RawMap:
     import sdfio
 
     content: Any = sdfio.read(path)
-    return _Map(_x_first(content.data), (float(content.header.x_scale), float(content.header.y_scale)), "sdf", "m")
+    return RawMap(_x_first(content.data), (float(content.header.x_scale), float(content.header.y_scale)), "sdf", "m")
 
 
-_LAST_RESORTS: dict[str, Callable[[Path], _Map]] = {
+_LAST_RESORTS: dict[str, Callable[[Path], RawMap]] = {
     "x3p": _x3p,
     "sdf": _sdf,
     **dict.fromkeys(TABLES, _table),
@@ -360,7 +358,7 @@ def _x_first(rows: Any) -> Field:
     return np.ascontiguousarray(np.ma.filled(np.ma.asarray(rows, dtype=np.float64), np.nan).T)
 
 
-def library() -> Any:
+def surface_topography() -> Any:
     """SurfaceTopography, without its remark that MPI is absent."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ImportWarning)
@@ -368,34 +366,8 @@ def library() -> Any:
     return SurfaceTopography
 
 
-@contextmanager
-def _quietly() -> Iterator[list[str]]:
-    """Collect a reader's warnings as notes, and drop what it prints or logs: the terminal belongs to the caller."""
-    notes: list[str] = []
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        yield from _collecting(notes)
-    finally:
-        logging.disable(before)
-
-
-def _collecting(notes: list[str]) -> Iterator[list[str]]:
-    with redirect_stdout(StringIO()), redirect_stderr(StringIO()), warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("ignore")
-        warnings.simplefilter("always", UserWarning)
-        yield notes
-    notes.extend(f"the reader warns: {_first_line(w.message)}" for w in caught)
-
-
 def _why(reason: Exception | None) -> str:
     """The reader's own words, unless they only speak of bytes that it did not expect at the start."""
-    if isinstance(reason, library().Exceptions.FileFormatMismatch):
+    if isinstance(reason, surface_topography().Exceptions.FileFormatMismatch):
         return "its content is something else"
-    return _first_line(reason)
-
-
-def _first_line(reason: Any) -> str:
-    text = next((line.strip() for line in str(reason).splitlines() if line.strip()), type(reason).__name__)
-    printable = "".join(c for c in text if c.isprintable()).rstrip(".;")
-    return printable if len(printable) <= 100 else printable[:97] + "..."
+    return first_line(reason)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from asperity.arrays import Field
+from asperity.dialect import sniff_dialect
 from asperity.errors import UnreadableFile
 
 SUFFIXES = {"txt", "csv", "tsv", "asc", "dat", "xyz", "hfm", "prf"}
-_MISSING = {"", "nan", "na", "bad", "***", "-", "inf", "-inf"}  # how exports write a height that was not measured
 _LONGEST_HEADER = 200  # lines
 
 
@@ -29,11 +29,12 @@ def read_table(path: Path) -> Field:
         raise UnreadableFile(f"{path.name} is not a text file; name it after its format")
     encoding = "utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     lines = [line for line in content.decode(encoding, errors="replace").splitlines() if line.strip()]
-    separator, comma = _dialect(lines)
+    dialect = sniff_dialect([line for line in lines if re.search(r"\d", line)][-100:], fewest_columns=2)
     rows: list[list[float]] = []
     for number, line in enumerate(lines):
-        row = _row(line, separator, comma)
-        if row is None or (not np.isfinite(row).any() and not rows):
+        numbers = [dialect.number(field) for field in dialect.fields(line)]
+        row = [value for value in numbers if value is not None]
+        if len(row) < len(numbers) or (not np.isfinite(row).any() and not rows):
             if rows or number >= _LONGEST_HEADER:
                 raise UnreadableFile(f"{path.name} has no numbers in {line.strip()[:40]!r}; mend or delete that line")
             continue
@@ -45,39 +46,3 @@ def read_table(path: Path) -> Field:
     if not rows:
         raise UnreadableFile(f"{path.name} holds no table of numbers; export it again as text")
     return np.array(rows)
-
-
-def _dialect(lines: list[str]) -> tuple[str | None, bool]:
-    """What stands between the numbers (None: blanks), and whether their decimals follow a comma."""
-    sample = [line for line in lines if re.search(r"\d", line)][-100:]
-    text = "\n".join(sample)
-    for separator in (";", "\t"):
-        if separator in text:
-            return separator, "," in text
-    if '"' in text:
-        return '"', bool(re.search(r'"[^"\n]*,[^"\n]*"(?:[,\s]|$)', text)) and "." not in text
-    if "," not in text:
-        return None, False
-    # 0,5 1,25: numbers with decimal commas between blanks; 0.5,1.25 and 1, 2, 3: commas between numbers
-    between_blanks = all(re.fullmatch(r"\s*[^\s,]*(?:,\d+\S*)?(?:\s+[^\s,]*(?:,\d+\S*)?)+\s*", line) for line in sample)
-    return (None, True) if "." not in text and between_blanks else (",", False)
-
-
-def _row(line: str, separator: str | None, comma: bool) -> list[float] | None:
-    if separator == '"':
-        fields = re.findall(r'"([^"]*)"', line) if '"' in line else line.split(",")
-    else:
-        fields = line.strip().split(separator)
-    values = []
-    for field in fields:
-        text = field.strip().strip('"')
-        if text.lower() in _MISSING:
-            values.append(np.nan)
-            continue
-        try:
-            values.append(float(text.replace(",", ".") if comma else text))
-        except ValueError:
-            return None
-    if separator is not None and values and np.isnan(values[-1]) and not fields[-1].strip():
-        values.pop()  # a separator at the end of the line
-    return values
