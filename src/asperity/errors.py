@@ -1,5 +1,6 @@
 """The errors asperity raises on purpose: each carries one sentence that names the thing, the value and the remedy."""
 
+from collections.abc import Collection
 from typing import Any
 
 
@@ -30,3 +31,9 @@ def require_positive(name: str, value: float, unit: str = "") -> float:
             f"{name} must be positive and finite, got {value:g} {unit}".rstrip() + "; correct its sign or value"
         )
     return value
+
+
+def require_choice(name: str, value: str, known: Collection[str]) -> None:
+    """Say which names are known, unless `value` is one of them."""
+    if value not in known:
+        raise BadInput(f"{name} must be one of {', '.join(known)}, got {value!r}")

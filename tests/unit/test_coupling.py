@@ -1,4 +1,6 @@
-from dataclasses import replace
+import pickle
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -6,6 +8,14 @@ import pytest
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import (
     PRESETS,
+    STIFFNESS_LAWS,
+    HertzForRadian,
+    HertzLine,
+    HertzPoint,
+    LoadedContact,
+    NoiseExcitation,
+    StiffnessLaw,
+    Tangent,
     VibrationModel,
     contact_vibration,
     dry_full_load,
@@ -13,10 +23,11 @@ from asperity.coupling import (
     oscillator,
     preset_choices,
     search_band,
+    vibration_choices,
 )
-from asperity.coupling.model import cutoff_hz
 from asperity.ehl import ContactState
 from asperity.errors import BadInput
+from asperity.quantities import Parameter
 
 CONDITIONS = ContactConditions(
     pair=ElasticPair((207e9, 207e9), (0.3, 0.3)),
@@ -60,9 +71,9 @@ def test_resonance_grows_with_the_sixth_root_of_the_load_share():
 
 
 def test_cutoff_follows_the_area_share():
-    assert cutoff_hz(state(car=1.0), MODEL) == pytest.approx(30.0)
+    assert MODEL.excitation.cutoff_hz(1.0) == pytest.approx(30.0)
     proportional = VibrationModel(mass=0.1, damping_ratio=0.02, cutoff_exponent=1.0, car_reference=0.5)
-    assert cutoff_hz(state(car=0.25), proportional) == pytest.approx(15.0)
+    assert proportional.excitation.cutoff_hz(0.25) == pytest.approx(15.0)
 
 
 def test_band_follows_from_the_contact_alone():
@@ -153,17 +164,55 @@ def test_the_presets_differ_in_what_the_paper_did_and_sound_is_the_default():
     assert sound == MODEL
     assert set(preset_choices("sound")) == set(PRESETS["paper"])
     paper = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
-    assert (paper.rate_hz, paper.filter, paper.coefficient, paper.damping_law) == (
-        10e3,
-        "bilinear",
-        "kept",
-        "hertz-for-radian",
-    )
-    heard = contact_vibration(dry_full_load(CONDITIONS, 2e-6), CONDITIONS, paper)
-    assert heard.oscillator.damping_ratio == pytest.approx(0.02 / (2 * np.pi))
-    assert heard.response.rate_hz == 10e3
-    assert heard.resonance.found
-    assert heard.dynamic_load == pytest.approx(0.002, abs=0.001)  # physics.md section 4: 0.002 F
+    assert (paper.rate_hz, paper.damping_law) == (10e3, HertzForRadian())
+    assert paper.excitation == NoiseExcitation(filter="bilinear", height_of="record", coefficient="kept")
+    vibration = contact_vibration(dry_full_load(CONDITIONS, 2e-6), CONDITIONS, paper)
+    assert vibration.oscillator.damping_ratio == pytest.approx(0.02 / (2 * np.pi))
+    assert vibration.response.rate_hz == 10e3
+    assert vibration.resonance.found
+    assert vibration.dynamic_load == pytest.approx(0.002, abs=0.001)  # physics.md section 4: 0.002 F
+
+
+def test_a_law_is_stated_by_its_name_with_its_parameters_or_is_given_itself():
+    line = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="hertz-line", reference_depth=1e-3)
+    assert line.stiffness_law == HertzLine(1e-3)
+    assert line == VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law=HertzLine(reference_depth=1e-3))
+    assert replace(line, rate_hz=2e5).stiffness_law == HertzLine(1e-3)
+    assert replace(MODEL, filter_order=3).excitation == NoiseExcitation(filter_order=3)
+    assert pickle.loads(pickle.dumps(line)) == line
+    with pytest.raises(TypeError, match="filtre"):
+        VibrationModel(mass=0.1, damping_ratio=0.02, filtre="bilinear")
+
+
+def test_parameters_of_laws_not_in_use_are_kept_for_when_they_are():
+    model = VibrationModel(mass=0.1, damping_ratio=0.02, reference_depth=1e-3, cutoff_exponent=1.0)
+    assert model.stiffness_law == HertzPoint()
+    assert model.with_choices(stiffness_law="tangent").stiffness_law == Tangent(1e-3)
+    surface = model.with_choices(excitation="surface")
+    assert surface.needs_solution
+    assert surface.with_choices(excitation="noise") == model
+    assert model.with_choices(cutoff_exponent=None).excitation == NoiseExcitation()
+    assert model.with_choices(excitation=NoiseExcitation()).excitation == NoiseExcitation()
+
+
+@dataclass(frozen=True)
+class Cushioned(StiffnessLaw):
+    """A law by the recipe of CONTRIBUTING."""
+
+    cushion: Annotated[float, Parameter("N/m", "k")] = 1e6
+    name = "cushioned"
+    asperities_alone = True
+
+    def __call__(self, contact: LoadedContact) -> float:
+        return self.cushion * contact.clr
+
+
+def test_a_new_law_is_a_class_and_a_line_in_its_table(monkeypatch):
+    monkeypatch.setitem(STIFFNESS_LAWS, Cushioned.name, Cushioned)
+    assert vibration_choices()["cushion"] == (float, 1e6, "N/m")
+    model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="cushioned", cushion=2e6)
+    assert oscillator(state(clr=0.5), CONDITIONS, model).stiffness == 1e6
+    assert search_band(CONDITIONS, model)[0] < search_band(CONDITIONS, model)[1]
 
 
 def test_damping_laws_are_eq_5_with_radians_with_hertz_and_a_constant():
@@ -208,6 +257,11 @@ def test_the_excitations_choices_reach_the_noise():
     assert averaged.half_width == pytest.approx(CONDITIONS.hertz.half_widths[0])
     assert averaged.speed == pytest.approx(0.42)
     noise = averaged.source
-    assert (noise.order, noise.filter, noise.height_of, noise.reference_cutoff_hz) == (3, "bilinear", "record", 30.0)
+    assert (noise.filter_order, noise.filter, noise.height_of, noise.reference_cutoff_hz) == (
+        3,
+        "bilinear",
+        "record",
+        30.0,
+    )
     with pytest.raises(BadInput, match="passing_speed"):
         excitation(state(), replace(CONDITIONS, surface_speeds=(1.9, 1.9)), model)

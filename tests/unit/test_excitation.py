@@ -19,7 +19,7 @@ def noise(**choices) -> FilteredNoise:
 def test_density_integrates_to_the_height(filter_name, order, height_as, rms):
     rate = 10e3
     frequency = np.concatenate([np.linspace(0.0, 500.0, 200_001), np.geomspace(500.01, 5000.0, 20_001)])
-    density = noise(filter=filter_name, order=order, height_as=height_as).density(frequency, rate)
+    density = noise(filter=filter_name, filter_order=order, height_as=height_as).density(frequency, rate)
     beyond = density[-1] * 5000.0 if filter_name == "continuous" and order == 1 else 0.0  # f^-2 from 5 kHz on
     assert np.trapezoid(density, frequency) + beyond == pytest.approx(rms**2, rel=1e-4)
 
@@ -64,7 +64,7 @@ def test_a_kept_coefficient_leaves_the_noise_alone_and_a_readjusted_one_the_heig
 
 @pytest.mark.parametrize(
     "choices",
-    [{}, {"order": 1}, {"order": 4}, {"filter": "bilinear"}, {"filter": "bilinear", "order": 3}],
+    [{}, {"filter_order": 1}, {"filter_order": 4}, {"filter": "bilinear"}, {"filter": "bilinear", "filter_order": 3}],
     ids=str,
 )
 def test_records_have_the_expected_spectrum(choices):
@@ -187,7 +187,7 @@ def test_a_wide_patch_silences_the_resonance():
 
 def test_bad_input_is_named():
     with pytest.raises(BadInput, match="order"):
-        noise(order=9)
+        noise(filter_order=9)
     with pytest.raises(BadInput, match="continuous, bilinear"):
         noise(filter="elliptic")
     with pytest.raises(BadInput, match=r"must lie between 1/duration \(30.* got 20"):

@@ -63,7 +63,9 @@ def test_the_contact_line_is_the_oscillators_own_response():
     one = simulate_rig(**SMALL).recordings[0]
     model = VibrationModel(mass=0.1, damping_ratio=0.02)
     spring = replace(_spring(one.crf_hz), damping_ratio=one.damping_ratio)
-    ridden = FilteredNoise(height=one.true_sq_m, cutoff_hz=model.cutoff_reference_hz).profile(4_000_000, 100e3, 3)
+    ridden = FilteredNoise(height=one.true_sq_m, cutoff_hz=model.excitation.cutoff_reference_hz).profile(
+        4_000_000, 100e3, 3
+    )
     seen = power_spectrum(acceleration(spring, ridden), segment=20_000)
     inside = (seen.frequency_hz > 2500) & (seen.frequency_hz < 3700)
     ratio = seen.density[inside] / np.interp(seen.frequency_hz[inside], one.frequency_hz, one.contact_density)

@@ -5,7 +5,6 @@ import pytest
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel, contact_vibration, excitation, oscillator, search_band
-from asperity.coupling.model import cutoff_hz
 from asperity.ehl import ContactState
 from asperity.signals import Signal, power_spectrum
 from asperity.vibration import acceleration
@@ -75,7 +74,7 @@ def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(win
     assert abs(np.mean(errors)) < 0.35 * stated
 
     # CRFA in the continuum, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4 zeta^2)/(4 zeta^2)
-    fc, zeta = cutoff_hz(state, model), 0.02
+    fc, zeta = model.excitation.cutoff_hz(state.car), 0.02
     truth = 4e-12 * 2 * np.sqrt(2) / (np.pi * fc) * (2 * np.pi * fc) ** 4 * (1 + 4 * zeta**2) / (4 * zeta**2)
     relative = np.array([fit.crfa / truth for fit in fits])
     assert np.std(relative) == pytest.approx(np.median([fit.crfa_std / fit.crfa for fit in fits]), rel=0.2)

@@ -4,7 +4,6 @@ A parameter is a quantity where its law gives it a unit, else a plain value. Sec
 a law needs nothing here.
 """
 
-from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from functools import cache, partial
 from typing import Annotated, Any, TypeAlias, cast, get_type_hints
@@ -24,20 +23,19 @@ from asperity.lubricant import LAWS, LawFamily, Lubricant, Solid, Thermal, make_
 from asperity.quantities import parameters
 
 
-def section_fields(law: type, units: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """A dataclass's fields as fields of a section: quantities where they have a unit, else as annotated."""
-    types = get_type_hints(law)
-    units = units or {name: parameter.unit for name, parameter in parameters(law)}
-    section: dict[str, Any] = {}
-    for entry in fields(law):
-        unit = units.get(entry.name)
-        default: Any = ... if entry.default is MISSING else entry.default
-        kind = Annotated[float, amount_in(unit)] if unit else Annotated[types[entry.name], Strict()]
-        if default is None:
-            kind = Annotated[kind | None, OPTIONAL]
-        written = default_amount(default, unit) if unit and isinstance(default, float) else default
-        section[entry.name] = (kind, written)
-    return section
+def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
+    """A parameter as a field of a section: a quantity where it has a unit, else as annotated; MISSING: required."""
+    kind = Annotated[float, amount_in(unit)] if unit else Annotated[kind, Strict()]
+    if default is None:
+        kind = Annotated[kind | None, OPTIONAL]
+    written = default_amount(default, unit) if unit and isinstance(default, float) else default
+    return kind, ... if default is MISSING else written
+
+
+def section_fields(law: type) -> dict[str, Any]:
+    """A dataclass's fields as fields of a section."""
+    types, units = get_type_hints(law), {name: parameter.unit for name, parameter in parameters(law)}
+    return {entry.name: section_field(types[entry.name], entry.default, units[entry.name]) for entry in fields(law)}
 
 
 @cache

@@ -2,39 +2,24 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any, Literal
 
 from pydantic import create_model
 
 from asperity.case.amounts import default_amount
-from asperity.case.laws import section_fields
+from asperity.case.laws import section_field
 from asperity.case.refusals import Section, validated
-from asperity.coupling import PRESETS, VibrationModel, preset_choices
-
-_VIBRATION_UNITS = {
-    "mass": "kg",
-    "damping": "N s/m",
-    "reference_depth": "m",
-    "passing_speed": "m/s",
-    "rate_hz": "Hz",
-    "duration_s": "s",
-    "cutoff_reference_hz": "Hz",
-}
+from asperity.coupling import PRESETS, VibrationModel, preset_choices, vibration_choices
 
 
 def _vibration_key(name: str) -> str:
-    """The key of a field of VibrationModel: in a case, the unit stands beside the value."""
+    """The key of a keyword of VibrationModel: in a case, the unit stands beside the value."""
     return re.sub("_(hz|s)$", "", name)
 
 
 _PRESET: Any = (Literal["sound", "paper"], "sound")
-VibrationSection = create_model(
-    "vibration",
-    __base__=Section,
-    preset=_PRESET,
-    **{_vibration_key(name): kind for name, kind in section_fields(VibrationModel, _VIBRATION_UNITS).items()},
-)
+_FIELDS: dict[str, Any] = {_vibration_key(name): section_field(*choice) for name, choice in vibration_choices().items()}
+VibrationSection = create_model("vibration", __base__=Section, preset=_PRESET, **_FIELDS)
 
 
 def parse_vibration(value: object) -> Any:
@@ -49,9 +34,9 @@ def parse_vibration(value: object) -> Any:
 
 def _preset_table(name: str) -> dict[str, Any]:
     """A preset's choices as a case writes them."""
-    units = _VIBRATION_UNITS
+    units = {key: choice.unit for key, choice in vibration_choices().items()}
     return {
-        _vibration_key(key): default_amount(choice, units[key]) if key in units else choice
+        _vibration_key(key): default_amount(choice, units[key]) if units[key] else choice
         for key, choice in preset_choices(name).items()
     }
 
@@ -65,6 +50,6 @@ def vibration_model(section: Any) -> VibrationModel | None:
     """The vibration model that a section states; None without one."""
     if section is None:
         return None
-    values = {entry.name: getattr(section, _vibration_key(entry.name)) for entry in fields(VibrationModel)}
+    values = {name: getattr(section, _vibration_key(name)) for name in vibration_choices()}
     plain: dict[str, Any] = {name: float(v) if isinstance(v, float) else v for name, v in values.items()}
     return VibrationModel(**plain)

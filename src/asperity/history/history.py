@@ -10,7 +10,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.case import Case
-from asperity.coupling import Vibration, contact_vibration, needs_solution
+from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import ContactState, Memory, step_seconds
 from asperity.history.rows import mean_state
 from asperity.surface import MovingSurfaces
@@ -118,7 +118,7 @@ class History:
         None without [vibration], or where its stiffness or excitation is that of one solved contact.
         """
         model, case = self.case.vibration, self.case
-        if model is None or needs_solution(model):
+        if model is None or model.needs_solution:
             return None
         with case.naming("vibration"):
             return contact_vibration(self.mean_state, case.conditions, model)

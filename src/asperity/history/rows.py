@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.case import Case
-from asperity.coupling import needs_solution, oscillator
+from asperity.coupling import oscillator
 from asperity.ehl import ContactSolution, ContactState, Friction, Snapshot, friction
 from asperity.errors import BadInput
 from asperity.quantities import quantity, read
@@ -47,7 +47,7 @@ class _Step:
     @property
     def resonance_hz(self) -> float:
         model = self.case.vibration
-        if model is None or needs_solution(model):
+        if model is None or model.needs_solution:
             return math.nan
         try:
             return oscillator(self.state, self.case.conditions, model).natural_frequency_hz

@@ -1,4 +1,4 @@
-"""What a mass that rides on a contact hears of its history, without the paper's coupling.
+"""How a mass on a contact vibrates over its history, without the paper's coupling.
 
 The load is held at every step, so that the approach of the bodies is the way that a slow mass would go: it is the
 profile, and the tangent stiffness of the solved contact is the spring. No height from Sq, no cut-off from CAR, no
@@ -7,30 +7,31 @@ sphere's stiffness from CLR; the paper's way stands beside it, on the same histo
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
 from asperity.coupling import (
-    BAND_FACTOR,
     LINEAR_UP_TO,
+    Tangent,
     Vibration,
     VibrationModel,
+    band_about,
     contact_vibration,
     damped_oscillator,
-    needs_solution,
 )
-from asperity.ehl import Scales, solve_contact, tangent_stiffness
+from asperity.ehl import Scales, solve_contact
 from asperity.errors import BadInput, NotConverged
 from asperity.history.history import History
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
-from asperity.wear import FEWEST_LINES, IndicatorMethod, Resonance, contact_resonance, no_resonance
+from asperity.wear import FEWEST_LINES, Resonance, contact_resonance, no_resonance
 
 MOMENTS = 5  # of the settled steps, at which the tangent stiffness is taken
-WAVES = 0.4  # of a passage's steps: the shortest wave that is told has two and a half steps
+WAVES = 0.4  # of a passage's steps: the shortest wave that is resolved has two and a half steps
 RUNG_DOWN = 12.0  # time constants of the oscillator: what is left of the start is e^-12
 SAMPLES_PER_PERIOD = 60.0  # straight lines between samples then cost the resonance 0.2 % of its power
 SILENT = 1e-5  # of a²/R: what the solver's tolerance leaves of the approach is no roughness
@@ -38,7 +39,7 @@ SILENT = 1e-5  # of a²/R: what the solver's tolerance leaves of the approach is
 
 @dataclass(frozen=True, kw_only=True)
 class HistoryVibration:
-    """A history as an accelerometer would hear it.
+    """A history as an accelerometer would record it.
 
     `oscillator` has the mean of `stiffness` [N/m], shape (moments,), the tangent stiffness of the contact as it lies at
     the steps `moments`; steps at which a neighbouring load could not be solved are in `unsolved`. `profile` [m] is
@@ -53,13 +54,13 @@ class HistoryVibration:
     stiffness: Field
     moments: tuple[int, ...]
     unsolved: tuple[int, ...]
-    profile: Signal | None
-    response: Signal | None
-    spectrum: Spectrum | None
     spacing_hz: float | None
-    not_periodic: float | None
     resonance: Resonance
     coupled: Vibration
+    profile: Signal | None = None
+    response: Signal | None = None
+    spectrum: Spectrum | None = None
+    not_periodic: float | None = None
 
     @property
     def dynamic_load(self) -> float | None:
@@ -70,11 +71,11 @@ class HistoryVibration:
 
     def verdict(self) -> str:
         """One sentence: the contact's own resonance, the paper's, and what drives the mass."""
-        said = self.scalars()
-        paper = said["coupled_resonance_hz"]
+        scalars = self.scalars()
+        paper = scalars["coupled_resonance_hz"]
         sentence = (
             f"By its own stiffness, taken at {len(self.moments)} moments, the contact resonates at "
-            f"{said['tangent_resonance_hz']:.0f} ± {said['tangent_resonance_std_hz']:.0f} Hz, "
+            f"{scalars['tangent_resonance_hz']:.0f} ± {scalars['tangent_resonance_std_hz']:.0f} Hz, "
             + ("by the paper's coupling not at all" if paper is None else f"by the paper's coupling at {paper:.0f} Hz")
         )
         force = self.dynamic_load
@@ -117,7 +118,7 @@ def history_vibration(
 
     Parameters
     ----------
-    history : its settled steps are listened to, at least one passage of the rough track
+    history : its settled steps are ridden over, at least one passage of the rough track
     model : mass, damping law, reference depth and indicator; the case's unless given. Its stiffness law and its
         excitation are those of `coupled` only, and the paper's there if they ask for one solved contact
     moments : how many steps, evenly over the settled ones, the tangent stiffness is the mean of
@@ -139,55 +140,54 @@ def history_vibration(
     steps, stiffness, unsolved = _tangents(history, surfaces, model, moments)
     with case.naming("vibration"):
         oscillator = damped_oscillator(float(np.mean(stiffness)), case.conditions.load, model)
-        alone = replace(model, stiffness_law="hertz-point", excitation="noise") if needs_solution(model) else model
+        alone = model
+        if model.needs_solution:
+            alone = model.with_choices(stiffness_law="hertz-point", excitation="noise")
         coupled = contact_vibration(history.mean_state, case.conditions, alone)
-    rows = history.settled
-    period, objection = _period(surfaces)
-    if period is not None:
-        profile, not_periodic, objection = repeating(
-            rows["time_s"].to_numpy(), rows["rigid_approach_m"].to_numpy(), period
-        )
-        if profile is not None and np.std(profile.values) < SILENT * Scales.of(case.conditions, case.lubricant).gap:
-            objection = "the approach of the bodies does not change: there is nothing to excite a vibration"
     f0 = oscillator.natural_frequency_hz
-    if objection is not None or period is None or profile is None:
-        band = f0 / BAND_FACTOR, f0 * BAND_FACTOR
-        return HistoryVibration(
-            oscillator=oscillator,
-            stiffness=stiffness,
-            moments=steps,
-            unsolved=unsolved,
-            profile=None,
-            response=None,
-            spectrum=None,
-            spacing_hz=None if period is None else 1.0 / period,
-            not_periodic=None,
-            resonance=no_resonance(objection or "", band, model.method),
-            coupled=coupled,
-        )
-    profile = resampled(profile, SAMPLES_PER_PERIOD * f0)
-    response = steady_response(oscillator, profile)
-    spectrum = power_spectrum(response, window="boxcar")
-    return HistoryVibration(
+    period, objection = _period(surfaces)
+    profile: Signal | None = None
+    not_periodic: float | None = None
+    if period is not None:
+        profile, not_periodic, objection = _passage(history, period)
+    vibration = HistoryVibration(
         oscillator=oscillator,
         stiffness=stiffness,
         moments=steps,
         unsolved=unsolved,
+        spacing_hz=None if period is None else 1.0 / period,
+        resonance=no_resonance(objection or "", band_about(f0), model.method),
+        coupled=coupled,
+    )
+    if profile is None:
+        return vibration
+    profile = resampled(profile, SAMPLES_PER_PERIOD * f0)
+    response = steady_response(oscillator, profile)
+    spectrum = power_spectrum(response, window="boxcar")
+    return replace(
+        vibration,
         profile=profile,
         response=response,
         spectrum=spectrum,
-        spacing_hz=1.0 / period,
         not_periodic=not_periodic,
         resonance=_resonance(spectrum, f0, model),
-        coupled=coupled,
     )
+
+
+def _passage(history: History, period: float) -> tuple[Signal | None, float | None, str | None]:
+    """What `repeating` makes of the approach of the bodies, unless nothing moves."""
+    rows, case = history.settled, history.case
+    profile, not_periodic, objection = repeating(rows["time_s"].to_numpy(), rows["rigid_approach_m"].to_numpy(), period)
+    if profile is not None and np.std(profile.values) < SILENT * Scales.of(case.conditions, case.lubricant).gap:
+        return None, None, "the approach of the bodies does not change: there is nothing to excite a vibration"
+    return profile, not_periodic, objection
 
 
 def repeating(time: Field, heights: Field, period: float) -> tuple[Signal | None, float, str | None]:
     """One period of what repeats in `heights` [m] at evenly spaced `time` [s], both (steps,), about its mean.
 
     Least squares of the period's waves, so that it need be no whole number of steps. Returns it, what is left of the
-    heights over what they vary by, both root mean square, and why it could not be told (or None).
+    heights over what they vary by, both root mean square, and why there is no period (or None).
     """
     step = (time[-1] - time[0]) / (time.size - 1)
     length = period / step
@@ -197,21 +197,19 @@ def repeating(time: Field, heights: Field, period: float) -> tuple[Signal | None
     waves = int(WAVES * length)
     phase = 2.0 * np.pi * np.outer(time / period, np.arange(1, waves + 1))
     basis = np.hstack([np.ones((time.size, 1)), np.cos(phase), np.sin(phase)])
-    found: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
-    left = float(np.std(heights - basis @ found))
+    coefficients: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
+    left = float(np.std(heights - basis @ coefficients))
     varied = float(np.std(heights))
     samples = math.ceil(length)
     lines = np.zeros(samples // 2 + 1, dtype=complex)
-    lines[1 : waves + 1] = samples / 2.0 * (found[1 : waves + 1] - 1j * found[waves + 1 :])
+    lines[1 : waves + 1] = samples / 2.0 * (coefficients[1 : waves + 1] - 1j * coefficients[waves + 1 :])
     return Signal(np.fft.irfft(lines, samples), samples / period, "m"), left / varied if varied else 0.0, None
 
 
 def resampled(profile: Signal, rate_hz: float) -> Signal:
     """A profile that repeats, at `rate_hz` or faster: its own waves and no others."""
-    import scipy.fft as fft
-
     samples = profile.values.size
-    finer = fft.next_fast_len(max(samples, math.ceil(samples * rate_hz / profile.rate_hz)), real=True)
+    finer = scipy.fft.next_fast_len(max(samples, math.ceil(samples * rate_hz / profile.rate_hz)), real=True)
     lines = np.fft.rfft(profile.values) * (finer / samples)
     if samples % 2 == 0 and finer > samples:
         lines[-1] /= 2.0  # half the sampling rate was one line of two signs
@@ -243,13 +241,13 @@ def _period(surfaces: MovingSurfaces) -> tuple[float | None, str | None]:
 def _tangents(
     history: History, surfaces: MovingSurfaces, model: VibrationModel, moments: int
 ) -> tuple[tuple[int, ...], Field, tuple[int, ...]]:
-    case, rows = history.case, history.settled
+    case, rows, spring = history.case, history.settled, Tangent(model.stated.get("reference_depth"))
     chosen = np.unique(np.linspace(0, len(rows) - 1, moments + 2)[1:-1].round().astype(int))
     solved, stiffness, unsolved = [], [], []
     for number, time in zip(rows["step"].iloc[chosen], rows["time_s"].iloc[chosen], strict=True):
         try:
             contact = solve_contact(case.conditions, case.lubricant, surfaces.at(float(time)), options=case.options)
-            stiffness.append(tangent_stiffness(contact, reference_depth=model.reference_depth).total)
+            stiffness.append(spring.of(contact))
             solved.append(int(number))
         except NotConverged as unfinished:
             failure = unfinished
@@ -263,7 +261,7 @@ def _tangents(
 
 def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonance:
     """Looked for about f0, where the lines are close enough to show one."""
-    band = f0 / BAND_FACTOR, min(f0 * BAND_FACTOR, float(spectrum.frequency_hz[-1]))
+    band = band_about(f0, float(spectrum.frequency_hz[-1]))
     apart = spectrum.spacing_hz
     if (band[1] - band[0]) / apart < FEWEST_LINES + 1:
         least = math.ceil((FEWEST_LINES + 1) * apart / (band[1] - band[0]))
@@ -273,7 +271,7 @@ def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonanc
             band,
             model.method,
         )
-    return contact_resonance(spectrum, band_hz=band, method=cast(IndicatorMethod, model.method))
+    return contact_resonance(spectrum, band_hz=band, method=model.method)
 
 
 def _number(value: float) -> float | None:

@@ -16,7 +16,7 @@ import scipy
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.conditions import ContactConditions
-from asperity.coupling import ASPERITIES_ALONE, VibrationModel, dry_full_load, oscillator, search_band
+from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, oscillator, search_band
 from asperity.ehl import ContactState, contact_state, solve_contact
 from asperity.errors import BadInput, require_positive
 from asperity.files import whole_file
@@ -205,10 +205,11 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
     model = case.vibration
     if model is None:
         raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
-    if model.stiffness_law not in ASPERITIES_ALONE:
+    if not model.stiffness_law.asperities_alone:
         raise BadInput(
             f"{case.source}: a rig's resonance follows the asperities' load, got the stiffness law "
-            f"{model.stiffness_law!r}; take {' or '.join(ASPERITIES_ALONE)}"
+            f"{model.stiffness_law.name!r}; "
+            f"take {' or '.join(name for name, law in STIFFNESS_LAWS.items() if law.asperities_alone)}"
         )
     return case.conditions, model
 

@@ -3,20 +3,19 @@
 Where a single record decides, as in the paper, an ensemble says what that record could have shown.
 """
 
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from asperity.arrays import Field
-from asperity.coupling import VibrationModel, dry_full_load, excitation, oscillator, search_band
+from asperity.coupling import NoiseExcitation, VibrationModel, dry_full_load, excitation, oscillator, search_band
 from asperity.errors import BadInput
 from asperity.paper.contact import papers_contact
 from asperity.paper.numbers import DAMPING_RATIO, MASS, TABLE1_PRINTED
 from asperity.signals import power_spectrum
 from asperity.vibration import ContactOscillator, Excitation, acceleration
-from asperity.wear import IndicatorMethod, contact_resonance
+from asperity.wear import contact_resonance
 
 SHORTEST_TRANSFORM = 16384  # the paper's, it seems: 1.6 s at 10 kHz and the next power of two
 FEWEST_RECORDS = 20
@@ -90,8 +89,10 @@ def riding(model: VibrationModel, cutoff_hz: float, height: float, load: float) 
     """The oscillator under `load` [N], and noise of `height` [m] behind `cutoff_hz` that it rides over."""
     conditions = papers_contact(load)
     state = dry_full_load(conditions, height)
+    noise = model.excitation
+    assert isinstance(noise, NoiseExcitation)  # of either preset
     # CAR is 1: the cut-off is the reference's times (1/CAR_ref)^q
-    law = replace(model, car_reference=model.cutoff_reference_hz / cutoff_hz, cutoff_exponent=1.0)
+    law = model.with_choices(car_reference=noise.cutoff_reference_hz / cutoff_hz, cutoff_exponent=1.0)
     return oscillator(state, conditions, model), excitation(state, conditions, law)
 
 
@@ -104,7 +105,7 @@ def expected_crfa(model: VibrationModel, cutoff_hz: float, height: float, load: 
 
 def continuous_crfa(model: VibrationModel, cutoff_hz: float, height: float, load: float) -> float:
     """The same without sampling: what an accelerometer on the contact itself would find [(m/s^2)^2/Hz]."""
-    spring, ridden_over = riding(replace(model, filter="continuous"), cutoff_hz, height, load)
+    spring, ridden_over = riding(model.with_choices(filter="continuous"), cutoff_hz, height, load)
     f0 = np.array(spring.natural_frequency_hz)
     return float(spring.gain(f0) * ridden_over.density(f0, model.rate_hz))
 
@@ -122,7 +123,7 @@ def _records(model: VibrationModel, cutoff: float, height: float, load: float, r
         else:
             band = search_band(papers_contact(load), model)
             spectrum = power_spectrum(response, window="boxcar")
-            fit = contact_resonance(spectrum, band_hz=band, method=cast(IndicatorMethod, model.method))
+            fit = contact_resonance(spectrum, band_hz=band, method=model.method)
             readings[:, number] = fit.crf_hz, fit.crfa
     return readings
 

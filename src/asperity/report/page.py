@@ -77,7 +77,7 @@ def render_page(runs: Sequence["Run"], *, title: str | None = None) -> str:
             run.solution.lubricant and isinstance(run.solution.lubricant.rheology, Newtonian) for run in runs
         ),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
-        sphere=any(run.case.vibration and run.case.vibration.stiffness_law == "hertz-point" for run in runs),
+        sphere=any(run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs),
         line=any(run.solution.conditions.geometry == "line" for run in runs),
         imbalance=_span([one["mass_flux_imbalance"] for one in scalars]),
         paper=CITATION,
@@ -615,34 +615,13 @@ def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
 def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     if model is None:
         return {"Vibration": "not asked for"}
-    damping = f"damping ratio {model.damping_ratio:.3g}"
-    if model.damping_law == "constant":
-        damping = f"damping {model.damping:.3g} N s/m"
-    elif model.damping_law != "ratio":
-        damping += f" by the law {model.damping_law}"
+    damping = model.damping_law.summary(model.damping_ratio)
     return {
-        "Oscillator": f"mass {model.mass:.4g} kg, {damping}, stiffness law {model.stiffness_law}",
-        "Excitation": _excitation(model),
+        "Oscillator": f"mass {model.mass:.4g} kg, {damping}, stiffness law {model.stiffness_law.name}",
+        "Excitation": f"{model.excitation.summary}{model.patch.summary}, seed {model.seed}",
         "Record": f"{model.duration_s:.4g} s at {model.rate_hz * 1e-3:.4g} kHz; resonance by {model.method}"
         + ("" if model.response == "exact" else f"; response {model.response}"),
     }
-
-
-def _excitation(model: VibrationModel) -> str:
-    """What the mass rides over; the defaults of the noise are not worth a reader's time."""
-    patch = "" if model.patch == "none" else f", averaged over a {model.patch} patch"
-    if model.excitation == "surface":
-        return f"the surface's own spectrum run over{patch}, seed {model.seed}"
-    height = {"rms": "RMS", "ra": "Ra"}[model.height_as]
-    of = "" if model.height_of == "process" else f" of the {model.height_of}"
-    low_pass = "low pass" if model.filter_order == 2 else f"low pass of order {model.filter_order}"
-    if model.filter != "continuous":
-        low_pass = f"{model.filter} {low_pass}"
-    kept = ", coefficient kept" if model.coefficient == "kept" else ""
-    return (
-        f"white noise of {height} height Sq{of} behind a {low_pass} at {model.cutoff_reference_hz:.4g} Hz × "
-        f"(CAR/{model.car_reference:.3g})^{model.cutoff_exponent:.3g}{kept}{patch}, seed {model.seed}"
-    )
 
 
 _UNSAID = {"direction_deg": 0.0, "turn": False, "outliers": "keep"}  # what goes without saying

@@ -48,8 +48,7 @@ def excitation_figure(heard: Vibration, model: VibrationModel) -> Figure:
         _draw_record(a, noise, "(a) white noise, before any coefficient", "height [m]", 1.0, GREY)
         _draw_spectrum(b, noise, "(b) its spectrum", "density [m²/Hz]", GREY)
         b.axhline(2.0 / profile.rate_hz, color="black", linestyle="--", linewidth=1.0, label="2 / rate")
-        name = "filtered" if model.excitation == "noise" else "the surface run over"
-        _draw_record(c, profile, f"(c) profile, {name}", "height [µm]", MICRO, BLUE)
+        _draw_record(c, profile, f"(c) profile, {model.excitation.label}", "height [µm]", MICRO, BLUE)
         _draw_spectrum(d, profile, "(d) its spectrum", "density [m²/Hz]", BLUE)
         if heard.oscillator is not None and heard.expected is not None:
             f = heard.expected.frequency_hz[1:]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.case import Case
-from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load, needs_solution
+from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load
 from asperity.ehl import ContactState, Iteration
 from asperity.errors import BadInput
 from asperity.quantities import lines, quantity, read
@@ -39,14 +39,14 @@ class VibratedCase:
         """One sentence: the resonance, of which contact, and whether its spring may be taken as linear."""
         resonance, model, force = self.resonance, self.case.vibration, self.vibration.dynamic_load
         load = f"{self.case.conditions.load:g} N on asperities"
-        solved = model is not None and needs_solution(model)
+        solved = model is not None and model.needs_solution
         contact = f"solved contact, {100 * self.state.clr:.0f} % of {load}" if solved else f"dry contact, all {load}"
         if not resonance.found:
             return f"No contact resonance ({resonance.reason.rstrip('.')}): {contact}."
         deviation = f" ± {resonance.crf_std_hz:.1f}" if math.isfinite(resonance.crf_std_hz) else ""
         sentence = f"Contact resonance at {resonance.crf_hz:.1f}{deviation} Hz"
         sentence += f", CRFA {resonance.crfa:.3g} (m/s^2)^2/Hz: {contact}"
-        linear = model is not None and model.response != "nonlinear"
+        linear = model is not None and model.linear
         if linear and force is not None and force > LINEAR_UP_TO:
             sentence += (
                 f"; but the dynamic force is {100 * force:.0f} % of the load, too much for a linear spring: "
@@ -71,7 +71,7 @@ def vibrate_case(case: Case, *, progress: Callable[[Iteration], None] | None = N
     model = case.vibration
     if model is None:
         raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
-    if needs_solution(model):
+    if model.needs_solution:
         run = solve_case(case, progress=progress)
         assert run.vibration is not None  # the case has a model
         return VibratedCase(case=case, state=run.state, vibration=run.vibration)

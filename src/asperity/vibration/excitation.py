@@ -4,19 +4,22 @@ Two sources, filtered noise (the paper's section 2.2) and a surface's own spectr
 patch that averages either. Which of them a contact rides over is for `asperity.coupling` to say.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput, require_choice, require_positive
 from asperity.signals import Signal
 from asperity.surface import Surface
 
-FILTERS = ("continuous", "bilinear")
-HEIGHTS_AS = ("rms", "ra")
-HEIGHTS_OF = ("process", "record", "noise")
+FilterName: TypeAlias = Literal["continuous", "bilinear"]
+HeightAs: TypeAlias = Literal["rms", "ra"]
+HeightOf: TypeAlias = Literal["process", "record", "noise"]
+PatchShape: TypeAlias = Literal["line", "point"]
 RA_TO_RMS = float(np.sqrt(np.pi / 2.0))  # of Gaussian heights
 HIGHEST_ORDER = 8
 
@@ -33,35 +36,59 @@ class Excitation(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FilteredNoise:
+@dataclass(frozen=True, kw_only=True)
+class NoiseFilter:
+    """A Butterworth low pass, and what of the noise has the stated height.
+
+    Parameters
+    ----------
+    filter : "continuous", the process sampled without error; "bilinear", the digital filter of the same name, started
+        from rest: what the paper must have used. It has no power left at rate/2, so a resonance near there is starved
+    filter_order : the paper names none, 2 reproduces its Table 1
+    height_as : "rms" or "ra", the mean absolute height
+    height_of : what has that height. "process": the filtered noise at large, so that one record scatters about it.
+        "record": this very record is scaled to it; chance in the few slow waves of a record then passes to every other
+        frequency. "noise": the noise before the filter, sample by sample; what is left behind depends on the rate
+
+    Raises
+    ------
+    BadInput
+        for an order out of range or a name that is not known.
+    """
+
+    filter: FilterName = "continuous"
+    filter_order: int = 2
+    height_as: HeightAs = "rms"
+    height_of: HeightOf = "process"
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.filter_order <= HIGHEST_ORDER:
+            raise BadInput(
+                f"filter order must lie between 1 and {HIGHEST_ORDER}, got {self.filter_order}; 2 is the default"
+            )
+        require_choice("filter", self.filter, get_args(FilterName))
+        require_choice("height_as", self.height_as, get_args(HeightAs))
+        require_choice("height_of", self.height_of, get_args(HeightOf))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilteredNoise(NoiseFilter):
     """Gaussian white noise behind a Butterworth low pass.
 
     Parameters
     ----------
     height, cutoff_hz : of the profile [m], of the filter [Hz]
-    order : of the filter; the paper names none, 2 reproduces its Table 1
-    filter : "continuous", the process sampled without error; "bilinear", the digital filter of the same name, started
-        from rest: what the paper must have used. It has no power left at rate/2, so a resonance near there is starved
-    height_as : "rms" or "ra", the mean absolute height
-    height_of : what has that height. "process": the filtered noise at large, so that one record scatters about it.
-        "record": this very record is scaled to it; chance in the few slow waves of a record then passes to every other
-        frequency. "noise": the noise before the filter, sample by sample; what is left behind depends on the rate
     reference_cutoff_hz : the cut-off [Hz] at which the noise's coefficient is set so that the height comes out, and
         then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at each cut-off, ^3
 
     Raises
     ------
     BadInput
-        for a quantity out of range or a name that is not known.
+        for a quantity out of range.
     """
 
     height: float
     cutoff_hz: float
-    order: int = 2
-    filter: str = "continuous"
-    height_as: str = "rms"
-    height_of: str = "process"
     reference_cutoff_hz: float | None = None
 
     def __post_init__(self) -> None:
@@ -69,7 +96,7 @@ class FilteredNoise:
         require_positive("profile cut-off", self.cutoff_hz, "Hz")
         if self.reference_cutoff_hz is not None:
             require_positive("reference cut-off", self.reference_cutoff_hz, "Hz")
-        require_filter(self.order, self.filter, self.height_as, self.height_of)
+        super().__post_init__()
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
         """White noise times |H|^2 [m^2/Hz]; without a rescaling of the record the exact expectation.
@@ -82,7 +109,7 @@ class FilteredNoise:
             warped, corner = np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5)), np.tan(np.pi * cutoff / rate_hz)
         else:
             warped, corner = frequency, cutoff
-        return np.asarray(self._white_density(rate_hz) / (1.0 + (warped / corner) ** (2 * self.order)))
+        return np.asarray(self._white_density(rate_hz) / (1.0 + (warped / corner) ** (2 * self.filter_order)))
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
         """Record of `samples` heights [m].
@@ -103,8 +130,8 @@ class FilteredNoise:
         if self.height_of == "record":
             kept = self.reference_cutoff_hz
             judged = heights if kept is None else self._filtered(kept, samples, rate_hz, seed)
-            found = np.std(judged) if self.height_as == "rms" else np.mean(np.abs(judged - np.mean(judged)))
-            heights *= self.height / float(found)
+            height = np.std(judged) if self.height_as == "rms" else np.mean(np.abs(judged - np.mean(judged)))
+            heights *= self.height / float(height)
         return Signal(heights, rate_hz, "m")
 
     @property
@@ -119,17 +146,16 @@ class FilteredNoise:
 
     def _noise_bandwidth(self, cutoff: float, rate_hz: float) -> float:
         """∫|H|^2 df [Hz]: fc (π/2n) / sin(π/2n), or over the warped axis."""
-        quarter = np.pi / (2.0 * self.order)
+        quarter = np.pi / (2.0 * self.filter_order)
         if self.filter == "continuous":
             return float(cutoff * quarter / np.sin(quarter))
         _require_below_half(cutoff, rate_hz)
-        from scipy.integrate import quad
-
         corner = np.tan(np.pi * cutoff / rate_hz)
 
         def integrand(t: float) -> float:  # t = tan(π f/rate) over the corner's
-            return float(1.0 / ((1.0 + (t * corner) ** 2) * (1.0 + t ** (2 * self.order))))
+            return float(1.0 / ((1.0 + (t * corner) ** 2) * (1.0 + t ** (2 * self.filter_order))))
 
+        quad = scipy.integrate.quad
         area = quad(integrand, 0.0, 1.0)[0] + quad(lambda u: integrand(1.0 / u) / u**2, 0.0, 1.0)[0]
         return float(rate_hz / np.pi * corner * area)
 
@@ -137,11 +163,10 @@ class FilteredNoise:
         """Noise behind the filter at `cutoff`, of the expected height before any rescaling of the record."""
         white_density = self._white_density(rate_hz)
         if self.filter == "bilinear":
-            from scipy.signal import butter, sosfilt
-
+            sections = scipy.signal.butter(self.filter_order, cutoff, fs=rate_hz, output="sos")
             white = white_noise(samples, seed) * np.sqrt(white_density * rate_hz / 2.0)
-            return np.asarray(sosfilt(butter(self.order, cutoff, fs=rate_hz, output="sos"), white))
-        if self.order == 2:
+            return np.asarray(scipy.signal.sosfilt(sections, white))
+        if self.filter_order == 2:
             rms = float(np.sqrt(white_density * self._noise_bandwidth(cutoff, rate_hz)))
             return _butterworth_noise(samples, cutoff / rate_hz, rms, seed)
         source = replace(self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz)
@@ -151,19 +176,6 @@ class FilteredNoise:
 def white_noise(samples: int, seed: int) -> Field:
     """Independent Gaussian samples of variance 1: what a digital filter of that seed is fed, the paper's Fig 3a."""
     return np.random.default_rng(seed).standard_normal(samples)
-
-
-def require_filter(order: int, filter_name: str, height_as: str, height_of: str) -> None:
-    """Say which of a noise filter's choices is not known."""
-    if not 1 <= order <= HIGHEST_ORDER:
-        raise BadInput(f"filter order must lie between 1 and {HIGHEST_ORDER}, got {order}; 2 is the default")
-    for name, value, known in (
-        ("filter", filter_name, FILTERS),
-        ("height_as", height_as, HEIGHTS_AS),
-        ("height_of", height_of, HEIGHTS_OF),
-    ):
-        if value not in known:
-            raise BadInput(f"{name} must be one of {', '.join(known)}, got {value!r}")
 
 
 def _require_below_half(cutoff: float, rate_hz: float) -> None:
@@ -190,13 +202,11 @@ class SurfaceTrack:
     @classmethod
     def of(cls, surface: Surface, speed: float) -> "SurfaceTrack":
         """The mean spectrum of the surface's cuts along rolling, Hann-tapered: line width 1.5 over the length."""
-        from scipy.signal import periodogram
-
         if surface.sq == 0.0:
             raise BadInput("a flat surface excites nothing; give it a roughness, or take filtered noise")
         heights = surface.heights - np.mean(surface.heights)
         spacing = surface.grid.spacing[0]
-        wavenumber, spectra = periodogram(heights, 1.0 / spacing, "hann", detrend=False, axis=0)
+        wavenumber, spectra = scipy.signal.periodogram(heights, 1.0 / spacing, "hann", detrend=False, axis=0)
         return cls(wavenumber=wavenumber, spectrum=np.mean(spectra, axis=1), speed=speed)
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:  # noqa: ARG002 - the same at any rate
@@ -211,22 +221,21 @@ class SurfaceTrack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchAverage:
-    """An excitation as the contact patch feels it: averaged with the weight of Hertz's pressure.
+    """An excitation averaged over the contact patch, with the weight of Hertz's pressure.
 
     Waves of k = 2π f/v run across the patch of half-width a [m]: their height shrinks by 2 J1(ka)/(ka) in a line
     contact (`shape` "line"), by 3 (sin ka - ka cos ka)/(ka)^3 in a round one ("point").
     """
 
     source: Excitation
-    shape: str
+    shape: PatchShape
     half_width: float
     speed: float
 
     def __post_init__(self) -> None:
         require_positive("half-width of the contact patch", self.half_width, "m")
         require_positive("speed at which the surface passes", self.speed, "m/s")
-        if self.shape not in PATCHES:
-            raise BadInput(f"contact patch must be one of {', '.join(PATCHES)}, got {self.shape!r}")
+        require_choice("contact patch", self.shape, PATCHES)
 
     def weight(self, frequency_hz: Field) -> Field:
         """What is left of a wave's height, 1 at 0 Hz, sign included."""
@@ -239,31 +248,25 @@ class PatchAverage:
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
         """The source's record, averaged [m]."""
-        import scipy.fft as fft
-
-        reach = int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64  # so that no end is felt
+        reach = int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64  # beyond the reach of either end
         heights = self.source.profile(samples + 2 * reach, rate_hz, seed).values
-        length = fft.next_fast_len(heights.size, real=True)
-        weight = self.weight(fft.rfftfreq(length, 1.0 / rate_hz))
-        averaged = fft.irfft(fft.rfft(heights, length) * weight, length)
+        length = scipy.fft.next_fast_len(heights.size, real=True)
+        weight = self.weight(scipy.fft.rfftfreq(length, 1.0 / rate_hz))
+        averaged = scipy.fft.irfft(scipy.fft.rfft(heights, length) * weight, length)
         return Signal(np.ascontiguousarray(averaged[reach : reach + samples]), rate_hz, "m")
 
 
 def _line_patch(ka: Field) -> Field:
-    from scipy.special import j1
-
     safe = np.maximum(ka, 1e-6)
-    return np.asarray(2.0 * j1(safe) / safe)
+    return np.asarray(2.0 * scipy.special.j1(safe) / safe)
 
 
 def _point_patch(ka: Field) -> Field:
-    from scipy.special import spherical_jn
-
     safe = np.maximum(ka, 1e-6)
-    return np.asarray(3.0 * spherical_jn(1, safe) / safe)
+    return np.asarray(3.0 * scipy.special.spherical_jn(1, safe) / safe)
 
 
-PATCHES = {"line": _line_patch, "point": _point_patch}
+PATCHES: dict[PatchShape, Callable[[Field], Field]] = {"line": _line_patch, "point": _point_patch}
 
 
 def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
@@ -271,16 +274,13 @@ def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> 
 
     What is left is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
     """
-    import scipy.fft as fft
-
-    length = fft.next_fast_len(samples + samples // 4, real=True)
-    frequency = fft.rfftfreq(length, 1.0 / rate_hz)
+    length = scipy.fft.next_fast_len(samples + samples // 4, real=True)
+    frequency = scipy.fft.rfftfreq(length, 1.0 / rate_hz)
     density = source.density(frequency, rate_hz)
-    rng = np.random.default_rng(seed)
-    waves = rng.standard_normal(2 * frequency.size).view(complex)
+    waves = white_noise(2 * frequency.size, seed).view(complex)
     waves *= np.sqrt(density * (rate_hz * length / 4.0))
     waves[0] = 0.0
-    return np.ascontiguousarray(fft.irfft(waves, length, overwrite_x=True)[:samples])
+    return np.ascontiguousarray(scipy.fft.irfft(waves, length, overwrite_x=True)[:samples])
 
 
 def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:
@@ -288,12 +288,9 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
 
     State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan 1978): y is an ARMA(2, 1) series of one white noise.
     """
-    from scipy.linalg import expm
-    from scipy.signal import lfilter
-
     omega = 2.0 * np.pi * cutoff
     drift = np.array([[0.0, 1.0], [-(omega**2), -np.sqrt(2.0) * omega]])
-    exponential = expm(np.block([[-drift, np.diag([0.0, 1.0])], [np.zeros((2, 2)), drift.T]]))
+    exponential = scipy.linalg.expm(np.block([[-drift, np.diag([0.0, 1.0])], [np.zeros((2, 2)), drift.T]]))
     step = exponential[2:, 2:].T
     noise = step @ exponential[:2, 2:]
     # y_n - tr(A) y_(n-1) + det(A) y_(n-2) = e1_(n-1) + (A12 e2 - A22 e1)_(n-2): its variance, neighbour covariance ...
@@ -306,6 +303,6 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
     denominator = np.array([1.0, -np.trace(step), np.linalg.det(step)])
 
     settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))  # 12 time constants: what is left of the start is e^-12
-    white = np.random.default_rng(seed).standard_normal(settling + samples)
+    white = white_noise(settling + samples, seed)
     to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)  # unit white noise would have variance 1 / (2 √2 ω^3)
-    return np.asarray(to_rms * lfilter(numerator, denominator, white)[settling:])
+    return np.asarray(to_rms * scipy.signal.lfilter(numerator, denominator, white)[settling:])

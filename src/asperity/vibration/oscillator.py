@@ -7,14 +7,18 @@ docs/theory/vibration.md sets every equation beside its function and its test.
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
+import scipy
 
 from asperity.arrays import Field, Mask
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput, require_choice, require_positive
 from asperity.signals import Signal, Spectrum
 
-RESPONSE_METHODS = ("exact", "rk5", "nonlinear")
+ResponseMethod: TypeAlias = Literal["exact", "rk5", "nonlinear"]
+RESPONSE_METHODS: tuple[ResponseMethod, ...] = get_args(ResponseMethod)
+SUBSTEPS = 8  # between two samples: at three samples a period 1e-5 off
 LONGEST_STEP = 0.8  # of 1/ω0: one step of 1e-4 s a sample, as the paper's would be, diverges from 200 N up
 
 
@@ -85,9 +89,9 @@ class ContactOscillator:
 
     def _recursion(self, rate_hz: float, read: Field) -> tuple[Field, Field]:
         """Denominator and numerator of the filter from the profile's kinks to read · (r, r'); see `_exact`."""
-        from scipy.linalg import expm
-
-        step = expm(np.array([[0.0, 1.0], [-self.stiffness / self.mass, -self.damping / self.mass]]) / rate_hz)
+        step = scipy.linalg.expm(
+            np.array([[0.0, 1.0], [-self.stiffness / self.mass, -self.damping / self.mass]]) / rate_hz
+        )
         determinant = float(step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0])
         denominator = np.array([1.0, -(step[0, 0] + step[1, 1]), determinant])
         # read (zI - step)^-1 step (0, 1), with Cayley-Hamilton for step^2, and half a jump passed straight on
@@ -103,7 +107,7 @@ def require_damping_ratio(damping_ratio: float) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class MassMotion:
     """How the mass moves, at the samples of the profile, shape (samples,).
 
     `compression` of the spring beyond its static one, y_i - y [m]; `displacement` y [m]; `velocity` y' [m/s];
@@ -123,7 +127,9 @@ class Motion:
         return float(1.0 - np.mean(self.in_contact))
 
 
-def acceleration(oscillator: ContactOscillator, profile: Signal, *, method: str = "exact", substeps: int = 8) -> Signal:
+def acceleration(
+    oscillator: ContactOscillator, profile: Signal, *, method: ResponseMethod = "exact", substeps: int = SUBSTEPS
+) -> Signal:
     """Acceleration of the mass [m/s^2] at the samples of `profile` [m]; at first the mass moves along with the profile.
 
     Parameters
@@ -149,7 +155,9 @@ def acceleration(oscillator: ContactOscillator, profile: Signal, *, method: str 
     return Signal(moved.acceleration, profile.rate_hz, "m/s^2")
 
 
-def mass_motion(oscillator: ContactOscillator, profile: Signal, *, method: str = "exact", substeps: int = 8) -> Motion:
+def mass_motion(
+    oscillator: ContactOscillator, profile: Signal, *, method: ResponseMethod = "exact", substeps: int = SUBSTEPS
+) -> MassMotion:
     """Displacement, velocity and acceleration of the mass: the paper's Fig 4; arguments as for `acceleration`."""
     _check(profile, method)
     slopes: Field = np.diff(profile.values) * profile.rate_hz
@@ -161,7 +169,7 @@ def mass_motion(oscillator: ContactOscillator, profile: Signal, *, method: str =
         touching = np.ones(compression.size, dtype=bool)
     else:
         compression, velocity, pushed, touching = _runge_kutta(oscillator, profile.rate_hz, slopes, method, substeps)
-    return Motion(
+    return MassMotion(
         compression=compression,
         displacement=profile.values - compression,
         velocity=velocity,
@@ -170,9 +178,8 @@ def mass_motion(oscillator: ContactOscillator, profile: Signal, *, method: str =
     )
 
 
-def _check(profile: Signal, method: str) -> None:
-    if method not in RESPONSE_METHODS:
-        raise BadInput(f"response method must be one of {', '.join(RESPONSE_METHODS)}, got {method!r}")
+def _check(profile: Signal, method: ResponseMethod) -> None:
+    require_choice("response method", method, RESPONSE_METHODS)
     if profile.unit != "m":
         raise BadInput(f"a profile must be in m, got {profile.unit!r}; convert its heights")
     if not np.isfinite(profile.values).all():
@@ -185,22 +192,20 @@ def _exact(oscillator: ContactOscillator, profile: Signal, read: Field) -> Field
     Between samples r'' = -(C r' + S r)/m, free; at each sample the profile's slope, and r' with it, jumps by d. So
     x⁺ = e^(Fh) (x + (0, d)) with x = (r, r'), read in the middle of the jump.
     """
-    from scipy.signal import lfilter
-
     denominator, numerator = oscillator._recursion(profile.rate_hz, read)
     jumps = np.zeros(profile.values.size)
     jumps[1:-1] = np.diff(profile.values, 2) * profile.rate_hz
-    return np.asarray(lfilter(numerator, denominator, jumps))
+    return np.asarray(scipy.signal.lfilter(numerator, denominator, jumps))
 
 
 def _runge_kutta(
-    oscillator: ContactOscillator, rate_hz: float, slopes: Field, method: str, substeps: int
+    oscillator: ContactOscillator, rate_hz: float, slopes: Field, method: ResponseMethod, substeps: int
 ) -> tuple[Field, Field, Field, Mask]:
     """Compression beyond the static one, velocity, acceleration, and whether the mass touches."""
     from asperity.kernels.oscillator import Contact, ride
 
     if substeps < 1:
-        raise BadInput(f"Runge-Kutta needs at least 1 sub-step, got {substeps}; 8 is the default")
+        raise BadInput(f"Runge-Kutta needs at least 1 sub-step, got {substeps}; {SUBSTEPS} is the default")
     swing = oscillator.angular_frequency / rate_hz
     if swing / substeps > LONGEST_STEP:
         raise BadInput(

@@ -1,0 +1,137 @@
+"""The vibration of a contact: ride over it, record the acceleration, look for its resonance."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from asperity.conditions import ContactConditions
+from asperity.coupling.band import band_about, require_sampling, search_band
+from asperity.coupling.laws import LoadedContact
+from asperity.coupling.model import VibrationModel
+from asperity.coupling.spring import oscillator
+from asperity.ehl import ContactSolution, ContactState
+from asperity.errors import NotConverged
+from asperity.signals import Signal, Spectrum, power_spectrum
+from asperity.vibration import ContactOscillator, Excitation, acceleration, expected_spectrum, mass_motion
+from asperity.wear import Resonance, contact_resonance, no_resonance
+
+LINEAR_UP_TO = 0.2  # rms dynamic force over load; the CRF is then 0.4 % lower than the linear spring's
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vibration:
+    """The vibration of a mass on a contact.
+
+    `resonance` was searched in `band_hz`, which follows from the contact alone; `full_load_crf_hz` is the resonance
+    with all load on asperities [Hz]. `profile` [m], `response` [m/s^2] and its `spectrum` are the record; `expected`
+    is what `spectrum` scatters about, in closed form (of the linear spring), and `expected_crfa` its continuous height
+    at the oscillator's own frequency [(m/s^2)^2/Hz]. `dynamic_load` is the rms dynamic force over the spring's load
+    (above 0.2 a linear spring misleads), `contact_loss` the share of the time in the air. When no asperity touches
+    there is no spring and no record: all of these are None and `resonance.reason` says so.
+    """
+
+    resonance: Resonance
+    band_hz: tuple[float, float]
+    full_load_crf_hz: float
+    oscillator: ContactOscillator | None = None
+    profile: Signal | None = None
+    response: Signal | None = None
+    spectrum: Spectrum | None = None
+    expected: Spectrum | None = None
+    expected_crfa: float | None = None
+    dynamic_load: float | None = None
+    contact_loss: float | None = None
+
+
+def excitation(
+    state: ContactState,
+    conditions: ContactConditions,
+    model: VibrationModel,
+    *,
+    solution: ContactSolution | None = None,
+) -> Excitation:
+    """What passes under the mass, by the model's excitation and averaged over its patch.
+
+    Raises
+    ------
+    BadInput
+        for a flat surface, noise behind a contact without touching asperities, roughness that has to pass at a speed
+        and does not, a surface that is not known because there is no solution.
+    """
+    contact = LoadedContact(state.clr, state, conditions, solution)
+    return model.patch(model.excitation(contact), contact)
+
+
+def contact_vibration(
+    state: ContactState,
+    conditions: ContactConditions,
+    model: VibrationModel,
+    *,
+    solution: ContactSolution | None = None,
+) -> Vibration:
+    """Ride over the contact, record the acceleration and look for its resonance.
+
+    Parameters
+    ----------
+    state, conditions, model : the contact, as scalars, and how it vibrates
+    solution : the solved contact, for the stiffness law "tangent" and the excitation "surface"
+
+    Raises
+    ------
+    BadInput
+        for a sampling rate below `samples_per_period` times the full-load resonance, or what `oscillator`,
+        `excitation` and its records refuse.
+    """
+    full_load_crf_hz = require_sampling(conditions, model, state.sq)
+    objection, spring = _objection(state, model), None
+    if objection is None:
+        try:
+            spring = oscillator(state, conditions, model, solution=solution)
+        except NotConverged as unfinished:
+            objection = f"the tangent stiffness takes neighbouring loads, and at one of them: {unfinished}"
+    if model.stiffness_law.asperities_alone:
+        band_hz = search_band(conditions, model)
+    else:
+        band_hz = band_about(full_load_crf_hz if spring is None else spring.natural_frequency_hz, model.rate_hz / 2.0)
+    if spring is None:
+        return Vibration(
+            resonance=no_resonance(objection or "", band_hz, model.method),
+            band_hz=band_hz,
+            full_load_crf_hz=full_load_crf_hz,
+        )
+    below = excitation(state, conditions, model, solution=solution)
+    profile = below.profile(round(model.duration_s * model.rate_hz), model.rate_hz, model.seed)
+    response, contact_loss = _response(spring, profile, model)
+    spectrum = power_spectrum(response, window="boxcar")
+    heights = below.density(spectrum.frequency_hz, model.rate_hz)
+    f0 = np.array(spring.natural_frequency_hz)
+    return Vibration(
+        resonance=contact_resonance(spectrum, band_hz=band_hz, method=model.method),
+        band_hz=band_hz,
+        full_load_crf_hz=full_load_crf_hz,
+        oscillator=spring,
+        profile=profile,
+        response=response,
+        spectrum=spectrum,
+        expected=expected_spectrum(spring, replace(spectrum, density=heights, unit="m^2/Hz"), rate_hz=model.rate_hz),
+        expected_crfa=float(spring.gain(f0) * below.density(f0, model.rate_hz)),
+        dynamic_load=float(model.mass * np.std(response.values) / (spring.load or conditions.load)),
+        contact_loss=contact_loss,
+    )
+
+
+def _objection(state: ContactState, model: VibrationModel) -> str | None:
+    """Why there can be no resonance, where that is known beforehand."""
+    if state.sq == 0.0:
+        return "the surfaces are flat: there is no roughness to excite a vibration"
+    if state.clr == 0.0 and model.stiffness_law.asperities_alone:
+        return "no asperity carries load: the oil separates the surfaces, and there is no contact spring to resonate"
+    return model.excitation.objection(state)
+
+
+def _response(spring: ContactOscillator, profile: Signal, model: VibrationModel) -> tuple[Signal, float]:
+    """Acceleration of the mass [m/s^2], and the share of the time in which it touches nothing."""
+    if model.linear:
+        return acceleration(spring, profile, method=model.response, substeps=model.substeps), 0.0
+    motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
+    return Signal(motion.acceleration, profile.rate_hz, "m/s^2"), motion.contact_loss

@@ -1,0 +1,39 @@
+"""The mass on the contact's spring, by a model's laws."""
+
+from asperity.conditions import ContactConditions
+from asperity.coupling.laws import LoadedContact, StiffnessLaw
+from asperity.coupling.model import VibrationModel
+from asperity.ehl import ContactSolution, ContactState
+from asperity.errors import require_positive
+from asperity.vibration import ContactOscillator, require_damping_ratio
+
+
+def oscillator(
+    state: ContactState,
+    conditions: ContactConditions,
+    model: VibrationModel,
+    *,
+    solution: ContactSolution | None = None,
+) -> ContactOscillator:
+    """The mass on the contact spring, by the model's stiffness and damping laws.
+
+    Raises BadInput when the law's spring is that of the asperities and they carry nothing, or when it needs the solved
+    contact and there is none.
+    """
+    if model.stiffness_law.asperities_alone:
+        require_positive("load share of the asperities (CLR)", state.clr)
+    return loaded_oscillator(model.stiffness_law, LoadedContact(state.clr, state, conditions, solution), model)
+
+
+def loaded_oscillator(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> ContactOscillator:
+    """The model's mass and damping on the spring that `law` makes of a contact."""
+    load = contact.asperity_load if law.asperities_alone else contact.conditions.load
+    return damped_oscillator(law(contact), load, model)
+
+
+def damped_oscillator(stiffness: float, load: float, model: VibrationModel) -> ContactOscillator:
+    """The model's mass and damping on a spring of `stiffness` [N/m] that carries `load` [N]."""
+    ratio = model.damping_law(mass=model.mass, stiffness=stiffness, damping_ratio=model.damping_ratio)
+    return ContactOscillator(
+        mass=model.mass, stiffness=stiffness, damping_ratio=require_damping_ratio(ratio), load=load
+    )
