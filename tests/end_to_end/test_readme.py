@@ -1,0 +1,61 @@
+"""What README shows is what happens: its first commands, and its Python."""
+
+import io
+import os
+import re
+import shlex
+import shutil
+from contextlib import redirect_stdout
+
+import pytest
+
+from support.pages import read
+from support.source import ROOT
+
+README = read(ROOT / "README.md")
+# Another processor sums in another order, see test_golden_numbers; nothing but 0 demands every digit.
+TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+def same(printed: str, shown: str) -> bool:
+    """The same words, and numbers within the tolerance or one in the last digit."""
+    if TOLERANCE == 0.0:
+        return printed == shown
+    pairs = zip(NUMBER.findall(printed), NUMBER.findall(shown), strict=False)
+    near = (float(a) == pytest.approx(float(b), rel=TOLERANCE, abs=1.01 * last_digit(b)) for a, b in pairs)
+    return NUMBER.sub("", printed) == NUMBER.sub("", shown) and all(near)
+
+
+def last_digit(number: str) -> float:
+    return 10.0 ** -len(number.partition(".")[2])
+
+
+def test_the_first_commands_print_the_verdict_that_is_shown(asp):
+    shutil.copytree(ROOT / "examples", "examples")
+    commands, verdict = next(
+        (block, after)
+        for block, after in zip(README.blocks, README.blocks[1:], strict=False)
+        if (block.language, after.language) == ("sh", "")
+    )
+    solve, report = commands.text.splitlines()
+    code, out, _ = asp(*shlex.split(solve)[1:])
+    assert code == 0
+    assert same(out.splitlines()[0], verdict.text.strip())
+    assert asp(*shlex.split(report)[1:])[0] == 0
+
+
+def test_the_python_prints_what_is_shown():
+    (block,) = (block for block in README.blocks if block.language == "python")
+    after = next(line.text for line in README.prose if line.number > block.line.number and "This prints" in line.text)
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        exec(compile(block.text, "README.md", "exec"), {})
+    assert same(printed.getvalue().strip(), re.search(r"`([^`]+)`", after)[1])
+
+
+def test_a_difference_is_seen():
+    shown = "CLR 0.822, CRF 3711 Hz"
+    assert same(shown, shown)
+    assert not same("CLR 0.832, CRF 3711 Hz", shown)
+    assert not same("CAR 0.822, CRF 3711 Hz", shown)
