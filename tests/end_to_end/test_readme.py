@@ -1,4 +1,4 @@
-"""What README shows is what happens: its first commands, and its Python."""
+"""What README and docs/case-file.md show is what happens: first commands, Python, refusals."""
 
 import io
 import os
@@ -52,6 +52,14 @@ def test_the_python_prints_what_is_shown():
     with redirect_stdout(printed):
         exec(compile(block.text, "README.md", "exec"), {})
     assert same(printed.getvalue().strip(), re.search(r"`([^`]+)`", after)[1])
+
+
+REFUSED = ('contact.lod="400 N"', "lubricant.viscosity.law=baruss", "contact.radius=5.4", 'contact.load="-5 N"')
+
+
+def test_refusals_are_those_that_are_shown(asp):
+    *_, shown = (block for block in read(ROOT / "docs" / "case-file.md").blocks if not block.language)
+    assert [asp("solve", "case.toml", "--set", mistake)[2].strip() for mistake in REFUSED] == shown.text.splitlines()
 
 
 def test_a_difference_is_seen():
