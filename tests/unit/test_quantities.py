@@ -1,9 +1,10 @@
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated
 
 import pytest
 
 from asperity.quantities import NO_VALUE, Parameter, catalogue, parameters, quantity, select, with_deviation
+from asperity.surface import ProfileParameters, SurfaceParameters
 
 
 def test_every_line_is_whole():
@@ -63,3 +64,10 @@ def test_a_law_says_unit_and_symbol_beside_its_parameters():
         z: float
 
     assert dict(parameters(Law)) == {"eta0": Parameter("Pa s", "η₀"), "z": Parameter()}
+
+
+def test_every_parameter_of_a_surface_is_in_the_catalogue():
+    for kind, group in ((SurfaceParameters, "surface"), (ProfileParameters, "profile")):
+        names = {entry.name.rstrip("_") for entry in fields(kind)} - {"sq"}  # the contact's Sq too
+        keys = {entry.key.removesuffix("_m") for entry in select(group, detail=True)} - {"pixel", "size"}
+        assert names == keys

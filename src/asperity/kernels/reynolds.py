@@ -145,6 +145,15 @@ def net_outflow(
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def _through_north(faces: Faces, pressure: Field, d_pressure: Field, d_log: Field, i: int, j: int, jn: int) -> float:
+    """Linearised Poiseuille flow from cell (i, j) to (i, jn)."""
+    d_face = faces.north_by_own[i, j] * d_log[j] + faces.north_by_next[i, j] * d_log[jn]
+    d_flow = faces.north[i, j] * (d_pressure[i, j] - d_pressure[i, jn])
+    flow: float = d_flow + d_face * (pressure[i, j] - pressure[i, jn])
+    return flow
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def jacobian_product(
     rows: Rows,
     film: Film,
@@ -165,8 +174,7 @@ def jacobian_product(
     real = pressure.dtype.type
     dx, dy = spacing
     half, over_dx, over_dy2, kept = real(0.5), real(1.0 / dx), real(1.0 / (dy * dy)), real(storing)
-    touching = real(rows.contact_scale)
-    state, scale = rows.state, rows.fluid_scale
+    state, scale, touching = rows.state, rows.fluid_scale, real(rows.contact_scale)
     log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
     d_log, d_log_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
@@ -202,16 +210,10 @@ def jacobian_product(
         # y faces: what leaves a line through its north face enters the next
         last = ny - 1
         for j in range(last):
-            d_face = faces.north_by_own[i, j] * d_log[j] + faces.north_by_next[i, j] * d_log[j + 1]
-            north = faces.north[i, j] * (d_pressure[i, j] - d_pressure[i, j + 1]) + d_face * (
-                pressure[i, j] - pressure[i, j + 1]
-            )
+            north = _through_north(faces, pressure, d_pressure, d_log, i, j, j + 1)
             out[i, j] += over_dy2 * north
             out[i, j + 1] -= over_dy2 * north
-        d_face = faces.north_by_own[i, last] * d_log[last] + faces.north_by_next[i, last] * d_log[0]
-        north = faces.north[i, last] * (d_pressure[i, last] - d_pressure[i, 0]) + d_face * (
-            pressure[i, last] - pressure[i, 0]
-        )
+        north = _through_north(faces, pressure, d_pressure, d_log, i, last, 0)
         out[i, last] += over_dy2 * north
         out[i, 0] -= over_dy2 * north
         for j in range(ny):

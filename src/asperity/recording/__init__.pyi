@@ -2,6 +2,7 @@ from .check import Gauge as Gauge
 from .check import Quality as Quality
 from .check import check_recording as check_recording
 from .model import ACCELERATION as ACCELERATION
+from .model import Channel as Channel
 from .model import Fact as Fact
 from .model import OpenRecording as OpenRecording
 from .model import Recording as Recording

@@ -8,16 +8,12 @@ import scipy
 
 from asperity.arrays import Field
 from asperity.grid import Grid
+from asperity.quantities import catalogue
 from asperity.surface.bearing import bearing_curve, core_heights
 from asperity.surface.condition import Form, Outliers, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface
 from asperity.surface.profile import ProfileParameters, profile_parameters
 from asperity.surface.read import read_surface
-
-LENGTHS = {
-    *("sa", "sq", "sp", "sv", "sz", "sal", "sk", "spk", "svk"),
-    *("ra", "rq", "rp", "rv", "rz", "rt", "rsm", "rk", "rpk", "rvk"),
-}  # parameters in metres; the others are plain numbers
 
 _DECAYED = 0.2  # ISO 25178-2: the autocorrelation at which Sal and Str are read
 _DIRECTIONS = 180  # rays over half a turn; the autocorrelation is the same backwards
@@ -87,9 +83,10 @@ class SurfaceDescription:
 
 
 def _plain(parameters: SurfaceParameters | ProfileParameters) -> dict[str, object]:
-    """Names with their unit behind, None for what is not a number."""
+    """By the keys of the catalogue, where lengths end in _m; None for what is not a number."""
+    known = catalogue()
     return {
-        f"{name}_m" if name in LENGTHS else name.rstrip("_"): None if value != value else value
+        f"{name}_m" if f"{name}_m" in known else name.rstrip("_"): value if value == value else None
         for name, value in asdict(parameters).items()
     }
 
