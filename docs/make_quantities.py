@@ -21,6 +21,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "vibration": "Vibration model",
     "curve": "Friction curves",
     "history": "Steps of a history",
+    "history_vibration": "Vibration of a history",
     "track": "Series of recordings",
     "recording": "A recording",
 }

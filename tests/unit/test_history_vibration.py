@@ -35,7 +35,7 @@ def history(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def heard(history):
+def vibration(history):
     return history_vibration(history, moments=2)
 
 
@@ -50,27 +50,27 @@ def waves(period, numbers, samples, rate):
 def test_waves_of_a_period_that_is_no_whole_number_of_steps_are_found():
     period, rate = 43.21e-6, 1e6
     time = np.arange(100) / rate
-    told, left, objection = repeating(time, 5e-7 + waves(period, (1, 3, 11), 100, rate), period)
+    profile, left, objection = repeating(time, 5e-7 + waves(period, (1, 3, 11), 100, rate), period)
     assert objection is None
     assert left < 1e-9
-    assert told.duration_s == pytest.approx(period, rel=1e-12)
-    expected = waves(period, (1, 3, 11), told.values.size, told.rate_hz)
-    np.testing.assert_allclose(told.values, expected, atol=1e-16)
+    assert profile.duration_s == pytest.approx(period, rel=1e-12)
+    expected = waves(period, (1, 3, 11), profile.values.size, profile.rate_hz)
+    np.testing.assert_allclose(profile.values, expected, atol=1e-16)
 
 
 def test_what_does_not_repeat_is_said():
     period, rate = 40e-6, 1e6
     steady = waves(period, (1, 3), 200, rate)
     drift = np.random.default_rng(1).standard_normal(200) * 0.5 * np.std(steady)
-    told, left, _ = repeating(np.arange(200) / rate, steady + drift, period)
+    profile, left, _ = repeating(np.arange(200) / rate, steady + drift, period)
     # noise of 0.5 beside 1; of 200 numbers 33 are the period's own, and take their share of the noise
     assert left == pytest.approx(np.sqrt(0.25 * (1 - 33 / 200) / 1.25), rel=0.1)
-    assert np.std(told.values - waves(period, (1, 3), 40, rate)) < np.std(drift)
+    assert np.std(profile.values - waves(period, (1, 3), 40, rate)) < np.std(drift)
 
 
 def test_less_than_a_passage_says_how_many_steps_are_missing():
-    told, _, objection = repeating(np.arange(30) * 1e-6, np.zeros(30), 41.5e-6)
-    assert told is None
+    profile, _, objection = repeating(np.arange(30) * 1e-6, np.zeros(30), 41.5e-6)
+    assert profile is None
     assert "12 steps more" in objection
 
 
@@ -139,65 +139,65 @@ def test_the_approach_follows_a_wave_much_longer_than_the_contact():
     surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds, grid)
     taken = list(islice(moving_contact(conditions, chosen.lubricant, surfaces, options=chosen.options), 48 + 481))
     rows = taken[49:]
-    told, left, objection = repeating(
+    profile, left, objection = repeating(
         np.array([one.time for one in rows]),
         np.array([one.solution.rigid_approach for one in rows]),
         surfaces.passage(0),
     )
     assert objection is None
     assert left < 0.01
-    line = np.fft.rfft(told.values)[1] * 2.0 / told.values.size
+    line = np.fft.rfft(profile.values)[1] * 2.0 / profile.values.size
     begun = -grid.lower[0] / grid.extent[0] / 10  # x = 0 lies so far along the track
     expected = 20e-9 * np.exp(-2j * np.pi * begun)
     assert abs(line - expected) < 0.1 * 20e-9
     assert abs(line) == pytest.approx(20e-9, rel=0.04)
 
 
-def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, heard):
+def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration):
     chosen, rows = history.case, history.settled
-    assert heard.unsolved == ()
-    number = heard.moments[0]
+    assert vibration.unsolved == ()
+    number = vibration.moments[0]
     surface = chosen.moving_surfaces().at(float(rows["time_s"][rows["step"] == number].iloc[0]))
     contact = solve_contact(chosen.conditions, chosen.lubricant, surface, options=chosen.options)
-    assert heard.stiffness[0] == pytest.approx(tangent_stiffness(contact).total, rel=1e-6)
-    assert heard.oscillator.stiffness == pytest.approx(np.mean(heard.stiffness))
-    assert heard.oscillator.damping_ratio == chosen.vibration.damping_ratio
-    assert heard.not_periodic < 0.5
-    assert np.std(heard.profile.values) == pytest.approx(rows["rigid_approach_m"].std(ddof=0), rel=0.15)
+    assert vibration.stiffness[0] == pytest.approx(tangent_stiffness(contact).total, rel=1e-6)
+    assert vibration.oscillator.stiffness == pytest.approx(np.mean(vibration.stiffness))
+    assert vibration.oscillator.damping_ratio == chosen.vibration.damping_ratio
+    assert vibration.not_periodic < 0.5
+    assert np.std(vibration.profile.values) == pytest.approx(rows["rigid_approach_m"].std(ddof=0), rel=0.15)
     # the power of the answer is that of the profile's lines by the closed form
-    lines = np.abs(np.fft.rfft(heard.profile.values)[1:] / heard.profile.values.size) ** 2 * 2.0
-    frequency = np.arange(1, lines.size + 1) * heard.spacing_hz
-    inside = frequency < heard.profile.rate_hz / 6.0
-    power = np.sum(lines[inside] * heard.oscillator.gain(frequency[inside]))
-    assert np.var(heard.response.values) == pytest.approx(power, rel=0.05)
+    lines = np.abs(np.fft.rfft(vibration.profile.values)[1:] / vibration.profile.values.size) ** 2 * 2.0
+    frequency = np.arange(1, lines.size + 1) * vibration.spacing_hz
+    inside = frequency < vibration.profile.rate_hz / 6.0
+    power = np.sum(lines[inside] * vibration.oscillator.gain(frequency[inside]))
+    assert np.var(vibration.response.values) == pytest.approx(power, rel=0.05)
 
 
-def test_a_track_as_short_as_the_contact_shows_no_resonance_and_says_so(history, heard):
+def test_a_track_as_short_as_the_contact_shows_no_resonance_and_says_so(history, vibration):
     speed, track = history.case.conditions.surface_speeds[0], history.case.grid.extent[0]
-    assert heard.spacing_hz == pytest.approx(speed / track)
-    assert not heard.resonance.found
-    assert "motion.track" in heard.resonance.reason
+    assert vibration.spacing_hz == pytest.approx(speed / track)
+    assert not vibration.resonance.found
+    assert "motion.track" in vibration.resonance.reason
 
 
-def test_the_papers_way_stands_beside_it(history, heard):
-    assert heard.coupled.oscillator == history.vibration.oscillator
+def test_the_papers_way_stands_beside_it(history, vibration):
+    assert vibration.coupled.oscillator == history.vibration.oscillator
     model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent", rate_hz=2e5)
     other = history_vibration(history, model, moments=1)
-    assert other.coupled.oscillator.stiffness == pytest.approx(heard.coupled.oscillator.stiffness)
+    assert other.coupled.oscillator.stiffness == pytest.approx(vibration.coupled.oscillator.stiffness)
 
 
-def test_a_kept_history_is_heard_alike(history, heard):
+def test_a_kept_history_is_heard_alike(history, vibration):
     again = history_vibration(load_history(history.folder), moments=2)
-    np.testing.assert_allclose(again.response.values, heard.response.values, rtol=1e-9)
+    np.testing.assert_allclose(again.response.values, vibration.response.values, rtol=1e-9)
 
 
 def test_a_smooth_contact_hears_nothing():
     flat = case(**{"surface": {"kind": "flat"}})
-    heard = history_vibration(run_history(flat, steps=3), moments=1)
-    assert heard.profile is None
-    assert "flat" in heard.resonance.reason
-    assert heard.coupled.oscillator is None
-    assert heard.oscillator.natural_frequency_hz > 5000.0
+    vibration = history_vibration(run_history(flat, steps=3), moments=1)
+    assert vibration.profile is None
+    assert "flat" in vibration.resonance.reason
+    assert vibration.coupled.oscillator is None
+    assert vibration.oscillator.natural_frequency_hz > 5000.0
 
 
 def test_two_rough_surfaces_that_slide_do_not_repeat():
@@ -228,14 +228,14 @@ def test_the_command_listens(history, capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:
         main([*arguments, "--json"])
     assert not ended.value.code
-    said = json.loads(capsys.readouterr().out)
-    heard = history_vibration(history)
-    assert said["computed"] == 0
-    assert said["tangent_resonance_hz"] == pytest.approx(heard.oscillator.natural_frequency_hz)
-    assert said["coupled_crf_hz"] == pytest.approx(heard.coupled.resonance.crf_hz)
-    assert said["history_crf_hz"] is None
-    assert "motion.track" in said["history_crf_reason"]
+    scalars = json.loads(capsys.readouterr().out)
+    vibration = history_vibration(history)
+    assert scalars["computed"] == 0
+    assert scalars["tangent_resonance_hz"] == pytest.approx(vibration.oscillator.natural_frequency_hz)
+    assert scalars["coupled_crf_hz"] == pytest.approx(vibration.coupled.resonance.crf_hz)
+    assert scalars["history_crf_hz"] is None
+    assert "motion.track" in scalars["history_crf_reason"]
     with pytest.raises(SystemExit):
         main([*arguments, "--report", str(tmp_path / "page.html")])
-    assert heard.verdict() in capsys.readouterr().out
-    assert in_print(heard.verdict()) in html.unescape((tmp_path / "page.html").read_text("utf-8"))
+    assert vibration.verdict() in capsys.readouterr().out
+    assert in_print(vibration.verdict()) in html.unescape((tmp_path / "page.html").read_text("utf-8"))

@@ -25,6 +25,7 @@ from asperity.coupling import (
 from asperity.ehl import Scales, solve_contact
 from asperity.errors import BadInput, NotConverged
 from asperity.history.history import History
+from asperity.quantities import lines, read
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
@@ -46,7 +47,7 @@ class HistoryVibration:
     one passage of the rough track, the approach of the bodies about its mean, which repeats; `response` [m/s^2] and
     `spectrum` are the steady answer to it, whose lines are `spacing_hz` apart, speed over track. `not_periodic` is what
     of the approach does not repeat, root mean square over root mean square. Without roughness, or where nothing
-    repeats, these are None and `resonance.reason` says why; `resonance` is looked for as in any record, `coupled` is
+    repeats, these are None and `resonance.reason` says why; `resonance` is estimated as in any record, `coupled` is
     the paper's way to the vibration of the history's mean contact.
     """
 
@@ -69,19 +70,43 @@ class HistoryVibration:
             return None
         return float(self.oscillator.mass * np.std(self.response.values) / self.oscillator.load)
 
+    @property
+    def crf_hz(self) -> float | None:
+        """The resonance that the history shows [Hz]."""
+        return self.resonance.crf_hz if self.resonance.found else None
+
+    @property
+    def coupled_crf_hz(self) -> float | None:
+        """The resonance by the paper's coupling [Hz]."""
+        return self.coupled.resonance.crf_hz if self.coupled.resonance.found else None
+
+    @property
+    def stiffness_std(self) -> float:
+        """Standard deviation of the tangent stiffness over the moments [N/m]."""
+        return float(np.std(self.stiffness))
+
+    @property
+    def natural_frequency_std_hz(self) -> float:
+        """Standard deviation of the natural frequency over the moments [Hz]."""
+        f0 = self.oscillator.natural_frequency_hz
+        return 0.5 * f0 * float(np.std(self.stiffness) / np.mean(self.stiffness))
+
+    @property
+    def approach_std(self) -> float | None:
+        """Root mean square of the profile [m]."""
+        return None if self.profile is None else float(np.std(self.profile.values))
+
     def verdict(self) -> str:
         """One sentence: the contact's own resonance, the paper's, and what drives the mass."""
-        scalars = self.scalars()
-        paper = scalars["coupled_resonance_hz"]
+        f0, coupled, force = self.oscillator.natural_frequency_hz, self.coupled.oscillator, self.dynamic_load
         sentence = (
             f"By its own stiffness, taken at {len(self.moments)} moments, the contact resonates at "
-            f"{scalars['tangent_resonance_hz']:.0f} ± {scalars['tangent_resonance_std_hz']:.0f} Hz, "
-            + ("by the paper's coupling not at all" if paper is None else f"by the paper's coupling at {paper:.0f} Hz")
+            f"{f0:.0f} ± {self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling "
+            + ("not at all" if coupled is None else f"at {coupled.natural_frequency_hz:.0f} Hz")
         )
-        force = self.dynamic_load
-        if self.profile is not None and force is not None:
+        if self.approach_std is not None and force is not None:
             sentence += (
-                f"; the approach of the bodies drives a mass on it by {1e9 * np.std(self.profile.values):.3g} nm rms, "
+                f"; the approach of the bodies drives a mass on it by {1e9 * self.approach_std:.3g} nm rms, "
                 f"with a force of {100 * force:.0f} % of the load"
             )
             if force > LINEAR_UP_TO:
@@ -92,23 +117,8 @@ class HistoryVibration:
 
     def scalars(self) -> dict[str, Any]:
         """What `asperity run --listen --json` says besides the history; None where there is none."""
-        slower, coupled = self.oscillator.natural_frequency_hz, self.coupled.oscillator
-        return {
-            "history_crf_hz": self.resonance.crf_hz if self.resonance.found else None,
-            "history_crf_std_hz": _number(self.resonance.crf_std_hz),
-            "history_crf_reason": self.resonance.reason,
-            "tangent_resonance_hz": slower,
-            "tangent_resonance_std_hz": 0.5 * slower * float(np.std(self.stiffness) / np.mean(self.stiffness)),
-            "tangent_stiffness_n_per_m": float(np.mean(self.stiffness)),
-            "tangent_stiffness_std_n_per_m": float(np.std(self.stiffness)),
-            "tangent_unsolved": list(self.unsolved),
-            "coupled_crf_hz": self.coupled.resonance.crf_hz if self.coupled.resonance.found else None,
-            "coupled_resonance_hz": None if coupled is None else coupled.natural_frequency_hz,
-            "approach_std_m": None if self.profile is None else float(np.std(self.profile.values)),
-            "line_spacing_hz": self.spacing_hz,
-            "not_periodic": self.not_periodic,
-            "history_dynamic_load": self.dynamic_load,
-        }
+        reasons = {"history_crf_reason": self.resonance.reason, "tangent_unsolved": list(self.unsolved)}
+        return read(self, lines("history_vibration")) | reasons
 
 
 def history_vibration(
@@ -201,19 +211,18 @@ def repeating(time: Field, heights: Field, period: float) -> tuple[Signal | None
     left = float(np.std(heights - basis @ coefficients))
     varied = float(np.std(heights))
     samples = math.ceil(length)
-    lines = np.zeros(samples // 2 + 1, dtype=complex)
-    lines[1 : waves + 1] = samples / 2.0 * (coefficients[1 : waves + 1] - 1j * coefficients[waves + 1 :])
-    return Signal(np.fft.irfft(lines, samples), samples / period, "m"), left / varied if varied else 0.0, None
+    spectrum = np.zeros(samples // 2 + 1, dtype=complex)
+    spectrum[1 : waves + 1] = samples / 2.0 * (coefficients[1 : waves + 1] - 1j * coefficients[waves + 1 :])
+    return Signal(np.fft.irfft(spectrum, samples), samples / period, "m"), left / varied if varied else 0.0, None
 
 
 def resampled(profile: Signal, rate_hz: float) -> Signal:
     """A profile that repeats, at `rate_hz` or faster: its own waves and no others."""
     samples = profile.values.size
     finer = scipy.fft.next_fast_len(max(samples, math.ceil(samples * rate_hz / profile.rate_hz)), real=True)
-    lines = np.fft.rfft(profile.values) * (finer / samples)
-    if samples % 2 == 0 and finer > samples:
-        lines[-1] /= 2.0  # half the sampling rate was one line of two signs
-    return Signal(np.fft.irfft(lines, finer), profile.rate_hz * finer / samples, profile.unit)
+    return replace(
+        profile, values=scipy.signal.resample(profile.values, finer), rate_hz=profile.rate_hz * finer / samples
+    )
 
 
 def steady_response(oscillator: ContactOscillator, profile: Signal) -> Signal:
@@ -272,7 +281,3 @@ def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonanc
             model.method,
         )
     return contact_resonance(spectrum, band_hz=band, method=model.method)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
