@@ -17,7 +17,8 @@ from asperity.cli import main
 from asperity.errors import BadInput
 from asperity.paper import Anchor
 from asperity.study import calibrate, plan_points, run_study
-from asperity.study.calibration import _levels, _Slopes
+from asperity.study.calibration import _levels
+from asperity.study.slopes import MisfitSlopes
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 DRY = {
@@ -132,21 +133,21 @@ def test_scatter_over_surfaces_is_no_information():
     rng = np.random.default_rng(3)
     learnt, naive = [], []
     for _ in range(200):
-        slopes = _Slopes(np.zeros((6, 4)), 5.0 * rng.standard_normal((6, 4, 1)))
+        slopes = MisfitSlopes(np.zeros((6, 4)), 5.0 * rng.standard_normal((6, 4, 1)))
         learnt.append(slopes.information[0, 0])
         naive.append(float(np.sum(slopes.mean**2)))
     assert np.mean(naive) == pytest.approx(4 * 25.0 / 6.0, rel=0.1)
     assert np.median(learnt) < 0.25 * np.mean(naive)
     assert np.mean(np.array(learnt) > 12.0) < 0.2  # seldom enough to count as determined; the squares mostly are
     assert np.mean(np.array(naive) > 12.0) > 0.5
-    true = _Slopes(np.zeros((6, 4)), 5.0 + 5.0 * rng.standard_normal((6, 4, 1)))
+    true = MisfitSlopes(np.zeros((6, 4)), 5.0 + 5.0 * rng.standard_normal((6, 4, 1)))
     assert true.information[0, 0] == pytest.approx(4 * 25.0, rel=0.5)
 
 
 def test_information_of_a_line_is_that_of_least_squares():
     rng = np.random.default_rng(4)
     jacobian = rng.standard_normal((5, 3))
-    slopes = _Slopes(np.zeros((3, 5)), np.repeat(jacobian[None], 3, axis=0))
+    slopes = MisfitSlopes(np.zeros((3, 5)), np.repeat(jacobian[None], 3, axis=0))
     assert slopes.information == pytest.approx(jacobian.T @ jacobian)
     covariance, scale = slopes.covariance(2)
     assert scale == 1.0

@@ -13,7 +13,8 @@ from asperity import load_case
 from asperity.cli import main
 from asperity.errors import AsperityError, BadInput
 from asperity.study import ParameterRange, sensitivity
-from asperity.study.global_sensitivity import indices, knee, sample_design
+from asperity.study.global_sensitivity import knee
+from asperity.study.indices import indices, sample_design
 from asperity.study.ranges import OPEN_RANGES, open_ranges, overrides_at, parse_range
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"

@@ -129,12 +129,7 @@ def simulate_rig(
     _require_tests(samples, repeats, trend, repeat_std_hz, seed)
     _require_record(duration_s, rate_hz)
     conditions, model = _contact(case)
-    band_hz = search_band(conditions, model)
-    if rate_hz < RATE_PER_BAND * band_hz[1]:
-        raise BadInput(
-            f"rig sampling rate must be at least {RATE_PER_BAND:g} times the upper end of the "
-            f"search band, {band_hz[1]:.0f} Hz, got {rate_hz:g} Hz; raise it"
-        )
+    band_hz = _band(conditions, model, rate_hz)
     sq, sq_std = _rings(samples)
     whole = replace(dry_full_load(conditions, float(sq[0])), clr=1.0)
     full_load_crf_hz = oscillator(whole, conditions, model).natural_frequency_hz
@@ -188,6 +183,17 @@ def _require_record(duration_s: float, rate_hz: float) -> None:
             f"a rig recording needs at least {SHORTEST_RECORD} samples, got {duration_s:g} s at {rate_hz:g} Hz; "
             "lengthen it"
         )
+
+
+def _band(conditions: ContactConditions, model: VibrationModel, rate_hz: float) -> tuple[float, float]:
+    """The search band [Hz], which the sampling rate must be able to show."""
+    band_hz = search_band(conditions, model)
+    if rate_hz < RATE_PER_BAND * band_hz[1]:
+        raise BadInput(
+            f"rig sampling rate must be at least {RATE_PER_BAND:g} times the upper end of the "
+            f"search band, {band_hz[1]:.0f} Hz, got {rate_hz:g} Hz; raise it"
+        )
+    return band_hz
 
 
 def _rings(samples: int) -> tuple[Field, Field]:

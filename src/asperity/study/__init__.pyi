@@ -4,9 +4,11 @@ from .axes import group_means as group_means
 from .axes import pair_means as pair_means
 from .axes import swept_axis as swept_axis
 from .axes import varying_outputs as varying_outputs
-from .calibration import CalibratedParameter as CalibratedParameter
-from .calibration import Calibration as Calibration
 from .calibration import calibrate as calibrate
+from .calibration_result import CalibratedParameter as CalibratedParameter
+from .calibration_result import Calibration as Calibration
+from .calibration_result import ParameterDirection as ParameterDirection
+from .calibration_result import TradeOff as TradeOff
 from .curve import MEAN_CONFIDENCE as MEAN_CONFIDENCE
 from .curve import SQ_KEY as SQ_KEY
 from .curve import WearCurve as WearCurve
@@ -27,6 +29,7 @@ from .global_sensitivity import SQ_LEVELS as SQ_LEVELS
 from .global_sensitivity import Sensitivity as Sensitivity
 from .global_sensitivity import SensitivityOutcome as SensitivityOutcome
 from .global_sensitivity import sensitivity as sensitivity
+from .indices import SensitivityMethod as SensitivityMethod
 from .overview import FailureReason as FailureReason
 from .overview import StudyOverview as StudyOverview
 from .plan import SEED_KEYS as SEED_KEYS

@@ -9,15 +9,17 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.quantities import quantity
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
+from asperity.study.indices import SIZES, SampleDesign, SensitivityMethod, indices, sample_design
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 from asperity.study.ranges import (
     ParameterRange,
@@ -34,33 +36,16 @@ from asperity.wear import FEWEST_PLACES, split_stages
 if TYPE_CHECKING:
     import pandas
 
-Method = Literal["morris", "sobol"]
-SIZES: dict[str, int] = {"morris": 12, "sobol": 64}  # trajectories; base samples, a power of two
-LEVELS = 4  # places a factor of Morris' design can take
 SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
 CELLS = 128
 SEED_FACTOR = "seed"  # the factor's name
-CONFIDENCE = 0.95  # of SALib's intervals
-RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
-ROUNDING = 1e-9  # relative difference that nothing has made
 RESERVED = {
     "surface.sq": "it is what the curves run along; give sq",
     "surface.seed": "the surface is a factor by itself",
     "vibration.seed": "it goes with the surface, which is a factor by itself",
     "grid.cells": "they go with the domain; give cells",
 }
-
-
-class Design(NamedTuple):
-    """Points to evaluate, as shares 0 to 1 of each factor's range, shape (points, factors).
-
-    Runs of `block` points stand or fall together: without one of them the rest says nothing.
-    """
-
-    method: Method
-    shares: Field
-    block: int
 
 
 class SensitivityOutcome(NamedTuple):
@@ -94,7 +79,7 @@ class Sensitivity:
     """
 
     case: Case
-    method: Method
+    method: SensitivityMethod
     ranges: tuple[ParameterRange, ...]
     factors: tuple[str, ...]
     outcomes: tuple[SensitivityOutcome, ...]
@@ -129,18 +114,15 @@ class Sensitivity:
     def verdict(self) -> str:
         """How far the curves can be trusted, in a sentence or two."""
         parts = []
-        for quantity, name, scale, unit in (
-            ("car", "CAR", 100.0, "%"),
-            ("clr", "CLR", 100.0, "%"),
-            ("crf_hz", "CRF", 1.0, "Hz"),
-        ):
-            found = [outcome for outcome in self.outcomes if outcome.quantity == quantity]
-            if found:
-                widest = max(found, key=lambda outcome: float(np.subtract(*self.spread(outcome.name)[::-1])))
-                low, high = (scale * end for end in self.spread(widest.name))
+        for entry in map(quantity, ("car", "clr", "crf_hz")):
+            outcomes = [outcome for outcome in self.outcomes if outcome.quantity == entry.key]
+            if outcomes:
+                widest = max(outcomes, key=lambda outcome: float(np.subtract(*self.spread(outcome.name)[::-1])))
+                low, high = (entry.factor * end for end in self.spread(widest.name))
                 first = self.ranking(widest.name).iloc[0]
                 mover = f"most by {first['factor']}" if first["share"] > 0.0 else "by none of them"
-                parts.append(f"{name} at Sq {1e6 * widest.sq:g} um from {low:.0f} to {high:.0f} {unit} (moved {mover})")
+                span = f"from {low:.0f} to {high:.0f} {entry.display}"
+                parts.append(f"{entry.symbol} at Sq {1e6 * widest.sq:g} um {span} (moved {mover})")
         order = self.overall()
         ranked = ", ".join(f"{name} {100 * share:.0f} %" for name, share in order.items())
         return (
@@ -197,7 +179,7 @@ def sensitivity(
     case: Case,
     *,
     vary: Sequence[ParameterRange | str] | None = None,
-    method: Method = "morris",
+    method: SensitivityMethod = "morris",
     size: int | None = None,
     sq: Sequence[float] = SQ_LEVELS,
     levels: int = CURVE_LEVELS,
@@ -254,84 +236,6 @@ def sensitivity(
     return _analysed(case, ranges, factors, design, result, sq, curve, seeds)
 
 
-# The sample and its indices ------------------------------------------------------------------------------------------
-
-
-def sample_design(method: Method, factors: int, size: int, seed: int = 0) -> Design:
-    """Morris' trajectories or Saltelli's sample over the unit cube, by SALib.
-
-    Raises
-    ------
-    BadInput
-        for a size that the method cannot take, or without SALib.
-    """
-    _require_salib()
-    if size < 2:
-        raise BadInput(f"{_counted(method)} must be 2 or more, got {size}; {SIZES[method]} is the default")
-    if method == "morris":
-        from SALib.sample import morris
-
-        return Design(method, morris.sample(_problem(factors), size, num_levels=LEVELS, seed=seed), factors + 1)
-    if size & (size - 1):
-        nearest = 2 ** round(math.log2(size))
-        raise BadInput(f"samples of the method sobol must be a power of two, got {size}; take {nearest}")
-    from SALib.sample import sobol
-
-    shares = sobol.sample(_problem(factors), size, calc_second_order=False, seed=seed)
-    return Design(method, shares, factors + 2)
-
-
-def indices(design: Design, outcome: Field) -> dict[str, Field]:
-    """Each factor's effect on an outcome of shape (points,), by SALib; blocks that hold a nan are left out.
-
-    Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape (factors,).
-
-    Raises
-    ------
-    AsperityError
-        if fewer than two blocks are left.
-    """
-    whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
-    if np.count_nonzero(whole) < 2:
-        raise AsperityError("too many contacts failed to say what moves the curves; narrow the ranges")
-    kept = np.repeat(whole, design.block)
-    values, shares = outcome[kept], design.shares[kept]
-    factors = shares.shape[1]
-    names = (
-        ("mu", "mu_star", "mu_star_conf", "sigma") if design.method == "morris" else ("s1", "s1_conf", "st", "st_conf")
-    )
-    if np.ptp(values) <= ROUNDING * np.abs(values).max():
-        return {name: np.zeros(factors) for name in names}
-    problem = _problem(factors)
-    if design.method == "morris":
-        from SALib.analyze import morris
-
-        found = morris.analyze(problem, shares, values, num_levels=LEVELS, conf_level=CONFIDENCE, seed=RESAMPLING)
-    else:
-        from SALib.analyze import sobol
-
-        found = sobol.analyze(problem, values, calc_second_order=False, conf_level=CONFIDENCE, seed=RESAMPLING)
-    return {name: np.asarray(found[_SALIB.get(name, name)], dtype=float) for name in names}
-
-
-_SALIB = {"s1": "S1", "s1_conf": "S1_conf", "st": "ST", "st_conf": "ST_conf"}
-
-
-def _problem(factors: int) -> dict[str, Any]:
-    return {"num_vars": factors, "names": [f"x{i}" for i in range(factors)], "bounds": [[0.0, 1.0]] * factors}
-
-
-def _counted(method: Method) -> str:
-    return "trajectories" if method == "morris" else "samples"
-
-
-def _require_salib() -> None:
-    try:
-        import SALib  # noqa: F401
-    except ModuleNotFoundError:
-        raise BadInput("sensitivity needs SALib; pip install 'asperity[study]'") from None
-
-
 # The study -----------------------------------------------------------------------------------------------------------
 
 
@@ -351,7 +255,7 @@ def _plan(
     case: Case,
     ranges: Sequence[ParameterRange],
     seeded: Sequence[str],
-    design: Design,
+    design: SampleDesign,
     curve: Sequence[float],
     seeds: int,
     seed: int,
@@ -368,7 +272,9 @@ def _plan(
     return plan_points(case, points)
 
 
-def _seeds(seeded: Sequence[str], design: Design, number: int, share: float, surface: int, seed: int) -> dict[str, int]:
+def _seeds(
+    seeded: Sequence[str], design: SampleDesign, number: int, share: float, surface: int, seed: int
+) -> dict[str, int]:
     """The realisation that a share of the seed's range stands for.
 
     Sobol's shares are all different. Morris' are four, so each trajectory has four realisations of its own: its step
@@ -383,7 +289,7 @@ def _analysed(
     case: Case,
     ranges: tuple[ParameterRange, ...],
     factors: tuple[str, ...],
-    design: Design,
+    design: SampleDesign,
     result: StudyResult,
     sq: Sequence[float],
     curve: Sequence[float],
@@ -392,7 +298,7 @@ def _analysed(
     import pandas
 
     shape = (len(design.shares), len(curve), seeds)
-    curves, unheard = _curves(result, shape)
+    curves, silent_share = _curves(result, shape)
     outcomes, columns = _outcomes(curves, sq, curve)
     values = pandas.DataFrame(
         {
@@ -426,7 +332,7 @@ def _analysed(
         values=values,
         left_out=int(np.count_nonzero(lost)) * design.block,
         distinct=_distinct(curves, curve),
-        silent=unheard,
+        silent=silent_share,
         result=result,
     )
 
@@ -460,9 +366,9 @@ def _outcomes(
 ) -> tuple[list[SensitivityOutcome], list[Field]]:
     outcomes, columns = [], []
     places = {level: place for place, level in enumerate(curve)}
-    for quantity, values in curves.items():
+    for key, values in curves.items():
         for level in sq:
-            outcomes.append(SensitivityOutcome(f"{quantity} at {1e6 * level:g} um", quantity, level))
+            outcomes.append(SensitivityOutcome(f"{key} at {1e6 * level:g} um", key, level))
             columns.append(values[:, places[float(f"{level:.6g}")]])
     if "crf_hz" in curves and len(curve) >= FEWEST_PLACES:
         outcomes.append(SensitivityOutcome("knee", "knee_m", math.nan))
