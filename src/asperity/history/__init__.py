@@ -1,4 +1,4 @@
-"""A case let move, step after step, and what a mass hears of it."""
+"""A case let move, step after step, and how a mass vibrates on it."""
 
 import lazy_loader
 

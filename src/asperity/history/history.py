@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas
 
 from asperity.arrays import Field, Mask
 from asperity.case import Case
@@ -14,9 +15,6 @@ from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import ContactState, Memory, step_seconds
 from asperity.history.rows import mean_state
 from asperity.surface import MovingSurfaces
-
-if TYPE_CHECKING:
-    import pandas
 
 SUMMARISED = (
     "car",
@@ -59,7 +57,7 @@ class History:
     """
 
     case: Case
-    table: "pandas.DataFrame"
+    table: pandas.DataFrame
     frames: tuple[Frame, ...]
     folder: Path | None
     seconds: float
@@ -82,7 +80,7 @@ class History:
         return tuple(int(number) for number in self.table["step"][~self.table["converged"]])
 
     @property
-    def settled(self) -> "pandas.DataFrame":
+    def settled(self) -> pandas.DataFrame:
         """The steps that means are of: oil has crossed the domain once, or else the second half.
 
         Where surfaces are flattened nothing repeats, and it is the last pass.
@@ -95,7 +93,7 @@ class History:
         crossing = math.ceil(self.case.grid.cells[0] / self.case.motion.time_step)
         return self.table[self.table["step"] >= min(crossing, (self.steps + 1) // 2)]
 
-    def by_pass(self) -> "pandas.DataFrame":
+    def by_pass(self) -> pandas.DataFrame:
         """Each whole pass of the rough surface's track (of two, the slower one's), the start apart: means of its steps.
 
         Columns as in `table`, `pass` in place of `step`; of what only grows or falls (`time_s`, `track_sq_m`,
@@ -157,9 +155,9 @@ class History:
             passes = self.by_pass()[list(OVER_PASSES)].astype(object)
             scalars["passes"] = passes.where(passes.notna(), None).to_dict("records")
         resonance = None if self.vibration is None else self.vibration.resonance
-        found = resonance if resonance is not None and resonance.found else None
-        scalars["crf_hz"] = None if found is None else _number(found.crf_hz)
-        scalars["crfa"] = None if found is None else _number(found.crfa)
+        contact = resonance if resonance is not None and resonance.found else None
+        scalars["crf_hz"] = None if contact is None else _number(contact.crf_hz)
+        scalars["crfa"] = None if contact is None else _number(contact.crfa)
         return scalars
 
     def verdict(self) -> str:

@@ -13,9 +13,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import filelock
 import numpy as np
+import pandas
+import pyarrow
+import pyarrow.parquet
+import xarray
 
 from asperity.arrays import Field
 from asperity.case import Case, load_case, relative_path
@@ -26,9 +31,6 @@ from asperity.history.history import Frame, History
 from asperity.history.rows import Row
 from asperity.quantities import quantity
 from asperity.surface import MovingSurfaces
-
-if TYPE_CHECKING:
-    import pandas
 
 FORMAT = 1  # counts up when a reader of the format before could not read the folder
 TABLE, MEMORY, MAPS = "history.parquet", "memory.npz", "fields"
@@ -70,8 +72,7 @@ def is_history(folder: Path) -> bool:
         return False
 
 
-def _table(rows: list[Row]) -> "pandas.DataFrame":
-    import pandas
+def _table(rows: list[Row]) -> pandas.DataFrame:
 
     return pandas.DataFrame(rows)
 
@@ -113,8 +114,6 @@ class Keeper:
 
     def write(self, folder: Path) -> None:
         """Rows first, then what the next step needs: a crash between them leaves rows too many, which are dropped."""
-        import pyarrow.parquet
-
         if self.memory is None:
             return
         table = pyarrow.Table.from_pylist(self.rows).replace_schema_metadata({"case": self.case.text})
@@ -160,7 +159,6 @@ def open_keeper(
     if folder is None:
         yield Keeper(case, None, every or usual)
         return
-    import filelock
 
     if folder.exists():
         make_folder(folder)  # a file is refused
@@ -218,7 +216,6 @@ def _manifest(case: Case, digest: str, every: int, folder: Path) -> dict[str, An
 
 
 def _rows(folder: Path) -> list[Row]:
-    import pyarrow.parquet
 
     path = folder / TABLE
     if not path.exists():
@@ -248,7 +245,6 @@ def _frame(snapshot: Snapshot) -> Frame:
 
 
 def _write_frame(frame: Frame, snapshot: Snapshot, folder: Path) -> None:
-    import xarray
 
     grid, on = snapshot.solution.grid, ("x", "y")
     about: dict[str, dict[str, Any]] = {
@@ -274,8 +270,6 @@ def _write_frame(frame: Frame, snapshot: Snapshot, folder: Path) -> None:
 
 def _frames(folder: Path, last: int) -> tuple[Frame, ...]:
     """The maps on disk, up to the last step kept."""
-    import xarray
-
     frames = []
     for path in sorted((folder / MAPS).glob("step-*.nc")):
         try:

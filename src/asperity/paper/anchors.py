@@ -4,9 +4,10 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
+import pandas
 from pydantic import Field as Entry
 
 from asperity.case import Length, Section, parse_section
@@ -14,9 +15,6 @@ from asperity.errors import BadInput, UnreadableFile
 from asperity.paper.numbers import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
 from asperity.paper.rig import TRENDS
 from asperity.wear import Stages
-
-if TYPE_CHECKING:
-    import pandas
 
 AnchorSense = Literal["about", "at least", "at most"]
 SPLIT_ANCHOR = "split"  # the quantity of an anchor that is a break between stages
@@ -81,14 +79,12 @@ class Anchor:
         return max(off, 0.0) if self.sense == "at most" else off
 
 
-def compare_with_anchors(curve: CurveOverSq, anchors: Sequence[Anchor] | None = None) -> "pandas.DataFrame":
+def compare_with_anchors(curve: CurveOverSq, anchors: Sequence[Anchor] | None = None) -> pandas.DataFrame:
     """A row an anchor, the paper's unless given: what is printed, ours with its 90 % interval, the miss, whether met.
 
     `met` is True where the miss is within the tolerance, and `possible` where some value of the interval would be.
     Both are False where the curve has no value (a Sq that was not computed, stages that are not there).
     """
-    import pandas
-
     rows = []
     for anchor in PAPER_ANCHORS if anchors is None else anchors:
         ours, low, high = anchor.of(curve)
@@ -116,10 +112,8 @@ def compare_with_anchors(curve: CurveOverSq, anchors: Sequence[Anchor] | None = 
     return pandas.DataFrame(rows)
 
 
-def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> "pandas.DataFrame":
+def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas.DataFrame:
     """Our CRF at the rig's twelve Sq values with the spread over seeds, beside what is printed: the two ends."""
-    import pandas
-
     rows = []
     for number, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
         ours, low, high = curve.at(1e-6 * sq, quantity)

@@ -41,7 +41,7 @@ TABLE1_PRINTED = (  # cut-off [Hz], height [um], load [N], CRF [Hz], CRFA [(m/s^
     (40.0, 2.0, 200.0, 3322.55, 2.04),
 )
 
-# Section 4: the rig, its twelve rings in 4.1, what was heard of them in 4.2
+# Section 4: the rig, its twelve rings in 4.1, their resonances in 4.2
 RIG_LOAD = 500.0  # [N]
 ROLLER_HZ, RING_HZ = 3375.0 / 60.0, 300.0 / 60.0
 SAMPLES_SQ_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)

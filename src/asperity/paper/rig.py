@@ -1,6 +1,6 @@
 """The paper's rig, simulated: recordings of worn rings whose contact resonance is known, to judge methods by.
 
-The contact is asperity's own oscillator over its own rough profile. What a real accelerometer hears besides, and what
+The contact is asperity's own oscillator over its own rough profile. What a real accelerometer picks up besides, and what
 fools a search for the highest point, is drawn anew for each rig: structural modes, shaft and mains lines, noise.
 """
 
@@ -109,7 +109,7 @@ def simulate_rig(
     Parameters
     ----------
     duration_s, rate_hz : of each recording; the paper's are 300 s at 20 kHz
-    disturbance : what is heard besides the contact, by default at an SNR of 10 dB; its modes, levels and tones are
+    disturbance : what is recorded besides the contact, by default at an SNR of 10 dB; its modes, levels and tones are
         drawn anew for each seed
     trend : name in TRENDS, the CRF over Sq: "knee", straight to 1.8 um and on at another slope, between the paper's
         ends; "smooth", a saturating exponential between them; "constant"

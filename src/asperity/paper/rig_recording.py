@@ -25,7 +25,7 @@ GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten ti
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
-    """What the accelerometer hears besides the contact.
+    """What the accelerometer picks up besides the contact.
 
     `snr_db`: power of the contact's line over that of everything else, both within the contact's search band, in the
     mean over recordings. `modes` structural modes share most of that band with it. `gain_db` is the standard

@@ -1,4 +1,4 @@
-"""Cases solved: the contact, what is read off it, what an accelerometer would hear; friction curves."""
+"""Cases solved: the contact, what is read off it, how a mass on it vibrates; friction curves."""
 
 import lazy_loader
 

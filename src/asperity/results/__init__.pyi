@@ -1,4 +1,5 @@
 from .curves import FrictionCurve as FrictionCurve
+from .curves import FrictionCurveKind as FrictionCurveKind
 from .curves import FrictionPoint as FrictionPoint
 from .curves import SolverProgress as SolverProgress
 from .curves import stribeck_curve as stribeck_curve

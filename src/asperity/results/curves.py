@@ -16,6 +16,7 @@ from asperity.errors import BadInput, require_positive
 from asperity.surface import Surface
 
 SolverProgress = Callable[[Iteration], None]
+FrictionCurveKind = Literal["stribeck", "traction"]
 
 SPEED_RANGE = (0.01, 10.0)  # of the case's entrainment speed
 SPEEDS = 13
@@ -50,7 +51,7 @@ class FrictionPoint:
 class FrictionCurve:
     """Friction over speed ("stribeck") or over the slide-to-roll ratio ("traction"), by rising abscissa."""
 
-    kind: Literal["stribeck", "traction"]
+    kind: FrictionCurveKind
     points: tuple[FrictionPoint, ...]
     boundary_friction: float
     sq: float  # composite roughness [m]
@@ -155,7 +156,7 @@ def traction_curve(
     return _curve(case, "traction", _solved(case, case.surface(), wanted, progress))
 
 
-def _curve(case: Case, kind: Literal["stribeck", "traction"], points: list[FrictionPoint]) -> FrictionCurve:
+def _curve(case: Case, kind: FrictionCurveKind, points: list[FrictionPoint]) -> FrictionCurve:
     if not points:
         raise BadInput("a curve needs at least one point, got none")
     return FrictionCurve(

@@ -57,7 +57,7 @@ MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """A solved case: the contact, what a tribologist reads off it, and what an accelerometer would hear.
+    """A solved case: the contact, what a tribologist reads off it, and how a mass on it vibrates.
 
     `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the numbers has to know.
     Friction, heat and stress are worked out when they are first asked for.
@@ -196,7 +196,7 @@ def solve_case(
     progress: Callable[[Iteration], None] | None = None,
     strict: bool = True,
 ) -> Run:
-    """Solve a case and listen to it.
+    """Solve a case, and work out its vibration.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def load_run(path: str | Path) -> Run:
         text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
     except (KeyError, ValueError):
         raise UnreadableFile(
-            f"{path} holds a solution without its case; solve the case with asperity solve --out"
+            f"{path} holds a solution without its case; save the run (Run.save), not its solution alone"
         ) from None
     case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
     case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))

@@ -16,6 +16,8 @@ from .curve import curve_of as curve_of
 from .curve import is_wear_study as is_wear_study
 from .curve import wear_curve as wear_curve
 from .evaluate import BOTH_PRESETS as BOTH_PRESETS
+from .evaluate import CaseStatus as CaseStatus
+from .evaluate import StudyField as StudyField
 from .execute import StudyCost as StudyCost
 from .execute import StudyProgress as StudyProgress
 from .execute import StudyResult as StudyResult
@@ -33,6 +35,7 @@ from .indices import SensitivityMethod as SensitivityMethod
 from .overview import FailureReason as FailureReason
 from .overview import StudyOverview as StudyOverview
 from .plan import SEED_KEYS as SEED_KEYS
+from .plan import StudyCase as StudyCase
 from .plan import StudyPlan as StudyPlan
 from .plan import as_written as as_written
 from .plan import plan_points as plan_points

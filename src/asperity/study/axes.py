@@ -6,18 +6,16 @@ Swept quantities are in the unit that they were written in.
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas
 
 from asperity.arrays import Field
 from asperity.case import Case, split_amount
 from asperity.errors import BadInput
 from asperity.study.curve import student_reach
 from asperity.study.plan import StudyPlan, as_written
-
-if TYPE_CHECKING:
-    import pandas
 
 MOST_VALUES = 12  # of a swept quantity that has a mean each, however few cases share one
 GROUPS = 8  # of one with more
@@ -64,7 +62,7 @@ class SweptAxis:
         return self.places.size > max(MOST_VALUES, 0.5 * self.values.size)
 
 
-def swept_axis(plan: StudyPlan, table: "pandas.DataFrame", key: str) -> SweptAxis:
+def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
     """A swept key over the rows of a study's table, in the unit that its first value was written in."""
     own = _own_value(plan.case, key)
     written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]
@@ -81,7 +79,7 @@ def swept_axis(plan: StudyPlan, table: "pandas.DataFrame", key: str) -> SweptAxi
     return SweptAxis(key, numbers, unit, logarithmic=_crowds_low(np.unique(numbers)))
 
 
-def varying_outputs(table: "pandas.DataFrame") -> list[str]:
+def varying_outputs(table: pandas.DataFrame) -> list[str]:
     """Which of `OUTPUTS` a study's table holds and vary in it; CRF and CRFA once where the presets have theirs."""
     by_preset = ("crf_hz", "crfa") if "crf_sound_hz" in table else ()
     there = [key for key in OUTPUTS if key in table and key not in by_preset]

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas
 
 from asperity.arrays import Field
 from asperity.case import Case, split_amount
@@ -33,9 +33,6 @@ from asperity.study.ranges import (
     stated_value,
 )
 from asperity.study.slopes import PRIOR_VARIANCE, MisfitSlopes
-
-if TYPE_CHECKING:
-    import pandas
 
 FREE = OPEN_RANGES[:4]  # what decides CAR and CLR: cap, correlation length, alpha, inlet
 CELLS, SEEDS, SCREENED, STARTS = 128, 3, 32, 2
@@ -219,7 +216,7 @@ def _start(case: Case, entry: ParameterRange) -> float | None:
     return None if value is None else float(split_amount(value, entry.unit)[0])
 
 
-def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> "pandas.DataFrame":
+def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> pandas.DataFrame:
     """The anchors that the curve's levels can tell."""
     reached = [a for a in anchors if a.sq is not None and np.isfinite(a.of(curve)[0])]
     aimed_without = [a for a in anchors if a.fitted and a not in reached]

@@ -2,18 +2,16 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas
 
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.paper import Anchor
 from asperity.study.curve import WearCurve
 from asperity.study.ranges import ParameterRange
-
-if TYPE_CHECKING:
-    import pandas
 
 LEARNT_FROM = 0.5  # share of a range's variance that the anchors must take away from a quantity to determine it
 
@@ -92,9 +90,9 @@ class Calibration:
     correlation: Field
     directions: tuple[ParameterDirection, ...]
     trade_offs: tuple[TradeOff, ...]
-    start: "pandas.DataFrame"
-    fit: "pandas.DataFrame"
-    check: "pandas.DataFrame"
+    start: pandas.DataFrame
+    fit: pandas.DataFrame
+    check: pandas.DataFrame
     start_misfit: float
     misfit: float
     evaluations: int
@@ -133,7 +131,7 @@ class Calibration:
     def scalars(self) -> dict[str, Any]:
         """What `asperity calibrate --json` prints; None where there is none."""
 
-        def rows(table: "pandas.DataFrame") -> list[dict[str, Any]]:
+        def rows(table: pandas.DataFrame) -> list[dict[str, Any]]:
             return [{str(key): _or_none(value) for key, value in row.items()} for row in table.to_dict("records")]
 
         return {

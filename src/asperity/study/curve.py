@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas
 import scipy
 from numpy.typing import ArrayLike
 
@@ -18,9 +18,6 @@ from asperity.study.execute import StudyProgress, StudyResult, run_study
 from asperity.study.plan import plan_points
 from asperity.wear import Stages, split_stages
 
-if TYPE_CHECKING:
-    import pandas
-
 SQ_KEY = "surface.sq"
 MEAN_CONFIDENCE = 0.90  # of the intervals of means
 
@@ -31,12 +28,12 @@ class WearCurve:
 
     Parameters
     ----------
-    sq : shape (levels,), roughness asked for [m], rising
+    sq : shape (levels,), roughness wanted [m], rising
     table : a row a case, as in `StudyResult.table`; what failed is left out of every mean
     """
 
     sq: Field
-    table: "pandas.DataFrame"
+    table: pandas.DataFrame
 
     @property
     def left_out(self) -> int:
@@ -44,7 +41,7 @@ class WearCurve:
         return int((self.table["status"] != DONE).sum())
 
     def values(self, quantity: str, level: int) -> Field:
-        """Every seed's value of a column at a level, shape (seeds,); where there is none, as of an unheard CRF, none.
+        """Every seed's value of a column at a level, shape (seeds,); where there is none, as of a CRF that was not found, none.
 
         Raises
         ------
@@ -96,24 +93,22 @@ class WearCurve:
     @cached_property
     def stages(self) -> dict[str, Stages]:
         """Stages along Sq in micrometres, from the CRF and CRFA of each vibration preset; empty without vibration."""
-        found = {}
+        stages = {}
         rows = self.table[self.table["status"] == DONE]
         for preset in BOTH_PRESETS:
             if f"crf_{preset}_hz" in rows:
                 std = rows[f"crf_std_{preset}_hz"].to_numpy(dtype=float)
-                found[preset] = split_stages(
+                stages[preset] = split_stages(
                     1e6 * rows[SQ_KEY].to_numpy(dtype=float),
                     rows[f"crf_{preset}_hz"].to_numpy(dtype=float),
                     rows[f"crfa_{preset}"].to_numpy(dtype=float),
                     crf_std_hz=np.nan_to_num(std),
                     unit="um",
                 )
-        return found
+        return stages
 
-    def summary(self) -> "pandas.DataFrame":
+    def summary(self) -> pandas.DataFrame:
         """Mean, standard deviation and interval of the paper's quantities, a row a level."""
-        import pandas
-
         columns: dict[str, Field] = {"sq_um": 1e6 * self.sq}
         for name in self.quantities:
             low, high = self.interval(name).T
@@ -123,8 +118,8 @@ class WearCurve:
     @property
     def quantities(self) -> tuple[str, ...]:
         """The columns that the paper's Figs 7 and 8 show."""
-        heard = [f"{name}_{preset}{unit}" for preset in BOTH_PRESETS for name, unit in (("crf", "_hz"), ("crfa", ""))]
-        wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *heard)
+        vibration = [f"{name}_{preset}{unit}" for preset in BOTH_PRESETS for name, unit in (("crf", "_hz"), ("crfa", ""))]
+        wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *vibration)
         return tuple(name for name in wanted if name in self.table)
 
     def verdict(self) -> str:
@@ -161,7 +156,7 @@ def wear_curve(
     workers: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> WearCurve:
-    """Solve a case at several roughnesses, several surfaces each, and listen to all of them.
+    """Solve a case at several roughnesses, several surfaces each, and find the resonance of each.
 
     Parameters
     ----------

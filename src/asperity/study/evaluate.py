@@ -1,4 +1,4 @@
-"""One case of a study to one row: solved, listened to with both vibration presets, every number by its name.
+"""One case of a study to one row: solved, made to vibrate by both vibration presets, every number by its name.
 
 Runs in worker processes: takes and gives only what can be sent, raises nothing that a case can cause.
 """
@@ -8,9 +8,12 @@ import math
 import multiprocessing
 import os
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import wait
-from typing import Any
+from typing import Any, Literal, get_args
+
+from threadpoolctl import threadpool_limits
 
 from asperity.arrays import Field
 from asperity.case import Case
@@ -20,8 +23,10 @@ from asperity.processes import leave_interrupts_to_the_parent
 from asperity.results import Run, solve_case, vibrate_case
 from asperity.wear import Resonance
 
-DONE, NOT_CONVERGED, FAILED = "done", "not converged", "failed"
-FIELDS = ("pressure", "gap", "in_contact", "surface_height")
+CaseStatus = Literal["done", "not converged", "failed"]
+StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
+DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
+FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
 
 Row = dict[str, Any]
@@ -35,10 +40,14 @@ def evaluate_batch(
 
     One thread does the algebra: two would sum in another order, and a resumed study is to be the same to the last bit.
     """
-    from threadpoolctl import threadpool_limits
-
     with _alone, threadpool_limits(1):
         return [evaluate(case, kind, overrides, wanted) for overrides in batch]
+
+
+def timed_batch(*job: Any) -> tuple[list[tuple[Row, dict[str, Field]]], float]:
+    """`evaluate_batch`, and the seconds it took."""
+    begun = time.perf_counter()
+    return evaluate_batch(*job), time.perf_counter() - begun
 
 
 def evaluate(
@@ -91,17 +100,18 @@ def _both_presets(case: Case, run: Run) -> Row:
         assert model is not None
         assert run.vibration is not None
         row[f"reason_{preset}"] = ""
-        found: Resonance | None = None
+        resonance: Resonance | None = None
         if model == case.vibration:
-            found = run.vibration.resonance
+            resonance = run.vibration.resonance
         else:
             try:
-                found = contact_vibration(run.state, case.conditions, model, solution=run.solution).resonance
+                resonance = contact_vibration(run.state, case.conditions, model, solution=run.solution).resonance
             except AsperityError as refusal:
                 row[f"reason_{preset}"] = str(refusal)
-        heard = found if found is not None and found.found else None
+        if resonance is not None and not resonance.found:
+            resonance = None
         for name, unit in (("crf", "_hz"), ("crfa", ""), ("crf_std", "_hz"), ("crfa_std", "")):
-            value = math.nan if heard is None else float(getattr(heard, f"{name}{unit}"))
+            value = math.nan if resonance is None else float(getattr(resonance, f"{name}{unit}"))
             row[f"{name}_{preset}{unit}"] = value if math.isfinite(value) else None
     return row
 

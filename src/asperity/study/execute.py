@@ -22,13 +22,15 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas
 
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.files import MANIFEST, versions
 from asperity.processes import cores
-from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker
+from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker, timed_batch
 from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.store import (
     TABLE,
@@ -42,9 +44,6 @@ from asperity.study.store import (
     require_zarr,
     table_of,
 )
-
-if TYPE_CHECKING:
-    import pandas
 
 BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose
 LARGEST_BATCH = 200
@@ -79,14 +78,14 @@ class StudyResult:
     """A study: its plan, and a row for every finished case, in the plan's order."""
 
     plan: StudyPlan
-    table: "pandas.DataFrame"
+    table: pandas.DataFrame
     folder: Path | None = None
     path: Path | None = None  # of the merged table
     seconds: float = 0.0
     computed: int = 0  # now; the other rows were kept from before
 
     @property
-    def failures(self) -> "pandas.DataFrame":
+    def failures(self) -> pandas.DataFrame:
         """The rows that must not be used, each with its reason."""
         return failed(self.table)
 
@@ -204,7 +203,7 @@ def dask_executor(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client
     except ModuleNotFoundError:
-        raise BadInput("--executor dask needs dask.distributed; pip install 'asperity[study]'") from None
+        raise BadInput("a dask executor needs dask.distributed; pip install 'asperity[study]'") from None
     try:
         client: Any = Client(address, timeout=DASK_WAIT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
@@ -364,7 +363,7 @@ def _hand_out(work: _Work, executor: Executor, workers: int, pending: dict[Futur
         batch = work.batch(workers)
         job = (work.plan.case, work.plan.kind, [case.overrides for case in batch], work.fields)
         try:
-            pending[executor.submit(_timed, *job)] = batch
+            pending[executor.submit(timed_batch, *job)] = batch
         except BrokenExecutor:
             work.waiting.extendleft(reversed(batch))
             return False
@@ -382,11 +381,6 @@ def _salvaged(work: _Work, pending: dict[Future[Any], list[StudyCase]]) -> list[
         else:
             work.finish(batch, results, seconds)
     return lost
-
-
-def _timed(*job: Any) -> tuple[list[tuple[Row, dict[str, Field]]], float]:
-    begun = time.perf_counter()
-    return evaluate_batch(*job), time.perf_counter() - begun
 
 
 def _workers_of(executor: Executor) -> int:
@@ -431,5 +425,5 @@ def estimate_study(
         return StudyCost(0, 0, 0.0, 0, workers or cores())
     chosen = [share[round(part * (len(share) - 1))] for part in (0.0, 0.5, 1.0)]
     evaluate_batch(plan.case, plan.kind, [chosen[1].overrides])  # loads and compiles
-    _, seconds = _timed(plan.case, plan.kind, [case.overrides for case in chosen])
+    _, seconds = timed_batch(plan.case, plan.kind, [case.overrides for case in chosen])
     return StudyCost(len(share), kept, seconds / len(chosen), len(chosen), workers or cores())

@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas
 
 from asperity.arrays import Field
 from asperity.case import Case
@@ -32,9 +33,6 @@ from asperity.study.ranges import (
 )
 from asperity.study.silence import silent, with_silence
 from asperity.wear import FEWEST_PLACES, split_stages
-
-if TYPE_CHECKING:
-    import pandas
 
 SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
@@ -73,8 +71,8 @@ class Sensitivity:
     values : a row a point: each factor's share of its range, then every outcome
     left_out : points of blocks in which a contact failed
     distinct : share of the points whose curve has a distinct stage by `split_stages`; nan where it was not asked
-    silent : share of contacts with a film too full to hear anything, whose CRF counts as that of a load share of 1 %,
-        and whose CRFA as the lowest heard
+    silent : share of contacts with a film too full to resonate, whose CRF counts as that of a load share of 1 %,
+        and whose CRFA as the lowest found
     result : the study behind it
     """
 
@@ -83,8 +81,8 @@ class Sensitivity:
     ranges: tuple[ParameterRange, ...]
     factors: tuple[str, ...]
     outcomes: tuple[SensitivityOutcome, ...]
-    effects: "pandas.DataFrame"
-    values: "pandas.DataFrame"
+    effects: pandas.DataFrame
+    values: pandas.DataFrame
     left_out: int
     distinct: float
     silent: float
@@ -95,7 +93,7 @@ class Sensitivity:
         """The column of `effects` that ranks factors."""
         return "mu_star" if self.method == "morris" else "st"
 
-    def ranking(self, outcome: str) -> "pandas.DataFrame":
+    def ranking(self, outcome: str) -> pandas.DataFrame:
         """The rows of `effects` of one outcome, the factor that moves it most first."""
         rows = self.effects[self.effects["outcome"] == outcome]
         return rows.sort_values(self.measure, ascending=False, kind="stable", ignore_index=True)
@@ -295,7 +293,6 @@ def _analysed(
     curve: Sequence[float],
     seeds: int,
 ) -> Sensitivity:
-    import pandas
 
     shape = (len(design.shares), len(curve), seeds)
     curves, silent_share = _curves(result, shape)
@@ -308,8 +305,8 @@ def _analysed(
     )
     effects = []
     for outcome, column in zip(outcomes, columns, strict=True):
-        found = indices(design, column)
-        ranked = found["mu_star" if design.method == "morris" else "st"]
+        measures = indices(design, column)
+        ranked = measures["mu_star" if design.method == "morris" else "st"]
         whole = float(np.sum(np.maximum(ranked, 0.0)))
         for i, factor in enumerate(factors):
             row: dict[str, Any] = {
@@ -318,7 +315,7 @@ def _analysed(
                 "sq_m": outcome.sq,
                 "factor": factor,
             }
-            row |= {name: float(column[i]) for name, column in found.items()}
+            row |= {name: float(column[i]) for name, column in measures.items()}
             row["share"] = max(float(ranked[i]), 0.0) / whole if whole > 0.0 else 0.0
             effects.append(row)
     lost = np.isnan(np.asarray(columns)).any(axis=0).reshape(-1, design.block).any(axis=1)
@@ -350,15 +347,15 @@ def _curves(result: StudyResult, shape: tuple[int, int, int]) -> tuple[dict[str,
     def column(name: str) -> Field:
         return table[name].to_numpy(dtype=float, na_value=np.nan)
 
-    found = {name: over(column(name)) for name in ("car", "clr")}
+    curves = {name: over(column(name)) for name in ("car", "clr")}
     if "full_load_crf_hz" not in table:
-        return found, math.nan
+        return curves, math.nan
     filled = with_silence(table)
     crfa = filled["crfa"].to_numpy(dtype=float)
-    found["crf_hz"] = over(filled["crf_hz"].to_numpy(dtype=float))
+    curves["crf_hz"] = over(filled["crf_hz"].to_numpy(dtype=float))
     if np.nanmax(crfa, initial=0.0) > 0.0:
-        found["log10_crfa"] = over(np.log10(np.where(crfa == 0.0, np.nanmin(crfa[crfa > 0.0]), crfa)))
-    return found, float(np.mean(silent(table)[done]))
+        curves["log10_crfa"] = over(np.log10(np.where(crfa == 0.0, np.nanmin(crfa[crfa > 0.0]), crfa)))
+    return curves, float(np.mean(silent(table)[done]))
 
 
 def _outcomes(

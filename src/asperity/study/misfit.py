@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas
 import scipy
 
 from asperity.arrays import Field
@@ -20,9 +20,6 @@ from asperity.study.execute import StudyProgress, run_study
 from asperity.study.plan import StudyPlan, plan_points
 from asperity.study.ranges import ParameterRange, overrides_at
 from asperity.study.silence import with_silence
-
-if TYPE_CHECKING:
-    import pandas
 
 CHECK_SEEDS = 5
 STEP = 0.1  # of a range, either way, over which slopes are taken
@@ -52,7 +49,7 @@ class MisfitSolver:
         self.cases = self.failed = 0
         self.seconds = 0.0
 
-    def solve(self, wanted: Sequence[Field | None], seeds: int | None = None) -> "list[pandas.DataFrame]":
+    def solve(self, wanted: Sequence[Field | None], seeds: int | None = None) -> list[pandas.DataFrame]:
         """The rows of each set of shares (None: the case as it is), all levels and seeds, as one study."""
         sets = [
             {} if shares is None else overrides_at(self.case, self.ranges, [float(share) for share in shares])
@@ -63,7 +60,7 @@ class MisfitSolver:
         place = table["point"] // len(self.sq)
         return [with_silence(table[place == number]) for number in range(len(sets))]
 
-    def _run(self, plan: StudyPlan, folder: str) -> "pandas.DataFrame":
+    def _run(self, plan: StudyPlan, folder: str) -> pandas.DataFrame:
         out = None if self.out is None else self.out / folder
         result = run_study(plan, out=out, executor=self.executor, progress=self.progress)
         self.cases += len(plan.cases)

@@ -3,9 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import pandas
 from threadpoolctl import threadpool_limits
 
 from asperity.errors import AsperityError, BadInput
@@ -24,9 +25,6 @@ from asperity.study.curve import SQ_KEY, WearCurve, curve_of, is_wear_study
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyResult
 from asperity.study.plan import SEED_KEYS, as_written
-
-if TYPE_CHECKING:
-    import pandas
 
 MOST_MAPS = 8  # the paper's Figs 5 and 6 have eight
 MOST_REASONS = 10
@@ -64,7 +62,7 @@ class StudyOverview:
             )
 
     @cached_property
-    def used(self) -> "pandas.DataFrame":
+    def used(self) -> pandas.DataFrame:
         """The rows that may be used."""
         table = self.result.table
         return table[table["status"] == DONE]
@@ -204,7 +202,7 @@ class StudyOverview:
     # Tables ----------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def tables(self) -> "dict[str, pandas.DataFrame]":
+    def tables(self) -> dict[str, pandas.DataFrame]:
         """Every table by its file's name, in SI but for columns whose name has another unit."""
         tables = {"cases": self.result.table, "failures": self.result.failures}
         if self.curve is None:
@@ -216,7 +214,7 @@ class StudyOverview:
             tables |= {f"rig-{preset}": rig_prediction(self.curve, f"crf_{preset}_hz") for preset in self.curve.stages}
         return tables
 
-    def _points(self) -> "pandas.DataFrame":
+    def _points(self) -> pandas.DataFrame:
         """A row a point: how many cases may be used, mean and standard deviation of each output."""
         keys = [key for key in self.result.plan.axes if key in self.used]
         groups = self.used.groupby("point", sort=True)

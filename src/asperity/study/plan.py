@@ -15,6 +15,7 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from asperity.case import Case, RangeSection, Section, Seeding, StudyKind, split_amount, to_si
 from asperity.errors import BadInput, UnreadableFile
@@ -341,9 +342,7 @@ def _between(span: _Span, share: float, scale: str) -> Decimal:
 
 def _sampled(case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int) -> list[dict[str, Any]]:
     """Points of a Latin hypercube: over ranges evenly, over lists entry by entry."""
-    from scipy.stats import qmc
-
-    shares = qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
+    shares = scipy.stats.qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
     points: list[dict[str, Any]] = [{} for _ in range(samples)]
     for column, (key, (name, values)) in enumerate(sorted(keys.items())):  # a restated case has another order
         for point, share in zip(points, shares[:, column], strict=True):

@@ -52,10 +52,10 @@ class ParameterRange:
 
     def value(self, share: float) -> float:
         """The value at a share of the way, 0 to 1, in the range's unit."""
-        found = self.low + share * (self.high - self.low)
+        value = self.low + share * (self.high - self.low)
         if self.log:
-            found = self.low * (self.high / self.low) ** share
-        return float(f"{found:.{DIGITS}g}")
+            value = self.low * (self.high / self.low) ** share
+        return float(f"{value:.{DIGITS}g}")
 
     def share(self, value: float) -> float:
         """How far along the range a value in its unit lies; not bounded to 0 and 1."""
@@ -119,8 +119,8 @@ def _number_or_text(text: str) -> object:
 
 def open_ranges(case: Case, wanted: Sequence[ParameterRange] = OPEN_RANGES) -> tuple[ParameterRange, ...]:
     """Those of `wanted` that the case has a key for; lengths of roughness kept to what its grid can carry."""
-    found = [entry for entry in wanted if _has(case, entry.key)]
-    return tuple(_carried(case, entry, found) if entry.key == LENGTH_KEY else entry for entry in found)
+    ranges = [entry for entry in wanted if _has(case, entry.key)]
+    return tuple(_carried(case, entry, ranges) if entry.key == LENGTH_KEY else entry for entry in ranges)
 
 
 def _has(case: Case, key: str) -> bool:
@@ -151,8 +151,8 @@ def _carried(case: Case, lengths: ParameterRange, others: Sequence[ParameterRang
 
 def entry_of(key: str) -> tuple[str, int | None]:
     """The case's key, and the place in its pair where the key names one: "grid.x[0]" is ("grid.x", 0)."""
-    found = _ENTRY.fullmatch(key)
-    return (found["key"], int(found["place"])) if found else (key, None)
+    entry = _ENTRY.fullmatch(key)
+    return (entry["key"], int(entry["place"])) if entry else (key, None)
 
 
 def stated_value(case: Case, key: str) -> Any:
@@ -172,23 +172,23 @@ def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Sequence[
     Where the domain is moved along x or y, its cells go with it, so that their size stays that of the case's cells on
     the widest domain in the ranges.
     """
-    found: dict[str, Any] = {}
+    overrides: dict[str, Any] = {}
     for entry, share in zip(ranges, shares, strict=True):
         key, place = entry_of(entry.key)
         if place is None:
-            found[key] = entry.written(share)
+            overrides[key] = entry.written(share)
         else:
-            whole = found.get(key, stated_value(case, key))
-            found[key] = [entry.written(share) if i == place else value for i, value in enumerate(whole)]
+            whole = overrides.get(key, stated_value(case, key))
+            overrides[key] = [entry.written(share) if i == place else value for i, value in enumerate(whole)]
     cells = list(case.grid.cells)
     for axis, key in enumerate(("grid.x", "grid.y")):
-        if key in found and cells[axis] > 1:
-            reach = found[key][1] - found[key][0]
+        if key in overrides and cells[axis] > 1:
+            reach = overrides[key][1] - overrides[key][0]
             even = 2 * round(cells[axis] * reach / _widest(case, ranges, key) / 2)
             cells[axis] = max(even, FEWEST_CELLS)
     if tuple(cells) != case.grid.cells:
-        found["grid.cells"] = cells
-    return found
+        overrides["grid.cells"] = cells
+    return overrides
 
 
 def _widest(case: Case, ranges: Sequence[ParameterRange], key: str) -> float:

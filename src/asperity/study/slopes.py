@@ -4,9 +4,9 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas
 import scipy
 
 from asperity.arrays import Field
@@ -16,9 +16,6 @@ from asperity.study.calibration_result import LEARNT_FROM, ParameterDirection, T
 from asperity.study.curve import WearCurve
 from asperity.study.evaluate import DONE
 from asperity.study.misfit import MisfitSolver, neighbours
-
-if TYPE_CHECKING:
-    import pandas
 
 PRIOR_VARIANCE = 1.0 / 12.0  # of a share that may be anything from 0 to 1
 FARTHEST = 0.3  # of a range, to which slopes are trusted
@@ -37,7 +34,7 @@ class MisfitSlopes:
         pairs = neighbours(best)
         tables = solver.solve([best, *itertools.chain(*pairs)], seeds)
 
-        def values(table: "pandas.DataFrame") -> Field:
+        def values(table: pandas.DataFrame) -> Field:
             """Shape (seeds, anchors): what each surface by itself gives."""
             each = np.full((seeds, len(solver.aimed)), np.nan)
             for seed in range(seeds):

@@ -12,7 +12,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import filelock
+import pandas
+import pyarrow
+import pyarrow.parquet
 
 from asperity.arrays import Field
 from asperity.case import load_case, relative_path, to_si
@@ -20,10 +25,6 @@ from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
 from asperity.study.evaluate import DONE, Row
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
-
-if TYPE_CHECKING:
-    import pandas
-    import pyarrow
 
 FORMAT = 1  # counts up when a reader of the format before could not read the folder
 PARTS, TABLE, MAPS = "parts", "table.parquet", "fields.zarr"
@@ -40,16 +41,14 @@ class Store:
 
     def finished(self) -> dict[str, tuple[str, int]]:
         """Status and attempt of every case that some part holds."""
-        import pyarrow.parquet
-
-        found: dict[str, tuple[str, int]] = {}
+        newest: dict[str, tuple[str, int]] = {}
         for path in self._parts():
             with _naming(path):
                 part = pyarrow.parquet.read_table(path, columns=["case_id", "status", "attempt"]).to_pydict()
             for case_id, status, attempt in zip(*(part[name] for name in part), strict=True):
-                if attempt >= found.get(case_id, ("", 0))[1]:
-                    found[case_id] = status, attempt
-        return found
+                if attempt >= newest.get(case_id, ("", 0))[1]:
+                    newest[case_id] = status, attempt
+        return newest
 
     def keep(self, rows: Sequence[Row], maps: Mapping[str, Mapping[str, Field]]) -> None:
         """Write a finished batch: its fields first, then its rows.
@@ -76,18 +75,14 @@ class Store:
 
     def merge(self) -> Path:
         """Write what is finished as one table, in the order of the plan, and return its path."""
-        import pyarrow
-
         path = self.folder / TABLE
         table = pyarrow.Table.from_pandas(self.table(), preserve_index=False)
         about = {"asperity": version("asperity"), "case": self.plan.case.text}
         self._write(path, table.replace_schema_metadata({**table.schema.metadata, **about}))
         return path
 
-    def table(self) -> "pandas.DataFrame":
+    def table(self) -> pandas.DataFrame:
         """What is finished, a row a case in the order of the plan."""
-        import pyarrow.parquet
-
         parts = []
         for path in self._parts():
             with _naming(path):
@@ -109,8 +104,7 @@ class Store:
     def _parts(self) -> list[Path]:
         return sorted((self.folder / PARTS).glob("*.parquet"))
 
-    def _write(self, path: Path, table: "pyarrow.Table") -> None:
-        import pyarrow.parquet
+    def _write(self, path: Path, table: pyarrow.Table) -> None:
 
         try:
             with whole_file(path) as part:
@@ -156,8 +150,6 @@ def open_read(folder: Path, plan: StudyPlan) -> Store:
 
 def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
     """Lock the folder: a whole study against everybody, a shard against itself and a whole study."""
-    import filelock
-
     whole, own = folder / ".whole.lock", folder / f".shard-{shard[0]}-of-{shard[1]}.lock"
     try:
         if shard == (1, 1):
@@ -202,8 +194,8 @@ def read_plan(folder: Path) -> StudyPlan:
 
 def kept_versions(folder: Path) -> dict[str, str]:
     """What a study's folder was begun with."""
-    found: dict[str, str] = read_manifest(folder, of="study", layout=FORMAT)["versions"]
-    return found
+    begun_with: dict[str, str] = read_manifest(folder, of="study", layout=FORMAT)["versions"]
+    return begun_with
 
 
 def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
@@ -240,7 +232,6 @@ def _require_same(manifest: Mapping[str, Any], plan: StudyPlan, folder: Path) ->
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    import pyarrow
 
     try:
         yield
@@ -264,20 +255,15 @@ def require_zarr() -> Any:
 # Tables --------------------------------------------------------------------------------------------------------------
 
 
-def table_of(rows: Iterable[Row]) -> "pyarrow.Table":
+def table_of(rows: Iterable[Row]) -> pyarrow.Table:
     """Rows as a table; a row may lack what another has."""
-    import pyarrow
-
     rows = list(rows)
     names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     return pyarrow.Table.from_pydict({name: [row.get(name) for row in rows] for name in names})
 
 
-def in_order(parts: Sequence["pyarrow.Table"], plan: StudyPlan) -> "pandas.DataFrame":
+def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFrame:
     """Finished rows behind the plan's own columns, by case number; of a case computed twice, the last attempt."""
-    import pandas
-    import pyarrow
-
     planned = pandas.DataFrame(
         {
             "case_id": [case.id for case in plan.cases],
@@ -320,6 +306,6 @@ def _of_one_type(values: Sequence[Any]) -> list[Any]:
     return [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
 
 
-def failed(table: "pandas.DataFrame") -> "pandas.DataFrame":
+def failed(table: pandas.DataFrame) -> pandas.DataFrame:
     """The rows that must not be used."""
     return table[table["status"] != DONE]
