@@ -1,6 +1,6 @@
 """The paper's rig, simulated: recordings of worn rings whose contact resonance is known, to judge methods by.
 
-The contact is asperity's own oscillator over its own rough profile. What a real accelerometer picks up besides, and what
+The contact is asperity's own oscillator over its own rough profile. What an accelerometer picks up besides, and what
 fools a search for the highest point, is drawn anew for each rig: structural modes, shaft and mains lines, noise.
 """
 

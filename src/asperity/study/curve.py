@@ -41,7 +41,7 @@ class WearCurve:
         return int((self.table["status"] != DONE).sum())
 
     def values(self, quantity: str, level: int) -> Field:
-        """Every seed's value of a column at a level, shape (seeds,); where there is none, as of a CRF that was not found, none.
+        """Every seed's value of a column at a level, shape (seeds,); seeds without one are left out.
 
         Raises
         ------
@@ -118,8 +118,8 @@ class WearCurve:
     @property
     def quantities(self) -> tuple[str, ...]:
         """The columns that the paper's Figs 7 and 8 show."""
-        vibration = [f"{name}_{preset}{unit}" for preset in BOTH_PRESETS for name, unit in (("crf", "_hz"), ("crfa", ""))]
-        wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *vibration)
+        resonances = [key for preset in BOTH_PRESETS for key in (f"crf_{preset}_hz", f"crfa_{preset}")]
+        wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *resonances)
         return tuple(name for name in wanted if name in self.table)
 
     def verdict(self) -> str:

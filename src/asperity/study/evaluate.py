@@ -25,7 +25,8 @@ from asperity.wear import Resonance
 
 CaseStatus = Literal["done", "not converged", "failed"]
 StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
-DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
+STATUSES: tuple[CaseStatus, ...] = get_args(CaseStatus)
+DONE, NOT_CONVERGED, FAILED = STATUSES
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
 
