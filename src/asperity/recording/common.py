@@ -32,22 +32,22 @@ def facts_in(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
         if not 0.0 < number < 1e12:
             raise UnreadableFile(f"{name} states {key} = {number:g}, which is no sampling rate or step; {REMEDY}")
         rates[key] = number if stated([(key, value)], RATE_NAMES) else 1.0 / number
-    found: dict[str, Any] = {}
+    facts: dict[str, Any] = {}
     if rates:
         key, rate = next(iter(rates.items()))
         other = next((k for k, r in rates.items() if abs(r / rate - 1.0) > 1e-4), None)
         if other is not None:
             raise UnreadableFile(f"{name} states two sampling rates, {key} and {other}; give it without one of them")
-        found |= {"rate_hz": whole_rate(rate, 1e-9), "rate_source": f"file ({key})"}
+        facts |= {"rate_hz": whole_rate(rate, 1e-9), "rate_source": f"file ({key})"}
     for _, value in stated(attributes.items(), UNIT_NAMES):
         text = _text(value)
         if text:
-            found["unit"] = text
+            facts["unit"] = text
     for _, value in stated(attributes.items(), START_NAMES):
-        started = when(value)
+        started = parse_time(value)
         if started is not None:
-            found["started"] = started
-    return found
+            facts["started"] = started
+    return facts
 
 
 def whole_rate(rate: float, rounding: float) -> float:
@@ -56,7 +56,7 @@ def whole_rate(rate: float, rounding: float) -> float:
     return whole if whole > 0.0 and abs(whole / rate - 1.0) <= rounding < 0.5 / rate else rate
 
 
-def when(value: Any) -> datetime | None:
+def parse_time(value: Any) -> datetime | None:
     """A time as files write it; None for what is none."""
     if isinstance(value, datetime):
         return value.replace(tzinfo=None)
@@ -164,7 +164,7 @@ def numeric(array: Any) -> bool:
     return kind in "iuf"
 
 
-def only(channels: Iterable[Channel], name: str) -> tuple[Channel, ...]:
+def required(channels: Iterable[Channel], name: str) -> tuple[Channel, ...]:
     """All channels; refused where there is none.
 
     Raises
@@ -172,7 +172,7 @@ def only(channels: Iterable[Channel], name: str) -> tuple[Channel, ...]:
     UnreadableFile
         for a file without any.
     """
-    found = tuple(channels)
-    if not found:
+    every = tuple(channels)
+    if not every:
         raise UnreadableFile(f"{name} holds no row of samples; give a file with a recording in it")
-    return found
+    return every

@@ -11,7 +11,7 @@ import numpy as np
 
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, only
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, required
 from asperity.recording.model import Channel, Contents
 
 _DEEPEST = 8  # groups in groups
@@ -40,7 +40,7 @@ def read(path: Path) -> Contents:
         raise UnreadableFile(f"{path.name} is a damaged HDF5 file ({first_line(error)}); {REMEDY}") from error
     finally:
         file.close()
-    return Contents(format="mat v7.3" if matlab else "hdf5", channels=only(channels, path.name), notes=notes)
+    return Contents(format="mat v7.3" if matlab else "hdf5", channels=required(channels, path.name), notes=notes)
 
 
 def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
@@ -50,16 +50,16 @@ def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: l
         return
     around = above | _attributes(group)
     members = [(str(key), group.get(key)) for key in group if not str(key).startswith("#")]
-    for key, one in members:
-        if isinstance(one, h5py.Dataset) and one.size is not None and one.size <= 64:
-            around[key] = _scalar(one)
-    for key, one in members:
+    for key, member in members:
+        if isinstance(member, h5py.Dataset) and member.size is not None and member.size <= 64:
+            around[key] = _scalar(member)
+    for key, member in members:
         inner = f"{name}/{key}" if name else key
-        if isinstance(one, h5py.Group):
-            yield from _channels(path, one, inner, around, notes)
-        elif isinstance(one, h5py.Dataset) and numeric(one) and one.size is not None and one.size > 64:
-            facts = facts_in(path.name, around | _attributes(one))
-            yield from columns(inner, _OnDisk(path, one.name, one.shape), notes, **facts)
+        if isinstance(member, h5py.Group):
+            yield from _channels(path, member, inner, around, notes)
+        elif isinstance(member, h5py.Dataset) and numeric(member) and member.size is not None and member.size > 64:
+            facts = facts_in(path.name, around | _attributes(member))
+            yield from columns(inner, _OnDisk(path, member.name, member.shape), notes, **facts)
 
 
 class _OnDisk:
@@ -83,18 +83,18 @@ class _OnDisk:
         return values
 
 
-def _scalar(one: Any) -> Any:
+def _scalar(member: Any) -> Any:
     """A small data set as a number, or as text: MATLAB keeps that as 16-bit characters."""
-    value = one[()]
-    if isinstance(value, np.ndarray) and one.attrs.get("MATLAB_class") == b"char":
+    value = member[()]
+    if isinstance(value, np.ndarray) and member.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, value.reshape(-1).tolist()))
     return value
 
 
-def _attributes(one: Any) -> dict[str, Any]:
-    return {str(key): value for key, value in one.attrs.items()}
+def _attributes(member: Any) -> dict[str, Any]:
+    return {str(key): value for key, value in member.attrs.items()}
 
 
 def _every_attribute(file: Any) -> Iterator[str]:
-    for one in file.values():
-        yield from one.attrs
+    for member in file.values():
+        yield from member.attrs

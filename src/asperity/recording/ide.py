@@ -6,7 +6,7 @@ from typing import Any
 
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, only, sliced
+from asperity.recording.common import REMEDY, required, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -24,16 +24,16 @@ def read(path: Path) -> Contents:
     try:
         with idelib.importFile(str(path)) as data:
             started = data.lastUtcTime or None
-            for one in data.channels.values():
-                for sub in one.subchannels:
+            for channel in data.channels.values():
+                for sub in channel.subchannels:
                     events = sub.getSession()
                     if len(events) < 2:
                         continue
-                    name = f"{one.id}.{sub.id} {sub.name}"
+                    name = f"{channel.id}.{sub.id} {sub.name}"
                     channels.append(
                         Channel(
                             name=name,
-                            blocks=sliced(_slices(path, one.id, sub.id), len(events), notes, name),
+                            blocks=sliced(_slices(path, channel.id, sub.id), len(events), notes, name),
                             samples=len(events),
                             rate_hz=float(events.getSampleRate()),
                             rate_source="file (mean over the recording)",
@@ -45,7 +45,7 @@ def read(path: Path) -> Contents:
         raise
     except Exception as error:
         raise UnreadableFile(f"{path.name} is no readable IDE recording ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="enDAQ ide", channels=only(channels, path.name), notes=notes)
+    return Contents(format="enDAQ ide", channels=required(channels, path.name), notes=notes)
 
 
 def _slices(path: Path, channel: int, subchannel: int) -> Any:

@@ -12,7 +12,7 @@ import scipy
 
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, only
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, required
 from asperity.recording.model import Channel, Contents
 
 _DEEPEST = 8
@@ -38,7 +38,7 @@ def read(path: Path) -> Contents:
         raise
     except Exception as error:
         raise UnreadableFile(f"{path.name} is no readable MATLAB file ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="mat v5", channels=only(channels, path.name), notes=notes)
+    return Contents(format="mat v5", channels=required(channels, path.name), notes=notes)
 
 
 def _channels(file: str, held: dict[str, Any], name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
@@ -50,11 +50,11 @@ def _channels(file: str, held: dict[str, Any], name: str, above: dict[str, Any],
         if fields := _fields(value):
             yield from _channels(file, fields, inner, around, notes)
         elif isinstance(value, np.ndarray) and value.dtype == object:
-            for number, one in enumerate(value.reshape(-1)[:64], 1):
-                if fields := _fields(one):
+            for number, entry in enumerate(value.reshape(-1)[:64], 1):
+                if fields := _fields(entry):
                     yield from _channels(file, fields, f"{inner}({number})", around, notes)
-                elif isinstance(one, np.ndarray) and numeric(one) and one.size > 64:
-                    yield from columns(f"{inner}({number})", one, notes, **facts_in(file, around))
+                elif isinstance(entry, np.ndarray) and numeric(entry) and entry.size > 64:
+                    yield from columns(f"{inner}({number})", entry, notes, **facts_in(file, around))
         elif isinstance(value, np.ndarray) and numeric(value) and value.size > 64:
             yield from columns(inner, value, notes, **facts_in(file, around))
 

@@ -11,7 +11,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, columns, facts_in, only
+from asperity.recording.common import REMEDY, columns, facts_in, required
 from asperity.recording.model import Channel, Contents
 
 _SMALL = 64  # samples: what is shorter describes the others
@@ -47,7 +47,7 @@ def read_npy(path: Path) -> Contents:
         raise
     except (OSError, ValueError, TypeError, OverflowError, MemoryError, AttributeError, SyntaxError) as error:
         raise UnreadableFile(f"{path.name} is no readable .npy file ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="npy", channels=only(_of_array(path, array, notes), path.name), notes=notes)
+    return Contents(format="npy", channels=required(_of_array(path, array, notes), path.name), notes=notes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +102,7 @@ def read_npz(path: Path) -> Contents:
     channels: list[Channel] = []
     for member, shape, fortran, dtype in arrays:
         channels += _of_member(path, member, shape, fortran, dtype, notes, facts)
-    return Contents(format="npz", channels=only(channels, path.name), notes=notes)
+    return Contents(format="npz", channels=required(channels, path.name), notes=notes)
 
 
 def _of_member(

@@ -9,7 +9,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, facts_in, only
+from asperity.recording.common import REMEDY, facts_in, required
 from asperity.recording.model import Channel, Contents
 from asperity.recording.timing import Clock, is_time
 from asperity.recording.units import name_and_unit
@@ -31,9 +31,11 @@ def read(path: Path) -> Contents:
             schema, rows = file.schema_arrow, file.metadata.num_rows
             table = {str(k): v for k, v in _decoded(schema.metadata).items() if k not in ("pandas", "ARROW:schema")}
             numbers = [
-                one for one in schema if pyarrow.types.is_floating(one.type) or pyarrow.types.is_integer(one.type)
+                entry
+                for entry in schema
+                if pyarrow.types.is_floating(entry.type) or pyarrow.types.is_integer(entry.type)
             ]
-            labels = [(one.name, *name_and_unit(one.name)) for one in numbers]
+            labels = [(entry.name, *name_and_unit(entry.name)) for entry in numbers]
             clock = next((label for label in labels if is_time(label[1])), None)
             timed = {} if clock is None else _timed(path, file, clock)
             facts = [
@@ -51,7 +53,7 @@ def read(path: Path) -> Contents:
         for (label, name, _), known in zip(labels, facts, strict=True)
         if (label != (clock or ("",))[0]) and not label.startswith("__index")
     )
-    return Contents(format="parquet", channels=only(channels, path.name), notes=notes)
+    return Contents(format="parquet", channels=required(channels, path.name), notes=notes)
 
 
 def _timed(path: Path, file: Any, column: tuple[str, str, str | None]) -> dict[str, Any]:

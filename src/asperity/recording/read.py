@@ -12,7 +12,7 @@ from typing import Any
 from asperity.errors import BadInput, UnreadableFile, require_positive
 from asperity.quiet import first_line, quietly
 from asperity.recording import hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
-from asperity.recording.common import REMEDY, when
+from asperity.recording.common import REMEDY, parse_time
 from asperity.recording.model import (
     ACCELERATION,
     FULL_SCALE,
@@ -23,7 +23,7 @@ from asperity.recording.model import (
     OpenRecording,
     Recording,
 )
-from asperity.recording.sidecar import beside
+from asperity.recording.sidecar import stated_beside
 from asperity.recording.units import acceleration_scale
 
 _SAME = 1e-4  # relative difference up to which two stated rates agree
@@ -51,7 +51,7 @@ FORMATS = (  # in the order in which they are tried; text comes after all of the
     _Format(numpys.is_npz, ("npz",), numpys.read_npz),
     _Format(uff.is_uff, ("uff", "unv", "u58", "bunv"), uff.read, "pyuff"),
 )
-SUFFIXES = {suffix for one in FORMATS for suffix in one.suffixes} | text.SUFFIXES
+SUFFIXES = {suffix for form in FORMATS for suffix in form.suffixes} | text.SUFFIXES
 
 
 def read_recording(
@@ -102,11 +102,13 @@ def open_channels(path: str | Path, **given: Any) -> list[OpenRecording]:
     path = Path(path)
     with quietly():
         contents = read_contents(path)
-        stated, _ = beside(path)
+        stated, _ = stated_beside(path)
         if given.get("channel") is not None or "channel" in stated or len(contents.channels) == 1:
             return [_chosen(path, contents, **given)]
-        every = [_chosen(path, contents, **given | {"channel": one.name}) for one in contents.channels]
-        return [replace(one, facts=one.facts | {"channel": Fact(one.channel.name, "file")}) for one in every]
+        every = [_chosen(path, contents, **given | {"channel": opened.name}) for opened in contents.channels]
+        return [
+            replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")}) for opened in every
+        ]
 
 
 def read_contents(path: Path) -> Contents:
@@ -118,8 +120,8 @@ def read_contents(path: Path) -> Contents:
         for a file that is missing, damaged, in no known format or without a time record.
     """
     if not path.is_file():
-        said = "is a folder; name the files in it" if path.is_dir() else "does not exist; check its name"
-        raise UnreadableFile(f"{path} {said}")
+        refusal = "is a folder; name the files in it" if path.is_dir() else "does not exist; check its name"
+        raise UnreadableFile(f"{path} {refusal}")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
@@ -128,11 +130,11 @@ def read_contents(path: Path) -> Contents:
     if not head:
         raise UnreadableFile(f"{path.name} is empty; {REMEDY}")
     suffix = path.suffix[1:].lower()
-    chosen = next((one for one in FORMATS if one.known(head)), None)
+    chosen = next((form for form in FORMATS if form.known(head)), None)
     if chosen is None:
         if suffix == "mat" and not text.looks_like_text(head):
             chosen = FORMATS[1]  # MATLAB 4 has no header
-        elif any(suffix in one.suffixes for one in FORMATS):
+        elif any(suffix in form.suffixes for form in FORMATS):
             raise UnreadableFile(f"{path.name} is named {suffix} but does not begin like one; {REMEDY}")
         elif not text.looks_like_text(head):
             raise UnreadableFile(
@@ -160,33 +162,33 @@ def _chosen(
     channel: str | None = None,
     scale: float | None = None,
 ) -> OpenRecording:
-    stated, sidecar = beside(path)
-    asked, asked_by = (channel, "command line") if channel is not None else (stated.get("channel"), sidecar)
-    one = _channel(path, contents, asked)
+    stated, sidecar = stated_beside(path)
+    requested, stated_by = (channel, "command line") if channel is not None else (stated.get("channel"), sidecar)
+    selected = _channel(path, contents, requested)
     facts = {
         "format": Fact(contents.format, "file"),
-        "channel": Fact(one.name, asked_by if asked is not None else "file (its only one)"),
+        "channel": Fact(selected.name, stated_by if requested is not None else "file (its only one)"),
     }
     notes: list[str] = []
-    facts["rate"] = _rate(path, one, rate_hz, (stated.get("rate_hz"), sidecar))
+    facts["rate"] = _rate(path, selected, rate_hz, (stated.get("rate_hz"), sidecar))
     factor = scale if scale is not None else stated.get("scale")
     if factor is not None:
         facts["scale"] = Fact(float(factor), "command line" if scale is not None else sidecar)
-    facts["unit"] = _unit(path, one, unit, (stated.get("unit"), sidecar), scaled=factor is not None)
+    facts["unit"] = _unit(path, selected, unit, (stated.get("unit"), sidecar), scaled=factor is not None)
     unit_text = str(facts["unit"].value)
     total = 1.0 if factor is None else float(factor)
-    metres = None if _is_force(one.name, unit_text) else acceleration_scale(unit_text)
+    metres = None if _is_force(selected.name, unit_text) else acceleration_scale(unit_text)
     if metres is not None:
         total, unit_text = total * metres, ACCELERATION
     elif unit_text == "g":
         unit_text = "gram-force"
-        notes.append(f"g is taken as grams of force, because the channel is called {one.name}")
-    began = _start(path, one, (stated.get("started"), sidecar))
+        notes.append(f"g is taken as grams of force, because the channel is called {selected.name}")
+    began = _start(path, selected, (stated.get("started"), sidecar))
     if began is not None:
         facts["started"] = began
     return OpenRecording(
         path=path,
-        channel=one,
+        channel=selected,
         rate_hz=float(facts["rate"].value),
         unit=unit_text,
         scale=total,
@@ -196,29 +198,32 @@ def _chosen(
     )
 
 
-def _channel(path: Path, contents: Contents, asked: str | None) -> Channel:
+def _channel(path: Path, contents: Contents, requested: str | None) -> Channel:
     channels = contents.channels
-    names = [one.name for one in channels]
-    if asked is None:
+    names = [channel.name for channel in channels]
+    if requested is None:
         if len(channels) == 1:
             return channels[0]
-        rates = sorted({one.rate_hz for one in channels if one.rate_hz is not None})
+        rates = sorted({channel.rate_hz for channel in channels if channel.rate_hz is not None})
         differing = f" of {len(rates)} rates" if len(rates) > 1 else ""
         raise BadInput(
             f"{path.name} holds {len(channels)} channels{differing} ({_listed(names)}); give channel, one of them"
         )
-    for fits in (asked, asked.strip()):
+    for fits in (requested, requested.strip()):
         if fits in names:
             return channels[names.index(fits)]
-    plain = asked.strip().lower()
-    meant = [one for one in channels if plain in _short_names(one.name)]
-    if len(meant) == 1:
-        return meant[0]
-    if meant:
-        raise BadInput(f"{path.name} has {len(meant)} channels {asked!r}; give {_listed([one.name for one in meant])}")
-    if asked.strip().isdigit() and 0 < int(asked) <= len(channels):
-        return channels[int(asked) - 1]
-    raise BadInput(f"{path.name} has no channel {asked!r}; it has {_listed(names)}")
+    plain = requested.strip().lower()
+    matching = [channel for channel in channels if plain in _short_names(channel.name)]
+    if len(matching) == 1:
+        return matching[0]
+    if matching:
+        raise BadInput(
+            f"{path.name} has {len(matching)} channels {requested!r}; "
+            f"give {_listed([channel.name for channel in matching])}"
+        )
+    if requested.strip().isdigit() and 0 < int(requested) <= len(channels):
+        return channels[int(requested) - 1]
+    raise BadInput(f"{path.name} has no channel {requested!r}; it has {_listed(names)}")
 
 
 def _short_names(name: str) -> set[str]:
@@ -227,52 +232,54 @@ def _short_names(name: str) -> set[str]:
 
 
 def _listed(names: list[str]) -> str:
-    shown = ", ".join(names[:8])
-    return shown if len(names) <= 8 else f"{shown} and {len(names) - 8} more"
+    listed = ", ".join(names[:8])
+    return listed if len(names) <= 8 else f"{listed} and {len(names) - 8} more"
 
 
-def _rate(path: Path, one: Channel, given: float | None, sidecar: tuple[float | None, str]) -> Fact:
+def _rate(path: Path, channel: Channel, given: float | None, sidecar: tuple[float | None, str]) -> Fact:
     if given is not None:
         require_positive("sampling rate", given, "Hz")
     others = [(given, "command line"), sidecar]
     rate, source = next(((value, name) for value, name in others if value is not None), (None, ""))
-    if one.rate_hz is not None:
-        if rate is not None and abs(rate / one.rate_hz - 1.0) > _SAME:
+    if channel.rate_hz is not None:
+        if rate is not None and abs(rate / channel.rate_hz - 1.0) > _SAME:
             raise BadInput(
-                f"{path.name} states {one.rate_hz:g} Hz in its {one.rate_source.removeprefix('file ').strip('()')}, "
-                f"the {source} says {rate:g} Hz; leave out the wrong one"
+                f"{path.name} states {channel.rate_hz:g} Hz in its "
+                f"{channel.rate_source.removeprefix('file ').strip('()')}, the {source} says {rate:g} Hz; "
+                "leave out the wrong one"
             )
-        return Fact(float(one.rate_hz), one.rate_source)
+        return Fact(float(channel.rate_hz), channel.rate_source)
     if rate is None:
         raise BadInput(
-            f"{path.name} states no sampling rate{one.rate_hint}; give rate_hz, "
+            f"{path.name} states no sampling rate{channel.rate_hint}; give rate_hz, "
             f"or state it as rate_hz in {path.name}.toml beside it"
         )
     return Fact(float(rate), source)
 
 
-def _unit(path: Path, one: Channel, given: str | None, sidecar: tuple[str | None, str], *, scaled: bool) -> Fact:
+def _unit(path: Path, channel: Channel, given: str | None, sidecar: tuple[str | None, str], *, scaled: bool) -> Fact:
     others = [(given, "command line"), sidecar]
     unit, source = next(((value, name) for value, name in others if value is not None), (None, ""))
-    if one.full_scale:
+    if channel.full_scale:
         if unit is not None and not scaled:
             raise BadInput(
                 f"{path.name} holds shares of full scale, so a unit needs its scale; "
                 f"give scale, the {unit} at full scale"
             )
         return Fact(unit or FULL_SCALE, source or "file (integer samples)")
-    if one.unit is not None and unit is not None and not scaled and not _same_unit(one.unit, unit):
+    if channel.unit is not None and unit is not None and not scaled and not _same_unit(channel.unit, unit):
         raise BadInput(
-            f"{path.name} states its unit as {one.unit}, the {source} says {unit}; leave it out, or give its scale too"
+            f"{path.name} states its unit as {channel.unit}, the {source} says {unit}; "
+            "leave it out, or give its scale too"
         )
     if unit is not None:
-        return Fact(unit, source if one.unit is None or scaled else "file")
-    return Fact(UNKNOWN, "nobody") if one.unit is None else Fact(one.unit, "file")
+        return Fact(unit, source if channel.unit is None or scaled else "file")
+    return Fact(UNKNOWN, "nobody") if channel.unit is None else Fact(channel.unit, "file")
 
 
-def _same_unit(one: str, other: str) -> bool:
-    first, second = acceleration_scale(one), acceleration_scale(other)
-    return one.strip().lower() == other.strip().lower() or (first is not None and first == second)
+def _same_unit(unit: str, other: str) -> bool:
+    first, second = acceleration_scale(unit), acceleration_scale(other)
+    return unit.strip().lower() == other.strip().lower() or (first is not None and first == second)
 
 
 def _is_force(name: str, unit: str) -> bool:
@@ -281,10 +288,10 @@ def _is_force(name: str, unit: str) -> bool:
     return unit == "g" and re.fullmatch(r"(?i)F[xyznfrt]?|.*(force|load|kraft).*", last) is not None
 
 
-def _start(path: Path, one: Channel, sidecar: tuple[Any, str]) -> Fact | None:
+def _start(path: Path, channel: Channel, sidecar: tuple[Any, str]) -> Fact | None:
     if sidecar[0] is not None:
         return Fact(*sidecar)
-    if one.started is not None:
-        return Fact(one.started, "file")
-    named = when(path.name) or when(path.stem)
+    if channel.started is not None:
+        return Fact(channel.started, "file")
+    named = parse_time(path.name) or parse_time(path.stem)
     return None if named is None else Fact(named, "file name")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import BadInput
-from asperity.recording.common import when
+from asperity.recording.common import parse_time
 
 FOLDER_WIDE = "recordings"
 KEYS = ("rate_hz", "unit", "channel", "scale", "started")
@@ -19,7 +19,7 @@ def is_sidecar(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-def beside(path: Path) -> tuple[dict[str, Any], str]:
+def stated_beside(path: Path) -> tuple[dict[str, Any], str]:
     """What is stated beside `path`, and the name of the file that states it; nothing, if there is none.
 
     Raises
@@ -59,7 +59,7 @@ def _checked(path: Path) -> dict[str, Any]:
         if key in ("unit", "channel") and not isinstance(value, str) and not (key == "channel" and number):
             raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
     if "started" in stated:
-        started = when(stated["started"])
+        started = parse_time(stated["started"])
         if started is None:
             raise BadInput(f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00")
         stated["started"] = started

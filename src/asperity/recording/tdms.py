@@ -5,7 +5,7 @@ from typing import Any
 
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, Reader, facts_in, only, sliced
+from asperity.recording.common import REMEDY, Reader, facts_in, required, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -25,21 +25,27 @@ def read(path: Path) -> Contents:
             if opened.file_status.incomplete_final_segment:
                 notes.append("cut short: its last segment is not complete")
             for group in opened.groups():
-                for one in group.channels():
-                    if one.data_type is None or len(one) == 0 or getattr(one.dtype, "kind", "") not in "iuf":
+                for channel in group.channels():
+                    if (
+                        channel.data_type is None
+                        or len(channel) == 0
+                        or getattr(channel.dtype, "kind", "") not in "iuf"
+                    ):
                         continue
-                    properties = dict(opened.properties) | dict(group.properties) | dict(one.properties)
-                    name = f"{group.name}/{one.name}"
-                    reader = _slices(path, group.name, one.name)
+                    properties = dict(opened.properties) | dict(group.properties) | dict(channel.properties)
+                    name = f"{group.name}/{channel.name}"
+                    reader = _slices(path, group.name, channel.name)
                     facts = facts_in(path.name, properties)
                     channels.append(
-                        Channel(name=name, blocks=sliced(reader, len(one), notes, name), samples=len(one), **facts)
+                        Channel(
+                            name=name, blocks=sliced(reader, len(channel), notes, name), samples=len(channel), **facts
+                        )
                     )
     except UnreadableFile:
         raise
     except Exception as error:
         raise UnreadableFile(f"{path.name} is no readable TDMS file ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="tdms", channels=only(channels, path.name), notes=notes)
+    return Contents(format="tdms", channels=required(channels, path.name), notes=notes)
 
 
 def _slices(path: Path, group: str, channel: str) -> Reader:

@@ -17,7 +17,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.dialect import MISSING, Dialect, sniff_dialect
 from asperity.errors import UnreadableFile
-from asperity.recording.common import MOST_CHANNELS, facts_in, only, when
+from asperity.recording.common import MOST_CHANNELS, facts_in, parse_time, required
 from asperity.recording.model import Channel, Contents
 from asperity.recording.timing import Clock, from_stamps, is_time
 from asperity.recording.units import known_unit, name_and_unit
@@ -85,7 +85,7 @@ def read(path: Path) -> Contents:
         prefix = f"{number}/" if len(tables) > 1 else ""
         channels += _channels(path, table, prefix, notes, open_bytes if large else None)
     blocks = f", {len(tables)} blocks" if len(tables) > 1 else ""
-    return Contents(format=f"text{blocks}", channels=only(channels, path.name), notes=notes)
+    return Contents(format=f"text{blocks}", channels=required(channels, path.name), notes=notes)
 
 
 def _opener(path: Path) -> Callable[[], BinaryIO]:
@@ -146,7 +146,7 @@ def _decoded(line: bytes) -> str:
 def _row(fields: list[str], dialect: Dialect) -> tuple[list[float] | None, bool]:
     """The numbers of a line, or None; and whether its first field is a date."""
     values = [dialect.number(field) for field in fields]
-    stamped = len(values) > 1 and values[0] is None and when(fields[0].strip().strip('"')) is not None
+    stamped = len(values) > 1 and values[0] is None and parse_time(fields[0].strip().strip('"')) is not None
     if stamped:
         values[0] = np.nan
     numbers = [value for value in values if value is not None]
@@ -161,19 +161,19 @@ def _labels(header: list[str], count: int, dialect: Dialect) -> tuple[list[str],
     for line in [line for line in header if line.strip()][-3:]:
         bare = line.lstrip("#%/ ")
         alone = count == 1 and not re.search("[:=]", bare)  # a blank in the label of an only column separates nothing
-        fields = [one.strip().strip('"') for one in ([bare] if alone else dialect.fields(bare))]
+        fields = [label.strip().strip('"') for label in ([bare] if alone else dialect.fields(bare))]
         if len(fields) + (line.rstrip().endswith(dialect.separator or "\0")) in (count, count + 1):
             fitting.append((fields + [""] * count)[:count])
     if not fitting:
         return [str(number + 1) for number in range(count)], [None] * count
     below: list[str] = fitting[-1]
-    are_units = [known_unit(one) for one in below]
-    if len(fitting) > 1 and any(are_units) and all(known_unit(one) or len(one) < 9 for one in below):
+    are_units = [known_unit(label) for label in below]
+    if len(fitting) > 1 and any(are_units) and all(known_unit(label) or len(label) < 9 for label in below):
         names = [name or str(k + 1) for k, name in enumerate(fitting[-2])]
-        return names, [one if known else None for one, known in zip(below, are_units, strict=True)]
+        return names, [label if known else None for label, known in zip(below, are_units, strict=True)]
     if any(dialect.number(label) is not None for label in below if label):
         return [str(number + 1) for number in range(count)], [None] * count
-    pairs = [name_and_unit(one) for one in below]
+    pairs = [name_and_unit(label) for label in below]
     return [name or str(k + 1) for k, (name, _) in enumerate(pairs)], [unit for _, unit in pairs]
 
 
@@ -181,10 +181,10 @@ def _declared(header: list[str]) -> dict[str, str]:
     """Key: value, key = value and key;value lines of a header, with hertz and seconds as plain numbers."""
     declared = {}
     for line in header:
-        found = re.match(r"[#%/\s\"]*([A-Za-z][^:=;\t]{0,40}?)\"?\s*[:=;\t]\s*\"?(.+?)\"?[;\t,\s]*$", line)
-        if not found:
+        pair = re.match(r"[#%/\s\"]*([A-Za-z][^:=;\t]{0,40}?)\"?\s*[:=;\t]\s*\"?(.+?)\"?[;\t,\s]*$", line)
+        if not pair:
             continue
-        key, value = re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", found[1].strip(), flags=re.I), found[2].strip()
+        key, value = re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I), pair[2].strip()
         scaled = re.fullmatch(r"([-+\d.,eE]+)\s*(kHz|Hz|ms|us|µs|s|S/s|samples/s)?", value)
         if scaled:
             try:
@@ -200,9 +200,9 @@ def _started(header: list[str]) -> datetime | None:
     """The last date that a header line states, after a colon or the words that CETR's viewer uses."""
     for line in reversed(header):
         for text in (line.partition(":")[2], re.sub(r"^[A-Za-z ]*\b(?:date|at)\b:?\s*", "", line)):
-            found = when(text.strip())
-            if found is not None:
-                return found
+            started = parse_time(text.strip())
+            if started is not None:
+                return started
     return None
 
 
@@ -270,7 +270,7 @@ def _line_by_line(chunk: bytes, table: _Table, at: int, column: int | None) -> t
             fields = table.dialect.fields(text)
             values = [table.dialect.number(field) for field in fields]
             if table.stamped and values and values[0] is None:
-                stamp = when(fields[0].strip().strip('"'))
+                stamp = parse_time(fields[0].strip().strip('"'))
                 if stamp is not None:
                     values[0] = 0.0
                     if column is None:  # a large file's are too many to keep

@@ -5,7 +5,7 @@ from typing import Any
 
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, only, sliced, when, whole_rate
+from asperity.recording.common import REMEDY, parse_time, required, sliced, whole_rate
 from asperity.recording.model import Channel, Contents
 
 TIME_RESPONSE = 1
@@ -40,12 +40,12 @@ def read(path: Path) -> Contents:
         raise UnreadableFile(f"{path.name} holds data sets {sorted(set(kinds))} and no 58; export the time record")
     channels: list[Channel] = []
     others: list[str] = []
-    for one in sets:
+    for record in sets:
         try:
-            if int(one["func_type"]) != TIME_RESPONSE:
-                others.append(_FUNCTIONS.get(int(one["func_type"]), f"function type {one['func_type']}"))
+            if int(record["func_type"]) != TIME_RESPONSE:
+                others.append(_FUNCTIONS.get(int(record["func_type"]), f"function type {record['func_type']}"))
             else:
-                channels.append(_channel(path, one, notes, taken=[channel.name for channel in channels]))
+                channels.append(_channel(path, record, notes, taken=[channel.name for channel in channels]))
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             raise UnreadableFile(f"{path.name} is a damaged universal file ({first_line(error)}); {REMEDY}") from error
     if not channels:
@@ -55,26 +55,26 @@ def read(path: Path) -> Contents:
         )
     if others:
         notes.append(f"left out {' and '.join(dict.fromkeys(others))}: no time record")
-    return Contents(format="uff 58", channels=only(channels, path.name), notes=notes)
+    return Contents(format="uff 58", channels=required(channels, path.name), notes=notes)
 
 
-def _channel(path: Path, one: dict[str, Any], notes: list[str], taken: list[str]) -> Channel:
-    values = one["data"]
+def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[str]) -> Channel:
+    values = record["data"]
     if values.dtype.kind == "c":
         raise ValueError("its time record is complex")
-    if int(one["abscissa_spacing"]) != 1:
+    if int(record["abscissa_spacing"]) != 1:
         raise UnreadableFile(f"{path.name} is sampled unevenly; export it at an even step")
-    step = float(one["abscissa_inc"])
-    label = str(one.get("rsp_ent_name", "")).strip()
-    node = f"{one.get('rsp_node', '')}:{one.get('rsp_dir', '')}"
+    step = float(record["abscissa_inc"])
+    label = str(record.get("rsp_ent_name", "")).strip()
+    node = f"{record.get('rsp_node', '')}:{record.get('rsp_dir', '')}"
     name = label if label and label != "NONE" else node
     if name in taken:
         name = f"{name} {node}" if f"{name} {node}" not in taken else f"{name} {len(taken) + 1}"
-    unit = str(one.get("ordinate_axis_units_lab", "")).strip()
-    samples, promised = int(values.size), int(one["num_pts"])
+    unit = str(record.get("ordinate_axis_units_lab", "")).strip()
+    samples, promised = int(values.size), int(record["num_pts"])
     if samples < promised:
         notes.append(f"cut short: {samples} of {promised} samples are there")
-    started = next((found for key in ("id3", "id2", "id4", "id5") if (found := when(one.get(key, "")))), None)
+    started = next((time for key in ("id3", "id2", "id4", "id5") if (time := parse_time(record.get(key, "")))), None)
     return Channel(
         name=name,
         blocks=sliced(lambda i, j: values[i:j], samples, notes, name),

@@ -9,7 +9,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, only
+from asperity.recording.common import REMEDY, required
 from asperity.recording.model import Channel, Contents
 
 
@@ -36,7 +36,7 @@ def read(path: Path) -> Contents:
     integer = kind not in ("FLOAT", "DOUBLE")
 
     def blocks(number: int) -> Any:
-        def one(size: int) -> Iterator[Field]:
+        def read_blocks(size: int) -> Iterator[Field]:
             with soundfile.SoundFile(path) as sound:
                 while True:
                     block = sound.read(size, dtype="float64", always_2d=True)
@@ -44,7 +44,7 @@ def read(path: Path) -> Contents:
                         return
                     yield np.ascontiguousarray(block[:, number])
 
-        return one
+        return read_blocks
 
     channels = (
         Channel(
@@ -57,7 +57,9 @@ def read(path: Path) -> Contents:
         )
         for number in range(count)
     )
-    return Contents(format=f"wav, {kind.lower().replace('_', ' ')}", channels=only(channels, path.name), notes=notes)
+    return Contents(
+        format=f"wav, {kind.lower().replace('_', ' ')}", channels=required(channels, path.name), notes=notes
+    )
 
 
 def _stated_frames(path: Path) -> int | None:

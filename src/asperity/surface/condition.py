@@ -166,8 +166,8 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
         for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
         if measured.uniform is None or (i, j)[measured.uniform] == 0
     ]
-    found, *_ = np.linalg.lstsq(np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None)
-    c = dict.fromkeys(((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)), 0.0) | dict(zip(powers, found, strict=True))
+    fitted, *_ = np.linalg.lstsq(np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None)
+    c = dict.fromkeys(((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)), 0.0) | dict(zip(powers, fitted, strict=True))
     gradient = np.array([c[1, 0], c[0, 1]])
     bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
     steep = int(np.argmax(np.abs(bends)))

@@ -130,11 +130,11 @@ def non_gaussian_surface(
     stretch = johnson.stretch(skewness, kurtosis)
     longer = (lengths[0] * stretch, lengths[1] * stretch)
     gaussian = _filtered_noise(grid, 1.0, *_gaussian_spectrum(longer, direction), rng).heights
-    curve, found = johnson.fit(*johnson.histogram(gaussian), skewness, kurtosis)
-    if abs(found[0] - skewness) > 0.02 * max(1.0, abs(skewness)) or abs(found[1] - kurtosis) > 0.02 * kurtosis:
+    curve, reached = johnson.fit(*johnson.histogram(gaussian), skewness, kurtosis)
+    if abs(reached[0] - skewness) > 0.02 * max(1.0, abs(skewness)) or abs(reached[1] - kurtosis) > 0.02 * kurtosis:
         raise BadInput(
             f"this sample cannot take a skewness of {skewness:g} and a kurtosis of {kurtosis:g} (nearest: "
-            f"{found[0]:.3g} and {found[1]:.3g}); use a larger domain, shorter correlation lengths or milder values"
+            f"{reached[0]:.3g} and {reached[1]:.3g}); use a larger domain, shorter correlation lengths or milder values"
         )
     heights = curve(gaussian)
     heights -= heights.mean()

@@ -52,13 +52,13 @@ def _nearest(
     """Misfit, spread and shift of the family's best curve: the best of a coarse net, refined."""
 
     def misfit(parameters: Field) -> Field:
-        found = _moments(family(z, float(np.exp(parameters[0])), float(parameters[1])), shares)
-        return np.asarray(np.nan_to_num((found - wanted) / np.array([1.0, wanted[1]]), nan=1e3, posinf=1e3))
+        reached = _moments(family(z, float(np.exp(parameters[0])), float(parameters[1])), shares)
+        return np.asarray(np.nan_to_num((reached - wanted) / np.array([1.0, wanted[1]]), nan=1e3, posinf=1e3))
 
     net = [np.array([d, s]) for d in np.linspace(-1.5, 3.5, 11) for s in np.linspace(0.0, 5.0, 9)]
     start = min(net, key=lambda parameters: float(np.sum(misfit(parameters) ** 2)))
-    found = scipy.optimize.least_squares(misfit, start, bounds=([-3.0, -1.0], [6.0, 20.0]))
-    return float(found.cost), float(np.exp(found.x[0])), float(found.x[1])
+    nearest = scipy.optimize.least_squares(misfit, start, bounds=([-3.0, -1.0], [6.0, 20.0]))
+    return float(nearest.cost), float(np.exp(nearest.x[0])), float(nearest.x[1])
 
 
 @cache

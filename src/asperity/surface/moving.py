@@ -79,7 +79,7 @@ class MovingSurfaces:
     @property
     def uniform(self) -> bool:
         """Whether nothing varies along y."""
-        return all(bool(np.all(one.heights == one.heights[:, :1])) for one in (self.first, self.second))
+        return all(bool(np.all(surface.heights == surface.heights[:, :1])) for surface in (self.first, self.second))
 
     def at(self, time: float) -> Surface:
         """What the gap sees after `time` [s]: the sum of both, on the contact's grid."""

@@ -115,17 +115,17 @@ def prepare_surface(
             heights = _close(heights, axis, cells, shared)
             steps.append(_closing(axis, shared, levelled, grid, before, _shape_inside(heights, grid)))
     heights = heights - heights.mean()
-    found = float(np.std(heights))
+    natural_sq = float(np.std(heights))
     if sq is None:
-        steps.append(f"removed the mean; Sq is {length_text(found)}")
+        steps.append(f"removed the mean; Sq is {length_text(natural_sq)}")
         return PreparedSurface(Surface(heights, grid), tuple(steps))
-    if found == 0.0:
+    if natural_sq == 0.0:
         raise BadInput(f"{measured.name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq out")
     steps.append(
-        f"removed the mean and scaled the heights by {sq / found:.4g}, "
-        f"from Sq {length_text(found)} to {length_text(sq)}"
+        f"removed the mean and scaled the heights by {sq / natural_sq:.4g}, "
+        f"from Sq {length_text(natural_sq)} to {length_text(sq)}"
     )
-    return PreparedSurface(Surface(heights * (sq / found), grid), tuple(steps))
+    return PreparedSurface(Surface(heights * (sq / natural_sq), grid), tuple(steps))
 
 
 def _fitting(measured: MeasuredSurface, grid: Grid, fit: Fit) -> str:

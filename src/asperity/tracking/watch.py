@@ -91,7 +91,7 @@ def watch_folder(
             if table is not None and readings:
                 places = read_table(table)
                 readings = [reading for reading in readings if Path(reading.file).name in places.places]
-                known, x_name = {one.file: places.place(Path(one.file)) for one in readings}, places.x_name
+                known, x_name = {reading.file: places.place(Path(reading.file)) for reading in readings}, places.x_name
             if readings:
                 track = judge(readings, target, known, x_name, shaft_hz=shaft_hz, method=method, detector=detector)
             yield Update(new=new, track=track, waiting=len(unread) - len(arrived))

@@ -287,8 +287,8 @@ def _lines_model(frequency: Field, floors: Field, leakage: Field) -> Model:
         level, f0, zeta = np.exp(theta[:-2].reshape(-1, 3, 1)).transpose(1, 0, 2)
         parts = level[:, None] * np.stack(line_and_slopes(wide, f0, zeta), axis=1)  # (lines, 3, frequencies)
         if reach:
-            shown = [np.convolve(part, leakage, "valid") for part in parts.reshape(-1, wide.size)]
-            parts = np.reshape(shown, (*parts.shape[:2], frequency.size))
+            blurred = [np.convolve(part, leakage, "valid") for part in parts.reshape(-1, wide.size)]
+            parts = np.reshape(blurred, (*parts.shape[:2], frequency.size))
         expected = parts[:, 0].sum(axis=0) + floors @ theta[-2:]
         return expected, np.concatenate([parts.reshape(-1, frequency.size), floors.T]).T
 
