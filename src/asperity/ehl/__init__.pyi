@@ -3,6 +3,7 @@ from .cavitation import solve_film as solve_film
 from .conserving_motion import moving_conserving_contact as moving_conserving_contact
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
+from .influence import Tractions as Tractions
 from .motion import LONGEST_STEP as LONGEST_STEP
 from .motion import Memory as Memory
 from .motion import Snapshot as Snapshot
@@ -12,6 +13,7 @@ from .motion import moving_contact as moving_contact
 from .motion import step_seconds as step_seconds
 from .outcome import ContactModel as ContactModel
 from .outcome import Convergence as Convergence
+from .outcome import Figures as Figures
 from .outcome import Iteration as Iteration
 from .outcome import Options as Options
 from .outcome import SolveStatus as SolveStatus
@@ -22,6 +24,7 @@ from .sharing import LoadSharing as LoadSharing
 from .sharing import clr_below as clr_below
 from .sharing import sharing_by_film as sharing_by_film
 from .solution import ContactSolution as ContactSolution
+from .solution import Oil as Oil
 from .solution import save_dataset as save_dataset
 from .solve import solve_contact as solve_contact
 from .state import ContactState as ContactState
@@ -30,6 +33,7 @@ from .stiffness import TangentStiffness as TangentStiffness
 from .stiffness import roller_depth as roller_depth
 from .stiffness import tangent_stiffness as tangent_stiffness
 from .storage import load_solution as load_solution
+from .stress import Peak as Peak
 from .stress import StressTensor as StressTensor
 from .stress import SubsurfaceStress as SubsurfaceStress
 from .stress import hertz_stress as hertz_stress
