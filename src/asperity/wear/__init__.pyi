@@ -20,5 +20,6 @@ from .series import SeriesMethod as SeriesMethod
 from .series import series_resonances as series_resonances
 from .stages import FEWEST_PLACES as FEWEST_PLACES
 from .stages import Detector as Detector
+from .stages import StageKind as StageKind
 from .stages import Stages as Stages
 from .stages import split_stages as split_stages

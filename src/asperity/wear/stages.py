@@ -16,7 +16,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 
 Detector = Literal["bayesian"]
-Kind = Literal["severe", "running-in", "no distinct stage", "no change", "too few"]
+StageKind = Literal["severe", "running-in", "no distinct stage", "no change", "too few"]
 
 FEWEST_PLACES = 7  # different x: three on either side of a break, and one to contradict
 STRONG_EVIDENCE = 6.0  # BIC difference, "strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
@@ -45,7 +45,7 @@ class Stages:
     verdict : all of this in one sentence
     """
 
-    kind: Kind
+    kind: StageKind
     split: float
     interval: tuple[float, float]
     probability: Field
@@ -239,7 +239,7 @@ STAGE_DETECTORS: dict[Detector, Callable[[Field, Field, Field | None, Field, Fie
 
 
 def _without_stage(
-    kind: Kind, verdict: str, recordings: int, evidence: dict[str, float], probability: Field, scatter: float
+    kind: StageKind, verdict: str, recordings: int, evidence: dict[str, float], probability: Field, scatter: float
 ) -> Stages:
     return Stages(
         kind=kind,
