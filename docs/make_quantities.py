@@ -24,6 +24,8 @@ TITLES = {  # of groups, where the group's own name does not do
     "history_vibration": "Vibration of a history",
     "track": "Series of recordings",
     "recording": "A recording",
+    "axis": "Axes and parts of figures",
+    "condition": "Conditions",
 }
 
 

@@ -15,8 +15,11 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 NO_VALUE = "–"
 DIMENSIONLESS = "1"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# display units over their SI unit; any other display unit is the SI unit itself
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
-_FACTORS |= {"N/µm": 1e-6, "mJ": 1e3, "1/GPa": 1e9}  # display over SI unit; any other is the SI unit itself
+# display units over their SI unit; any other display unit is the SI unit itself
+_FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
+_FACTORS |= {"1/µm": 1e-6, "1/GPa": 1e9, "mm/s": 1e3, "N/µm": 1e-6, "N/mm": 1e-3, "mJ": 1e3}
 _DISPLAYS = {"Pa": "MPa", "1/Pa": "1/GPa", "kg/m^3": "kg/m³"}  # of laws' parameters, where it is not the SI unit
 
 
@@ -47,7 +50,7 @@ class Quantity:
     @property
     def factor(self) -> float:
         """What a stored number is multiplied with to be in the display unit."""
-        return _FACTORS.get(self.display, 1.0)
+        return 1.0 if self.display == self.unit else _FACTORS.get(self.display, 1.0)
 
     @property
     def title(self) -> str:
@@ -63,6 +66,11 @@ class Quantity:
     def label(self) -> str:
         """What an axis is called: symbol or name, and display unit."""
         return f"{self.short} [{self.display}]" if self.display else self.short
+
+    @property
+    def axis(self) -> str:
+        """What an axis with room for it is called: name and symbol, and display unit."""
+        return f"{self.title} [{self.display}]" if self.display else self.title
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -90,6 +98,10 @@ class Quantity:
         """A stored value with its unit: "84.0 ± 2.4 %"."""
         number = self.number(value, deviation)
         return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
+
+    def named(self, value: Any, deviation: float | None = None) -> str:
+        """A stored value behind its symbol: "CLR 84.0 ± 2.4 %"."""
+        return f"{self.short} {self.text(value, deviation)}"
 
     def number_in(self, values: Mapping[str, Any]) -> str:
         """Its number in a row, a run's or a table's, with its deviation where the row has one."""

@@ -20,7 +20,7 @@ from asperity.errors import BadInput, NotConverged, UnreadableFile
 from asperity.grid import Grid
 from asperity.history import load_history, run_history
 from asperity.history.run import MODELS
-from asperity.report.motion_page import render_motion_page
+from asperity.report.motion.page import render_motion_page
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, flat_surface, gaussian_surface, track_grid
 
 GRID = Grid((32, 16), (0.0, 0.0), (64e-6, 16e-6))
@@ -342,9 +342,9 @@ def test_the_page_has_every_map_and_loads_nothing(history):
     page = render_motion_page(history)
     assert page == render_motion_page(history)
     data = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
-    assert len(data["frames"]) == len(data["said"]) == 3
+    assert len(data["frames"]) == len(data["words"]) == 3
     assert data["size"] == [48, 32]
-    assert "step 10 of 12" in data["said"][2]
+    assert "step 10 of 12" in data["words"][2]
     beside_the_data = re.sub(r'"data:[^"]*"', '"#"', page)
     assert not re.findall(r"""(?:src|href)=["'](?!#)|url\(|@import|fetch\(""", beside_the_data)
     assert all(uri.startswith("data:image/png;base64,") for uri in data["frames"])
@@ -355,7 +355,8 @@ def test_a_picture_shows_what_the_step_has(history):
 
     from PIL import Image
 
-    from asperity.report.motion_figures import CONTACT_COLOUR, frame_picture, ranges
+    from asperity.report.drawing import CONTACT_COLOUR
+    from asperity.report.motion.exhibits import frame_picture, ranges
 
     frame = history.frames[1]
     packed, (width, height) = frame_picture(frame, ranges(history))

@@ -13,7 +13,6 @@ IMPORTS_INSIDE_FUNCTIONS = 80  # fewer than that, and only where they save start
 UNDER_WAY = pytest.mark.xfail(reason="rooms are still being re-planned", strict=True)
 
 
-@UNDER_WAY
 def test_no_file_is_too_long():
     lines = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8").count("\n") for path in files()}
     long = [f"{name}: {count} lines" for name, count in lines.items() if count > LONGEST_FILE]

@@ -17,7 +17,11 @@ from asperity.ehl.outcome import Figures
 from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure
-from asperity.report import figures, page, rubbing_figures, surface_map, write_report
+from asperity.quantities import quantity
+from asperity.report import base, surface_map, write_report
+from asperity.report.drawing import CONTACT_COLOUR, svg
+from asperity.report.run import contact, page, rubbing, vibration
+from asperity.report.run import several as against_roughness
 from asperity.results import Run
 from asperity.surface import MeasuredSurface, Surface, SurfaceDescription, flat_surface, surface_parameters
 
@@ -162,7 +166,7 @@ def test_page_loads_nothing(which, request):
         ("Load share of asperities", "54.2", "%"),
         ("Contact area share in the Hertz zone", "37.1", "%"),
         ("Contact area of the whole domain", "60.3", "%"),
-        ("Composite roughness", "1.250", "µm"),
+        ("Composite roughness", "1.25", "µm"),
         ("Smallest film", "0.005", "µm"),
         ("Central film", "0.512", "µm"),
         ("Mean film", "0.634", "µm"),
@@ -342,17 +346,20 @@ def test_report_needs_a_run_and_a_folder(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("value", "deviation", "shown"),
+    ("value", "deviation", "parts"),
     [
-        (3461.23, 2.345, ("3461.2", "± 2.3")),
-        (3461.23, 23.45, ("3461", "± 23")),
-        (0.0088412, 0.0004712, ("8.84×10⁻³", "± 0.47×10⁻³")),
-        (3461.23, None, ("3461", "")),
-        (3461.23, float("nan"), ("3461", "")),
+        (0.84, 0.024, ("84.0", "± 2.4 %")),
+        (0.84, None, ("84.0", "%")),
+        (None, None, ("–", "")),
     ],
 )
-def test_value_and_deviation_end_at_the_same_digit(value, deviation, shown):
-    assert page.with_deviation(value, deviation) == shown
+def test_a_tile_sets_deviation_and_unit_apart(value, deviation, parts):
+    assert base.tile(quantity("clr"), {"clr": value, "clr_error": deviation})[1:] == parts
+
+
+def test_a_tile_repeats_the_power_of_ten():
+    shown = base.tile(quantity("crfa"), {"crfa": 0.0003172, "crfa_std": 0.00002114})
+    assert shown[1:] == ("3.17×10⁻⁴", "± 0.21×10⁻⁴ (m/s²)²/Hz")
 
 
 @pytest.mark.parametrize(
@@ -361,10 +368,11 @@ def test_value_and_deviation_end_at_the_same_digit(value, deviation, shown):
         ("residual 6.2e-03; tolerance 1e-04", "residual 6.2×10⁻³; tolerance 1×10⁻⁴"),
         ("54.2 % of it at 3461.2 ± 2.3 Hz", "54.2~% of it at 3461.2~±~2.3~Hz"),
         ("3 nm, not 3 nmol", "3~nm, not 3 nmol"),
+        ("Sq 1.25 um after 3 us, sq_um", "Sq 1.25~µm after 3 µs, sq_um"),
     ],
 )
 def test_prose_is_set_as_in_print(written, shown):
-    assert page.in_print(written) == shown.replace("~", "\N{NO-BREAK SPACE}")
+    assert base.in_print(written) == shown.replace("~", "\N{NO-BREAK SPACE}")
 
 
 def test_load_on_capped_oil_is_not_hidden():
@@ -376,62 +384,55 @@ def test_load_on_capped_oil_is_not_hidden():
 
 
 MAP = ["x along rolling [µm]", "y [µm]"]
-ROUGH = "composite roughness Sq [µm]"
+ROUGH = "composite roughness, Sq [µm]"
+
+
+def labels_of(exhibit):
+    """Every label of its axes."""
+    return [label for axes in exhibit.figure().axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
 
 
 @pytest.mark.parametrize(
-    ("name", "labels"),
+    ("draw", "labels"),
     [
-        ("contact_map", MAP),
-        ("film_map", [*MAP, "film thickness [µm]"]),
-        ("pressure_map", [*MAP, "pressure [GPa]"]),
-        ("roughness_map", [*MAP, "height, material up [µm]"]),
-        ("centre_line", ["pressure [GPa]", "x along rolling [µm]", "gap [µm]"]),
-        ("height_distribution", ["height above the mean [µm]", "density [1/µm]"]),
-        ("convergence_history", ["Newton step", "relative size [-]"]),
-        ("spectrum", ["frequency [Hz]", "acceleration density [(m/s²)²/Hz]"]),
-        ("shares_against_roughness", [ROUGH, "taken by asperities [%]"]),
-        ("resonance_against_roughness", [ROUGH, "contact resonance [Hz]"]),
+        (contact.contact_map, MAP),
+        (contact.film_map, [*MAP, "gap between the deformed surfaces, h [µm]"]),
+        (contact.pressure_map, [*MAP, "contact pressure, p [GPa]"]),
+        (contact.roughness_map, [*MAP, "composite roughness height, z [µm]"]),
+        (contact.centre_line, ["p [GPa]", "x along rolling [µm]", "h [µm]"]),
+        (contact.height_distribution, ["height above the mean [µm]", "density [1/µm]"]),
+        (contact.convergence_history, ["Newton step", "relative size [-]"]),
+        (rubbing.stress_map, [*MAP, "von Mises stress [GPa]"]),
+        (rubbing.stress_section, ["x along rolling [µm]", "depth [µm]", "von Mises stress [GPa]"]),
+        (rubbing.stress_over_depth, ["depth [µm]", "von Mises stress [GPa]"]),
     ],
 )
-def test_every_axis_has_a_label_with_its_unit(name, labels):
-    run = run_like()
-    shown = {
-        "height_distribution": (run.solution.surface.heights,),
-        "convergence_history": (run.solution.convergence,),
-        "spectrum": (run.vibration,),
-        "shares_against_roughness": ([run.scalars()],),
-        "resonance_against_roughness": ([run.scalars()], 3800.0),
-    }
-    figure = getattr(figures, name)(*shown.get(name, (run.solution,)))
-    written = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
-    assert written == labels
+def test_every_axis_has_a_label_with_its_unit(draw, labels):
+    assert labels_of(draw(run_like())) == labels
 
 
-@pytest.mark.parametrize(
-    ("name", "labels"),
-    [
-        ("traction_map", [*MAP, "shear stress [MPa]"]),
-        ("temperature_map", [*MAP, "hotter surface above ambient [K]"]),
-        ("temperature_line", ["x along rolling [µm]", "above ambient [K]"]),
-        ("stress_map", [*MAP, "largest von Mises stress below [GPa]"]),
-        ("stress_section", ["x along rolling [µm]", "depth [µm]", "von Mises stress [GPa]"]),
-        ("stress_over_depth", ["depth [µm]", "von Mises stress [GPa]"]),
-        ("friction_against_roughness", [ROUGH, "shear force over load"]),
-    ],
-)
-def test_every_axis_of_friction_heat_and_stress_has_a_label_with_its_unit(name, labels):
+def test_every_axis_of_friction_and_heat_has_a_label_with_its_unit():
     run = run_like()
-    part = {"traction": run.friction, "temperature": run.heat, "stress": run.stress}.get(name.partition("_")[0])
-    given = ([run.scalars()],) if part is None else (run.solution, part)
-    figure = getattr(rubbing_figures, name)(*given)
-    written = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
-    assert written == labels
+    shear = labels_of(rubbing.traction_map(run, run.friction))
+    assert shear == [*MAP, "traction along rolling on body 1 [MPa]"]
+    hotter = labels_of(rubbing.temperature_map(run, run.friction, run.heat))
+    assert hotter == [*MAP, "hotter surface above ambient [K]"]
+    assert labels_of(rubbing.temperature_line(run, run.heat)) == ["x along rolling [µm]", "rise above ambient [K]"]
+
+
+def test_every_axis_over_roughness_and_frequency_has_a_label_with_its_unit():
+    run = run_like()
+    points = [run.scalars()]
+    assert labels_of(against_roughness.shares_against_roughness(points)) == [ROUGH, "share [%]"]
+    assert labels_of(against_roughness.resonance_against_roughness(points, 3800.0)) == [ROUGH, "CRF [Hz]"]
+    assert labels_of(against_roughness.friction_against_roughness(points)) == [ROUGH, "µ"]
+    density = labels_of(vibration.spectrum(run.vibration, run.resonance_in_words()))
+    assert density == ["frequency [Hz]", "acceleration density [(m/s²)²/Hz]"]
 
 
 def test_the_circle_in_the_section_stands_on_the_largest_stress():
     run = run_like()
-    axes = rubbing_figures.stress_section(run.solution, run.stress).axes[0]
+    axes = rubbing.stress_section(run).figure().axes[0]
     (image,), (circle,) = axes.images, axes.get_lines()
     left, right, bottom, top = image.get_extent()
     assert top == 0.0 < bottom  # depth grows downwards
@@ -446,7 +447,7 @@ def test_the_circle_in_the_section_stands_on_the_largest_stress():
 
 def test_stress_over_depth_stands_beside_that_of_hertz():
     run = run_like()
-    axes = rubbing_figures.stress_over_depth(run.solution, run.stress).axes[0]
+    axes = rubbing.stress_over_depth(run).figure().axes[0]
     lines = {line.get_label(): line for line in axes.get_lines()}
     depth, smooth = lines["Hertz (smooth, dry, no friction)"].get_data()
     hertz = run.solution.conditions.hertz
@@ -457,7 +458,7 @@ def test_stress_over_depth_stands_beside_that_of_hertz():
 
 def test_temperatures_are_cut_through_the_hottest_cell():
     run = run_like()
-    axes = rubbing_figures.temperature_line(run.solution, run.heat).axes[0]
+    axes = rubbing.temperature_line(run, run.heat).figure().axes[0]
     first, second = (line.get_ydata() for line in axes.get_lines()[:2])
     assert max(first.max(), second.max()) == pytest.approx(run.heat.max_k)
 
@@ -497,39 +498,35 @@ def test_heat_that_acts_back_is_not_left_out():
 
 
 def test_contact_is_drawn_where_it_is():
-    solution = run_like().solution
+    run = run_like()
+    solution = run.solution
     touching = np.zeros(solution.grid.cells, dtype=bool)
     touching[3, 20] = True
-    axes = figures.contact_map(replace(solution, in_contact=touching)).axes[0]
+    axes = contact.contact_map(replace(run, solution=replace(solution, in_contact=touching))).figure().axes[0]
     (image,) = axes.images
     left, right, bottom, top = image.get_extent()
     colours = image.get_array()
     rows, columns = colours.shape[:2]
-    (spot,) = np.argwhere(np.all(np.isclose(colours, to_rgb(figures.CONTACT_COLOUR)), axis=2))
+    (spot,) = np.argwhere(np.all(np.isclose(colours, to_rgb(CONTACT_COLOUR)), axis=2))
     assert image.origin == "lower"
     assert left + (spot[1] + 0.5) / columns * (right - left) == pytest.approx(solution.grid.x[3] * 1e6)
     assert bottom + (spot[0] + 0.5) / rows * (top - bottom) == pytest.approx(solution.grid.y[20] * 1e6)
 
 
-def test_shares_count_cells_of_the_hertz_zone_only():
-    solution = run_like().solution
-    a = solution.conditions.hertz.half_widths[0]
-    inside = np.flatnonzero(np.abs(solution.grid.x) <= a)
-    touching = np.ones(solution.grid.cells, dtype=bool)
-    touching[inside] = False
-    touching[inside[0], :6] = True  # a quarter of one column
-    pressure = np.ones(solution.grid.cells)
-    pressure[inside[1]] = 0.0
-    shares = figures.zone_shares(replace(solution, in_contact=touching, pressure=pressure))
-    assert shares.contact == pytest.approx(0.25 / inside.size)
-    assert shares.cavitated == pytest.approx(1.0 / inside.size)
-    assert sum(shares) == pytest.approx(1.0)
+def test_shares_of_the_map_are_those_of_the_run():
+    run = run_like()
+    alt = contact.contact_map(run).alt
+    shares = [float(share) for share in re.findall(r"([\d.]+) %", alt)]
+    assert shares[0] == pytest.approx(100.0 * run.state.car, abs=0.051)
+    assert shares[2] == pytest.approx(100.0 * run.sharing.cavitated, abs=0.051)
+    assert sum(shares) == pytest.approx(100.0, abs=0.11)
 
 
 def test_hertz_is_dashed_beside_the_solved_pressure():
-    solution = run_like().solution
-    upper, lower = figures.centre_line(solution).axes
-    hertz = next(line for line in upper.lines if line.get_label().startswith("Hertz"))
+    run = run_like()
+    solution = run.solution
+    upper, lower = contact.centre_line(run).figure().axes
+    hertz = next(line for line in upper.lines if "Hertz" in line.get_label())
     assert hertz.get_linestyle() == "--"
     area = np.trapezoid(hertz.get_ydata(), hertz.get_xdata()) * 1e9 * 1e-6
     assert area == pytest.approx(solution.conditions.line_load, rel=0.05)  # on cells of a fifth of the half-width
@@ -538,19 +535,19 @@ def test_hertz_is_dashed_beside_the_solved_pressure():
 
 
 def test_resonance_is_marked_where_it_was_found():
-    vibration = run_like().vibration
-    (axes,) = figures.spectrum(vibration).axes
+    run = run_like()
+    (axes,) = vibration.spectrum(run.vibration, run.resonance_in_words()).figure().axes
     marks = {line.get_label(): line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2}
-    assert marks["CRF ± 2 std"] == vibration.resonance.crf_hz
-    assert marks["CRF at full load"] == vibration.full_load_crf_hz
+    assert marks["CRF ± 2 std"] == run.vibration.resonance.crf_hz
+    assert marks["CRF at full load"] == run.vibration.full_load_crf_hz
     fitted = next(line for line in axes.lines if line.get_label() == "fitted resonance")
     peak = fitted.get_xdata()[np.argmax(fitted.get_ydata())]
-    assert peak == pytest.approx(vibration.resonance.crf_hz, rel=2e-3)
+    assert peak == pytest.approx(run.vibration.resonance.crf_hz, rel=2e-3)
 
 
 def test_highest_point_has_neither_curve_nor_interval():
     run = run_like(CASE + 'method = "peak"\n')
-    (axes,) = figures.spectrum(run.vibration).axes
+    (axes,) = vibration.spectrum(run.vibration, run.resonance_in_words()).figure().axes
     labels = {line.get_label() for line in axes.lines}
     assert "CRF" in labels
     assert "fitted resonance" not in labels
@@ -573,4 +570,6 @@ def test_surface_map_is_a_png_and_nothing_else(tmp_path):
 def test_flat_surface_can_be_drawn():
     surface = flat_surface(load_case(CASE).grid)
     assert isinstance(surface, Surface)
-    assert "perfectly smooth" in figures.svg(figures.height_distribution(surface.heights))
+    run = run_like()
+    flat = replace(run, solution=replace(run.solution, surface=surface))
+    assert "perfectly smooth" in svg(contact.height_distribution(flat).figure())

@@ -20,10 +20,13 @@ from asperity.case import load_case
 from asperity.cli import main
 from asperity.errors import BadInput
 from asperity.paper import PAPER_ANCHORS, Anchor, is_papers_contact
-from asperity.report import study_figures, sweep_figures, write_study_report
-from asperity.report.figures import CONTACT_COLOUR
-from asperity.report.study_figures import ON_PAGE, ON_PAPER
-from asperity.report.study_page import StudyReport
+from asperity.report import write_study_report
+from asperity.report.drawing import CONTACT_COLOUR, ON_PAGE, ON_PAPER
+from asperity.report.study import maps
+from asperity.report.study.curve import resonance, rig, shares
+from asperity.report.study.page import render_study_page, study_exhibits
+from asperity.report.study.sweep import against
+from asperity.report.study.tables import anchor_rows
 from asperity.study import (
     StudyOverview,
     StudyResult,
@@ -61,8 +64,8 @@ def wear(folder):
 
 
 @pytest.fixture(scope="module")
-def report(wear):
-    return StudyReport(StudyOverview(wear))
+def overview_of_wear(wear):
+    return StudyOverview(wear)
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +112,18 @@ def without_maps(result):
     """The report of a study that was never solved, and so has no contacts to map."""
     overview = StudyOverview(result)
     overview.__dict__["mapped"] = []
-    return StudyReport(overview)
+    return overview
+
+
+def page_of(study):
+    """Its page, read."""
+    return Page(render_study_page(study, study_exhibits(study), lambda _: None))
+
+
+def figure_of(exhibit, result, anchors=None, medium=ON_PAPER):
+    """An exhibit of a wear study, drawn."""
+    study = StudyOverview(result, anchors)
+    return exhibit(study, study.curve).figure(medium)
 
 
 def plain(text):
@@ -175,14 +189,14 @@ def test_failures_are_loud_and_left_out():
     broken = study.table.copy()
     broken.loc[3, ["status", "reason", "clr"]] = ["failed", "<b>no</b> surface", 9.0]
     broken.loc[7, ["status", "reason", "clr"]] = ["not converged", "stalled", 9.0]
-    report = without_maps(replace(study, table=broken))
-    page = Page(report.page())
+    overview = without_maps(replace(study, table=broken))
+    page = page_of(overview)
     assert ("section", {"class": "verdict unfinished"}) in page.tags
     assert "2 of 75 cases failed or did not converge" in page.text
     (row,) = [row for row in page.rows if row[0] == "failed: <b>no</b> surface"]
     assert [plain(cell) for cell in row[1:]] == ["1", "surface.sq 0.5 µm (1 of 5 surfaces)"]
-    axes = study_figures.shares(report.study.curve, (), ON_PAGE).axes[0]
-    assert line(axes, "CLR, share of the load").get_ydata()[0] == pytest.approx(10.0)  # 0.2 a micrometre, not 900 %
+    axes = figure_of(shares, overview.result, (), ON_PAGE).axes[0]
+    assert line(axes, "CLR").get_ydata()[0] == pytest.approx(10.0)  # 0.2 a micrometre, not 900 %
     assert max(np.max(one.get_ydata()) for one in axes.get_lines()) < 100.0
 
 
@@ -191,7 +205,7 @@ def test_many_reasons_are_summed_up():
     table = study.table.copy()
     table.loc[:13, "status"] = "not converged"
     table.loc[:13, "reason"] = [f"stalled at a residual of {number}e-3" for number in (1, 1, *range(1, 13))]
-    reasons = without_maps(replace(study, table=table)).study.reasons
+    reasons = without_maps(replace(study, table=table)).reasons
     assert [reason.number for reason in reasons] == [3] + 9 * [1] + [2]
     assert reasons[-1].text == "2 other reasons"
 
@@ -199,18 +213,18 @@ def test_many_reasons_are_summed_up():
 def test_all_failed_is_a_page_and_nothing_computed_is_refused():
     study = with_knee()
     none = replace(study, table=study.table.assign(status="failed", reason="no oil"))
-    page = Page(StudyReport(StudyOverview(none)).page())
+    page = page_of(StudyOverview(none))
     assert "75 OF 75 CASES FAILED" in page.text
     assert not page.images()
     with pytest.raises(BadInput, match=r"no computed case yet, of 75"):
-        StudyReport(StudyOverview(replace(study, table=study.table[:0])))
+        StudyOverview(replace(study, table=study.table[:0]))
 
 
 def test_a_case_without_vibration_has_no_resonance_to_show():
     study = with_knee()
     heard = [name for name in study.table if name.startswith("crf")] + ["full_load_crf_hz"]
-    report = without_maps(replace(study, table=study.table.drop(columns=heard)))
-    page = Page(report.page())
+    overview = without_maps(replace(study, table=study.table.drop(columns=heard)))
+    page = page_of(overview)
     assert len(page.images()) == 1  # Fig 7 alone
     assert "The case has no [vibration]" in page.text
     anchors = [row[0] for row in page.rows if "Lubricants" in row[0]]
@@ -220,18 +234,18 @@ def test_a_case_without_vibration_has_no_resonance_to_show():
 
 def test_unfinished_study_says_so():
     study = with_knee()
-    report = without_maps(replace(study, table=study.table[:60]))
-    assert report.study.notes == ["15 of 75 cases have not been computed yet: run the study again."]
+    overview = without_maps(replace(study, table=study.table[:60]))
+    assert overview.notes == ["15 of 75 cases have not been computed yet: run the study again."]
 
 
 # The paper's figures -------------------------------------------------------------------------------------------------
 
 
 def test_shares_over_sq_with_the_printed_car(wear):
-    axes = study_figures.shares(curve_of(wear), PAPER_ANCHORS, ON_PAPER).axes[0]
+    axes = figure_of(shares, wear).axes[0]
     for label, column in (
-        ("CLR, share of the load", "clr"),
-        ("CAR of the Hertz zone", "car"),
+        ("CLR", "clr"),
+        ("CAR", "car"),
         ("CAR of the domain", "car_domain"),
     ):
         means = wear.table.groupby("surface.sq")[column].mean()
@@ -245,8 +259,7 @@ def test_shares_over_sq_with_the_printed_car(wear):
 
 
 def test_stages_are_marked_where_crf_bends():
-    curve = curve_of(with_knee(2.5))
-    figure = study_figures.resonance(curve, PAPER_ANCHORS, ON_PAPER)
+    figure = figure_of(resonance, with_knee(2.5))
     for axes in figure.axes:
         (strip,) = [patch for patch in axes.patches if patch.get_label() == "split, 90 %"]
         low, high = strip.get_x(), strip.get_x() + strip.get_width()
@@ -264,7 +277,7 @@ def test_levels_at_which_nothing_is_heard_keep_their_place():
     study = with_knee()
     quiet = study.table.copy()
     quiet.loc[quiet["surface.sq"] < 3.9e-6, ["crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper"]] = np.nan
-    figure = study_figures.resonance(curve_of(replace(study, table=quiet)), (), ON_PAPER)
+    figure = figure_of(resonance, replace(study, table=quiet), ())
     figure.savefig(io.BytesIO())  # a name of a stage outside the axes would leave them no room, and warn
     low, high = figure.axes[0].get_xlim()
     assert low < 0.5
@@ -272,14 +285,14 @@ def test_levels_at_which_nothing_is_heard_keep_their_place():
 
 
 def test_a_smooth_curve_has_no_stages(wear):
-    figure = study_figures.resonance(curve_of(wear), (), ON_PAGE)
+    figure = figure_of(resonance, wear, (), ON_PAGE)
     assert not [patch for axes in figure.axes for patch in axes.patches]
     assert [text.get_text() for text in figure.axes[0].texts] == ["too few"]
 
 
 def test_rings_of_the_rig_stand_beside_the_prediction():
     curve = curve_of(with_knee(2.5, scatter_hz=0.01))
-    axes = study_figures.rig(curve, ON_PAPER).axes[0]
+    axes = rig(curve, "sound").figure(ON_PAPER).axes[0]
     ours = points_of(axes, "ours at a ring's Sq")
     sq = np.array(RINGS_UM)
     expected = 2800.0 + 400.0 * np.minimum(sq, 2.5) + 20.0 * np.maximum(sq - 2.5, 0.0)
@@ -290,12 +303,12 @@ def test_rings_of_the_rig_stand_beside_the_prediction():
     assert dict(points_of(axes, "rings, CRF printed")) == pytest.approx(PRINTED_CRF)
 
 
-def test_maps_show_the_contact_of_the_study(report, wear):
-    figure = study_figures.contact_maps(report.study.runs, ON_PAPER)
+def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):
+    figure = maps.contact_maps(overview_of_wear.runs).figure(ON_PAPER)
     panels = [axes for axes in figure.axes if axes.images]
     firsts = wear.table.groupby("surface.sq").first()
     assert len(panels) == len(LEVELS_UM)
-    for axes, (sq, row), run in zip(panels, firsts.iterrows(), report.study.runs, strict=True):
+    for axes, (sq, row), run in zip(panels, firsts.iterrows(), overview_of_wear.runs, strict=True):
         title = axes.get_title("left")
         assert f"Sq {1e6 * sq:.3g} µm" in title
         shown = [float(share) for share in re.findall(r"([\d.]+) %", title)]
@@ -304,11 +317,11 @@ def test_maps_show_the_contact_of_the_study(report, wear):
         yellow = np.all(np.isclose(image, to_rgb(CONTACT_COLOUR)), axis=2)
         in_zone = np.abs(run.case.grid.x) <= run.case.conditions.hertz.half_widths[0]
         assert yellow[:, in_zone].mean() == pytest.approx(row["car"])  # an image's rows are y
-    assert not report.study.notes
+    assert not overview_of_wear.notes
 
 
-def test_surfaces_share_one_scale(report):
-    figure = study_figures.surfaces(report.study.runs, ON_PAPER)
+def test_surfaces_share_one_scale(overview_of_wear):
+    figure = maps.surfaces(overview_of_wear.runs).figure(ON_PAPER)
     images = [axes.images[0] for axes in figure.axes if axes.images]
     assert len({image.get_clim() for image in images}) == 1
     spread = [float(np.std(image.get_array())) for image in images]
@@ -318,8 +331,8 @@ def test_surfaces_share_one_scale(report):
 def test_a_map_that_differs_from_the_table_is_said(wear):
     table = wear.table.copy()
     table.loc[table["number"] == 3, "clr"] += 0.01
-    report = StudyReport(StudyOverview(replace(wear, table=table)))
-    (note,) = report.study.notes
+    overview = StudyOverview(replace(wear, table=table))
+    (note,) = overview.notes
     assert note.startswith("The contact mapped at Sq 1 µm, solved anew, has a CLR of")
 
 
@@ -339,11 +352,11 @@ def test_printed_numbers_stand_beside_the_papers_contact_only(overrides, papers)
 
 def test_anchors_of_ones_own_replace_the_papers(wear):
     own = (Anchor(name="CLR of my rig", quantity="clr", value=0.7, tolerance=0.1, sq=2e-6),)
-    report = StudyReport(StudyOverview(wear, own))
-    assert [shown.name for shown in report.figures] == ["shares", "resonance", "contact-maps", "surfaces"]
-    axes = study_figures.shares(report.study.curve, own, ON_PAGE).axes[0]
+    overview = StudyOverview(wear, own)
+    assert [exhibit.name for exhibit in study_exhibits(overview)] == ["shares", "resonance", "contact-maps", "surfaces"]
+    axes = figure_of(shares, wear, own, ON_PAGE).axes[0]
     assert points_of(axes, "CLR, given") == pytest.approx(np.array([[2.0, 70.0]]))
-    assert [row["name"] for row in report._anchor_rows()] == ["CLR of my rig"]
+    assert [row["name"] for row in anchor_rows(overview)] == ["CLR of my rig"]
 
 
 # Any other study -----------------------------------------------------------------------------------------------------
@@ -360,12 +373,12 @@ def over_two():
 
 
 def test_means_over_two_quantities_as_a_map():
-    report = StudyReport(StudyOverview(over_two()))
-    assert [shown.name for shown in report.figures] == [
+    overview = StudyOverview(over_two())
+    assert [exhibit.name for exhibit in study_exhibits(overview)] == [
         "against-contact-load", "against-surface-correlation-length",
         "over-contact-load-and-surface-correlation-length",
     ]  # fmt: skip
-    figure = report.figures[-1].draw(ON_PAPER)
+    figure = study_exhibits(overview)[-1].figure(ON_PAPER)
     image = figure.axes[0].images[0].get_array()
     assert np.asarray(image) == pytest.approx(np.array([[15, 75], [35, 52.5], [55, 30]]))  # means of pairs, by hand
     labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
@@ -377,15 +390,15 @@ def test_means_over_two_quantities_as_a_map():
 def test_what_has_no_case_has_no_colour():
     study = over_two()
     study.table.loc[study.table["point"] == 4, "status"] = "failed"
-    figure = StudyReport(StudyOverview(study)).figures[-1].draw(ON_PAGE)
+    figure = study_exhibits(StudyOverview(study))[-1].figure(ON_PAGE)
     image = np.ma.filled(figure.axes[0].images[0].get_array(), np.nan)
     assert np.isnan(image[1, 1])
     assert np.isnan(image).sum() == 1
 
 
 def test_means_against_one_quantity_have_students_interval():
-    report = StudyReport(StudyOverview(over_two()))
-    axes = report.figures[0].draw(ON_PAPER).axes[0]
+    overview = StudyOverview(over_two())
+    axes = study_exhibits(overview)[0].figure(ON_PAPER).axes[0]
     at_200 = np.array([10, 20, 30, 40, 50, 60])
     (bars,) = axes.containers
     assert bars[0].get_xydata() == pytest.approx(np.array([[200, 35], [300, 52.5]]))
@@ -396,15 +409,15 @@ def test_means_against_one_quantity_have_students_interval():
 def test_samples_are_averaged_in_groups():
     sq = np.random.default_rng(1).uniform(0.5, 3.0, 40)
     points = [{"surface.sq": f"{value:.4f} um", "lubricant.viscosity.alpha": "20 1/GPa"} for value in sq]
-    report = StudyReport(StudyOverview(made(points, clr=sq / 4.0)))
-    (axis,) = report.study.axes  # alpha has one value: no axis
+    overview = StudyOverview(made(points, clr=sq / 4.0))
+    (axis,) = overview.axes  # alpha has one value: no axis
     assert axis.binned
     x, mean, low, high = group_means(axis.values, 25.0 * axis.values, binned=True)
     assert len(x) == 8
     assert mean == pytest.approx(25.0 * x)
     assert mean.mean() == pytest.approx(25.0 * axis.values.mean())  # groups of five
     assert np.all((low < mean) & (mean < high))
-    assert len(Page(report.page()).images()) == 1
+    assert len(page_of(overview).images()) == 1
 
 
 @pytest.mark.parametrize(
@@ -426,7 +439,7 @@ def test_many_cases_are_a_picture():
     sq = np.linspace(0.5, 3.0, 4000)
     study = made([{"surface.sq": f"{value:.6f} um"} for value in sq], clr=sq / 4.0, car=sq / 5.0)
     axis = swept_axis(study.plan, study.table, "surface.sq")
-    figure = sweep_figures.against(study.table, axis, StudyReport(StudyOverview(study)).outputs, ON_PAGE)
+    figure = against(StudyOverview(study), axis).figure(ON_PAGE)
     drawing = io.BytesIO()
     figure.savefig(drawing, format="svg")
     assert drawing.tell() < 200_000  # 8000 dots as drawings take a megabyte

@@ -4,7 +4,7 @@ import pytest
 from asperity.coupling import VibrationModel, contact_vibration, dry_full_load
 from asperity.errors import BadInput
 from asperity.paper import TABLE1_PRINTED, Table1Row, papers_contact
-from asperity.report import excitation_figure, load_trend_figure, response_figure, table1_figure, write_png
+from asperity.report import excitation_figure, load_trend_figure, response_figure, table1_figure, write_figure
 
 PAPER = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
 CONTACT = papers_contact(200.0)
@@ -54,7 +54,7 @@ def test_table_1_is_drawn_with_its_printed_values(tmp_path):
     assert "height^2.0" in height.get_title("left")
     printed = next(line for line in height.get_lines() if line.get_label() == "printed")
     assert list(printed.get_ydata()) == [0.16, 0.64, 1.45, 2.58]
-    path = write_png(figure, tmp_path / "table1.png")
+    path = write_figure(figure, tmp_path / "table1.png")
     assert path.read_bytes().startswith(b"\x89PNG")
 
 

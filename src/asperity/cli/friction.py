@@ -89,9 +89,9 @@ def _show(
         with shown_progress(f"{case.source}, Sq {1e6 * case.surface().sq:.3g} um", quiet=quiet) as report_step:
             curves.append(curve(case, report_step))
     if out is not None:
-        from asperity.report import friction_figure, write_png
+        from asperity.report import friction_figure, write_figure
 
-        write_png(friction_figure(curves), out)
+        write_figure(friction_figure(curves), out)
     if as_json:
         figures = [] if out is None else [str(out)]
         print_json(

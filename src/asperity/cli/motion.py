@@ -72,7 +72,7 @@ def run_case(
     if report is not None:
         from asperity.report import write_motion_report
 
-        write_motion_report(history, report, heard=heard)
+        write_motion_report(history, report, vibration=heard)
     if as_json:
         said = history.scalars() if heard is None else {**history.scalars(), **heard.scalars()}
         print_json({**said, "report": None if report is None else str(report)})

@@ -58,11 +58,11 @@ def _vibrate(case: "Case", figures: Path | None, *, as_json: bool, quiet: bool) 
     heard = vibrated.vibration
     drawn: list[Path] = []
     if figures is not None and heard.oscillator is not None and case.vibration is not None:
-        from asperity.report import excitation_figure, response_figure, write_png
+        from asperity.report import excitation_figure, response_figure, write_figure
 
         drawn = [
-            write_png(excitation_figure(heard, case.vibration), figures / "excitation.png"),
-            write_png(response_figure(heard, case.vibration), figures / "response.png"),
+            write_figure(excitation_figure(heard, case.vibration), figures / "excitation.png"),
+            write_figure(response_figure(heard, case.vibration), figures / "response.png"),
         ]
     if as_json:
         print_json(vibrated.scalars() | {"figures": [str(path) for path in drawn]})
@@ -111,12 +111,12 @@ def _table1(preset: str, records: int | None, figures: Path | None, *, as_json: 
     )
     drawn: list[Path] = []
     if figures is not None:
-        from asperity.report import load_trend_figure, table1_figure, write_png
+        from asperity.report import load_trend_figure, table1_figure, write_figure
 
         model = VibrationModel.preset(preset, mass=MASS, damping_ratio=DAMPING_RATIO)
         drawn = [
-            write_png(table1_figure(rows), figures / "table1.png"),
-            write_png(load_trend_figure(model), figures / "load-trend.png"),
+            write_figure(table1_figure(rows), figures / "table1.png"),
+            write_figure(load_trend_figure(model), figures / "load-trend.png"),
         ]
     if as_json:
         rows_json = [asdict(row) for row in rows]

@@ -1,0 +1,129 @@
+"""What all pages share: exhibits, tiles, the template, numbers as they are set in print, and pages written whole.
+
+Nothing is solved or fitted for a page; it is self-contained and loads nothing.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from asperity.files import require_writable, whole_file
+from asperity.paper import CITATION
+from asperity.quantities import Quantity, with_deviation
+from asperity.report.drawing import ON_PAGE, ON_PAPER, Medium, svg, write_figure
+
+
+class Picture(NamedTuple):
+    """A figure as the page embeds it; `width` and `height` in CSS pixels keep its place while it loads."""
+
+    uri: str
+    width: int
+    height: int
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True, slots=True)
+class Exhibit:
+    """A figure: its file's name, how it is drawn for a medium, and what is said of it wherever it is shown."""
+
+    name: str
+    draw: Callable[[Medium], Figure]
+    caption: str
+    alt: str
+
+    def figure(self, medium: Medium = ON_PAGE) -> Figure:
+        """Drawn for that medium."""
+        with medium.drawing():
+            return self.draw(medium)
+
+    def picture(self) -> Picture:
+        """As a page embeds it."""
+        return self.picture_of(self.figure())
+
+    def picture_of(self, figure: Figure) -> Picture:
+        """As a page embeds it, once it is drawn."""
+        text = re.sub(r"^.*?(?=<svg)", "", svg(figure), flags=re.DOTALL)  # an image needs no XML prologue
+        width, height = figure.get_size_inches() * 96.0
+        uri = "data:image/svg+xml," + quote(re.sub(r"\s*\n\s*", " ", text), safe=" ='/:;,.()+-*!@?&$[]{}|~^`")
+        return Picture(uri, round(float(width)), round(float(height)), in_print(self.alt), in_print(self.caption))
+
+
+def write_exhibits(exhibits: Iterable[Exhibit], folder: Path, progress: Callable[[str], None]) -> None:
+    """Each exhibit for a paper, as PDF and PNG, and what to print below them in captions.md."""
+    captions = []
+    for exhibit in exhibits:
+        progress(f"drawing {exhibit.name}")
+        figure = exhibit.figure(ON_PAPER)
+        for suffix in (".pdf", ".png"):
+            write_figure(figure, folder / f"{exhibit.name}{suffix}", medium=ON_PAPER, dpi=300)
+        captions.append(f"**{exhibit.name}**: {exhibit.caption}\n\n")
+    with whole_file(folder / "captions.md") as part:
+        part.write_text(f"{''.join(captions)}asperity {version('asperity')}; method: doi:{CITATION.doi}\n", "utf-8")
+
+
+class Tile(NamedTuple):
+    """A number that stands out on a page, and what stands small beside it: deviation and unit."""
+
+    name: str
+    value: str
+    rest: str
+
+
+def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
+    """A quantity of a row, its deviation and unit apart."""
+    value, _, deviation = quantity.number_in(row).partition(" ± ")
+    if value.startswith("("):  # the power of ten of both
+        deviation, _, power = deviation.partition(")")
+        value, deviation = value[1:] + power, deviation + power
+    unit = quantity.display if quantity.text_in(row) != value else ""
+    return Tile(heading(quantity), value, f"± {deviation} {unit}".rstrip() if deviation else unit)
+
+
+def heading(quantity: Quantity) -> str:
+    """What a quantity is called at the beginning of a row."""
+    return capitalised(quantity.title)
+
+
+def capitalised(text: str) -> str:
+    """The text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
+def in_print(text: str) -> str:
+    """Prose with 1.3e-05 as 1.3×10⁻⁵, um as µm, and numbers that stay on one line with their unit."""
+    text = re.sub(r"\bum\b|(?<=\d )us\b", lambda unit: f"µ{unit[0][1]}", text)
+    text = re.sub(
+        r"\b\d(\.\d+)?e[+-]\d+",
+        lambda number: with_deviation(float(number[0]), None, f".{len(number[1] or '.') - 1}e"),
+        text,
+    )
+    return re.sub(r"(?<=\d) (?=[%±]|Hz|GPa|[µn]m\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
+
+
+def render(template: str, **values: Any) -> str:
+    """A page as HTML text, escaped and complete."""
+    environment = Environment(
+        loader=PackageLoader("asperity.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(version=version("asperity"), paper=CITATION, **values)
+
+
+def write_page(path: str | Path, page: Callable[[], str]) -> Path:
+    """Write a page whole or not at all, and return its path; BadInput, before anything is drawn, where it cannot be."""
+    path = Path(path)
+    require_writable(path)
+    with whole_file(path) as part:
+        part.write_text(page(), encoding="utf-8", newline="\n")
+    return path

@@ -1,0 +1,137 @@
+"""One HTML page of a history: what moving did to the contact, maps that move, curves over time, numbers, limits.
+
+The maps are small pictures in the page, shown one after the other by a few lines of script.
+"""
+
+import json
+from base64 import b64encode
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from asperity.errors import BadInput
+from asperity.history import History, HistoryVibration
+from asperity.quantities import Quantity, quantity
+from asperity.report.base import Picture, heading, in_print, render, tile, write_page
+from asperity.report.motion import exhibits
+
+NUMBERS = (
+    "clr",
+    "car",
+    "car_domain",
+    "contact_force_n",
+    "h_min_m",
+    "h_central_m",
+    "h_mean_m",
+    "p_max_pa",
+    "friction_coefficient",
+    "friction_power_w",
+    "flow_power_w",
+    "resonance_hz",
+    "mass_flux_imbalance",
+)
+TILES = ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz")
+
+
+class MovingMap(NamedTuple):
+    """A map of the page: its axes, and where the pictures are laid over them, in per cent of the figure."""
+
+    picture: Picture
+    left: float
+    top: float
+    width: float
+    height: float
+    zone: tuple[float, ...]  # where lines mark the Hertz zone of a line contact
+
+
+def write_motion_report(history: History, path: str | Path, *, vibration: HistoryVibration | None = None) -> Path:
+    """Write one self-contained HTML page about a history, whole or not at all; with what a mass on it does.
+
+    Raises
+    ------
+    BadInput
+        for a history without a kept map, or a path that cannot be written to.
+    """
+    if not history.frames:
+        raise BadInput("a report needs at least one map of the history, got none; run the case into a new folder")
+    return write_page(path, lambda: render_motion_page(history, vibration))
+
+
+def render_motion_page(history: History, vibration: HistoryVibration | None = None) -> str:
+    """The page as HTML text."""
+    reach = exhibits.ranges(history)
+    over_time = exhibits.curves(history)
+    figure = over_time.figure()
+    box = figure.axes[0].get_position()
+    motion, rows, values = history.case.motion, history.settled, history.scalars()
+    pass_by_pass = motion.flattening and len(history.by_pass()) >= 2
+    return render(
+        "motion/page.html.j2",
+        title="A contact in motion",
+        vibration=None if vibration is None else in_print(vibration.verdict()),
+        verdict=in_print(history.verdict()),
+        failed=history.failed,
+        steps=history.steps,
+        tiles=[tile(_over_time(key), values) for key in TILES if values[key] is not None],
+        maps=[_map(history, kind, reach) for kind in exhibits.KINDS],
+        curves=over_time.picture_of(figure),
+        begins=100.0 * box.x0,
+        ends=100.0 * box.x1,
+        running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
+        flattening=motion.flattening,
+        numbers=[_row(quantity(key), values) for key in NUMBERS],
+        settled_from=int(rows["step"].iloc[0]),
+        start=motion.start,
+        characteristic=motion.time_step == 1.0,
+        time_step=motion.time_step,
+        model=history.case.contents.model,
+        imbalance=quantity("mass_flux_imbalance").text(rows["mass_flux_imbalance"].mean()),
+        notes=[in_print(note) for note in history.notes],
+        case_text=history.case.text,
+        script_data=_script_data(history, reach),
+    )
+
+
+def _over_time(key: str) -> Quantity:
+    """A quantity whose deviation is that over time."""
+    return replace(quantity(key), deviation=f"{key}_std")
+
+
+def _row(entry: Quantity, values: dict[str, Any]) -> dict[str, str]:
+    """A line of the table: at the start, mean and standard deviation over the steps that count."""
+    columns = {"start": f"{entry.key}_start", "mean": entry.key, "std": f"{entry.key}_std"}
+    cells = {column: entry.number(values[key]) for column, key in columns.items()}
+    return {"name": heading(entry), "unit": entry.display, **cells}
+
+
+def _map(history: History, kind: exhibits.Kind, reach: exhibits.Ranges) -> MovingMap:
+    exhibit = exhibits.empty_map(history, kind, reach)
+    figure = exhibit.figure()
+    box = figure.axes[0].get_position()
+    left, top, width, height = (100.0 * share for share in (box.x0, 1.0 - box.y1, box.width, box.height))
+    grid, a = history.case.grid, history.case.conditions.hertz.half_widths[0]
+    sides = (-a, a) if history.case.conditions.geometry == "line" else ()
+    zone = tuple(left + width * (side - grid.lower[0]) / grid.extent[0] for side in sides)
+    return MovingMap(exhibit.picture_of(figure), left, top, width, height, zone)
+
+
+def _script_data(history: History, reach: exhibits.Ranges) -> str:
+    """What the page's script shows of each kept step: its maps, its numbers in words, its place in time."""
+    pictures = [exhibits.frame_picture(frame, reach) for frame in history.frames]
+    last = float(history.table["time_s"].iloc[-1])
+    return json.dumps(
+        {
+            "frames": ["data:image/png;base64," + b64encode(packed).decode() for packed, _ in pictures],
+            "size": pictures[0][1],
+            "words": [_in_words(history, frame.number) for frame in history.frames],
+            "place": [frame.time / last if last else 0.0 for frame in history.frames],
+        }
+    )
+
+
+def _in_words(history: History, number: int) -> str:
+    row = history.table[history.table["step"] == number].iloc[0]
+    values = [quantity(key).named(row[key]) for key in ("clr", "car")]
+    friction = quantity("friction_coefficient").number(row["friction_coefficient"])
+    time = quantity("time_s").text(row["time_s"])
+    return in_print(f"step {number} of {history.steps}, {time}: {', '.join(values)}, friction {friction}")

@@ -1,0 +1,1 @@
+"""The page of solved contacts and its exhibits; figures of measured surfaces, friction curves and vibration."""

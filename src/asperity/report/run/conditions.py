@@ -1,0 +1,167 @@
+"""The table of conditions of a run: what was given, in words and display units."""
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.conditions import ContactConditions
+from asperity.coupling import VibrationModel
+from asperity.ehl import ContactSolution
+from asperity.lubricant import LawFamily, Lubricant, Solid, law_name
+from asperity.quantities import NO_VALUE, parameters, quantity, with_deviation
+from asperity.results import Run
+
+TACIT = {"direction_deg": 0.0, "turn": False, "outliers": "keep"}  # of a surface: what goes without saying
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A row: what every run was given."""
+
+    name: str
+    cells: list[str]
+
+    @property
+    def varies(self) -> bool:
+        """Whether runs differ in it."""
+        return len(set(self.cells)) > 1
+
+
+def conditions_table(runs: Sequence[Run]) -> list[Condition]:
+    """The conditions of the runs side by side."""
+    columns = [_conditions(run) for run in runs]
+    names = dict.fromkeys(name for column in columns for name in column)
+    return [Condition(name, [column.get(name, NO_VALUE) for column in columns]) for name in names]
+
+
+def _conditions(run: Run) -> dict[str, str]:
+    solution = run.solution
+    return {
+        **_contact_rows(solution.conditions),
+        **_lubricant_rows(solution.lubricant),
+        **_thermal_rows(run),
+        "Roughness": f"{quantity('sq_m').named(solution.surface.sq)}; case: {_roughness(run.case.text)}",
+        **_numerical_rows(solution),
+        **_vibration_rows(run.case.vibration),
+    }
+
+
+def _law(family: LawFamily, law: object) -> str:
+    values = ((name, mark, getattr(law, name)) for name, mark in parameters(type(law)))
+    stated = (f"{mark.symbol or name} = {mark.text(value)}" for name, mark, value in values if value is not None)
+    return ", ".join([law_name(family, law), *stated])
+
+
+def _both(texts: Sequence[str]) -> str:
+    """What each of the bodies has."""
+    different = dict.fromkeys(texts)
+    return " and ".join(different) if len(different) > 1 else f"{texts[0]} (both)"
+
+
+def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
+    pair, hertz, radius = conditions.pair, conditions.hertz, quantity("radius_m")
+    contact = f"{conditions.geometry} contact, effective radius {radius.text(conditions.radius_along_rolling)}"
+    if conditions.geometry == "elliptic":
+        contact += f" along rolling, {radius.text(conditions.radius_across_rolling)} across"
+    load = quantity("load_n").text(conditions.load)
+    if conditions.length is not None:
+        contact += f", length {quantity('length_m').text(conditions.length)}"
+        load += f" ({quantity('line_load_n_per_m').text(conditions.line_load)})"
+    half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
+    across = "" if conditions.geometry == "line" else f", across rolling b = {half_widths[1]}"
+    speed, modulus = quantity("surface_speed_m_s"), quantity("reduced_modulus_pa")
+    return {
+        "Contact": contact,
+        "Load": load,
+        "Speeds": f"{' and '.join(map(speed.text, conditions.surface_speeds))}: "
+        + ", ".join(
+            f"{quantity(key).name} {quantity(key).text(value)}"
+            for key, value in (
+                ("entrainment_speed_m_s", conditions.entrainment_speed),
+                ("slide_to_roll", conditions.slide_to_roll),
+            )
+        ),
+        "Young's moduli": _both([quantity("youngs_modulus_pa").text(each) for each in pair.youngs_moduli]),
+        "Poisson's ratios": _both([f"{each:.4g}" for each in pair.poisson_ratios]),
+        "Reduced modulus": f"E* = {modulus.text(pair.reduced_modulus)} "
+        f"(E′ = 2 E* = {modulus.text(pair.effective_modulus)})",
+        "Pressure cap (hardness)": "none: purely elastic"
+        if conditions.hardness is None
+        else quantity("hardness_pa").text(conditions.hardness),
+        "Hertz (smooth, dry)": f"half-width a = {half_widths[0]}{across}, largest pressure "
+        f"{quantity('hertz_pressure_pa').text(hertz.p_max)}",
+    }
+
+
+def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:
+    if lubricant is None:
+        return {"Lubricant": "none: dry contact"}
+    return {
+        "Viscosity law": _law("viscosity", lubricant.viscosity),
+        "Density law": _law("density", lubricant.density),
+        "Rheology": _law("rheology", lubricant.rheology),
+        "Friction of the film": _law("friction", lubricant.friction),
+    }
+
+
+def _thermal_rows(run: Run) -> dict[str, str]:
+    thermal, temperature = run.case.thermal, quantity("temperature_k")
+    solids = [
+        f"{name.replace('_', ' ')} {_both([mark.text(getattr(solid, name)) for solid in thermal.solids])}"
+        for name, mark in parameters(Solid)
+    ]
+    rows = {"Boundary friction": f"{run.case.boundary_friction:g}", "Bodies": ", ".join(solids)}
+    if run.solution.lubricant is None:
+        return rows
+    bulk = "" if thermal.bulk is None else f", bodies at {_both([temperature.text(each) for each in thermal.bulk])}"
+    feedback = "the film's heat thins the oil" if thermal.feedback else "heat does not act back on the oil"
+    return {
+        **rows,
+        "Temperature": f"{temperature.text(thermal.ambient)} ambient{bulk}; {feedback}",
+        "Oil and heat": f"conductivity {thermal.oil_conductivity:g} W/m/K, viscosity falls by the law "
+        f"{_law('warmth', thermal.warmth)}",
+    }
+
+
+def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
+    grid, a, cell = solution.grid, solution.conditions.hertz.half_widths[0], quantity("cell_m")
+    (nx, ny), (dx, dy) = grid.cells, grid.spacing
+    sides = (
+        f"{name} from {' a to '.join(with_deviation(corner[axis] / a, None, '.2f') for corner in corners)} a"
+        for axis, name in enumerate("xy")
+        for corners in [(grid.lower, grid.upper)]
+    )
+    return {
+        "Grid": f"{nx} × {ny} cells of {cell.number(dx)} × {cell.text(dy)}",
+        "Domain": ", ".join(sides) + (", repeating in y" if grid.periodic[1] else ""),
+        "Contact threshold": f"gap of at most {quantity('contact_film_m').text(solution.options.contact_film)}",
+        "Tolerance": with_deviation(solution.options.tolerance, None, ".1e"),
+    }
+
+
+def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
+    if model is None:
+        return {"Vibration": "not asked for"}
+    damping = model.damping_law.summary(model.damping_ratio)
+    duration, rate = quantity("duration_s").text(model.duration_s), quantity("record_rate_hz").text(model.rate_hz)
+    return {
+        "Oscillator": f"mass {model.mass:.4g} kg, {damping}, stiffness law {model.stiffness_law.name}",
+        "Excitation": f"{model.excitation.summary}{model.patch.summary}, seed {model.seed}",
+        "Record": f"{duration} at {rate}; resonance by {model.method}"
+        + ("" if model.response == "exact" else f"; response {model.response}"),
+    }
+
+
+def _roughness(case_text: str) -> str:
+    """The case's [surface] in one line: which surface it was belongs beside every CAR."""
+    surface = tomllib.loads(case_text)["surface"]
+    second = surface.pop("second", None)
+    first = _table_in_words(surface)
+    return first if second is None else f"{first}; on the other body: {_table_in_words(second)}"
+
+
+def _table_in_words(table: dict[str, Any]) -> str:
+    stated = {key: value for key, value in table.items() if TACIT.get(key) != value}
+    texts = {key: " and ".join(map(str, value)) if isinstance(value, list) else value for key, value in stated.items()}
+    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in texts.items())

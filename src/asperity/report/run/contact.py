@@ -1,0 +1,243 @@
+"""Exhibits of a solved contact: contact, film, pressure, roughness as maps, a cut along rolling, how it was solved."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.arrays import Field
+from asperity.ehl import ContactSolution, hertz_zone
+from asperity.hertz import line_pressure
+from asperity.quantities import quantity
+from asperity.report.base import Exhibit
+from asperity.report.drawing import (
+    BLUE,
+    CONTACT_COLOUR,
+    GREEN,
+    GREY,
+    VERMILION,
+    Medium,
+    contact_colours,
+    contact_keys,
+    display,
+    draw_map,
+    legend_below,
+    map_figure,
+    mark_hertz_zone,
+    name_axes,
+    show_map,
+)
+from asperity.results import Run
+
+
+def contact_map(run: Run) -> Exhibit:
+    """Where asperities touch, where oil fills the gap and where it has ruptured: the paper's Fig 6."""
+    solution = run.solution
+    touching, ruptured = run.state.car, run.sharing.cavitated
+    contact, cavitated, film = (
+        quantity("share").text(share) for share in (touching, ruptured, 1.0 - touching - ruptured)
+    )
+    dry = solution.lubricant is None
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = map_figure(medium, solution.grid.extent)
+        show_map(axes, contact_colours(solution), solution)
+        mark_hertz_zone(axes, solution, "black")
+        axes.set_title(f"Asperity contact on {contact} of the Hertz zone")
+        others = (f"open gap {film}",) if dry else (f"oil film {film}", f"cavitated {cavitated}")
+        keys = contact_keys(f"asperity contact {contact}", *others)
+        figure.legend(handles=keys, loc="lower center", ncols=2, borderaxespad=0.2)
+        return figure
+
+    return Exhibit(
+        "contact",
+        draw,
+        "Contact state, shares of the Hertz zone. A cell counts as contact where the gap is at most "
+        f"{quantity('contact_film_m').text(solution.options.contact_film)}. The dashed lines bound the Hertz zone; oil "
+        "enters from the left.",
+        f"Map of the contact: asperities touch on {contact} of the Hertz zone, "
+        + ("the rest is open." if dry else f"oil fills {film}, {cavitated} has cavitated."),
+    )
+
+
+def film_map(run: Run) -> Exhibit:
+    """Gap between the deformed surfaces; the colours end where the Hertz zone's gaps do (its 99th percentile)."""
+    solution, state = run.solution, run.state
+
+    def draw(medium: Medium) -> Figure:
+        zone = hertz_zone(solution.conditions, solution.grid)
+        top = display("gap", float(np.percentile(solution.gap[zone], 99.0))) or 1.0
+        title = "Gap between the surfaces" if solution.lubricant is None else "Film thickness"
+        return draw_map(medium, solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top)
+
+    return Exhibit(
+        "film",
+        draw,
+        "Gap between the deformed surfaces. The colours end at the Hertz zone's 99th percentile.",
+        f"Map of the film thickness: mean {quantity('h_mean_m').text(state.h_mean)} in the Hertz zone, "
+        f"smallest {quantity('h_min_m').text(state.h_min)}.",
+    )
+
+
+def pressure_map(run: Run) -> Exhibit:
+    """Pressure of oil and asperities together."""
+    solution, pressure = run.solution, quantity("pressure")
+    largest = pressure.text(float(solution.pressure.max()))
+    capped = ""
+    if solution.p_cap is not None and solution.lubricant is not None:  # what CLR leaves out
+        share = quantity("capped_oil_load_ratio").text(run.state.capped_oil_load_ratio)
+        capped = f" Cells that stand at the hardness without touching carry {share} of the load; CLR leaves them out."
+
+    def draw(medium: Medium) -> Figure:
+        title = f"Pressure, at most {largest}"
+        return draw_map(medium, solution, "pressure", solution.pressure, title, cmap="inferno", vmin=0.0)
+
+    return Exhibit(
+        "pressure",
+        draw,
+        f"Pressure of oil and asperities together.{capped}",
+        f"Map of the pressure: at most {largest}; Hertz's would be {pressure.text(solution.conditions.hertz.p_max)}.",
+    )
+
+
+def centre_line(run: Run) -> Exhibit:
+    """Pressure and gap along rolling at the cell row nearest y = 0, with Hertz's pressure dashed."""
+    solution = run.solution
+
+    def draw(medium: Medium) -> Figure:
+        figure = Figure(figsize=(medium.single, 4.0), layout="constrained")
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.1, 1.0))
+        row = int(np.argmin(np.abs(solution.grid.y)))
+        upper.set_title(f"Cut along rolling at y = {quantity('y_m').text(solution.grid.y[row])}")
+        _draw_pressure_cut(upper, solution, row)
+        _draw_gap_cut(lower, solution, row)
+        left = max(solution.grid.lower[0], -2.5 * solution.conditions.hertz.half_widths[0])
+        lower.set_xlim(display("x_m", left), display("x_m", solution.grid.upper[0]))
+        keys = [key for axes in (upper, lower) for key in axes.get_legend_handles_labels()[0]]
+        legend_below(figure, 3, handles=keys)
+        return figure
+
+    return Exhibit(
+        "centre-line",
+        draw,
+        "Pressure and gap along rolling through the middle. The gap's axis ends where the Hertz zone's gaps do.",
+        "Curves along rolling: pressure with the dashed Hertz ellipse, and below it the gap with contact marked.",
+    )
+
+
+def _draw_pressure_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
+    x, hertz = solution.grid.x, solution.conditions.hertz
+    pressure = solution.pressure[:, row]
+    smooth = line_pressure(x, hertz.half_widths[0], hertz.p_max)
+    for values, stroke, style in (
+        (pressure, "-", {"color": BLUE, "linewidth": 1.1, "label": "pressure p, solved"}),
+        (smooth, "--", {"color": "black", "label": "p, Hertz (smooth, dry)"}),
+    ):
+        axes.plot(display("x_m", x), display("pressure", values), stroke, **style)
+    if solution.p_cap is not None and pressure.max() > 0.5 * solution.p_cap:
+        axes.axhline(display("pressure", solution.p_cap), color=VERMILION, linestyle=":", label="hardness")
+    axes.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
+
+
+def _draw_gap_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
+    x, gap = display("x_m", solution.grid.x), display("gap", solution.gap[:, row])
+    inside = np.abs(solution.grid.x) <= 1.2 * solution.conditions.hertz.half_widths[0]
+    top = 1.15 * float(gap[inside].max()) or 1.0
+    axes.plot(x, gap, color=GREEN, linestyle="-.", linewidth=1.1, label="gap h")
+    axes.fill_between(
+        x, 0.0, 0.06 * top, where=solution.in_contact[:, row], color=CONTACT_COLOUR, edgecolor="black", linewidth=0.3,
+        step="mid", label="asperity contact",
+    )  # fmt: skip
+    name_axes(axes, "x_m")
+    axes.set(ylabel=quantity("gap").label, ylim=(0.0, top))
+
+
+def roughness_map(run: Run) -> Exhibit:
+    """The roughness that was pressed into the contact, before it deformed."""
+    solution, sq = run.solution, quantity("sq_m")
+
+    def draw(medium: Medium) -> Figure:
+        heights, title = solution.surface.heights, f"Composite roughness, {sq.named(solution.surface.sq)}"
+        reach = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
+        colours: Any = {"cmap": "cividis", "vmin": -reach, "vmax": reach}
+        return draw_map(medium, solution, "surface_height", heights, title, extend="both", **colours)
+
+    return Exhibit(
+        "roughness",
+        draw,
+        "The composite roughness of both surfaces before they deform, material up.",
+        f"Map of the roughness heights, {sq.named(run.state.sq)}.",
+    )
+
+
+def height_distribution(run: Run) -> Exhibit:
+    """How often each height occurs, beside the Gaussian of the same Sq."""
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = medium.panel(3.1)
+        draw_height_distribution(axes, run.solution.surface.heights)
+        return figure
+
+    return Exhibit(
+        "heights",
+        draw,
+        "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
+        f"Histogram of the heights, {quantity('sq_m').named(run.state.sq)}, beside a Gaussian curve.",
+    )
+
+
+def draw_height_distribution(axes: Axes, heights: Field) -> None:
+    """The same of any heights [m]; what was not measured is left out."""
+    deviations = heights[np.isfinite(heights)] - np.nanmean(heights)
+    values = display("height_m", deviations)
+    sq = float(values.std())
+    name_axes(axes, "height_m", "height_density", title="Height distribution")
+    if sq == 0.0:
+        axes.text(0.5, 0.5, "perfectly smooth", transform=axes.transAxes, ha="center")
+        return
+    axes.hist(values, bins=80, range=(-4.5 * sq, 4.5 * sq), density=True, color="#9ec5dd", label="surface")
+    grid = np.linspace(-4.5 * sq, 4.5 * sq, 181)
+    gauss = np.exp(-0.5 * (grid / sq) ** 2) / (sq * np.sqrt(2.0 * np.pi))
+    axes.plot(grid, gauss, "--", color="black", label=f"Gaussian, {quantity('sq_m').named(float(deviations.std()))}")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the key
+    axes.legend(loc="upper right")
+
+
+def convergence_history(run: Run) -> Exhibit:
+    """Residual, load error and change of every step, grid level after grid level, against the tolerance."""
+    convergence = run.solution.convergence
+    history = convergence.history
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = medium.panel(3.1)
+        steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
+        for name, stroke, colour in (
+            ("residual", "-o", BLUE), ("load_error", "--s", VERMILION), ("change", ":^", GREEN),
+        ):  # fmt: skip
+            values = np.array([getattr(step, name) for step in history])
+            positive = np.where(values > 0.0, values, np.nan)  # a logarithmic axis has no place for exact zeros
+            style = {"color": colour, "markersize": 3, "markevery": sparse, "linewidth": 1.0}
+            axes.semilogy(steps, positive, stroke, label=name.replace("_", " "), **style)
+        axes.axhline(convergence.tolerance, color="black", linewidth=0.8, linestyle=(0, (6, 2)), label="tolerance")
+        starts = [i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells]
+        crowded = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
+        for start in starts:
+            nx, ny = history[start].cells
+            axes.axvline(start + 0.5, color=GREY, linewidth=0.6)
+            axes.annotate(
+                f"{nx} × {ny}", (start + 0.5, 0.0), (3, 3), xycoords=("data", "axes fraction"),
+                textcoords="offset points", fontsize=8, color="#374151", rotation=90 if crowded else 0,
+            )  # fmt: skip
+        outcome = "converged" if convergence.converged else f"NOT CONVERGED ({convergence.status})"
+        axes.set(xlabel="Newton step", ylabel="relative size [-]", title=f"Convergence: {outcome}")
+        axes.set_xlim(0.5, len(history) + 0.5)
+        legend_below(figure, 4)
+        return figure
+
+    return Exhibit(
+        "convergence",
+        draw,
+        f"How the solver got there: {convergence.explain()}.",
+        f"Residual, load error and change against the Newton step: {convergence.explain()}.",
+    )

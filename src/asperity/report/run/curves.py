@@ -1,0 +1,73 @@
+"""Friction curves: Stribeck's over speed, the traction curve over the slide-to-roll ratio."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from asperity.quantities import quantity
+from asperity.report.drawing import BLUE, GREEN, GREY, ON_PAGE, VERMILION, display, name_axes
+from asperity.results import FrictionCurve
+
+STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
+ABSCISSA = {"stribeck": "entrainment_speed_m_s", "traction": "slide_to_roll"}
+PARTS = {  # of a single curve, left and right: the quantity, what it is of, its stroke
+    "friction_coefficient": (("asperity_part", "asperities", STROKES[1]), ("oil_part", "oil", STROKES[2])),
+    "flash_temperature_max_k": (("film_temperature_max_k", "film", STROKES[2]),),
+}
+
+
+def friction_figure(curves: Sequence[FrictionCurve]) -> Figure:
+    """Friction and temperature over speed or slip, for curves of one kind; of a single curve its parts too."""
+    kind = f"{curves[0].kind.capitalize()} curve"
+    of = f", {_name(curves[0])}" if len(curves) == 1 else ""
+    with ON_PAGE.drawing():
+        figure = Figure(figsize=(ON_PAGE.double, 4.0), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _draw_panel(left, curves, "friction_coefficient", "coefficient")
+        _draw_panel(right, curves, "flash_temperature_max_k", "hotter surface")
+        limits = {curve.boundary_friction for curve in curves}
+        for limit in limits:
+            left.axhline(limit, color="black", linewidth=0.8, linestyle=(0, (1, 2)))
+            left.annotate(
+                f"boundary friction {limit:g}", (0.99, limit), xycoords=("axes fraction", "data"),
+                xytext=(0, 3), textcoords="offset points", ha="right", fontsize=8.5,
+            )  # fmt: skip
+        left.set(ylabel=quantity("friction_coefficient").axis, title=f"{kind}: friction{of}")
+        right.set(ylabel=quantity("temperature_rise_k").axis, title=f"{kind}: temperature{of}")
+        left.set_ylim(0.0, max(1.12 * max(limits), left.get_ylim()[1]))
+        unfinished = any(not point.converged for curve in curves for point in curve.points)
+        left.legend(title="crosses: not converged" if unfinished else None, loc="best")
+        right.legend(loc="best")
+    return figure
+
+
+def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str) -> None:
+    """A quantity of every curve; of a single curve the parts of it too."""
+    single = len(curves) == 1
+    for number, curve in enumerate(curves):
+        _draw(axes, curve, key, name if single else _name(curve), *STROKES[number % len(STROKES)])
+        for part, of, stroke in PARTS[key] if single else ():
+            _draw(axes, curve, part, of, *stroke)
+    abscissa = ABSCISSA[curves[0].kind]
+    if abscissa == "entrainment_speed_m_s":
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    name_axes(axes, abscissa)
+    axes.set_ylim(0.0, None)
+
+
+def _name(curve: FrictionCurve) -> str:
+    return quantity("sq_m").named(curve.sq) + (", heat fed back" if curve.feedback else "")
+
+
+def _draw(axes: Axes, curve: FrictionCurve, name: str, label: str, colour: str, stroke: str, marker: str) -> None:
+    abscissa = ABSCISSA[curve.kind]
+    x = display(abscissa, np.array([getattr(point, abscissa) for point in curve.points]))
+    y = np.array([getattr(point, name) for point in curve.points])
+    converged = np.array([point.converged for point in curve.points])
+    axes.plot(x, np.where(converged, y, np.nan), stroke, marker=marker, markersize=4, color=colour, label=label)
+    if not converged.all():
+        axes.plot(x[~converged], y[~converged], "x", color=colour)

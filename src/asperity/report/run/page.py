@@ -1,0 +1,186 @@
+"""One HTML page from solved runs: what was found, how, how well, and what the model leaves out."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from asperity.errors import BadInput
+from asperity.lubricant import Newtonian
+from asperity.quantities import Quantity, quantity, select
+from asperity.report.base import Exhibit, Picture, Tile, capitalised, heading, in_print, render, tile, write_page
+from asperity.report.run import contact, rubbing, several
+from asperity.report.run.conditions import conditions_table
+from asperity.report.run.vibration import spectrum
+from asperity.results import Run
+
+GROUPS = ("load", "film", "pressure", "friction", "heat", "stress", "resonance", "solver")
+TILES = (
+    "clr",
+    "car",
+    "h_mean_m",
+    "lambda_ratio",
+    "friction_coefficient",
+    "flash_temperature_max_k",
+    "crf_hz",
+    "crfa",
+)
+
+
+def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = None) -> Path:
+    """Write one self-contained HTML page about one or several runs, whole or not at all.
+
+    Parameters
+    ----------
+    runs : at least one; several are put side by side and drawn against their roughness
+    path : the file to write; its folder must exist
+    title : heading of the page; without it, the page says what it shows
+
+    Returns
+    -------
+    Path
+        The file written. The same runs and asperity version give the same bytes.
+
+    Raises
+    ------
+    BadInput
+        for no runs, or a path that cannot be written to.
+    """
+    if not runs:
+        raise BadInput("a report needs at least one run, got none; name the run files to show")
+    return write_page(path, lambda: render_page(runs, title=title))
+
+
+def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
+    """The page as HTML text."""
+    views = [_RunView(run, number if len(runs) > 1 else None) for number, run in enumerate(runs, 1)]
+    oils = [run.solution.lubricant for run in runs]
+    return render(
+        "run/page.html.j2",
+        title=title or _title(runs),
+        runs=views,
+        overview=[exhibit.picture() for exhibit in _overview(runs)] if len({run.state.sq for run in runs}) > 1 else [],
+        numbers=[_row(entry, views) for group in GROUPS for entry in select(group)],
+        conditions=conditions_table(runs),
+        lubricated=any(oil is not None for oil in oils),
+        newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
+        isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
+        sphere=any(run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs),
+        line=any(run.solution.conditions.geometry == "line" for run in runs),
+        imbalance=_span("mass_flux_imbalance", [run.state.mass_flux_imbalance for run in runs]),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    name: str
+    meaning: str
+    cells: list[str]
+    unit: str
+
+
+def _row(entry: Quantity, views: "Sequence[_RunView]") -> _Row:
+    cells = [entry.number_in(view.scalars) for view in views]
+    return _Row(heading(entry), entry.meaning, cells, entry.display)
+
+
+def _span(key: str, values: Sequence[float]) -> str:
+    """From the least to the largest of the values."""
+    low, high = quantity(key).text(min(values)), quantity(key).text(max(values))
+    return low if low == high else f"{low} to {high}"
+
+
+def _title(runs: Sequence[Run]) -> str:
+    several_runs = f": {len(runs)} runs" if len(runs) > 1 else ""
+    return f"Rough lubricated contact{several_runs}, Sq {_span('sq_m', [run.state.sq for run in runs])}"
+
+
+@dataclass(frozen=True)
+class _RunView:
+    """What the template shows of one run."""
+
+    run: Run
+    number: int | None
+
+    @property
+    def label(self) -> str:
+        rough = quantity("sq_m").named(self.run.state.sq)
+        return rough if self.number is None else f"{self.number}. {rough}"
+
+    @property
+    def anchor(self) -> str:
+        return f"run-{self.number or 1}"
+
+    @cached_property
+    def scalars(self) -> dict[str, float | int | bool | None]:
+        return self.run.scalars()
+
+    @property
+    def verdict(self) -> str:
+        return in_print(self.run.verdict())
+
+    @property
+    def converged(self) -> bool:
+        return self.run.solution.convergence.converged
+
+    @property
+    def ending(self) -> str:
+        return in_print(self.run.solution.convergence.explain()).capitalize()
+
+    @property
+    def tiles(self) -> list[Tile]:
+        return [tile(quantity(key), self.scalars) for key in TILES]
+
+    @cached_property
+    def pictures(self) -> list[Picture]:
+        return [exhibit.picture() for exhibit in _exhibits(self.run)]
+
+    @property
+    def notes(self) -> list[str]:
+        return [in_print(capitalised(note)) for note in (*self.run.remarks, *_missing_exhibits(self.run))]
+
+    @property
+    def case_text(self) -> str:
+        return self.run.case.text
+
+
+def _exhibits(run: Run) -> Iterator[Exhibit]:
+    """What is shown of a run, in the order of the page."""
+    yield contact.contact_map(run)
+    yield contact.film_map(run)
+    yield contact.pressure_map(run)
+    yield contact.centre_line(run)
+    yield contact.roughness_map(run)
+    yield contact.height_distribution(run)
+    friction, heat = run.friction, run.heat
+    if friction is not None and heat is not None and run.solution.conditions.sliding_speed != 0.0:
+        yield rubbing.traction_map(run, friction)
+        yield rubbing.temperature_map(run, friction, heat)
+        yield rubbing.temperature_line(run, heat)
+    yield rubbing.stress_map(run)
+    yield rubbing.stress_section(run)
+    yield rubbing.stress_over_depth(run)
+    if run.vibration is not None and run.vibration.spectrum is not None:
+        yield spectrum(run.vibration, run.resonance_in_words())
+    yield contact.convergence_history(run)
+
+
+def _missing_exhibits(run: Run) -> Iterator[str]:
+    """Why a figure is not there."""
+    if run.friction_failure is not None:
+        yield f"There is no friction and no temperature to show: {run.friction_failure}."
+    elif run.solution.conditions.sliding_speed == 0.0:
+        yield "There is no friction to show: both surfaces move at the same speed."
+    if run.vibration is not None and run.vibration.spectrum is None:
+        yield f"There is no spectrum to show: {run.vibration.resonance.reason}."
+
+
+def _overview(runs: Sequence[Run]) -> Iterator[Exhibit]:
+    """Several runs against their roughness."""
+    points = [run.scalars() for run in runs]
+    full_load = {run.vibration.full_load_crf_hz for run in runs if run.vibration is not None}
+    yield several.shares_against_roughness(points)
+    yield several.resonance_against_roughness(points, full_load.pop() if len(full_load) == 1 else None)
+    sliding = [point for point in points if point["friction_coefficient"]]
+    if sliding:
+        yield several.friction_against_roughness(sliding)

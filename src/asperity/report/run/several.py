@@ -1,0 +1,105 @@
+"""Exhibits of several runs: shares, resonance and friction against their roughness."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.quantities import quantity
+from asperity.report.base import Exhibit, capitalised
+from asperity.report.drawing import BLUE, VERMILION, Medium, display, legend_below, name_axes
+
+Points = Sequence[Mapping[str, Any]]  # the scalars of each run
+
+
+def shares_against_roughness(points: Points) -> Exhibit:
+    """CLR and CAR against Sq."""
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = medium.panel(3.3)
+        _draw(axes, points, "clr", "-o", VERMILION)
+        _draw(axes, points, "car", "--s", BLUE)
+        name_axes(axes, "sq_m", "share", title="Load and area share of asperities", ylim=(0.0, 100.0))
+        legend_below(figure, 1)
+        return figure
+
+    return Exhibit(
+        "shares-against-roughness",
+        draw,
+        "Share of the load (CLR) and of the Hertz zone (CAR) that asperities take, one surface each."
+        + _unfinished(points),
+        _values(points, "clr", "car"),
+    )
+
+
+def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) -> Exhibit:
+    """CRF against Sq, with two standard deviations."""
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = medium.panel(3.1)
+        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{quantity('crf_hz').short} ± 2 std of its fit")
+        for point in points:
+            if point["crf_hz"] is not None and point["crf_std_hz"] is not None:
+                place, reach = display("sq_m", point["sq_m"]), 2.0 * point["crf_std_hz"]
+                axes.errorbar(place, point["crf_hz"], reach, color=VERMILION, capsize=5, linewidth=1.0, zorder=1)
+        if full_load_crf_hz is not None:
+            label = "asperities carry all the load"
+            axes.axhline(full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label=label)
+        axes.set(ylabel=quantity("crf_hz").label, title=capitalised(quantity("crf_hz").name))
+        legend_below(figure)
+        return figure
+
+    return Exhibit(
+        "resonance-against-roughness",
+        draw,
+        "Contact resonance frequency with two standard deviations of its fit." + _unfinished(points),
+        _values(points, "crf_hz"),
+    )
+
+
+def friction_against_roughness(points: Points) -> Exhibit:
+    """Friction coefficient against Sq: asperities' and oil's parts."""
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = medium.panel(3.1)
+        _draw(axes, points, "friction_coefficient", "-o", "black")
+        _draw(axes, points, "friction_asperity_part", "--s", VERMILION)
+        _draw(axes, points, "friction_oil_part", ":^", BLUE)
+        axes.set(ylabel=quantity("friction_coefficient").label, title="Friction", ylim=(0.0, None))
+        legend_below(figure)
+        return figure
+
+    return Exhibit(
+        "friction-against-roughness",
+        draw,
+        "Friction coefficient, and what asperities and oil contribute to it.",
+        _values(points, "friction_coefficient"),
+    )
+
+
+def _draw(axes: Axes, points: Points, key: str, stroke: str, colour: str, label: str = "") -> None:
+    """One curve of a scalar against Sq; hollow markers where the solve did not converge."""
+    known = sorted((point for point in points if point[key] is not None), key=lambda point: float(point["sq_m"]))
+    sq, values = ([display(name, point[name]) for point in known] for name in ("sq_m", key))
+    axes.plot(sq, values, stroke, color=colour, markersize=6, label=label or quantity(key).title)
+    doubtful = [i for i, point in enumerate(known) if not point["converged"]]
+    places, heights = ([column[i] for i in doubtful] for column in (sq, values))
+    axes.plot(places, heights, stroke[-1], color=colour, markerfacecolor="white", markersize=6)
+    every = [display("sq_m", point["sq_m"]) for point in points]
+    margin = max(0.06 * (max(every) - min(every)), 0.1 * max(every)) or 0.5
+    name_axes(axes, "sq_m", xlim=(min(every) - margin, max(every) + margin))
+
+
+def _unfinished(points: Points) -> str:
+    converged = all(point["converged"] for point in points)
+    return "" if converged else " Hollow markers are runs that did not converge."
+
+
+def _values(points: Points, *keys: str) -> str:
+    """The points of the curves in words."""
+    texts = []
+    for point in points:
+        values = [quantity(key).named(point[key]) for key in keys]
+        texts.append(f"at {quantity('sq_m').text(point['sq_m'])} {' and '.join(values)}")
+    return f"{' and '.join(quantity(key).name for key in keys)} against Sq: {'; '.join(texts)}."

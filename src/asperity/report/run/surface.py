@@ -1,0 +1,114 @@
+"""A measured surface drawn: map, profile, bearing curve, radial and directional spectrum."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.errors import BadInput
+from asperity.quantities import quantity
+from asperity.report.drawing import BLUE, DASHED, GREEN, GREY, ON_PAGE, VERMILION, display, name_axes, write_figure
+from asperity.report.run.contact import draw_height_distribution
+from asperity.surface import MeasuredSurface, SurfaceDescription, SurfaceSpectrum, bearing_curve, surface_spectrum
+
+
+def surface_map(description: SurfaceDescription, path: Path) -> Path:
+    """Write a PNG of a measured surface, levelled: map, profile, bearing curve, radial and directional spectrum.
+
+    Raises
+    ------
+    BadInput
+        for a path that is not a .png, or cannot be written to.
+    """
+    if path.suffix.lower() != ".png":
+        raise BadInput(f"the map is written as PNG, got {path.name}; name a file that ends in .png")
+    with ON_PAGE.drawing():
+        figure = _surface_figure(description)
+    return write_figure(figure, path, dpi=130)
+
+
+def _surface_figure(description: SurfaceDescription) -> Figure:
+    levelled, spectrum = description.levelled, surface_spectrum(description.levelled)
+    figure = Figure(figsize=(11.0, 7.4), layout="constrained")
+    places = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
+    sq, pixel = quantity("sq_m").text(description.parameters.sq), quantity("cell_m")
+    dx, dy = levelled.grid.spacing
+    if levelled.uniform is None:
+        _draw_levelled_map(figure, figure.add_subplot(places[0, :2]), levelled)
+        _draw_lay(figure.add_subplot(places[0, 2], projection="polar"), spectrum)
+        _draw_profile(figure.add_subplot(places[1, 0]), levelled, "Profile through the middle, along x")
+        nx, ny = levelled.grid.cells
+        size = f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
+    else:
+        _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
+        draw_height_distribution(figure.add_subplot(places[1, 0]), levelled.profile)
+        size = f"profile, Rq {sq}, {levelled.profile.size} points every {pixel.text(min(dx, dy))}"
+    _draw_bearing_curve(figure.add_subplot(places[1, 1]), description)
+    _draw_radial_spectrum(figure.add_subplot(places[1, 2]), spectrum, levelled.uniform is not None)
+    figure.suptitle(f"{description.path.name}: {size}", x=0.01, ha="left", parse_math=False)
+    return figure
+
+
+def _draw_levelled_map(figure: Figure, axes: Axes, levelled: MeasuredSurface) -> None:
+    heights = display("surface_height", levelled.heights)
+    width, height = display("y_m", np.array(levelled.grid.extent))
+    reach = float(np.nanpercentile(np.abs(heights), 99.5)) or 1.0
+    axes.set_facecolor("#d946ef")  # what was not measured; no height has this colour
+    image = axes.imshow(
+        heights.T, origin="lower", extent=(0.0, width, 0.0, height), cmap="cividis", vmin=-reach, vmax=reach,
+        interpolation="none" if max(heights.shape) < 600 else "antialiased",
+    )  # fmt: skip
+    missing = f", {quantity('share').text(levelled.missing)} not measured (pink)" if levelled.missing else ""
+    axes.set(title=f"Levelled heights{missing}", xlabel=quantity("surface_x_m").axis, ylabel=quantity("y_m").axis)
+    figure.colorbar(image, ax=axes, label=quantity("height_m").axis, extend="both", shrink=0.9)
+
+
+def _draw_profile(axes: Axes, levelled: MeasuredSurface, title: str) -> None:
+    profile = display("height_m", levelled.profile)
+    spacing = display("surface_x_m", levelled.grid.spacing[1 if levelled.uniform == 0 else 0])
+    axes.plot((np.arange(profile.size) + 0.5) * spacing, profile, color=BLUE, linewidth=0.8)
+    axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle=DASHED)
+    name_axes(axes, "surface_x_m", "height_m", title=title)
+    axes.set_xlim(0.0, profile.size * spacing)
+
+
+def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
+    curve, parameters, sq = bearing_curve(description.levelled.heights), description.parameters, quantity("sq_m")
+    prefix = "S" if description.profile is None else "R"
+    axes.plot(display("material_ratio", curve.share), display("height_m", curve.height), color=BLUE)
+    top, bottom = (display("height_m", curve.height_at(share)) for share in (parameters.smr1, parameters.smr2))
+    axes.axhspan(bottom, top, color="#e5e7eb", linewidth=0)
+    core, peaks, pits = (sq.text(height) for height in (parameters.sk, parameters.spk, parameters.svk))
+    axes.text(
+        0.97, 0.96, f"{prefix}k {core} (shaded)\n{prefix}pk {peaks}, {prefix}vk {pits}",
+        transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
+    )  # fmt: skip
+    inner = [display("height_m", curve.height_at(share)) for share in (0.999, 0.001)]
+    if inner[0] < inner[1]:  # the rarest heights would flatten the rest
+        axes.set_ylim(inner[0] - 0.1 * (inner[1] - inner[0]), inner[1] + 0.4 * (inner[1] - inner[0]))
+    name_axes(axes, "material_ratio", "height_m", title="Bearing curve")
+    axes.set_xlim(0.0, 100.0)
+
+
+def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) -> None:
+    some = spectrum.density > 0.0
+    if not some.any():
+        axes.text(0.5, 0.5, "perfectly smooth", transform=axes.transAxes, ha="center")
+    else:
+        wavelength = display("wavelength_m", 2.0 * np.pi / spectrum.wavenumber[some])
+        axes.loglog(wavelength, spectrum.density[some], color=VERMILION, marker=".", markersize=4)
+        axes.invert_xaxis()
+    title = "Spectrum of the profile" if profile else "Spectrum, all directions"
+    name_axes(axes, "wavelength_m", "profile_power_density" if profile else "surface_power_density", title=title)
+
+
+def _draw_lay(axes: Axes, spectrum: SurfaceSpectrum) -> None:
+    polar: Any = axes
+    both = np.concatenate([spectrum.lay, spectrum.lay + np.pi, spectrum.lay[:1]])
+    share = display("share", np.concatenate([spectrum.share, spectrum.share, spectrum.share[:1]]))
+    polar.plot(both, share, color=GREEN)
+    polar.fill(both, share, color=GREEN, alpha=0.2)
+    polar.set_title("Lay: share of Sq² in ridges\nalong this direction [% per 5°]")
+    polar.tick_params(labelsize=8)

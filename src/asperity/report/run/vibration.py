@@ -1,0 +1,248 @@
+"""Figures of the vibration model: a run's spectrum, the paper's Figs 3 and 4, its Table 1 beside the printed values."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.arrays import Field
+from asperity.coupling import Vibration, VibrationModel
+from asperity.errors import BadInput
+from asperity.paper import Table1Row, continuous_crfa, expected_crfa
+from asperity.quantities import quantity
+from asperity.report.base import Exhibit
+from asperity.report.drawing import (
+    BAND_COLOUR,
+    BLUE,
+    GREEN,
+    GREY,
+    ON_PAGE,
+    VERMILION,
+    Medium,
+    display,
+    legend_below,
+    mean_of_neighbours,
+    name_axes,
+)
+from asperity.signals import Signal, Spectrum, power_spectrum
+from asperity.vibration import mass_motion, white_noise
+from asperity.wear import Resonance
+
+RATES = (10e3, 20e3, 50e3, 200e3)  # Hz
+LONGEST = 0.5  # seconds of a record that are drawn: more is a black bar
+LOADS = (100.0, 200.0, 300.0, 400.0)
+HEIGHT, CUTOFF = 2e-6, 30.0  # of Table 1's first four rows
+
+
+def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
+    """Acceleration spectrum around the search band, with the fitted resonance and its two-standard-deviation interval.
+
+    Raises
+    ------
+    BadInput
+        for a contact without a spectrum, which has no touching asperities.
+    """
+    density, resonance = vibration.spectrum, vibration.resonance
+    if density is None:
+        raise BadInput(f"there is no spectrum to draw: {resonance.reason}")
+    low, high = vibration.band_hz
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = medium.panel(3.5)
+        margin = 0.35 * (high - low)
+        _draw_band(axes, density, (low - margin, high + margin), (low, high))
+        axes.set_title(_resonance_title(resonance))
+        if resonance.found:
+            _mark_resonance(axes, resonance, np.linspace(low, high, 600))
+        axes.axvline(vibration.full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label="CRF at full load")
+        axes.set_xlim(low - margin, high + margin)
+        legend_below(figure)
+        return figure
+
+    band, full_load = f"{low:.0f} to {high:.0f} Hz", f"{vibration.full_load_crf_hz:.0f} Hz"
+    return Exhibit(
+        "spectrum",
+        draw,
+        f"Acceleration spectrum of a simulated record of {quantity('duration_s').text(density.duration_s)}, resolution "
+        f"{density.resolution_hz:.3g} Hz: {resonance_in_words}. Searched from {band}, where this contact can "
+        f"resonate; asperities that carry the whole load would give {full_load}.",
+        f"Acceleration spectrum around the search band {band}: {resonance_in_words}.",
+    )
+
+
+def _resonance_title(resonance: Resonance) -> str:
+    return (
+        f"Contact resonance at {quantity('crf_hz').text(resonance.crf_hz)}" if resonance.found else "No resonance found"
+    )
+
+
+def _draw_band(axes: Axes, density: Spectrum, ends: tuple[float, float], band: tuple[float, float]) -> None:
+    """The spectrum between the ends, means of neighbours where it has more lines than can be seen."""
+    near = (density.frequency_hz >= ends[0]) & (density.frequency_hz <= ends[1])
+    together = max(int(np.count_nonzero(near)) // 400, 1)
+    axes.axvspan(*band, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="search band")
+    frequency, level = (
+        mean_of_neighbours(values[near], together) for values in (density.frequency_hz, density.density)
+    )
+    name = "spectrum" if together == 1 else f"spectrum, mean of {together} lines"
+    axes.semilogy(frequency, level, color=GREY, linewidth=0.7, label=name)
+    name_axes(axes, "frequency_hz", "acceleration_density")
+
+
+def _mark_resonance(axes: Axes, resonance: Resonance, frequency: Field) -> None:
+    if np.isfinite(resonance.damping_ratio):  # a highest point has no curve
+        axes.semilogy(frequency, resonance.curve(frequency), color=VERMILION, label="fitted resonance")
+    reach = 2.0 * resonance.crf_std
+    interval = " ± 2 std" if np.isfinite(reach) else ""
+    if interval:
+        axes.axvspan(resonance.crf_hz - reach, resonance.crf_hz + reach, color=BLUE, alpha=0.35, linewidth=0)
+    axes.axvline(resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label=f"CRF{interval}")
+
+
+# The paper's Figs 3 and 4 --------------------------------------------------------------------------------------------
+
+
+def excitation_figure(vibration: Vibration, model: VibrationModel) -> Figure:
+    """White noise, its spectrum, the profile and its spectrum: the paper's Fig 3.
+
+    Raises BadInput for a contact that no asperity touches.
+    """
+    profile = vibration.profile
+    if profile is None:
+        raise BadInput(f"there is no profile to draw: {vibration.resonance.reason}")
+    with ON_PAGE.drawing():
+        figure, (a, b, c, d) = _four_panels()
+        noise = Signal(white_noise(profile.values.size, model.seed), profile.rate_hz, "m")
+        _draw_record(a, noise, "noise_height_m", "(a) white noise, before any coefficient", GREY)
+        _draw_spectrum(b, noise, "(b) its spectrum", GREY)
+        b.axhline(2.0 / profile.rate_hz, color="black", linestyle="--", linewidth=1.0, label="2 / rate")
+        _draw_record(c, profile, "profile_height_m", f"(c) profile, {model.excitation.label}", BLUE)
+        _draw_spectrum(d, profile, "(d) its spectrum", BLUE)
+        if vibration.oscillator is not None and vibration.expected is not None:
+            f = vibration.expected.frequency_hz[1:]
+            gain = vibration.oscillator.sampled_gain(f, profile.rate_hz)
+            density = vibration.expected.density[1:] / gain
+            d.loglog(f, density, "--", color="black", linewidth=1.0, label="closed form")
+        d.set_ylim(1e-11 * float(np.max(power_spectrum(profile).density)), None)
+        for axes in (b, d):
+            axes.legend(loc="lower left")
+    return figure
+
+
+def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
+    """Displacement, velocity, acceleration and the acceleration's spectrum: the paper's Fig 4.
+
+    Raises BadInput for a contact that no asperity touches.
+    """
+    profile, oscillator, density = vibration.profile, vibration.oscillator, vibration.spectrum
+    if profile is None or oscillator is None or density is None or vibration.expected is None:
+        raise BadInput(f"there is no response to draw: {vibration.resonance.reason}")
+    motion = mass_motion(oscillator, profile, method=model.response, substeps=model.substeps)
+    with ON_PAGE.drawing():
+        figure, (a, b, c, d) = _four_panels()
+        for axes, letter, key, colour in (
+            (a, "a", "displacement", BLUE), (b, "b", "velocity", GREEN), (c, "c", "acceleration", VERMILION),
+        ):  # fmt: skip
+            record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
+            _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
+        f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
+        near = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
+        f = density.frequency_hz[near]
+        d.plot(f, density.density[near], color=GREY, linewidth=0.7, label="raw periodogram")
+        d.plot(f, vibration.expected.density[near], color="black", linewidth=1.2, label="closed form")
+        if resonance.found:
+            label = f"{quantity('crf_hz').named(resonance.crf_hz)}, CRFA {quantity('crfa').number(resonance.crfa)}"
+            d.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
+        d.axvline(f0, color=BLUE, linestyle=":", linewidth=1.2, label=f"f0 {quantity('frequency_hz').text(f0)}")
+        name_axes(d, "frequency_hz", "acceleration_density", title="(d) spectrum of the acceleration")
+        d.set_ylim(0.0, None)
+        d.legend(loc="upper right" if resonance.found and resonance.crf_hz < f0 else "upper left")
+    return figure
+
+
+def _four_panels() -> tuple[Figure, Sequence[Any]]:
+    figure = Figure(figsize=(ON_PAGE.double, 5.6), layout="constrained")
+    return figure, figure.subplots(2, 2).ravel()
+
+
+def _draw_record(axes: Axes, record: Signal, key: str, title: str, colour: str) -> None:
+    values = display(key, record.values[: max(2, round(LONGEST * record.rate_hz))])
+    axes.plot(np.arange(values.size) / record.rate_hz, values, color=colour, linewidth=0.6)
+    name_axes(axes, "record_time_s", key, title=title)
+    axes.margins(x=0.0)
+
+
+def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
+    """Means over bins of equal width on a logarithmic axis, where there are more lines than a figure can show."""
+    density = power_spectrum(record)
+    frequency, level = density.frequency_hz[2:], density.density[2:]
+    edges = np.unique(np.searchsorted(frequency, np.geomspace(frequency[0], frequency[-1], 1200)))
+    width = np.diff([*edges, frequency.size])
+    binned = (np.add.reduceat(values, edges) / width for values in (frequency, level))
+    axes.loglog(*binned, color=colour, linewidth=0.7, label="one record")
+    name_axes(axes, "frequency_hz", "profile_density", title=title)
+
+
+# Its Table 1 ---------------------------------------------------------------------------------------------------------
+
+
+def table1_figure(rows: Sequence[Table1Row]) -> Figure:
+    """CRFA over load, height and cut-off: the printed values, and the median and 5 to 95 % range of our records."""
+    parts = (
+        (rows[:4], "load_n", "load_n", "load"),
+        (rows[4:8], "height_m", "profile_height_m", "height"),
+        (rows[8:], "cutoff_hz", "cutoff_hz", "cut-off"),
+    )
+    with ON_PAGE.drawing():
+        figure = Figure(figsize=(ON_PAGE.double, 3.9), layout="constrained")
+        panels = figure.subplots(1, 3)
+        for axes, (part, name, key, word) in zip(panels, parts, strict=True):
+            x = display(key, np.array([getattr(row, name) for row in part]))
+            median, low, high = (
+                np.array([getattr(row, f"crfa{end}") for row in part]) for end in ("", "_low", "_high")
+            )
+            axes.errorbar(
+                x, median, [median - low, high - median], fmt="o", color=BLUE, capsize=5,
+                label="ours: median, 5 to 95 % of single records",
+            )  # fmt: skip
+            axes.plot(x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="printed")
+            axes.set(xscale="log", yscale="log", title=f"median ~ {_power(word, x, median)}")
+            name_axes(axes, key)
+            _tick_at(axes, x)
+        panels[0].set_ylabel(quantity("crfa").label)
+        legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
+    return figure
+
+
+def load_trend_figure(model: VibrationModel) -> Figure:
+    """CRFA over load at several sampling rates, in closed form: what of the paper's trend is sampling, what physics."""
+    strokes = (("-o", VERMILION), ("--s", BLUE), ("-.^", GREEN), (":D", GREY))
+    with ON_PAGE.drawing():
+        figure = Figure(figsize=(5.6, 4.4), layout="constrained")
+        axes = figure.add_subplot()
+        for (stroke, colour), rate in zip(strokes, RATES, strict=True):
+            sampled = replace(model, rate_hz=rate)
+            crfa = np.array([expected_crfa(sampled, CUTOFF, HEIGHT, load) for load in LOADS])
+            label = f"{quantity('record_rate_hz').text(rate)}: {_power('load', np.array(LOADS), crfa)}"
+            axes.loglog(LOADS, crfa, stroke, color=colour, label=label)
+        continuous = [continuous_crfa(model, CUTOFF, HEIGHT, load) for load in LOADS]
+        axes.loglog(LOADS, continuous, color="black", linewidth=1.0, label="not sampled: load^0")
+        name_axes(axes, "load_n", "expected_crfa", title="CRFA falls with load: the sampling")
+        _tick_at(axes, np.array(LOADS))
+        legend_below(figure)
+    return figure
+
+
+def _tick_at(axes: Axes, places: Field) -> None:
+    axes.set_xticks(places, [f"{value:g}" for value in places])
+    axes.set_xticks([], minor=True)
+
+
+def _power(word: str, x: Field, values: Field) -> str:
+    """The power law through the values: "load^−0.67"."""
+    power = float(np.polyfit(np.log(x), np.log(values), 1)[0])
+    number = f"{power:.2f}".replace("-0.00", "0").replace("-", "−")
+    return f"{word}^{number}"

@@ -1,0 +1,1 @@
+"""The page of a study, its exhibits, and its figures and tables for a paper."""

@@ -1,0 +1,105 @@
+"""Exhibits of a few contacts of a wear study: the paper's Figs 5 and 6."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.quantities import quantity
+from asperity.report.base import Exhibit
+from asperity.report.drawing import (
+    ACROSS,
+    Medium,
+    contact_colours,
+    contact_keys,
+    display,
+    legend_below,
+    mark_hertz_zone,
+    panels_in_rows,
+    show_map,
+)
+from asperity.results import Run
+
+SHARES = ("clr", "car", "car_domain")
+
+
+def contact_maps(runs: Sequence[Run]) -> Exhibit:
+    """Where asperities touch, oil fills the gap and oil has ruptured, with CAR and CLR of each: the paper's Fig 6."""
+    dry = all(run.solution.lubricant is None for run in runs)
+
+    def draw(medium: Medium) -> Figure:
+        figure, panels = _sheet(runs, medium, above=3.0, below=4.4)
+        for run, axes, letter in zip(runs, panels, "abcdefgh", strict=False):
+            show_map(axes, contact_colours(run.solution), run.solution)
+            mark_hertz_zone(axes, run.solution, "black")
+            clr, car, domain = _shares(run)
+            axes.set_title(f"({letter}) {_sq(run)}: {clr}\n{car}\n{domain}", fontweight="normal", fontsize="small")
+        _label_outer(panels)
+        keys = contact_keys("asperity contact", *(("open gap",) if dry else ("oil film", "ruptured oil")))
+        legend_below(figure, 4 if len(runs) > 2 else 2, handles=keys)
+        return figure
+
+    each = "; ".join(f"{_sq(run)}: {', '.join(_shares(run))}" for run in runs)
+    return Exhibit(
+        "contact-maps",
+        draw,
+        "Contact of one surface a level: asperities yellow, oil red, ruptured oil striped; oil comes from the "
+        "left. The shares are those of this very surface.",
+        f"Contact maps. {each}.",
+    )
+
+
+def surfaces(runs: Sequence[Run]) -> Exhibit:
+    """Roughness of a few levels in one colour scale: the paper's Fig 5."""
+
+    def draw(medium: Medium) -> Figure:
+        key = "surface_height"
+        heights = [display(key, run.solution.surface.heights) for run in runs]
+        reach = max(float(np.percentile(np.abs(field), 99.5)) for field in heights) or 1.0
+        figure, panels = _sheet(runs, medium, above=1.4, below=5.4)
+        for run, field, axes, letter in zip(runs, heights, panels, "abcdefgh", strict=False):
+            image = show_map(axes, field, run.solution, cmap="cividis", vmin=-reach, vmax=reach)
+            axes.set_title(f"({letter}) {_sq(run)}", fontweight="normal")
+        _label_outer(panels)
+        style: Any = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}
+        figure.colorbar(image, ax=panels, label=quantity(key).axis, **style)
+        return figure
+
+    return Exhibit(
+        "surfaces",
+        draw,
+        "The same surfaces before they deform, all in one scale of heights.",
+        f"Maps of the surfaces' heights at {', '.join(_sq(run) for run in runs)}.",
+    )
+
+
+def _sq(run: Run) -> str:
+    return quantity("sq_m").named(run.state.sq)
+
+
+def _shares(run: Run) -> list[str]:
+    return [quantity(key).named(getattr(run.state, key)) for key in SHARES]
+
+
+def _sheet(runs: Sequence[Run], medium: Medium, *, above: float, below: float) -> tuple[Figure, list[Axes]]:
+    """Equal panels in rows for the maps of the runs, so many lines of type above each and below all."""
+    across = min(ACROSS, len(runs))
+    down = -(-len(runs) // across)
+    extent = runs[0].case.grid.extent
+    line, width = medium.line_height, medium.width(across)
+    panel = (width - 4.0 * line) / across - 0.6 * line
+    height = down * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
+    figure = Figure(figsize=(width, height), layout="compressed")
+    return figure, panels_in_rows(figure, len(runs), sharex=True, sharey=True)
+
+
+def _label_outer(panels: Sequence[Axes]) -> None:
+    """Labels at the left and at the bottom only; a panel above a gap has the bottom too."""
+    across = min(ACROSS, len(panels))
+    for number, axes in enumerate(panels):
+        lowest, leftmost = number + across >= len(panels), number % across == 0
+        axes.set_xlabel(quantity("x_m").axis if lowest else "")
+        axes.set_ylabel(quantity("y_m").axis if leftmost else "")
+        axes.tick_params(labelbottom=lowest, labelleft=leftmost)

@@ -1,0 +1,152 @@
+"""One HTML page of a study, and its figures and tables for a paper.
+
+A study of Sq alone gets the paper's Figs 5 to 8 and 13 with the printed numbers in them; any other gets each output
+against each swept quantity.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from asperity.files import make_folder, require_writable, whole_file
+from asperity.paper import Anchor
+from asperity.quantities import quantity
+from asperity.report.base import Exhibit, Picture, Tile, heading, in_print, render, write_exhibits, write_page
+from asperity.report.study import maps, tables
+from asperity.report.study.curve import curve_exhibits
+from asperity.report.study.sweep import sweep_exhibits
+from asperity.study import SEED_KEYS, FailureReason, StudyOverview, StudyResult
+
+TILES = ("clr", "car", "car_domain", "crf_sound_hz")
+
+Progress = Callable[[str], None]
+
+
+def write_study_report(
+    result: StudyResult,
+    path: str | Path,
+    *,
+    figures: str | Path | None = None,
+    anchors: Sequence[Anchor] | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Write one self-contained HTML page about a study, and its figures and tables for a paper.
+
+    Parameters
+    ----------
+    result : from `run_study` or `load_study`; what is missing, failed or did not converge is said, and left out of
+        every mean
+    path : the file to write; its folder must exist
+    figures : folder for each figure as PDF and as PNG (300 dpi, 84 or 174 mm wide), `captions.md` and the tables as
+        csv; made if it is not there
+    anchors : what a study of Sq should meet; by default the paper's printed numbers, if the case is its contact
+    progress : told in words what is being solved or drawn
+
+    Returns
+    -------
+    Path
+        The page. The same table and asperity version give the same bytes.
+
+    Raises
+    ------
+    BadInput
+        for a study without a computed case, or a place that cannot be written to.
+    """
+    require_writable(Path(path))
+    study = StudyOverview(result, anchors, progress)
+    folder = None if figures is None else _folder(Path(figures))
+    messages = progress or (lambda _: None)
+
+    def page() -> str:
+        exhibits = study_exhibits(study)
+        text = render_study_page(study, exhibits, messages)
+        if folder is not None:
+            write_exhibits(exhibits, folder, messages)
+            _write_tables(study, folder)
+        return text
+
+    return write_page(path, page)
+
+
+def _folder(path: Path) -> Path:
+    make_folder(path)
+    require_writable(path / "captions.md")
+    return path
+
+
+def _write_tables(study: StudyOverview, folder: Path) -> None:
+    """Each table as csv."""
+    for name, table in study.tables.items():
+        with whole_file(folder / f"{name}.csv") as part:
+            table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
+
+
+def study_exhibits(study: StudyOverview) -> list[Exhibit]:
+    """Every figure, in the order of the page."""
+    if not len(study.used):
+        return []
+    if study.curve is None:
+        return list(sweep_exhibits(study))
+    exhibits = list(curve_exhibits(study, study.curve))
+    if study.runs and not isinstance(study.runs, str):
+        exhibits += [maps.contact_maps(study.runs), maps.surfaces(study.runs)]
+    return exhibits
+
+
+def render_study_page(study: StudyOverview, exhibits: Sequence[Exhibit], progress: Progress) -> str:
+    """The page as HTML text."""
+    result = study.result
+
+    def picture(exhibit: Exhibit) -> Picture:
+        progress(f"drawing {exhibit.name}")
+        return exhibit.picture()
+
+    return render(
+        "study/page.html.j2",
+        title=_title(study),
+        verdict=in_print(study.verdict()),
+        failed=result.failed,
+        total=len(result.table),
+        tiles=_tiles(study),
+        notes=[in_print(note) for note in study.notes],
+        reasons=[FailureReason(in_print(why.text), why.number, in_print(why.cases)) for why in study.reasons],
+        pictures=[picture(exhibit) for exhibit in exhibits],
+        wear=study.curve is not None,
+        anchors=tables.anchor_rows(study),
+        printed=study.papers,
+        levels=tables.level_rows(study),
+        points=tables.point_rows(study),
+        many=tables.has_many_points(study),
+        facts=tables.facts(study),
+        case_text=result.plan.case.text,
+    )
+
+
+def _title(study: StudyOverview) -> str:
+    if study.curve is not None:
+        first, last = study.curve.sq[[0, -1]]
+        return f"Wear study, Sq {quantity('sq_m').number(first)} to {quantity('sq_m').text(last)}"
+    keys = [key for key in study.result.plan.axes if key not in SEED_KEYS]
+    return f"Study over {', '.join(keys) or 'seeds'}"
+
+
+def _tiles(study: StudyOverview) -> list[Tile]:
+    result, curve = study.result, study.curve
+    tiles = [
+        Tile("Cases", f"{len(result.table)}", f"of {len(result.plan.cases)}" if result.missing else ""),
+        Tile("Failed or not converged", f"{result.failed}", f"of {len(result.table)}"),
+    ]
+    if curve is None:
+        return tiles
+    for key in TILES:
+        if key in curve.table:
+            entry, (first, last) = quantity(key), curve.mean(key)[[0, -1]]
+            if np.isfinite([first, last]).all():
+                tiles.append(Tile(heading(entry), f"{entry.number(first)} to {entry.number(last)}", entry.display))
+    split = quantity("split")
+    for preset, stages in curve.stages.items():
+        low, high = (split.number(end) for end in stages.interval)
+        value, rest = (split.text(stages.split), f"90 %: {low} to {high}") if stages.found else ("none", stages.kind)
+        tiles.append(Tile(f"Split, preset {preset}", value, rest))
+    return tiles

@@ -1,0 +1,136 @@
+"""The tables of a study's page, in words and display units: levels, points, anchors, and what the study was."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from asperity.quantities import NO_VALUE, Quantity, quantity
+from asperity.report.base import in_print
+from asperity.report.study.curve import stage_names, surfaces_a_point
+from asperity.report.study.keys import axis_label, place_in_words
+from asperity.study import StudyOverview, as_written
+
+MOST_POINTS = 60  # in a table of the page; the csv has all
+MOST_OUTPUTS = 8  # beside each other in it
+LEVELS = ("clr", "car", "car_domain", "crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper")
+
+
+class Cell(NamedTuple):
+    """A value in a table, and what stands small below it."""
+
+    value: str
+    below: str = ""
+
+
+def anchor_rows(study: StudyOverview) -> list[dict[str, str]]:
+    """The anchors, what the study has there, and whether it meets them."""
+    if study.curve is None or not study.anchors:
+        return []
+    rows = []
+    for _, row in study.tables["anchors"].iterrows():
+        entry = _entry(row["quantity"])
+        sense = "" if row["sense"] == "about" else f"{row['sense']} "
+        rows.append(
+            {
+                "name": in_print(row["anchor"]),
+                "source": row["source"],
+                "wanted": f"{sense}{entry.text(row['printed'], row['tolerance'])}",
+                "ours": entry.text(row["ours"]),
+                "interval": _interval(entry, row["low"], row["high"]) or NO_VALUE,
+                "miss": f"{'+' if row['miss'] >= 0.0 else ''}{entry.number(row['miss'])}",
+                "met": "yes" if row["met"] else "within the interval" if row["possible"] else "NO",
+            }
+        )
+    return rows
+
+
+def _entry(column: str) -> Quantity:
+    """The quantity of a column of the study; a column that the catalogue has not is a plain number."""
+    try:
+        return quantity(column)
+    except KeyError:
+        return replace(quantity("dynamic_load"), key=column, name=column, form=".4g")
+
+
+def _interval(entry: Quantity, low: float, high: float) -> str:
+    """From low to high; empty where there is none."""
+    return f"{entry.number(low)} to {entry.number(high)}" if np.isfinite(low) and np.isfinite(high) else ""
+
+
+def level_rows(study: StudyOverview) -> list[list[Cell]]:
+    """Head and rows of the levels of a wear curve: means, and the interval below each."""
+    curve = study.curve
+    if curve is None:
+        return []
+    summary, stages, sq = study.tables["levels"], curve.stages.get("sound"), quantity("sq_m")
+    entries = [quantity(key) for key in LEVELS if key in summary]
+    rows = [[Cell(sq.label), Cell("Used"), *(Cell(entry.short, entry.display) for entry in entries)]]
+    staged = stages is not None and stages.found
+    if staged:
+        rows[0].append(Cell("Stage", "preset sound"))
+    for level, row in enumerate(summary.to_dict("records")):
+        cells = [Cell(sq.number(curve.sq[level])), Cell(str(curve.values("clr", level).size))]
+        for entry in entries:
+            low, high = row[f"{entry.key}_low"], row[f"{entry.key}_high"]
+            cells.append(Cell(entry.number(row[entry.key]), _interval(entry, low, high)))
+        if stages is not None and staged:
+            before, after = stage_names(stages)
+            cells.append(Cell(after if row["sq_um"] >= stages.split else before))
+        rows.append(cells)
+    return rows
+
+
+def has_many_points(study: StudyOverview) -> bool:
+    """Whether there are more points than the page has a table for."""
+    return study.curve is None and len(study.result.plan.points) > MOST_POINTS
+
+
+def point_rows(study: StudyOverview) -> list[list[Cell]]:
+    """Head and rows of the points of any other study, where there are not too many: means and standard deviations."""
+    if study.curve is not None or has_many_points(study) or not len(study.used):
+        return []
+    entries = [replace(quantity(key), deviation=f"{key}_std") for key in study.outputs[:MOST_OUTPUTS]]
+    head = [*(Cell(axis_label(axis)) for axis in study.axes), Cell("Used")]
+    rows = [[*head, *(Cell(entry.short, entry.display) for entry in entries)]]
+    for _, point in study.tables["points"].iterrows():
+        first = int(np.argmax(study.used["point"].to_numpy() == point["point"]))
+        places = (place_in_words(axis, axis.values[first]) for axis in study.axes)
+        numbers: Sequence[str] = [entry.number_in(dict(point)) for entry in entries]
+        rows.append([*map(Cell, places), Cell(f"{point['cases']:.0f}"), *map(_stacked, numbers)])
+    return rows
+
+
+def _stacked(number: str) -> Cell:
+    """A value, its deviation below it."""
+    value, _, deviation = number.partition(" ± ")
+    return Cell(value, f"± {deviation}") if deviation and not number.startswith("(") else Cell(number)
+
+
+def facts(study: StudyOverview) -> list[tuple[str, str]]:
+    """What the study was."""
+    plan = study.result.plan
+    points = f"{len(plan.points)} points" if len(plan.points) > 1 else "1 point"
+    rows = [
+        ("Computed", {"solve": "contact and vibration", "vibrate": "the vibration model alone"}[plan.kind]),
+        ("Cases", f"{len(plan.cases)}: {points} of {surfaces_a_point(study)}"),
+    ]
+    rows += [(key, _range(plan, key)) for key in plan.axes]
+    seeding = {
+        "independent": "drawn anew for every case from the case's own seed",
+        "common": "the same at every point, realisation by realisation",
+    }
+    seeds = "surfaces' seeds given: " + ", ".join(map(str, plan.seeds)) if plan.seeds else seeding[plan.seeding]
+    rows.append(("Seeds", f"{seeds}; each case's own stand in cases.csv"))
+    if study.result.folder is not None:
+        rows.append(("Folder", study.result.folder.resolve().name))
+    rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in study.result.versions.items())))
+    return rows
+
+
+def _range(plan: Any, key: str) -> str:
+    """The values of a swept key in words."""
+    values = list(dict.fromkeys(as_written(point[key]) for point in plan.points if key in point))
+    few = len(values) <= 8
+    return in_print(", ".join(values) if few else f"{len(values)} values, {values[0]} to {values[-1]}")

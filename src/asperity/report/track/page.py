@@ -1,0 +1,218 @@
+"""One HTML page of a tracked series: the verdict first, then trend, spectra, numbers, quality, method and limits."""
+
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.quantities import NO_VALUE, quantity
+from asperity.report.base import Exhibit, Picture, Tile, capitalised, in_print, render, write_page
+from asperity.report.track import exhibits
+from asperity.tracking import ALERT, DANGER, IN_A_ROW, Track, TrackedRecording
+
+METHODS = {
+    "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
+    "a gain of its own, and one oscillator line a recording, which moves or changes its height from one recording to "
+    "the next. What stays is taken for the machine, what moves for the contact.",
+    "modes": "Each spectrum by itself: several oscillator lines over a floor, of which one may be the contact's.",
+    "likelihood": "Each spectrum by itself: the likeliest single oscillator line over a sloping floor (Whittle "
+    "likelihood), against the floor alone by BIC.",
+    "peak": "The paper's: each spectrum smoothed three times by a five-point cubic, the highest point of the band "
+    "taken. It is not tested against chance, and structural modes or shaft lines can be that point.",
+}
+MOST_LINES = 20  # of those taken out, listed by name
+
+
+def write_track_report(track: Track, path: str | Path) -> Path:
+    """Write one self-contained HTML page about a series, whole or not at all.
+
+    Raises
+    ------
+    BadInput
+        for a path that cannot be written to.
+    """
+    return write_page(path, lambda: render_track_page(track))
+
+
+def render_track_page(track: Track) -> str:
+    """The page as HTML text."""
+    total = len(track.recordings)
+    low, high = track.target.band_hz
+    return render(
+        "track/page.html.j2",
+        title=_title(track),
+        total=f"{total} {'recording' if total == 1 else 'recordings'}",
+        level=track.alarm.level,
+        verdict=in_print(track.verdict()),
+        alarm=in_print(track.alarm.verdict),
+        tiles=_tiles(track),
+        trend=_pictures([exhibits.trend(track)] if track.resonance_count else []),
+        more=_pictures(_details(track)),
+        heads=_heads(track),
+        rows=[_row(recording, _with_clr(track)) for recording in track.recordings],
+        with_clr=_with_clr(track),
+        problems=[in_print(sentence) for sentence in track.problems],
+        notes=[in_print(sentence) for sentence in track.notes],
+        remarks=_remarks(track),
+        facts=_facts(track),
+        lines=_lines(track),
+        evidence=_evidence(track),
+        method=track.method,
+        method_in_words=METHODS[track.method],
+        band=in_print(track.target.source),
+        band_short=f"{low:.0f} to {high:.0f} Hz",
+        joint=track.method == "joint",
+        comparable=track.comparable,
+        resolution=_resolution(track),
+        alert=ALERT,
+        danger=DANGER,
+        in_a_row=IN_A_ROW,
+    )
+
+
+def _with_clr(track: Track) -> bool:
+    """Whether the contact model reads a load share off the CRF."""
+    return track.target.full_load_crf_hz is not None
+
+
+def _title(track: Track) -> str:
+    folders = {Path(recording.file).parent.name for recording in track.recordings}
+    where = f" in {folders.pop()}" if len(folders) == 1 and folders != {""} else ""
+    return f"Contact resonance of a series{where}"
+
+
+def _tiles(track: Track) -> list[Tile]:
+    total, stages = len(track.recordings), track.stages
+    tiles = [Tile("Resonance found", f"{track.resonance_count}", f"of {total}")]
+    if stages is not None and stages.found:
+        low, high = stages.interval
+        label = f"Break at, {exhibits.x_label(track)}"
+        tiles.append(Tile(label, f"{stages.split:.3g}", f"90 %: {low:.3g} to {high:.3g}"))
+    last = next((recording for recording in reversed(track.recordings) if recording.resonance.found), None)
+    if last is not None:
+        crf, clr = quantity("crf_hz"), quantity("clr")
+        value, _, deviation = crf.text(last.resonance.crf_hz, last.resonance.crf_std).partition(" ")
+        tiles.append(Tile(f"Last {crf.short}", value, deviation))
+        if np.isfinite(last.severe_probability):
+            probability = quantity("severe_probability").text(last.severe_probability)
+            tiles.append(Tile("Severe, last recording", probability, "probability"))
+        if np.isfinite(last.clr):
+            low, high = last.clr_interval
+            interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
+            tiles.append(Tile("Load share, last", clr.text(last.clr), interval))
+    unusable = sum(not recording.reading.usable for recording in track.recordings)
+    tiles.append(Tile("Not usable", f"{unusable}", f"of {total}"))
+    return tiles
+
+
+def _pictures(chosen: list[Exhibit]) -> list[Picture]:
+    return [exhibit.picture() for exhibit in chosen]
+
+
+def _details(track: Track) -> list[Exhibit]:
+    """What is shown below the trend."""
+    details = [exhibits.amplitude(track)] if track.resonance_count else []
+    if track.resonance_count and _with_clr(track):
+        details.append(exhibits.asperity_load_share(track))
+    if any(recording.clean is not None for recording in track.recordings):
+        details.append(exhibits.waterfall(track))
+        details.append(exhibits.spectrum_with_fit(track, exhibits.typical_recording(track)))
+    return details
+
+
+class _Row(NamedTuple):
+    """A line of the table of recordings."""
+
+    name: str
+    cells: list[str]
+    label: str
+    reason: str
+
+
+def _heads(track: Track) -> list[str]:
+    keys = ["crf_hz", "crfa", *(["clr"] if _with_clr(track) else []), "severe_probability"]
+    heads = {key: quantity(key).label for key in keys}
+    if not track.comparable:
+        heads["crfa"] = quantity("crfa").short
+    return [exhibits.x_label(track), *heads.values()]
+
+
+def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
+    resonance, row = recording.resonance, recording.row()
+    place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
+    heard = [quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")]
+    keys = [*(["clr"] if with_clr else []), "severe_probability"]
+    cells = [place, *heard, *(quantity(key).number(row[key]) for key in keys)]
+    return _Row(
+        Path(recording.file).name, cells, recording.label, in_print("" if resonance.found else resonance.reason)
+    )
+
+
+def _remarks(track: Track) -> list[tuple[str, str]]:
+    """What the checks remarked, with how many recordings it holds for, or which."""
+    remarks: dict[str, list[str]] = {}
+    for recording in track.recordings:
+        name = Path(recording.file).name
+        for sentence in recording.reading.quality.remarks if recording.reading.quality is not None else ():
+            remarks.setdefault(sentence, []).append(name)
+        if recording.reading.reason:
+            remarks.setdefault(f"Not used: {recording.reading.reason}", []).append(name)
+    total = len(track.recordings)
+
+    def holders(names: list[str]) -> str:
+        if len(names) == total and total > 1:
+            return "all"
+        return ", ".join(names) if len(names) <= 3 else f"{len(names)} recordings, first {names[0]}"
+
+    return [(in_print(capitalised(sentence)), holders(names)) for sentence, names in remarks.items()]
+
+
+def _facts(track: Track) -> list[tuple[str, str, str]]:
+    """Name, value and source of each fact; where recordings differ, the commonest and how many there are."""
+    readings, rows = [recording.reading for recording in track.recordings], []
+    for name in ("rate", "unit", "channel", "scale", "format"):
+        seen = Counter(reading.facts[name] for reading in readings if name in reading.facts)
+        if seen:
+            ((value, source), count), *others = seen.most_common()
+            more = f"; others in {seen.total() - count} recordings" if others else ""
+            rows.append((name.capitalize(), f"{value} Hz{more}" if name == "rate" else value + more, source))
+    lengths = [reading.quality.duration_s for reading in readings if reading.quality is not None]
+    if lengths:
+        shortest, longest = (quantity("duration_s").text(length) for length in (min(lengths), max(lengths)))
+        rows.append(("Length", shortest if shortest == longest else f"{shortest} to {longest}", "its samples"))
+    started = sorted(reading.started for reading in readings if reading.started)
+    if started:
+        first, last = started[0].replace("T", " "), started[-1].replace("T", " ")
+        source = next(reading.facts["started"][1] for reading in readings if reading.started)
+        rows.append(("Started", first if first == last else f"{first} to {last}", source))
+    return rows
+
+
+def _lines(track: Track) -> list[str]:
+    """The lines taken out of the recording that is shown, the strongest in words."""
+    if not any(recording.clean is not None for recording in track.recordings):
+        return []
+    clean = exhibits.typical_recording(track).clean
+    assert clean is not None
+    strongest = sorted(clean.removed, key=lambda line: -line.mean_square)[:MOST_LINES]
+    return [
+        f"{line.frequency_hz:.2f} Hz: {line.source}" for line in sorted(strongest, key=lambda line: line.frequency_hz)
+    ]
+
+
+def _evidence(track: Track) -> list[tuple[str, str]]:
+    if track.stages is None:
+        return []
+    ranked = sorted(track.stages.evidence.items(), key=lambda item: item[1])
+    return [(name, f"{value:.1f}") for name, value in ranked if np.isfinite(value)]
+
+
+def _resolution(track: Track) -> str:
+    spectrum = next((recording.reading.spectrum for recording in track.recordings if recording.clean is not None), None)
+    if spectrum is None:
+        return "no spectrum"
+    return (
+        f"{spectrum.window} window, {spectrum.segment} samples a piece, lines {spectrum.spacing_hz:.3g} Hz apart "
+        f"(noise bandwidth {spectrum.resolution_hz:.3g} Hz)"
+    )
