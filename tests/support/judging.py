@@ -51,7 +51,11 @@ def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
         return None
     if "..." in text and re.fullmatch(r"[\w.]+", text):
         pattern = text.replace("...", r"\w+")
-        return None if any(re.fullmatch(pattern, key) for key in vocabulary().stated) else "no key is like this"
+        return (
+            None
+            if any(re.fullmatch(pattern, key) for key in vocabulary().stated | vocabulary().defined)
+            else "no key is like this"
+        )
     return wrong_expression(text)
 
 
@@ -183,14 +187,14 @@ def wrong_table(table: object, parents: tuple[str, ...] = ()) -> str | None:
 def is_choice(text: str) -> bool:
     """Is this an amount, a choice that the code knows, or a file?"""
     shaped = AMOUNT.fullmatch(text) or A_FILE.fullmatch(text) or text.isdigit()
-    return bool(shaped) or vocabulary().is_written(text) or text in metavars()
+    return bool(shaped) or vocabulary().is_written(text) or text in metavars() or text[0] == "[" or is_case_key(text)
 
 
 def wrong_expression(text: str) -> str | None:
     """An expression of Python: what is called, looked up and given by name must be there."""
     source = re.sub(r"\.\.\.(?=[,)\]])", "_", re.sub(r"=\.\.\.", "=_", text)).lstrip(".")
     source = re.sub(r", _\)", ")", source)
-    for attempt in (f"({source})", source, f"{source}0", f"def {source}: ...", f"{source} ..."):
+    for attempt in (f"({source})", source, f"{source}0", f"dict({source})", f"def {source}: ...", f"{source} ..."):
         try:
             tree = ast.parse(attempt)
         except SyntaxError:

@@ -83,7 +83,11 @@ class Vocabulary:
 
     def _read_function(self, function: Function) -> None:
         arguments = function.args
-        names = {entry.arg for entry in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
+        entries = (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
+        names = {entry.arg for entry in entries}
+        for entry in entries:
+            if entry.annotation is not None:
+                self.types[entry.arg] |= _words(entry.annotation)
         self.parameters[function.name] |= names - {"self", "cls"}
         self.defined |= names | {function.name}
         if function.returns is not None:

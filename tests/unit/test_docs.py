@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 
 from support.judging import AMOUNT, block_problems, judged, leads, place, problems
 from support.pages import Line, Page, pages, read
-from support.source import PACKAGE, ROOT, functions, parsed
+from support.source import PACKAGE, ROOT, functions, modules, parsed
 from support.vocabulary import (
     case_sections,
     commands,
@@ -199,6 +199,18 @@ def test_tests_stand_in_the_files_that_are_named_beside_them(page):
         there = {function.name for file in files for function in functions(parsed(file))}
         named = {name for name in spans if not name.endswith(".py")}
         assert not files or named <= there, place(page, line)
+
+
+def test_docstrings_name_what_exists():
+    """In the package, where names of the same function's own are right, too."""
+    wrong = []
+    for module, tree in modules():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+                own = {name.id for name in ast.walk(node) if isinstance(name, ast.Name)}
+                page = Page(PACKAGE / module, text)
+                wrong += [f"{module}: {line}" for line in problems(page) if line.split("`")[1] not in own]
+    assert not wrong, "\n".join(wrong)
 
 
 def recipes() -> dict[str, str]:

@@ -47,7 +47,6 @@ def test_an_import_inside_a_nested_function_is_counted_once():
     assert len(imports_inside_functions(tree)) == 2
 
 
-@UNDER_WAY
 def test_types_that_public_functions_use_are_public():
     handed_out = {name: exported(face) for name, face in faces().items()}
     public = {id(thing) for names in handed_out.values() for thing in names.values()}

@@ -75,8 +75,8 @@ class Calibration:
     correlation : shape (parameters, parameters)
     directions : of the free quantities, the best determined first
     trade_offs : the dearest anchor first
-    start, fit, check : as `anchors.compare` has it. `check` is on the case's own cells, with surfaces that the fit has
-        not seen; `low` and `high` are 90 % intervals over seeds
+    start, fit, check : as `compare_with_anchors` has it. `check` is on the case's own cells, with surfaces that the fit
+        has not seen; `low` and `high` are 90 % intervals over seeds
     misfit, start_misfit : sums of squared misses in tolerances
     evaluations, cases : parameter sets tried, contacts solved or found in the folder
     failed : contacts that failed or did not converge, and were left out
