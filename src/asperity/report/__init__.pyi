@@ -1,3 +1,4 @@
+from .drawing import Medium as Medium
 from .drawing import write_figure as write_figure
 from .motion.page import write_motion_report as write_motion_report
 from .run.curves import friction_figure as friction_figure
