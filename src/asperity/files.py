@@ -40,6 +40,12 @@ def whole_file(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all; raises as `whole_file`."""
+    with whole_file(path) as part:
+        part.write_text(text, "utf-8")
+
+
 def require_writable(path: Path) -> None:
     """Refuse a path that could not be written, before the work that would be lost.
 

@@ -185,7 +185,10 @@ def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
         (("track", "bare.npy"), "states no sampling rate"),
         (("track", "empty"), "holds no recordings"),
         (("track", "missing"), "missing does not exist"),
-        (("track", "bare.npy", "--rate", "20000", "--out", "t.txt"), "--out must end in"),
+        (
+            ("track", "bare.npy", "--rate", "20000", "--out", "t.txt"),
+            "--out must be a file that ends in .csv, .parquet or .nc",
+        ),
         (("track", "bare.npy", "--rate", "20000", "--band", "4000", "2000"), "band must go from low to high"),
         (("track", "bare.npy", "--rate", "20000", "--method", "guess"), "method must be one of"),
         (("track", "bare.npy", "--rate", "20000", "--table", "t.csv"), "t.csv has no row for bare.npy"),

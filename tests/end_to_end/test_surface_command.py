@@ -24,7 +24,7 @@ def test_surface_names_what_it_did_and_found(asp):
     code, out, err = asp("surface", "ground.x3p", "--form", "quadratic", "--l-filter", "0.2 mm", "--out", "map.png")
     assert (code, err) == (0, "")
     assert out.startswith("ground.x3p: Sq 0.3")
-    for expected in ("Sk, Spk, Svk", "Smr1, Smr2", "Sp, Sv, Sz", "Sdq, Sdr", "quadratic form", "longer than 200 um"):
+    for expected in ("core height, Sk ", "Spk", "Smr1", "Sz", "Sdr", "quadratic form", "longer than 200 um"):
         assert expected in out
     assert Path("map.png").read_bytes().startswith(b"\x89PNG")
     found = json.loads(asp("surface", "ground.x3p", "--json")[1])["files"][0]
@@ -36,8 +36,8 @@ def test_a_profile_has_profile_parameters_and_a_figure(asp):
     code, out, _ = asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--out", "line.png")
     assert code == 0
     assert out.startswith("line.csv: profile, Rq 0.7")
-    assert "Ra, Rq" in out
-    assert "Rsm, Rdq" in out
+    assert "arithmetic mean height, Ra " in out
+    assert "mean profile element spacing, Rsm " in out
     assert Path("line.png").read_bytes().startswith(b"\x89PNG")
     found = json.loads(asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--json")[1])["files"][0]
     assert found["profile"]["rsm_m"] == pytest.approx(2.0 * np.pi * 9 * 0.1e-6, rel=0.01)

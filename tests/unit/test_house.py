@@ -35,7 +35,6 @@ def test_no_function_is_too_long():
     assert not long, "\n".join(long)
 
 
-@UNDER_WAY
 def test_imports_stand_at_the_top():
     inside = [(len(imports_inside_functions(tree)), name) for name, tree in modules()]
     listed = "\n".join(f"{name}: {count}" for count, name in sorted(inside, reverse=True) if count)

@@ -1,10 +1,16 @@
 from dataclasses import dataclass, fields
+from importlib.resources import files
 from typing import Annotated
 
 import pytest
 
 from asperity.quantities import NO_VALUE, Parameter, catalogue, parameters, quantity, select, with_deviation
 from asperity.surface import ProfileParameters, SurfaceParameters
+
+
+def test_a_key_stands_in_one_line():
+    keys = [line.split(",")[0] for line in files("asperity").joinpath("quantities.csv").read_text("utf-8").splitlines()]
+    assert len(keys) == len(set(keys))
 
 
 def test_every_line_is_whole():

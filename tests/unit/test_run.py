@@ -8,8 +8,8 @@ import xarray
 
 import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
-from asperity.cli.contact import _friction_rows, _print_run
-from asperity.quantities import quantity
+from asperity.cli.contact import run_table
+from asperity.quantities import NO_VALUE, catalogue, quantity
 
 SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
 
@@ -81,16 +81,22 @@ def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypa
     assert found["friction_coefficient"] is found["flash_temperature_max_k"] is None
     assert found["von_mises_max_pa"] > 0.0
     assert found["clr"] == run.scalars()["clr"]
-    assert _friction_rows(apart) == [("friction", "not found: friction and temperature did not settle")]
+    lines = list(run_table(apart))
+    assert lines[-1] == "  note: no friction: friction and temperature did not settle"
+    title = quantity("friction_coefficient").title
+    assert next(line for line in lines if line.startswith(f"  {title}  ")).split("  ")[-1] == NO_VALUE
     assert "shear" not in apart.to_dataset()
 
 
-def test_the_command_line_prints_friction_heat_and_stress(run, capsys):
-    _print_run(run)
-    rows = dict(line.strip().split("  ", 1) for line in capsys.readouterr().out.splitlines() if "  " in line.strip())
-    assert rows["friction coefficient"].strip().startswith(f"{run.friction.coefficient:.4f} (asperities ")
-    assert f"{run.heat.max_k:.1f} K" in rows["heat of friction, largest rise"]
-    assert f"{run.stress.peak.value / 1e9:.3f} GPa" in rows["von Mises stress in body 1, largest"]
+def test_the_command_line_prints_every_number_the_catalogue_has_for_a_table(run):
+    rows = dict(line.strip().split("  ", 1) for line in run_table(run) if "  " in line.strip())
+    shown = {title.strip(): value.strip() for title, value in rows.items()}
+    values = run.scalars()
+    deviations = {entry.deviation for entry in catalogue().values()}
+    for key in values.keys() - deviations:
+        entry = quantity(key)
+        assert entry.detail or shown[entry.title] == entry.text_in(values)
+    assert shown[quantity("p_max_pa").title] == f"{run.state.p_max / 1e9:.3f} GPa"
 
 
 @pytest.mark.parametrize("coefficient", [2.5, -0.1])

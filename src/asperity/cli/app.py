@@ -1,15 +1,22 @@
 """The application: its commands are in the modules beside this one; what asperity refuses becomes an exit code here."""
 
+import codecs
 import sys
+import unicodedata
 from collections.abc import Sequence
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
 
-from asperity.cli.flags import with_flags
+import asperity
+from asperity import quantities
+from asperity.cli.options import with_flags
 from asperity.errors import AsperityError, BadInput
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
+SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}
+PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", **SUPERSCRIPTS}
 
 app = typer.Typer(
     help="Hears how a lubricated contact wears: film, load sharing of asperities and oil, contact resonance.",
@@ -19,12 +26,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only, and no progress.")]
-
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; what asperity refuses is one line on stderr."""
+    codecs.register_error("plain", _plain)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="plain")
     try:
         code = app(args=arguments, prog_name="asperity", standalone_mode=False)
         if code == INTERRUPTED:
@@ -43,11 +51,26 @@ def _complain(sentence: str, code: int) -> int:
     return code
 
 
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    """What a terminal without our signs shows in their place."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    signs = error.object[error.start : error.end]
+    power = "^" if signs[0] in SUPERSCRIPTS else ""
+    return power + "".join(PLAIN.get(sign) or _name(sign) for sign in signs), error.end
+
+
+def _name(sign: str) -> str:
+    """A Greek letter by its name, another sign by what it is made of."""
+    known = unicodedata.name(sign, "")
+    if known.startswith("GREEK SMALL LETTER"):
+        return known.split()[-1].lower()
+    return unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode() or "?"
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from asperity import __version__
-
-        print(f"asperity {__version__}")
+        print(f"asperity {asperity.__version__}")
         raise typer.Exit
 
 

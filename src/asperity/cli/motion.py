@@ -1,40 +1,35 @@
 """`asperity run`: a case's roughness let move, step after step; goes on where it was stopped."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import chosen_case, print_json, print_rows, require_output
+from asperity import history, report
+from asperity.cli.app import app
+from asperity.cli.options import AsJson, OutFolder, Overrides, Page, Quiet, SurfaceFile, chosen_case, require_output
+from asperity.cli.show import Block, Row, progress, show, table, text, written
 from asperity.errors import AsperityError, BadInput, NotConverged
+from asperity.quantities import catalogue, quantity
 
 if TYPE_CHECKING:
-    from asperity.history import History, HistoryProgress, HistoryVibration
+    from asperity.history import History, HistoryProgress
+
+COMPILES = "the start; after installation the first solve compiles the solver, up to a minute ..."
 
 
-@app.command("run")
-def run_case(
-    case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="A case; its [motion] says how it moves.")],
+@app.command()
+def run(
+    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="A case; its [motion] says how it moves.")],
     steps: Annotated[
         int | None, typer.Option(metavar="N", help="Number of the last step; by default the case's.")
     ] = None,
     passes: Annotated[
         float | None, typer.Option(metavar="P", help="In place of --steps: how often the rough surface runs its track.")
     ] = None,
-    surface: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A measured surface in place of the case's own.")
-    ] = None,
-    override: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the case: motion.start=stationary."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of the history; what it holds is kept."),
-    ] = None,
+    surface: SurfaceFile = None,
+    overrides: Overrides = None,
+    out: OutFolder = None,
     every: Annotated[
         int | None, typer.Option(metavar="K", help="Keep maps of every K steps; by default about 40 in all.")
     ] = None,
@@ -44,110 +39,77 @@ def run_case(
     listen: Annotated[
         bool, typer.Option("--listen", help="Let the mass ride on the history, by the contact's own stiffness.")
     ] = False,
-    report: Annotated[Path | None, typer.Option(metavar="OUT.html", help="Make the page of the history too.")] = None,
+    page: Page = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Let the roughness move: film, load sharing, friction and resonance step after step."""
-    from asperity.history import run_history
-
-    if report is not None:
-        require_output(report, ".html")
-    chosen = chosen_case(case, surface, override or [])
+    require_output(page, ".html", option="--report")
+    chosen = chosen_case(path, overrides, surface)
     if steps is not None and passes is not None:
         raise BadInput(f"--steps {steps} and --passes {passes:g} both say how long to run; leave one out")
     failure = None
     try:
-        with shown_history(case.name, quiet=quiet) as tell:
-            history = run_history(
-                chosen, steps=steps, passes=passes, out=out, every=every, strict=not keep_going, progress=tell
+        with progress(path.name, COMPILES, quiet=quiet) as shown:
+
+            def step(taken: "HistoryProgress") -> None:
+                shown(f"step {taken.number} of {taken.steps}, {_clr(taken)}", taken.number, taken.steps)
+
+            moved = history.run_history(
+                chosen, steps=steps, passes=passes, out=out, every=every, strict=not keep_going, progress=step
             )
     except NotConverged as unfinished:
-        from asperity.history import History
-
-        if not isinstance(unfinished.solution, History):  # there was no snapshot to start from
+        if not isinstance(unfinished.solution, history.History):  # there was no snapshot to start from
             raise
-        history, failure = unfinished.solution, str(unfinished)
-    heard = _listened(history) if listen and failure is None else None
-    if report is not None:
-        from asperity.report import write_motion_report
-
-        write_motion_report(history, report, vibration=heard)
-    if as_json:
-        said = history.scalars() if heard is None else {**history.scalars(), **heard.scalars()}
-        print_json({**said, "report": None if report is None else str(report)})
-    else:
-        print(history.verdict())
-        if not quiet:
-            _print_history(history, heard, report)
+        moved, failure = unfinished.solution, str(unfinished)
+    vibration = history.history_vibration(moved) if listen and failure is None else None
+    if page is not None:
+        report.write_motion_report(moved, page, vibration=vibration)
+    added = {} if vibration is None else vibration.scalars()
+    show(
+        moved.verdict(),
+        lambda: {**moved.scalars(), **added, "report": None if page is None else str(page)},
+        _history_table(moved),
+        [] if vibration is None else [vibration.verdict()],
+        _kept(moved, page),
+        as_json=as_json,
+        quiet=quiet,
+    )
     if failure is not None:
         raise AsperityError(failure)
 
 
-@contextmanager
-def shown_history(label: str, *, quiet: bool) -> "Iterator[Callable[[HistoryProgress], None] | None]":
-    """Show the steps on a terminal."""
-    if quiet:
-        yield None
-        return
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    first = f"{label}: the start; after installation the first solve compiles the solver, up to a minute ..."
-    with console.status(first) if console.is_terminal else nullcontext() as status:
-
-        def tell(step: "HistoryProgress") -> None:
-            if status is not None:
-                clr = 100.0 * float(step.row["clr"])
-                status.update(f"{label}: step {step.number} of {step.steps}, {clr:.1f} % of the load on asperities")
-
-        yield tell
+def _clr(step: "HistoryProgress") -> str:
+    clr = quantity("clr")
+    return f"{clr.short} {clr.text(step.row['clr'])}"
 
 
-def _listened(history: "History") -> "HistoryVibration":
-    from asperity.history import history_vibration
+def _kept(moved: "History", page: Path | None) -> Block:
+    if moved.folder is not None:
+        yield f"Kept in {moved.folder}; asperity run with the same folder and more steps goes on"
+    yield from written("Report", page)
 
-    return history_vibration(history)
 
-
-def _print_history(history: "History", heard: "HistoryVibration | None", report: Path | None) -> None:
-    said = history.scalars()
-
-    def shown(name: str, scale: float, form: str) -> str:
-        if said[name] is None:
-            return "-"
-        start = "-" if said[f"{name}_start"] is None else f"{scale * said[f'{name}_start']:{form}}"
-        return f"{scale * said[name]:{form}} ± {scale * said[f'{name}_std']:{form}} (start {start})"
-
-    motion, each = history.case.motion, 1e6 * (said["step_s"] or 0.0)
-    rows = [
-        ("steps, of which computed now", f"{history.steps}, {history.computed} in {history.seconds:.1f} s"),
-        ("a step", f"{each:.4g} us, {motion.time_step:g} of the oil's way from cell to cell; start {motion.start}"),
-        (f"means and deviations, from step {said['settled_from_step']}", ""),
-        ("CLR, load on asperities", f"{shown('clr', 100, '.2f')} %"),
-        ("CAR, contact in the Hertz zone", f"{shown('car', 100, '.2f')} %"),
-        ("film: least", f"{shown('h_min_m', 1e6, '.3f')} um"),
-        ("film: central", f"{shown('h_central_m', 1e6, '.3f')} um"),
-        ("film: mean", f"{shown('h_mean_m', 1e6, '.3f')} um"),
-        ("largest pressure", f"{shown('p_max_pa', 1e-9, '.3f')} GPa"),
-        ("friction coefficient", shown("friction_coefficient", 1, ".4f")),
-        ("heat of friction", f"{shown('friction_power_w', 1, '.4g')} W"),
-        ("heat of pressure-driven flow", f"{shown('flow_power_w', 1, '.4g')} W"),
-        ("contact resonance by load share", f"{shown('resonance_hz', 1, '.1f')} Hz"),
-        ("oil lost or re-created, over oil carried", f"{shown('mass_flux_imbalance', 100, '.1f')} %"),
+def _history_table(moved: "History") -> Block:
+    """Means over the settled steps with their deviations over time, and where they began."""
+    values, motion = moved.scalars(), moved.case.motion
+    rows: list[Row] = [
+        ("steps, of which computed now", f"{moved.steps}, {moved.computed} in {text('seconds', moved.seconds)}"),
+        (
+            quantity("step_s").title,
+            f"{text('step_s', values['step_s'])}, {motion.time_step:g} of the oil's way from cell to cell; "
+            f"start {motion.start}",
+        ),
+        (f"means and deviations, from step {values['settled_from_step']}", ""),
     ]
-    for one in said.get("passes", [])[:: max(1, len(said.get("passes", [])) - 1)]:
-        shares = f"CLR {100 * one['clr']:.1f} %, CAR {100 * one['car']:.2f} %"
-        rows.append((f"pass {one['pass']}", f"{shares}, Sq of the tracks {1e6 * one['track_sq_m']:.3f} um"))
-    if said["crf_hz"] is not None:
-        rows.append(("CRF of the mean contact", f"{said['crf_hz']:.1f} Hz"))
-    print()
-    print_rows(rows)
-    for note in history.notes:
-        print(f"  note: {note}")
-    if heard is not None:
-        print(f"\n{heard.verdict()}")
-    if history.folder is not None:
-        print(f"\nKept in {history.folder}; asperity run with the same folder and more steps goes on")
-    if report is not None:
-        print(f"Report: {report}")
+    for entry in catalogue().values():
+        if f"{entry.key}_std" in values and f"{entry.key}_start" in values:
+            mean = entry.text(values[entry.key], values[f"{entry.key}_std"])
+            rows.append((entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})"))
+    passes = values.get("passes", [])
+    for lap in passes[:: max(1, len(passes) - 1)]:
+        shown = [quantity(key) for key in ("clr", "car", "track_sq_m")]
+        rows.append((f"pass {lap['pass']}", ", ".join(f"{entry.short} {entry.text_in(lap)}" for entry in shown)))
+    if values["crf_hz"] is not None:
+        rows.append((f"{quantity('crf_hz').title}, of the mean contact", text("crf_hz", values["crf_hz"])))
+    yield from table(rows, moved.notes)

@@ -8,238 +8,146 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import print_json, print_rows
-from asperity.cli.flags import with_flags
+from asperity import files, processes, report, tracking
+from asperity.cli import options
+from asperity.cli.app import app
+from asperity.cli.options import AsJson, Quiet, case_at, require_output
+from asperity.cli.show import Block, Row, columns, progress, show, span, table, text, written
 from asperity.errors import BadInput
-from asperity.files import make_folder
+from asperity.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.case import Case
-    from asperity.recording import OpenRecording, Quality
-    from asperity.tracking import Reading, Track
-    from asperity.wear import Resonance, SeriesMethod
+    from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track
+    from asperity.wear import SeriesMethod
 
 ALARM = 3
 IN_FULL = 4  # recordings that `check` shows with every fact
 
 
-def _hertz(text: str) -> float:
-    """A frequency as a bare number of hertz, or with its unit."""
-    from asperity.case import read_amount
-
-    try:
-        return float(text)
-    except ValueError:
-        return read_amount("a frequency", "Hz", text)
-
-
-Rate = Annotated[
-    float | None,
-    typer.Option(metavar="HZ", parser=_hertz, help="Sampling rate, for files that do not state it."),
-]
-Unit = Annotated[str | None, typer.Option(help="Unit of the values, such as g, for files that do not state it.")]
-Channel = Annotated[str | None, typer.Option(help="Name or number of the channel, where files have several.")]
-Scale = Annotated[
-    float | None, typer.Option(help="What a stored 1 stands for, in the unit: g at full scale of a wav, g per volt.")
-]
-CaseFile = Annotated[
-    Path | None, typer.Option("--case", metavar="CASE.toml", help="The contact: where to look, and load shares.")
-]
-Band = Annotated[
-    tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Where to look [Hz], instead of the case's band.")
-]
-Table = Annotated[
-    Path | None, typer.Option(metavar="CSV", help="Columns file, x (such as sq_um), sq_um_std, load_n, speed_hz.")
-]
-Shaft = Annotated[
-    list[float] | None, typer.Option(metavar="HZ", help="Shaft speed whose harmonics to remove; found if not given.")
-]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes that read at once, else all.")]
-Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
-
-
 @app.command()
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")],
-    rate: Rate = None,
-    unit: Unit = None,
-    channel: Channel = None,
-    scale: Scale = None,
-    case_file: CaseFile = None,
-    band: Band = None,
+    paths: options.RecordingFiles,
+    rate: options.Rate = None,
+    unit: options.Unit = None,
+    channel: options.Channel = None,
+    scale: options.Scale = None,
+    case_file: options.Contact = None,
+    band: options.Band = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings hold: rate, unit, length, channels, gaps, clipping, offset, machine off, too short."""
-    from asperity.recording import check_recording, open_channels
-    from asperity.tracking import recordings_in, search_target
-
-    target = search_target(_case(case_file), band)
-    checked: list[tuple[OpenRecording, Quality]] = []
-    refused: list[tuple[Path, str]] = []
-    paths = recordings_in([file for file in files if file.exists()]) if any(file.exists() for file in files) else []
-    for path in [*paths, *(file for file in files if not file.exists())]:
-        try:
-            channels = open_channels(path, rate_hz=rate, unit=unit, channel=channel, scale=scale)
-            checked += [
-                (one, check_recording(one, width_hz=target.width_hz, band_hz=target.band_hz)) for one in channels
-            ]
-        except BadInput as error:
-            refused.append((path, str(error)))
-    if as_json:
-        recordings = [_check_row(one, quality) for one, quality in checked]
-        print_json(
-            {
-                "verdict": _check_verdict(checked, refused),
-                "recordings": recordings,
-                "refused": [{"file": str(path), "reason": reason} for path, reason in refused],
-                "band_hz": list(target.band_hz),
-                "width_hz": target.width_hz,
-            }
+    checks = tracking.check_recordings(
+        paths, case=case_at(case_file), band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale
+    )
+    if checks.checked or as_json:
+        in_full = [_in_full(checked) for checked in checks.checked] if len(checks.checked) <= IN_FULL else []
+        show(
+            checks.verdict(),
+            checks.scalars,
+            [f"  for a resonance {text('width_hz', checks.target.width_hz)} wide in {checks.target.source}"],
+            *(in_full or [_in_lines(checks)]),
+            as_json=as_json,
+            quiet=quiet,
         )
-    elif checked:
-        print(_check_verdict(checked, refused))
-        if not quiet:
-            print(f"  for a resonance {target.width_hz:.0f} Hz wide in {with_flags(target.source)}")
-            _print_checks(checked)
-    if refused:
-        raise BadInput("; ".join(dict.fromkeys(reason for _, reason in refused)))
+    if checks.refused:
+        raise BadInput("; ".join(dict.fromkeys(reason for _, reason in checks.refused)))
 
 
-def _check_verdict(checked: "Sequence[tuple[OpenRecording, Quality]]", refused: Sequence[Any]) -> str:
-    good = sum(quality.usable for _, quality in checked)
-    total = len(checked) + len(refused)
-    if total == 1 and checked:
-        one, quality = checked[0]
-        return f"{one.path.name}: " + ("can be used." if quality.usable else f"cannot be used: {quality.faults[0]}.")
-    things = "channels" if len({one.path for one, _ in checked}) < len(checked) else "recordings"
-    sentence = f"{good} of {total} {things} can be used"
-    reasons = dict.fromkeys(quality.faults[0].partition(":")[0] for _, quality in checked if not quality.usable)
-    return f"{sentence}{': ' if reasons else ''}{'; '.join(reasons)}."
-
-
-def _check_row(one: "OpenRecording", quality: "Quality") -> dict[str, Any]:
-    return {
-        "file": str(one.path),
-        "channel": one.channel.name,
-        "usable": quality.usable,
-        "off": quality.off,
-        "rate_hz": one.rate_hz,
-        "unit": one.unit,
-        "samples": quality.samples,
-        "duration_s": quality.duration_s,
-        "rms": quality.rms,
-        "peak": quality.peak,
-        "offset": quality.offset,
-        "missing": quality.missing,
-        "gaps": quality.gaps,
-        "clipped": quality.clipped,
-        "stuck": quality.stuck,
-        "crfa_comparable": one.comparable,
-        "facts": {name: {"value": str(fact.value), "source": fact.source} for name, fact in one.facts.items()},
-        "faults": list(quality.faults),
-        "remarks": list(quality.remarks),
-    }
-
-
-def _print_checks(checked: "Sequence[tuple[OpenRecording, Quality]]") -> None:
-    """Few recordings in full; many a line each, and what was found wrong once."""
-    if len(checked) <= IN_FULL:
-        for one, quality in checked:
-            print(f"\n{one.path}, channel {one.channel.name}: {'usable' if quality.usable else 'NOT USABLE'}")
-            print_rows(_check_rows(one, quality))
-            for sentence in (*quality.faults, *quality.remarks):
-                print(f"  {'fault' if sentence in quality.faults else 'note'}: {sentence}")
-        return
-    print()
-    names = [f"{one.path.name}, {one.channel.name}" for one, _ in checked]
-    width = max(map(len, names))
-    said: dict[str, list[str]] = {}
-    for name, (one, quality) in zip(names, checked, strict=True):
-        state = "usable" if quality.usable else "NOT USABLE"
-        print(f"  {name:{width}}  {one.rate_hz:9g} Hz  {quality.duration_s:9.4g} s  rms {quality.rms:9.3g}  {state}")
-        for sentence in (*quality.faults, *quality.remarks):
-            said.setdefault(sentence, []).append(name)
-    for sentence, holders in said.items():
-        where = "all" if len(holders) == len(checked) else "; ".join(holders[:3])
-        print(
-            f"  note: {sentence} ({where}{f' and {len(holders) - 3} more' if 3 < len(holders) < len(checked) else ''})"
-        )
-
-
-def _check_rows(one: "OpenRecording", quality: "Quality") -> list[tuple[str, str]]:
-    facts = one.facts
+def _in_full(checked: "CheckedRecording") -> Block:
+    """Every fact of a recording, and who states it."""
+    recording, quality = checked
+    facts, state = recording.facts, "usable" if quality.usable else "NOT USABLE"
+    values = checked.scalars()
+    level = ", ".join(quantity(key).number_in(values) for key in ("rms", "peak", "offset"))
     rows = [
         ("format", str(facts["format"].value)),
-        ("rate", f"{one.rate_hz:g} Hz, stated by {facts['rate'].source}"),
-        ("unit", f"{facts['unit'].value}, stated by {facts['unit'].source}"),
-        *([("scale", f"{facts['scale'].value:g}, stated by {facts['scale'].source}")] if "scale" in facts else []),
-        ("length", f"{quality.duration_s:.4g} s, {quality.samples} samples"),
-        ("rms, peak, offset", f"{quality.rms:.4g}, {quality.peak:.4g}, {quality.offset:.4g}; unit: {one.unit}"),
+        (quantity("rate_hz").title, f"{text('rate_hz', recording.rate_hz)}, stated by {facts['rate'].source}"),
+        *(
+            (name, f"{facts[name].value}, stated by {facts[name].source}")
+            for name in ("unit", "scale", "started")
+            if name in facts
+        ),
+        (quantity("duration_s").title, f"{text('duration_s', quality.duration_s)}, {quality.samples} samples"),
+        ("rms, peak, offset", f"{level}; unit: {recording.unit}"),
     ]
-    if one.started is not None:
-        rows.insert(3, ("started", f"{one.started}, stated by {facts['started'].source}"))
-    return rows
+    yield f"{recording.path}, channel {recording.channel.name}: {state}"
+    yield from table(rows, quality.remarks)
+    yield from (f"  fault: {fault}" for fault in quality.faults)
+
+
+def _in_lines(checks: "RecordingChecks") -> Block:
+    """A line a recording, and what was found wrong once."""
+    shown = [quantity(key) for key in ("rate_hz", "duration_s", "rms")]
+    rows: list[list[str]] = []
+    holders: dict[str, list[str]] = {}
+    for checked in checks.checked:
+        values, quality = checked.scalars(), checked.quality
+        name = f"{checked.recording.path.name}, {values['channel']}"
+        state = "usable" if quality.usable else "NOT USABLE"
+        rows.append([name, *(entry.number_in(values) for entry in shown), values["unit"], state])
+        for sentence in (*quality.faults, *quality.remarks):
+            holders.setdefault(sentence, []).append(name)
+    yield from columns(["recording", *(entry.label for entry in shown), "unit", ""], rows, left=1)
+    for sentence, names in holders.items():
+        everywhere = len(names) == len(checks.checked)
+        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        yield f"  note: {sentence} ({'all' if everywhere else '; '.join(names[:3]) + more})"
 
 
 @app.command()
 def track(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")],
-    rate: Rate = None,
-    unit: Unit = None,
-    channel: Channel = None,
-    scale: Scale = None,
-    case_file: CaseFile = None,
-    band: Band = None,
-    table: Table = None,
-    shaft: Shaft = None,
-    method: Method = None,
-    report: Annotated[Path | None, typer.Option(metavar="OUT.html", help="Write one self-contained page.")] = None,
+    paths: options.RecordingFiles,
+    rate: options.Rate = None,
+    unit: options.Unit = None,
+    channel: options.Channel = None,
+    scale: options.Scale = None,
+    case_file: options.Contact = None,
+    band: options.Band = None,
+    table_file: options.Table = None,
+    shaft: options.Shaft = None,
+    method: options.Method = None,
+    page: options.Page = None,
     out: Annotated[
         list[Path] | None, typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat.")
     ] = None,
-    workers: Workers = None,
+    workers: options.Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Follow the contact resonance through a series of recordings: normal wear, severe wear, or no way to tell."""
-    from asperity.files import require_writable
-    from asperity.processes import cores
-    from asperity.tracking import track_recordings
-
-    for path in (*(out or ()), *([report] if report is not None else [])):
-        require_writable(path)
+    if page is not None:
+        files.require_writable(page)
     for path in out or ():
-        if path.suffix.lower() not in (".csv", ".parquet", ".nc"):
-            raise BadInput(f"--out must end in .csv, .parquet or .nc, got {path}; the page goes to --report")
-    with _shown_files(quiet=quiet) as told:
-        tracked = track_recordings(
-            files,
-            case=_case(case_file),
+        require_output(path, ".csv", ".parquet", ".nc")
+    with _files_read("reading recordings ...", quiet=quiet) as step:
+        tracked = tracking.track_recordings(
+            paths,
+            case=case_at(case_file),
             band_hz=band,
             rate_hz=rate,
             unit=unit,
             channel=channel,
             scale=scale,
-            table=table,
+            table=table_file,
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
-            workers=workers or cores(),
-            progress=told,
+            workers=workers or processes.cores(),
+            progress=step,
         )
-    written = _write(tracked, out or (), report)
-    if as_json:
-        page = None if report is None else str(report)
-        print_json(tracked.scalars() | {"report": page, "written": [str(path) for path in written]})
-    else:
-        print(tracked.verdict())
-        if not quiet:
-            _print_track(tracked)
-            for path in written:
-                print(f"  Written: {path}")
-            if not written:
-                print("  Add --report track.html for the page, --out track.csv for the table.")
+    kept = _write(tracked, out or (), page)
+    hint = ["  Add --report track.html for the page, --out track.csv for the table."]
+    show(
+        tracked.verdict(),
+        lambda: (
+            tracked.scalars() | {"report": None if page is None else str(page), "written": [str(path) for path in kept]}
+        ),
+        _series(tracked),
+        _searched(tracked),
+        written("  Written", *kept) if kept else hint,
+        as_json=as_json,
+        quiet=quiet,
+    )
     if tracked.alarmed:
         raise typer.Exit(ALARM)
 
@@ -253,151 +161,132 @@ def watch(
     settle: Annotated[
         float, typer.Option(metavar="SECONDS", min=0.0, help="How long a file must have stayed as it is.")
     ] = 2.0,
-    workers: Workers = None,
-    rate: Rate = None,
-    unit: Unit = None,
-    channel: Channel = None,
-    scale: Scale = None,
-    case_file: CaseFile = None,
-    band: Band = None,
-    table: Table = None,
-    shaft: Shaft = None,
-    method: Method = None,
+    workers: options.Workers = None,
+    rate: options.Rate = None,
+    unit: options.Unit = None,
+    channel: options.Channel = None,
+    scale: options.Scale = None,
+    case_file: options.Contact = None,
+    band: options.Band = None,
+    table_file: options.Table = None,
+    shaft: options.Shaft = None,
+    method: options.Method = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
-    from asperity.processes import cores
-    from asperity.tracking import watch_folder
-
-    results = out if out is not None else folder / "asperity-watch"
+    kept = out if out is not None else folder / "asperity-watch"
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
-    make_folder(results)
+    files.make_folder(kept)
     alarmed = False
-    with _shown_files(quiet=quiet, waiting="watching ...") as told:
-        updates = watch_folder(
+    with _files_read("watching ...", quiet=quiet) as step:
+        updates = tracking.watch_folder(
             folder,
-            results,
-            case=_case(case_file),
+            kept,
+            case=case_at(case_file),
             band_hz=band,
             rate_hz=rate,
             unit=unit,
             channel=channel,
             scale=scale,
-            table=table,
+            table=table_file,
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
             once=once,
             every_s=every,
             settle_s=settle,
-            workers=workers or cores(),
-            progress=told,
+            workers=workers or processes.cores(),
+            progress=step,
         )
         try:
             for update in updates:
                 alarmed = update.track is not None and update.track.alarmed
                 if update.track is not None:
-                    _write(update.track, [results / "track.csv", results / "track.nc"], results / "report.html")
-                _tell(update.new, update.track, update.waiting, results, as_json=as_json, quiet=quiet)
+                    _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / "report.html")
+                _show_update(update.new, update.track, update.waiting, kept, as_json=as_json, quiet=quiet)
         except KeyboardInterrupt:
             if once:
                 raise
-            print(f"stopped; what was heard is in {results}, and the next watch goes on from there", file=sys.stderr)
+            print(f"stopped; what was heard is in {kept}, and the next watch goes on from there", file=sys.stderr)
     if alarmed:
         raise typer.Exit(ALARM)
 
 
-def _tell(
+def _show_update(
     new: "Sequence[Reading]", tracked: "Track | None", waiting: int, results: Path, *, as_json: bool, quiet: bool
 ) -> None:
     """One update of a watch: a JSON object a line, or a verdict with what is new."""
-    import json
-
     verdict = "Nothing to judge yet: no recording has arrived." if tracked is None else tracked.verdict()
     if waiting:
         verdict += f" {waiting} more may still be written and wait for the next look."
-    if as_json:
-        told: dict[str, Any] = {"verdict": verdict} if tracked is None else tracked.scalars()
-        told |= {"new": [one.file for one in new], "waiting": waiting, "results": str(results)}
-        print(json.dumps(told, allow_nan=False), flush=True)
-        return
-    print(verdict, flush=True)
-    if quiet or tracked is None:
-        return
-    rows = {one.file: one for one in tracked.recordings}
-    for one in new:
-        print(f"  {Path(one.file).name}: {_found(rows[one.file]) if one.file in rows else one.reason}", flush=True)
-    print(f"  {len(tracked.recordings)} recordings so far; results in {results}", flush=True)
-
-
-def _write(tracked: "Track", out: Sequence[Path], report: Path | None) -> list[Path]:
-    written = [tracked.save(path) for path in out]
-    if report is not None:
-        from asperity.report import write_track_report
-
-        written.append(write_track_report(tracked, report))
-    return written
-
-
-def _print_track(tracked: "Track") -> None:
-    print()
-    name = max(10, *(len(Path(one.file).name) for one in tracked.recordings))
-    print(f"  {'recording':{name}}  {tracked.x_name:>10}  {'CRF [Hz]':>16}  {'CRFA':>9}  {'severe':>6}")
-    for one in tracked.recordings:
-        probability = "" if one.severe_probability != one.severe_probability else f"{one.severe_probability:.2f}"
-        amplitude = f"{one.resonance.crfa:.3g}" if one.resonance.found else ""
-        shown = _with_deviation(one.resonance) if one.resonance.found else "not found"
-        reason = "" if one.resonance.found else f"  {one.resonance.reason}"
-        print(f"  {Path(one.file).name:{name}}  {one.x:10.4g}  {shown:>16}  {amplitude:>9}  {probability:>6}{reason}")
-    print()
-    low, high = tracked.target.band_hz
-    rows = [("searched", f"{low:.0f} to {high:.0f} Hz"), ("method", tracked.method), ("alarm", tracked.alarm.verdict)]
-    print_rows(rows)
-    for sentence in (*tracked.problems, *tracked.notes):
-        print(f"  note: {with_flags(sentence)}")
-
-
-def _found(one: Any) -> str:
-    resonance = one.resonance
-    if not resonance.found:
-        return f"no contact resonance: {resonance.reason}"
-    stage = (
-        ""
-        if one.severe_probability != one.severe_probability
-        else f", severe with probability {one.severe_probability:.2f}"
+    values: dict[str, Any] = {"verdict": verdict} if tracked is None else tracked.scalars()
+    arrived = [recording.file for recording in new]
+    show(
+        verdict,
+        lambda: {**values, "new": arrived, "waiting": waiting, "results": str(results)},
+        [] if tracked is None else _arrived(new, values["recordings"], results),
+        as_json=as_json,
+        quiet=quiet,
+        a_line=True,
     )
-    return f"CRF {_with_deviation(resonance)} Hz{stage}"
 
 
-def _with_deviation(resonance: "Resonance") -> str:
-    deviation = "" if resonance.crf_std != resonance.crf_std else f" ± {resonance.crf_std:.1f}"
-    return f"{resonance.crf_hz:.1f}{deviation}"
+def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
+    rows = {row["file"]: row for row in recordings}
+    for arrived in new:
+        row = rows.get(arrived.file)
+        if row is None:
+            said = arrived.reason
+        elif not row["found"]:
+            said = f"no contact resonance: {row['reason']}"
+        else:
+            severe = [f"{quantity(key).title} {quantity(key).text_in(row)}" for key in ("severe_probability",)]
+            crf = f"{quantity('crf_hz').short} {quantity('crf_hz').text_in(row)}"
+            said = ", ".join([crf, *(severe if row["severe_probability"] is not None else [])])
+        yield f"  {Path(arrived.file).name}: {said}"
+    yield f"  {len(recordings)} recordings so far; results in {results}"
 
 
-def _case(path: Path | None) -> "Case | None":
-    from asperity.case import load_case
+def _write(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Path]:
+    kept = [tracked.save(path) for path in out]
+    return kept if page is None else [*kept, report.write_track_report(tracked, page)]
 
-    return None if path is None else load_case(path)
+
+def _series(tracked: "Track") -> Block:
+    """A row a recording, in the order of x."""
+    shown = [quantity(key) for key in ("crf_hz", "crfa", "severe_probability")]
+    rows = [
+        [
+            Path(row["file"]).name,
+            NO_VALUE if row["x"] is None else f"{row['x']:.4g}",
+            *(entry.number_in(row) if row["found"] else NO_VALUE for entry in shown),
+            "" if row["found"] else f"not found: {row['reason']}",
+        ]
+        for row in tracked.scalars()["recordings"]
+    ]
+    titles = ["recording", tracked.x_name, *(entry.label for entry in shown), ""]
+    yield from columns(titles, rows, left=1)
+
+
+def _searched(tracked: "Track") -> Block:
+    rows: list[Row] = [
+        (quantity("band_hz").title, span("band_hz", tracked.target.band_hz)),
+        ("method", tracked.method),
+        ("alarm", tracked.alarm.verdict),
+    ]
+    yield from table(rows, (*tracked.problems, *tracked.notes))
 
 
 @contextmanager
-def _shown_files(
-    *, quiet: bool, waiting: str = "reading recordings ..."
-) -> "Iterator[Callable[[Reading], None] | None]":
+def _files_read(doing: str, *, quiet: bool) -> "Iterator[Callable[[Reading], None]]":
     """Count files on a terminal as they are read."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield None
-        return
     count = 0
-    with console.status(waiting) as status:
+    with progress("recordings", doing, quiet=quiet) as shown:
 
-        def told(heard: "Reading") -> None:
+        def step(recording: "Reading") -> None:
             nonlocal count
             count += 1
-            status.update(f"{count} read, last {Path(heard.file).name}")
+            shown(f"{count} read, last {Path(recording.file).name}")
 
-        yield told
+        yield step

@@ -1,22 +1,26 @@
 """`asperity rig`: recordings of a simulated wear test, with the truth beside them."""
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from asperity.cli.app import AsJson, Quiet, app
-from asperity.cli.common import print_json, print_rows
+from asperity import case, paper
+from asperity.cli.app import app
+from asperity.cli.options import AsJson, Quiet, case_at
+from asperity.cli.show import known, progress, show, span, table
 from asperity.errors import BadInput
+from asperity.quantities import quantity
 
 
 @app.command()
 def rig(
     out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for recordings, table, truth and case.")],
-    case: Annotated[
+    case_file: Annotated[
         Path | None,
-        typer.Option(metavar="CASE.toml", help="Solve this contact at each roughness, in place of the paper's trend."),
+        typer.Option(
+            "--case", metavar="CASE.toml", help="Solve this contact at each roughness, in place of the paper's trend."
+        ),
     ] = None,
     samples: Annotated[int, typer.Option(help="Worn rings, from Sq 0.54 to 3.49 um.")] = 12,
     repeats: Annotated[int, typer.Option(help="Tests of each ring.")] = 5,
@@ -33,65 +37,44 @@ def rig(
     quiet: Quiet = False,
 ) -> None:
     """Simulate the paper's wear test: recordings to try asperity track on, and the truth to judge it by."""
-    from rich.console import Console
-
-    from asperity.case import load_case, read_amount
-    from asperity.paper import Disturbance, simulate_rig, write_rig
-
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out} is there already and not an empty folder; name a new one")
-    console = Console(stderr=True)
-    shown = console.is_terminal and not quiet
-    with console.status("simulating the rig ...") if shown else nullcontext() as status:
-        made = simulate_rig(
+    with progress("rig", "simulating ...", quiet=quiet) as shown:
+        made = paper.simulate_rig(
             samples=samples,
             repeats=repeats,
-            duration_s=read_amount("--duration", "s", duration),
-            rate_hz=read_amount("--rate", "Hz", rate),
-            disturbance=Disturbance(snr_db=snr, modes=modes),
+            duration_s=case.read_amount("--duration", "s", duration),
+            rate_hz=case.read_amount("--rate", "Hz", rate),
+            disturbance=paper.Disturbance(snr_db=snr, modes=modes),
             trend=trend,  # type: ignore[arg-type]
             seed=seed,
-            case=None if case is None else load_case(case),
+            case=case_at(case_file),
         )
-
-        def tell(written: int, of: int) -> None:
-            if status is not None:
-                status.update(f"{written} of {of} recordings written")
-
-        paths = write_rig(made, out, file_format=file_format, progress=tell)  # type: ignore[arg-type]
-    first, last = made.recordings[0], made.recordings[-1]
-    knee = "" if made.split_sq_m is None else f", with a knee at Sq {made.split_sq_m * 1e6:g} um"
-    ends = " to ".join(f"{one.crf_hz:.0f} Hz at Sq {one.sq_m * 1e6:.2f} um" for one in (first, last))
-    length = f"{first.duration_s:g} s at {first.rate_hz:g} Hz"
-    verdict = f"{len(paths)} recordings of {length}: true CRF from {ends}{knee}."
-    if as_json:
-        print_json(
-            {
-                "verdict": verdict,
-                "folder": str(out),
-                "recordings": [str(path) for path in paths],
-                "table": str(out / "table.csv"),
-                "truth": str(out / "truth.csv"),
-                "case": str(out / "rig.toml"),
-                "band_hz": list(made.band_hz),
-                "full_load_crf_hz": made.full_load_crf_hz,
-                "split_sq_m": made.split_sq_m,
-                "snr_db": snr,
-            }
+        paths = paper.write_rig(
+            made,
+            out,
+            file_format=file_format,  # type: ignore[arg-type]
+            progress=lambda done, total: shown(f"{done} of {total} recordings written", done, total),
         )
-        return
-    print(verdict)
-    if quiet:
-        return
-    low, high = made.band_hz
     shafts = " and ".join(f"{speed:g}" for speed in made.shaft_hz)
-    print()
-    print_rows(
-        [
-            ("contact's band", f"{low:.0f} to {high:.0f} Hz"),
-            ("all load on asperities", f"{made.full_load_crf_hz:.1f} Hz"),
-            ("SNR in that band", f"{snr:g} dB, {modes} structural modes, shafts at {shafts} Hz, mains"),
-            ("truth", str(out / "truth.csv")),
-        ]
+    rows = [
+        (quantity("band_hz").title, span("band_hz", made.band_hz)),
+        *known({"full_load_crf_hz": made.full_load_crf_hz}),
+        ("SNR in that band", f"{snr:g} dB, {modes} structural modes, shafts at {shafts} Hz, mains"),
+        ("truth", str(out / "truth.csv")),
+    ]
+    show(
+        paper.rig_verdict(made),
+        lambda: {
+            **paper.rig_scalars(made),
+            "folder": str(out),
+            "recordings": [str(path) for path in paths],
+            "table": str(out / "table.csv"),
+            "truth": str(out / "truth.csv"),
+            "case": str(out / "rig.toml"),
+        },
+        table(rows),
+        [f"Try next: asperity track {out} --table {out / 'table.csv'} --case {out / 'rig.toml'}"],
+        as_json=as_json,
+        quiet=quiet,
     )
-    print(f"\nTry next: asperity track {out} --table {out / 'table.csv'} --case {out / 'rig.toml'}")

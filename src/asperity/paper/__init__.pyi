@@ -28,6 +28,9 @@ from .rig import write_rig as write_rig
 from .rig_recording import Disturbance as Disturbance
 from .rig_recording import RigRecording as RigRecording
 from .rig_recording import Tones as Tones
+from .summary import rig_scalars as rig_scalars
+from .summary import rig_verdict as rig_verdict
+from .summary import table1_verdict as table1_verdict
 from .table1 import Table1Row as Table1Row
 from .table1 import continuous_crfa as continuous_crfa
 from .table1 import expected_crfa as expected_crfa

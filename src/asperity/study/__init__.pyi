@@ -4,6 +4,8 @@ from .axes import group_means as group_means
 from .axes import pair_means as pair_means
 from .axes import swept_axis as swept_axis
 from .axes import varying_outputs as varying_outputs
+from .calibrated import anchor_table as anchor_table
+from .calibrated import calibrated_text as calibrated_text
 from .calibration import calibrate as calibrate
 from .calibration_result import CalibratedParameter as CalibratedParameter
 from .calibration_result import Calibration as Calibration
@@ -42,3 +44,9 @@ from .plan import plan_points as plan_points
 from .plan import plan_study as plan_study
 from .ranges import ParameterRange as ParameterRange
 from .ranges import stated_value as stated_value
+from .summary import duration_text as duration_text
+from .summary import estimate_scalars as estimate_scalars
+from .summary import estimate_verdict as estimate_verdict
+from .summary import finished_curve as finished_curve
+from .summary import study_scalars as study_scalars
+from .summary import study_verdict as study_verdict

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
@@ -66,7 +67,15 @@ class SurfaceDescription:
     steps: tuple[str, ...]
     profile: ProfileParameters | None = None
 
-    def scalars(self) -> dict[str, object]:
+    def verdict(self) -> str:
+        """One sentence: roughness, cells and what is missing."""
+        measured, (nx, ny), (dx, dy) = self.measured, self.measured.grid.cells, self.measured.grid.spacing
+        what = f"Sq {1e6 * self.parameters.sq:.3g} um, {nx} x {ny} cells of {1e6 * dx:.4g} x {1e6 * dy:.4g} um"
+        if measured.uniform is not None:
+            what = f"profile, Rq {1e6 * self.parameters.sq:.3g} um, {nx} points every {1e6 * dx:.4g} um"
+        return f"{self.path}: {what}, {100 * measured.missing:.2g} % missing."
+
+    def scalars(self) -> dict[str, Any]:
         """What `asperity surface --json` prints for the file: SI numbers, None for what is not a number."""
         return {
             "file": str(self.path),

@@ -1,3 +1,6 @@
+from .checks import CheckedRecording as CheckedRecording
+from .checks import RecordingChecks as RecordingChecks
+from .checks import check_recordings as check_recordings
 from .files import recordings_in as recordings_in
 from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording

@@ -1,0 +1,138 @@
+"""The options that commands share, each declared once; and what is made of them before the work begins."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from asperity import case, files, results
+from asperity.errors import BadInput
+
+if TYPE_CHECKING:
+    from asperity.case import Case
+
+
+def _hertz(text: str) -> float:
+    """A frequency as a bare number of hertz, or with its unit."""
+    try:
+        return float(text)
+    except ValueError:
+        return case.read_amount("a frequency", "Hz", text)
+
+
+CaseOrRun = Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a kept run.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the case, contact.load='400 N'; repeat."),
+]
+SurfaceFile = Annotated[
+    Path | None, typer.Option("--surface", metavar="FILE", help="A measured surface in place of the case's own.")
+]
+Preset = Annotated[
+    str | None, typer.Option(help="sound or paper, in place of the case's; --table1 takes paper by default.")
+]
+
+OutFolder = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder to keep everything in; goes on from what it holds.")
+]
+OutPicture = Annotated[Path | None, typer.Option("--out", metavar="PNG", help="Draw the result.")]
+Page = Annotated[
+    Path | None, typer.Option("--report", metavar="OUT.html", help="Make one self-contained HTML page too.")
+]
+StudyFigures = Annotated[
+    Path | None,
+    typer.Option("--figures", metavar="DIR", help="Of a study: its figures as PDF and PNG, its tables as csv."),
+]
+
+Workers = Annotated[
+    int | None, typer.Option(metavar="N", min=1, help="Processes that work at once; default: all processors.")
+]
+Roughness = Annotated[
+    list[str] | None, typer.Option("--sq", metavar="LENGTH", help="At this roughness; may be repeated.")
+]
+Cells = Annotated[int, typer.Option(metavar="N", min=8, help="Cells along each axis of the widest domain.")]
+Seeds = Annotated[int, typer.Option(metavar="N", min=1, help="Surfaces that each point is the mean of.")]
+SampleSeed = Annotated[int, typer.Option(metavar="SEED", min=0, help="Of all that is drawn.")]
+
+RecordingFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")]
+Rate = Annotated[
+    float | None, typer.Option(metavar="HZ", parser=_hertz, help="Sampling rate, for files that do not state it.")
+]
+Unit = Annotated[
+    str | None, typer.Option(help="Unit of the values, such as g (of heights: um), for files that do not state it.")
+]
+Channel = Annotated[str | None, typer.Option(help="Name or number of the channel, where files have several.")]
+Scale = Annotated[
+    float | None, typer.Option(help="What a stored 1 stands for, in the unit: g at full scale of a wav, g per volt.")
+]
+Contact = Annotated[
+    Path | None, typer.Option("--case", metavar="CASE.toml", help="The contact: where to look, and load shares.")
+]
+Band = Annotated[
+    tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Where to look [Hz], instead of the case's band.")
+]
+Table = Annotated[
+    Path | None,
+    typer.Option("--table", metavar="CSV", help="Columns file, x (such as sq_um), sq_um_std, load_n, speed_hz."),
+]
+Shaft = Annotated[
+    list[float] | None, typer.Option(metavar="HZ", help="Shaft speed whose harmonics to remove; found if not given.")
+]
+Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only, and no progress.")]
+
+
+def chosen_case(path: Path, overrides: list[str] | None, surface: Path | None = None) -> "Case":
+    """The case of a case file or a run, with a measured surface and `--set KEY=VALUE` values put in."""
+    chosen = results.load_run(path).case if path.suffix == ".nc" else case.load_case(path)
+    if surface is not None:
+        if not surface.is_file():
+            raise BadInput(f"--surface {surface} does not exist; check its name")
+        chosen = chosen.with_overrides({"surface": {"file": case.relative_path(surface, chosen.folder)}})
+    replaced = {}
+    for override in overrides or []:
+        key, equals, value = override.partition("=")
+        if not (equals and key.strip() and value.strip()):
+            raise BadInput(f"--set takes KEY=VALUE such as contact.load='400 N', got {override!r}")
+        replaced[key.strip()] = value.strip()
+    return chosen.with_overrides(replaced) if replaced else chosen
+
+
+def case_at(path: Path | None) -> "Case | None":
+    """The case of a case file, if one was given."""
+    return None if path is None else case.load_case(path)
+
+
+def lengths(option: str, texts: list[str] | None) -> list[float] | None:
+    """Lengths given as an option that may be repeated [m]; None where it was not given."""
+    return [case.read_length(option, text) for text in texts] if texts else None
+
+
+_FLAGS = {  # what a message of the library asks for, and the option that gives it
+    "give rate_hz": "give --rate",
+    "give scale": "give --scale",
+    "give case or band_hz": "give --case or --band",
+    "; method modes": "; --method modes",
+    "such as um and mm": "such as --unit um --lateral-unit mm",
+    "choose another out": "choose another --out",
+}
+
+
+def with_flags(message: str) -> str:
+    """A message of the library with options in place of the arguments that it names."""
+    for argument, option in _FLAGS.items():
+        message = message.replace(argument, option)
+    return message
+
+
+def require_output(path: Path | None, *suffixes: str, option: str = "--out") -> None:
+    """BadInput unless a path that is given has a suffix and can be written to: asked before the work, not after."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        *most, last = suffixes
+        allowed = f"{', '.join(most)} or {last}" if most else last
+        raise BadInput(f"{option} must be a file that ends in {allowed}, got {path}")
+    files.require_writable(path)

@@ -1,0 +1,91 @@
+"""`asperity report`: pages of what was kept, runs, a study or a history."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asperity import history, paper, report, results, study
+from asperity.cli.app import app
+from asperity.cli.options import AsJson, Quiet, StudyFigures, require_output
+from asperity.cli.show import progress, show, written
+from asperity.errors import BadInput
+
+
+@app.command("report")
+def report_command(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN...|DIR", help="Runs kept by asperity solve --out, or the folder of a study or history."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run, or in the folder.")
+    ] = None,
+    figures: StudyFigures = None,
+    anchors: Annotated[
+        Path | None, typer.Option(metavar="FILE.toml", help="Of a study: numbers that it should meet, not the paper's.")
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make one self-contained HTML page of one run, of several, of a study or of a history."""
+    folders = [path for path in paths if path.is_dir()]
+    if folders and len(paths) > 1:
+        raise BadInput(f"a study's page holds nothing else, got {len(paths)} paths; name {folders[0]} alone")
+    of_study = bool(folders) and not history.is_history(folders[0])
+    if not of_study and (figures is not None or anchors is not None):
+        option = "--figures" if figures is not None else "--anchors"
+        raise BadInput(f"{option} is for a study's folder, got {paths[0]}; name the folder")
+    if out is None:
+        alone = paths[0].with_suffix(".html") if len(paths) == 1 else Path("report.html")
+        out = folders[0] / "report.html" if folders else alone
+    require_output(out, ".html")
+    if of_study:
+        _report_study(folders[0], out, figures, anchors, as_json=as_json, quiet=quiet)
+    elif folders:
+        _report_history(folders[0], out, as_json=as_json, quiet=quiet)
+    else:
+        _report_runs(paths, out, as_json=as_json, quiet=quiet)
+
+
+def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) -> None:
+    runs = [results.load_run(path) for path in paths]
+    report.write_report(runs, out)
+    show(
+        "\n".join(run.verdict() for run in runs),
+        lambda: {"report": str(out), "runs": [run.scalars() for run in runs]},
+        written("Report", out),
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
+    kept = history.load_history(folder)
+    report.write_motion_report(kept, out)
+    show(
+        kept.verdict(),
+        lambda: {"report": str(out), "history": kept.scalars()},
+        written("Report", out),
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _report_study(
+    folder: Path, out: Path, figures: Path | None, anchors: Path | None, *, as_json: bool, quiet: bool
+) -> None:
+    chosen = None if anchors is None else paper.load_anchors(anchors)
+    result = study.load_study(folder)
+    with progress("the study's page", quiet=quiet) as shown:
+        report.write_study_report(result, out, figures=figures, anchors=chosen, progress=shown)
+    paths = {"report": str(out), "figures": None if figures is None else str(figures)}
+    show(
+        study.study_verdict(result),
+        lambda: {**study.study_scalars(result), **paths},
+        [*written("Report", out), *written("Figures and tables", figures)],
+        as_json=as_json,
+        quiet=quiet,
+    )

@@ -1,0 +1,36 @@
+"""What a simulated rig and the paper's Table 1 come to, in a sentence and as numbers."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from asperity.paper.rig import Rig
+from asperity.paper.table1 import Table1Row
+
+
+def rig_verdict(rig: Rig) -> str:
+    """How many recordings, and from where to where the true CRF goes."""
+    first, last = rig.recordings[0], rig.recordings[-1]
+    knee = "" if rig.split_sq_m is None else f", with a knee at Sq {rig.split_sq_m * 1e6:g} um"
+    ends = " to ".join(f"{test.crf_hz:.0f} Hz at Sq {test.sq_m * 1e6:.2f} um" for test in (first, last))
+    length = f"{first.duration_s:g} s at {first.rate_hz:g} Hz"
+    return f"{len(rig.recordings)} recordings of {length}: true CRF from {ends}{knee}."
+
+
+def rig_scalars(rig: Rig) -> dict[str, Any]:
+    """What `asperity rig --json` prints of a rig."""
+    return {
+        "verdict": rig_verdict(rig),
+        "band_hz": list(rig.band_hz),
+        "full_load_crf_hz": rig.full_load_crf_hz,
+        "split_sq_m": rig.split_sq_m,
+        "snr_db": rig.disturbance.snr_db,
+    }
+
+
+def table1_verdict(rows: Sequence[Table1Row], preset: str) -> str:
+    """How near our CRFs are to the printed ones, and how many printed CRFAs a record of ours could have shown."""
+    inside, farthest = sum(row.within for row in rows), max(abs(row.crf_off) for row in rows)
+    return (
+        f"Table 1, preset {preset}: CRF within {100 * farthest:.2f} % of the printed ones, {inside} of {len(rows)} "
+        "printed CRFAs inside our 5 to 95 % range."
+    )

@@ -1,0 +1,80 @@
+"""What a study, or the estimate of its cost, comes to: in a sentence, and as numbers."""
+
+from typing import Any
+
+from asperity.study.curve import WearCurve, curve_of, is_wear_study
+from asperity.study.execute import StudyCost, StudyResult
+from asperity.study.plan import StudyPlan
+
+
+def study_verdict(result: StudyResult) -> str:
+    """How much of the study there is, and what it says."""
+    planned, there = len(result.plan.cases), len(result.table)
+    share = f"{there} cases" if there == planned else f"{there} of {planned} cases"
+    sentence = f"{share}, {result.failed or 'none'} failed"
+    if result.computed:
+        sentence += f"; {result.computed} computed in {duration_text(result.seconds)}"
+    curve = finished_curve(result)
+    if curve is not None and there == planned:
+        sentence += f". {curve.verdict()}"
+    return f"{sentence.rstrip('.')}."
+
+
+def study_scalars(result: StudyResult) -> dict[str, Any]:
+    """What `asperity study --json` prints."""
+    scalars: dict[str, Any] = {
+        "verdict": study_verdict(result),
+        "cases": len(result.table),
+        "planned": len(result.plan.cases),
+        "computed": result.computed,
+        "failed": result.failed,
+        "seconds": result.seconds,
+        "table": None if result.path is None else str(result.path),
+        "axes": list(result.plan.axes),
+        "seeds": result.plan.realisations,
+    }
+    curve = finished_curve(result)
+    if curve is not None and len(result.table) == len(result.plan.cases):
+        scalars["stages"] = {
+            name: {
+                "kind": stages.kind,
+                "split_um": stages.split if stages.found else None,
+                "interval_um": list(stages.interval) if stages.found else None,
+                "verdict": stages.verdict,
+            }
+            for name, stages in curve.stages.items()
+        }
+    return scalars
+
+
+def finished_curve(result: StudyResult) -> WearCurve | None:
+    """The wear curve of what is there of a study of Sq alone, if any of it did not fail."""
+    return curve_of(result) if is_wear_study(result) and len(result.table) > result.failed else None
+
+
+def estimate_verdict(cost: StudyCost) -> str:
+    """How many cases, and how long they will take."""
+    workers = "worker" if cost.workers == 1 else "workers"
+    time = duration_text(cost.seconds)
+    return f"{cost.cases} cases, {cost.kept} of them kept already: about {time} on {cost.workers} {workers}."
+
+
+def estimate_scalars(plan: StudyPlan, cost: StudyCost) -> dict[str, Any]:
+    """What `asperity study --dry-run --json` prints."""
+    return {
+        "verdict": estimate_verdict(cost),
+        "cases": cost.cases,
+        "kept": cost.kept,
+        "points": len(plan.points),
+        "seeds": plan.realisations,
+        "seconds_a_case": cost.case_s,
+        "seconds": cost.seconds,
+        "workers": cost.workers,
+    }
+
+
+def duration_text(seconds: float) -> str:
+    """A time as people plan with it: 4.2 s, 37 s, 12 min, 3.1 h."""
+    if seconds < 100:
+        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
