@@ -24,7 +24,6 @@ def test_no_folder_is_too_deep():
     assert [folder for folder in folders if len(folder.parts) > DEEPEST] == []
 
 
-@UNDER_WAY
 def test_no_function_is_too_long():
     lengths = [
         (function.end_lineno - function.lineno + 1, f"{name} {function.name}")
