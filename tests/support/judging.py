@@ -141,7 +141,7 @@ def wrong_shell(text: str) -> str | None:
         return next((f"the Makefile has no target {word}" for word in words[1:] if word not in targets), None)
     if "-m" in words:
         module = words[words.index("-m") + 1]
-        known = module in ("pytest", "asperity") or module in vocabulary().contents
+        known = module in ("pytest", "asperity") or {module, f"tests.{module}"} & vocabulary().contents.keys()
         files = (word for word in words if "/" in word and not word.startswith("."))
         return next(
             (f"no {file}" for file in files if not ROOT.joinpath(file).exists()), None if known else "no module"

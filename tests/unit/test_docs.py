@@ -13,6 +13,7 @@ import pytest
 from pint import Quantity
 from pydantic.fields import FieldInfo
 
+from asperity.quantities import catalogue
 from support.judging import AMOUNT, block_problems, judged, leads, place, problems
 from support.pages import Line, Page, pages, read
 from support.source import PACKAGE, ROOT, functions, modules, parsed
@@ -100,7 +101,8 @@ def test_every_command_has_its_section():
 @pytest.mark.parametrize("command", [name for name in sections() if golden(name)])
 def test_json_keys_are_those_of_the_golden_numbers(command):
     assert unknown_keys(command, sections()[command]) == []
-    words = names_in(line.text for line in sections()[command])
+    texts = [line.text for line in sections()[command]]
+    words = names_in(texts) | (set(catalogue()) if any("](quantities.md)" in text for text in texts) else set())
     keys = {key for tree in golden(command) for key in tree} - TABLES_BESIDE.get(command, set())
     assert sorted(key for key in keys if not any(stands_for(word, key) for word in words)) == []
 
@@ -113,14 +115,8 @@ def unknown_keys(command: str, lines: list[Line]) -> list[str]:
 
 
 def json_lines(lines: list[Line]) -> Iterator[str]:
-    """Paragraphs about `--json`, and the first column of a table of its keys."""
-    in_table = False
-    for line in lines:
-        in_table = (in_table and line.text[:1] in ("", "|")) or line.text == "Keys of `--json`:"
-        if in_table:
-            yield line.text.split("|")[1] if line.text.startswith("|") else ""
-        elif "`--json`" in line.text:
-            yield line.text.partition("`--json`")[2]
+    """What paragraphs say of `--json`."""
+    return (line.text.partition("`--json`")[2] for line in lines if "`--json`" in line.text)
 
 
 def names_in(texts: Iterable[str]) -> set[str]:
