@@ -17,7 +17,7 @@ from asperity.ehl.outcome import Figures
 from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure
-from asperity.quantities import quantity
+from asperity.quantities import catalogue, quantity
 from asperity.report import base, surface_map, write_report
 from asperity.report.drawing import CONTACT_COLOUR, svg
 from asperity.report.run import contact, page, rubbing, vibration
@@ -185,6 +185,14 @@ def test_every_number_is_there_with_its_unit(single, name, value, unit):
     assert row[1:] == [value, unit]
 
 
+def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
+    made_up = replace(quantity("clr"), key="made_up", symbol="", name="made-up share", deviation="")
+    known = {**catalogue(), "made_up": made_up}
+    monkeypatch.setattr("asperity.quantities.catalogue", lambda: known)
+    (row,) = [row for row in Page(page.render_page([run_like()])).rows if row[0].startswith("Made-up share")]
+    assert row[1:] == ["54.2", "%"]
+
+
 def test_resonance_is_given_with_its_standard_deviation(single):
     resonance = run_like().vibration.resonance
     (row,) = [row for row in single.rows if row[0].startswith("Contact resonance frequency")]
@@ -250,7 +258,7 @@ def test_several_runs_are_drawn_against_roughness(single, several):
         assert drawn(single, title) == 0
         assert drawn(several, title) == 1
     assert drawn(several, "Film thickness") == 3
-    assert "20.0 % to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
+    assert "20.0 to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
 
 
 def test_figures_carry_their_error_where_it_shows():

@@ -4,7 +4,7 @@ Nothing is solved or fitted for a page; it is self-contained and loads nothing.
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -90,6 +90,12 @@ def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
 def heading(quantity: Quantity) -> str:
     """What a quantity is called at the beginning of a row."""
     return capitalised(quantity.title)
+
+
+def span(quantity: Quantity, values: Collection[float]) -> str:
+    """From the least to the largest of the values: "20.0 to 69.4 %"."""
+    low, high = quantity.number(min(values)), quantity.text(max(values))
+    return high if quantity.text(min(values)) == high else f"{low} to {high}"
 
 
 def capitalised(text: str) -> str:

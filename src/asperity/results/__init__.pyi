@@ -6,6 +6,7 @@ from .curves import stribeck_curve as stribeck_curve
 from .curves import traction_curve as traction_curve
 from .levels import levels_verdict as levels_verdict
 from .levels import not_converged as not_converged
+from .run import RUN_GROUPS as RUN_GROUPS
 from .run import Run as Run
 from .run import Scalar as Scalar
 from .run import load_run as load_run

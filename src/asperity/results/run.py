@@ -51,7 +51,7 @@ FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
 Scalar = float | int | bool | None
-RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "solver", "resonance")
+RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "solver")
 MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2", "film_temperature")
 
 

@@ -196,7 +196,8 @@ def running_in(history: History) -> Exhibit:
                 axes.plot(table["pass"], values, marker=marker, markersize=3.5, color=colour, label=title)
             if len(keys) > 1:
                 axes.set_ylim(bottom=0.0)
-            axes.legend(loc="upper right")
+            if keys != (side,):  # else the axis says it
+                axes.legend(loc="upper right")
             axes.set(ylabel=quantity(side).label, xlabel="pass")
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         return figure

@@ -1,20 +1,18 @@
 """One HTML page from solved runs: what was found, how, how well, and what the model leaves out."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from asperity.errors import BadInput
 from asperity.lubricant import Newtonian
 from asperity.quantities import Quantity, quantity, select
-from asperity.report.base import Exhibit, Picture, Tile, capitalised, heading, in_print, render, tile, write_page
+from asperity.report.base import Exhibit, capitalised, heading, in_print, render, span, tile, write_page
 from asperity.report.run import contact, rubbing, several
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.vibration import spectrum
-from asperity.results import Run
+from asperity.results import RUN_GROUPS, Run
 
-GROUPS = ("load", "film", "pressure", "friction", "heat", "stress", "resonance", "solver")
 TILES = (
     "clr",
     "car",
@@ -53,95 +51,56 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
 
 def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     """The page as HTML text."""
-    views = [_RunView(run, number if len(runs) > 1 else None) for number, run in enumerate(runs, 1)]
+    views = [_view(run, number if len(runs) > 1 else None) for number, run in enumerate(runs, 1)]
+    scalars = [view["scalars"] for view in views]
     oils = [run.solution.lubricant for run in runs]
     return render(
         "run/page.html.j2",
         title=title or _title(runs),
         runs=views,
         overview=[exhibit.picture() for exhibit in _overview(runs)] if len({run.state.sq for run in runs}) > 1 else [],
-        numbers=[_row(entry, views) for group in GROUPS for entry in select(group)],
+        numbers=[_row(entry, scalars) for group in RUN_GROUPS for entry in select(group)],
         conditions=conditions_table(runs),
         lubricated=any(oil is not None for oil in oils),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
         sphere=any(run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs),
         line=any(run.solution.conditions.geometry == "line" for run in runs),
-        imbalance=_span("mass_flux_imbalance", [run.state.mass_flux_imbalance for run in runs]),
+        imbalance=span(quantity("mass_flux_imbalance"), [run.state.mass_flux_imbalance for run in runs]),
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    name: str
-    meaning: str
-    cells: list[str]
-    unit: str
-
-
-def _row(entry: Quantity, views: "Sequence[_RunView]") -> _Row:
-    cells = [entry.number_in(view.scalars) for view in views]
-    return _Row(heading(entry), entry.meaning, cells, entry.display)
-
-
-def _span(key: str, values: Sequence[float]) -> str:
-    """From the least to the largest of the values."""
-    low, high = quantity(key).text(min(values)), quantity(key).text(max(values))
-    return low if low == high else f"{low} to {high}"
+def _row(entry: Quantity, scalars: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """A line of the table of numbers."""
+    cells = [entry.number_in(values) for values in scalars]
+    return {"name": heading(entry), "meaning": entry.meaning, "cells": cells, "unit": entry.display}
 
 
 def _title(runs: Sequence[Run]) -> str:
     several_runs = f": {len(runs)} runs" if len(runs) > 1 else ""
-    return f"Rough lubricated contact{several_runs}, Sq {_span('sq_m', [run.state.sq for run in runs])}"
+    return f"Rough lubricated contact{several_runs}, Sq {span(quantity('sq_m'), [run.state.sq for run in runs])}"
 
 
-@dataclass(frozen=True)
-class _RunView:
+def _label(run: Run, number: int | None) -> str:
+    rough = quantity("sq_m").named(run.state.sq)
+    return rough if number is None else f"{number}. {rough}"
+
+
+def _view(run: Run, number: int | None) -> dict[str, Any]:
     """What the template shows of one run."""
-
-    run: Run
-    number: int | None
-
-    @property
-    def label(self) -> str:
-        rough = quantity("sq_m").named(self.run.state.sq)
-        return rough if self.number is None else f"{self.number}. {rough}"
-
-    @property
-    def anchor(self) -> str:
-        return f"run-{self.number or 1}"
-
-    @cached_property
-    def scalars(self) -> dict[str, float | int | bool | None]:
-        return self.run.scalars()
-
-    @property
-    def verdict(self) -> str:
-        return in_print(self.run.verdict())
-
-    @property
-    def converged(self) -> bool:
-        return self.run.solution.convergence.converged
-
-    @property
-    def ending(self) -> str:
-        return in_print(self.run.solution.convergence.explain()).capitalize()
-
-    @property
-    def tiles(self) -> list[Tile]:
-        return [tile(quantity(key), self.scalars) for key in TILES]
-
-    @cached_property
-    def pictures(self) -> list[Picture]:
-        return [exhibit.picture() for exhibit in _exhibits(self.run)]
-
-    @property
-    def notes(self) -> list[str]:
-        return [in_print(capitalised(note)) for note in (*self.run.remarks, *_missing_exhibits(self.run))]
-
-    @property
-    def case_text(self) -> str:
-        return self.run.case.text
+    scalars, convergence = run.scalars(), run.solution.convergence
+    return {
+        "label": _label(run, number),
+        "anchor": f"run-{number or 1}",
+        "scalars": scalars,
+        "verdict": in_print(run.verdict()),
+        "converged": convergence.converged,
+        "ending": in_print(convergence.explain()).capitalize(),
+        "tiles": [tile(quantity(key), scalars) for key in TILES],
+        "pictures": [exhibit.picture() for exhibit in _exhibits(run)],
+        "notes": [in_print(capitalised(note)) for note in (*run.remarks, *_missing_exhibits(run))],
+        "case_text": run.case.text,
+    }
 
 
 def _exhibits(run: Run) -> Iterator[Exhibit]:

@@ -67,18 +67,19 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
             " Diamonds: CAR as printed, which does not say of which area; crosses: CLR behind the CRF printed for "
             "the rig's smoothest and roughest ring. Their bars are tolerances of ours."
         )
-    ends = (f"{quantity(key).short} from {_from_to(key, curve.mean(key))}" for key, *_ in SHARES)
+    ends = (f"{quantity(key).short} from {first_to_last(key, curve.mean(key))}" for key, *_ in SHARES)
     return Exhibit(
         "shares",
         draw,
         "Share of the load on asperities (CLR), and of the area: contact cells over all cells of the Hertz "
         "zone (CAR), contact area of the domain over the Hertz area (CAR of the domain). "
         f"{_seeds(study)}{anchored}",
-        f"CLR and CAR against Sq from {_from_to('sq_m', curve.sq)}: {', '.join(ends)}.",
+        f"CLR and CAR against Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
     )
 
 
-def _from_to(key: str, values: Field) -> str:
+def first_to_last(key: str, values: Field) -> str:
+    """Where a curve begins and where it ends."""
     return f"{quantity(key).number(values[0])} to {quantity(key).text(values[-1])}"
 
 

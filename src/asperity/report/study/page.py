@@ -14,7 +14,7 @@ from asperity.paper import Anchor
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit, Picture, Tile, heading, in_print, render, write_exhibits, write_page
 from asperity.report.study import maps, tables
-from asperity.report.study.curve import curve_exhibits
+from asperity.report.study.curve import curve_exhibits, first_to_last
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.study import SEED_KEYS, FailureReason, StudyOverview, StudyResult
 
@@ -41,7 +41,7 @@ def write_study_report(
     figures : folder for each figure as PDF and as PNG (300 dpi, 84 or 174 mm wide), `captions.md` and the tables as
         csv; made if it is not there
     anchors : what a study of Sq should meet; by default the paper's printed numbers, if the case is its contact
-    progress : told in words what is being solved or drawn
+    progress : called with what is being solved or drawn
 
     Returns
     -------
@@ -125,8 +125,7 @@ def render_study_page(study: StudyOverview, exhibits: Sequence[Exhibit], progres
 
 def _title(study: StudyOverview) -> str:
     if study.curve is not None:
-        first, last = study.curve.sq[[0, -1]]
-        return f"Wear study, Sq {quantity('sq_m').number(first)} to {quantity('sq_m').text(last)}"
+        return f"Wear study, Sq {first_to_last('sq_m', study.curve.sq)}"
     keys = [key for key in study.result.plan.axes if key not in SEED_KEYS]
     return f"Study over {', '.join(keys) or 'seeds'}"
 

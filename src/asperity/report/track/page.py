@@ -141,9 +141,9 @@ def _heads(track: Track) -> list[str]:
 def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
     resonance, row = recording.resonance, recording.row()
     place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
-    heard = [quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")]
+    resonant = [quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")]
     keys = [*(["clr"] if with_clr else []), "severe_probability"]
-    cells = [place, *heard, *(quantity(key).number(row[key]) for key in keys)]
+    cells = [place, *resonant, *(quantity(key).number(row[key]) for key in keys)]
     return _Row(
         Path(recording.file).name, cells, recording.label, in_print("" if resonance.found else resonance.reason)
     )
