@@ -59,7 +59,8 @@ def test_a_presets_resonance_is_the_plain_one_by_another_name():
 
 def test_short_tables_leave_out_details_and_deviations():
     keys = [entry.key for entry in select("load")]
-    assert keys == ["clr", "capped_oil_load_ratio", "car", "car_domain"]
+    assert {"clr", "car", "car_domain"} <= set(keys)
+    assert "clr_error" not in keys
     assert "load_at_floor" in [entry.key for entry in select("sharing", detail=True)]
 
 

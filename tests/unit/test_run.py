@@ -10,6 +10,7 @@ import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
 from asperity.cli.contact import run_table
 from asperity.quantities import NO_VALUE, catalogue, quantity
+from asperity.report import write_report
 
 SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
 
@@ -97,6 +98,19 @@ def test_the_command_line_prints_every_number_the_catalogue_has_for_a_table(run)
         entry = quantity(key)
         assert entry.detail or shown[entry.title] == entry.text_in(values)
     assert shown[quantity("p_max_pa").title] == f"{run.state.p_max / 1e9:.3f} GPa"
+
+
+def test_one_line_of_the_catalogue_brings_a_number_wherever_numbers_are(run, tmp_path):
+    slope, name = run.state.contact_slope, "mean slope of touching cells"
+    assert run.scalars()["contact_slope"] == slope
+    assert any(line.split("  ")[1:] and name in line and f"{slope:.3f}" in line for line in run_table(run))
+    kept = run.save(tmp_path / "run.nc")
+    with xarray.open_dataset(kept, engine="h5netcdf") as dataset:
+        assert float(dataset["contact_slope"]) == slope
+        assert dataset["contact_slope"].attrs == {"long_name": name, "units": "1"}
+    page = write_report([load_run(kept)], tmp_path / "run.html").read_text("utf-8")
+    assert name.capitalize() in page
+    assert f"{slope:.3f}" in page
 
 
 @pytest.mark.parametrize("coefficient", [2.5, -0.1])

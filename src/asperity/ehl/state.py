@@ -30,7 +30,8 @@ class ContactState:
     `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
     relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
     equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when
-    dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream.
+    dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream;
+    `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch).
     """
 
     car: float
@@ -46,6 +47,7 @@ class ContactState:
     reynolds_residual: float
     load_error: float
     mass_flux_imbalance: float
+    contact_slope: float | None = None
 
 
 def contact_state(solution: ContactSolution) -> ContactState:
@@ -94,7 +96,16 @@ def state_of(solution: ContactSolution, balance: Balance | OilBalance) -> Contac
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,
         mass_flux_imbalance=float(unbalanced * dx * dy / (carried * width)),
+        contact_slope=_contact_slope(solution),
     )
+
+
+def _contact_slope(solution: ContactSolution) -> float | None:
+    """Central differences; y goes round."""
+    heights, (dx, dy) = solution.surface.heights, solution.grid.spacing
+    across = (np.roll(heights, -1, axis=1) - np.roll(heights, 1, axis=1)) / (2.0 * dy)
+    slope = np.hypot(np.gradient(heights, dx, axis=0), across)
+    return float(slope[solution.in_contact].mean()) if solution.in_contact.any() else None
 
 
 def _hertz_areas(conditions: ContactConditions, grid: Grid) -> float:

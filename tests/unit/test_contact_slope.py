@@ -1,0 +1,20 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity import Surface, contact_state, solve_contact
+from support.paper import contact, grid
+
+
+def test_the_mean_slope_of_waves_is_that_of_their_cosine():
+    where = grid((96, 48))
+    length, height = where.extent[0] / 4.0, 0.2e-6
+    waves = height * np.sin(2.0 * np.pi * (where.x[:, None] - where.lower[0]) / length) + 0.0 * where.y
+    solution = solve_contact(contact(), None, Surface(waves, where), strict=False)
+    assert solution.in_contact.any()
+    everywhere = replace(solution, in_contact=np.ones_like(solution.in_contact))
+    exact = height * 2.0 * np.pi / length * 2.0 / np.pi
+    assert contact_state(everywhere).contact_slope == pytest.approx(exact, rel=0.01)
+    nowhere = replace(solution, in_contact=np.zeros_like(solution.in_contact))
+    assert contact_state(nowhere).contact_slope is None
