@@ -18,9 +18,9 @@ import numpy as np
 from asperity.case import load_case
 from asperity.errors import BadInput
 from asperity.paper import simulate_rig, write_rig
-from asperity.recording import check_recording, open_channels, read_recording
+from asperity.recording import ReadOptions, check_recording, open_channels, read_recording
 from asperity.tracking import search_target, track_recordings
-from asperity.tracking.reading import FINEST_HZ, ReadOptions, read_spectrum
+from asperity.tracking.reading import FINEST_HZ, read_spectrum
 from asperity.wear import contact_resonance, remove_lines
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"

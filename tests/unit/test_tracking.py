@@ -10,10 +10,10 @@ import pytest
 from asperity.case import load_case
 from asperity.coupling import search_band
 from asperity.errors import BadInput, UnreadableFile
+from asperity.recording import ReadOptions
 from asperity.tracking import recordings_in, search_target, track_recordings
 from asperity.tracking.files import read_table
 from asperity.tracking.reading import (
-    ReadOptions,
     common_spacing,
     load_reading,
     read_spectrum,

@@ -5,6 +5,7 @@ from .model import ACCELERATION as ACCELERATION
 from .model import Channel as Channel
 from .model import Fact as Fact
 from .model import OpenRecording as OpenRecording
+from .model import ReadOptions as ReadOptions
 from .model import Recording as Recording
 from .read import open_channels as open_channels
 from .read import open_recording as open_recording

@@ -1,7 +1,9 @@
 """What several formats share: finding rate, unit and start among named values, and arrays as channels."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,17 @@ from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_N
 
 MOST_CHANNELS = 512  # more columns than that are a matrix, or a damaged file's
 REMEDY = "copy or export it again"
+
+
+@contextmanager
+def refused_as(path: Path, what: str) -> Iterator[None]:
+    """Refuse a file of which a library complains, saying `what` it is: no readable HDF5 file, for one."""
+    try:
+        yield
+    except UnreadableFile:
+        raise
+    except Exception as error:
+        raise UnreadableFile(f"{path.name} is {what} ({first_line(error)}); {REMEDY}") from error
 
 
 def facts_in(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -160,19 +173,4 @@ def columns(
 
 def numeric(array: Any) -> bool:
     """Whether an array holds real numbers."""
-    kind = getattr(getattr(array, "dtype", None), "kind", "")
-    return kind in "iuf"
-
-
-def required(channels: Iterable[Channel], name: str) -> tuple[Channel, ...]:
-    """All channels; refused where there is none.
-
-    Raises
-    ------
-    UnreadableFile
-        for a file without any.
-    """
-    every = tuple(channels)
-    if not every:
-        raise UnreadableFile(f"{name} holds no row of samples; give a file with a recording in it")
-    return every
+    return getattr(getattr(array, "dtype", None), "kind", "?") in "iuf"

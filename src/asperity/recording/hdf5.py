@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, required
+from asperity.recording.common import columns, facts_in, numeric, refused_as
 from asperity.recording.model import Channel, Contents
 
 _DEEPEST = 8  # groups in groups
@@ -27,20 +25,12 @@ def read(path: Path) -> Contents:
     import h5py
 
     notes: list[str] = []
-    try:
+    with refused_as(path, "no readable HDF5 file"):
         file = h5py.File(path, "r")
-    except OSError as error:
-        raise UnreadableFile(f"{path.name} is no readable HDF5 file ({first_line(error)}); {REMEDY}") from error
-    try:
+    with file, refused_as(path, "a damaged HDF5 file"):
         channels = list(_channels(path, file, "", {}, notes))
-        matlab = any(str(key).startswith("MATLAB") for key in _every_attribute(file))
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is a damaged HDF5 file ({first_line(error)}); {REMEDY}") from error
-    finally:
-        file.close()
-    return Contents(format="mat v7.3" if matlab else "hdf5", channels=required(channels, path.name), notes=notes)
+        matlab = any(str(key).startswith("MATLAB") for member in file.values() for key in member.attrs)
+    return Contents(format="mat v7.3" if matlab else "hdf5", channels=channels, notes=notes)
 
 
 def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
@@ -48,7 +38,7 @@ def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: l
 
     if name.count("/") > _DEEPEST:
         return
-    around = above | _attributes(group)
+    around = above | dict(group.attrs)
     members = [(str(key), group.get(key)) for key in group if not str(key).startswith("#")]
     for key, member in members:
         if isinstance(member, h5py.Dataset) and member.size is not None and member.size <= 64:
@@ -58,7 +48,7 @@ def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: l
         if isinstance(member, h5py.Group):
             yield from _channels(path, member, inner, around, notes)
         elif isinstance(member, h5py.Dataset) and numeric(member) and member.size is not None and member.size > 64:
-            facts = facts_in(path.name, around | _attributes(member))
+            facts = facts_in(path.name, around | dict(member.attrs))
             yield from columns(inner, _OnDisk(path, member.name, member.shape), notes, **facts)
 
 
@@ -89,12 +79,3 @@ def _scalar(member: Any) -> Any:
     if isinstance(value, np.ndarray) and member.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, value.reshape(-1).tolist()))
     return value
-
-
-def _attributes(member: Any) -> dict[str, Any]:
-    return {str(key): value for key, value in member.attrs.items()}
-
-
-def _every_attribute(file: Any) -> Iterator[str]:
-    for member in file.values():
-        yield from member.attrs

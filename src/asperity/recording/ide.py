@@ -4,9 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, required, sliced
+from asperity.recording.common import refused_as, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -21,31 +19,25 @@ def read(path: Path) -> Contents:
 
     notes: list[str] = []
     channels = []
-    try:
-        with idelib.importFile(str(path)) as data:
-            started = data.lastUtcTime or None
-            for channel in data.channels.values():
-                for sub in channel.subchannels:
-                    events = sub.getSession()
-                    if len(events) < 2:
-                        continue
-                    name = f"{channel.id}.{sub.id} {sub.name}"
-                    channels.append(
-                        Channel(
-                            name=name,
-                            blocks=sliced(_slices(path, channel.id, sub.id), len(events), notes, name),
-                            samples=len(events),
-                            rate_hz=float(events.getSampleRate()),
-                            rate_source="file (mean over the recording)",
-                            unit=str(sub.units[1]) or None,
-                            started=_utc(started),
-                        )
+    with refused_as(path, "no readable IDE recording"), idelib.importFile(str(path)) as data:
+        for channel in data.channels.values():
+            for sub in channel.subchannels:
+                events = sub.getSession()
+                if len(events) < 2:
+                    continue
+                name = f"{channel.id}.{sub.id} {sub.name}"
+                channels.append(
+                    Channel(
+                        name=name,
+                        blocks=sliced(_slices(path, channel.id, sub.id), len(events), notes, name),
+                        samples=len(events),
+                        rate_hz=float(events.getSampleRate()),
+                        rate_source="file (mean over the recording)",
+                        unit=str(sub.units[1]) or None,
+                        started=_utc(data.lastUtcTime),
                     )
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable IDE recording ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="enDAQ ide", channels=required(channels, path.name), notes=notes)
+                )
+    return Contents(format="enDAQ ide", channels=channels, notes=notes)
 
 
 def _slices(path: Path, channel: int, subchannel: int) -> Any:

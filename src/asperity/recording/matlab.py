@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, required
+from asperity.recording.common import columns, facts_in, numeric, refused_as
 from asperity.recording.model import Channel, Contents
 
 _DEEPEST = 8
@@ -30,15 +28,11 @@ def is_matlab(head: bytes) -> bool:
 def read(path: Path) -> Contents:
     """Channels named by variable and field: bearing.gs."""
     notes: list[str] = []
-    try:
+    with refused_as(path, "no readable MATLAB file"):
         held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
         held = {key: value for key, value in held.items() if not key.startswith("__")}
         channels = list(_channels(path.name, held, "", {}, notes))
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable MATLAB file ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="mat v5", channels=required(channels, path.name), notes=notes)
+    return Contents(format="mat v5", channels=channels, notes=notes)
 
 
 def _channels(file: str, held: dict[str, Any], name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:

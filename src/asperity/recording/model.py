@@ -3,7 +3,7 @@
 Formats are left to one module each beside this one; which channel is meant and in what unit to `read`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -55,8 +55,18 @@ class Contents:
     """What a reader found in a file. `notes` grows while channels are read."""
 
     format: str
-    channels: tuple[Channel, ...]
+    channels: Sequence[Channel]
     notes: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """What the caller states about recordings; None leaves it to the files. Meanings as in `read_recording`."""
+
+    rate_hz: float | None = None
+    unit: str | None = None
+    channel: str | None = None
+    scale: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,18 +4,19 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeAlias
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, columns, facts_in, required
+from asperity.recording.common import MOST_CHANNELS, REMEDY, columns, facts_in, refused_as
 from asperity.recording.model import Channel, Contents
 
 _SMALL = 64  # samples: what is shorter describes the others
 _LARGEST_HEADER = 1 << 16
+Header: TypeAlias = tuple[tuple[int, ...], bool, np.dtype[Any]]  # shape, whether in Fortran's order, type
 
 
 def is_npy(head: bytes) -> bool:
@@ -31,7 +32,7 @@ def is_npz(head: bytes) -> bool:
 def read_npy(path: Path) -> Contents:
     """One row, several along the longer axis, or the fields of a structured array."""
     notes: list[str] = []
-    try:
+    with refused_as(path, "no readable .npy file"):
         with path.open("rb") as file:
             shape, fortran, dtype = _header(file)
             offset = file.tell()
@@ -42,15 +43,11 @@ def read_npy(path: Path) -> Contents:
                 raise UnreadableFile(f"{path.name} is cut short; {REMEDY}")
             notes.append(f"cut short: {rows} of {shape[0]} samples are there")
             shape = (rows, *shape[1:])
-        array = _Stored(path=path, dtype=dtype, offset=offset, shape=shape, fortran=fortran)
-    except UnreadableFile:
-        raise
-    except (OSError, ValueError, TypeError, OverflowError, MemoryError, AttributeError, SyntaxError) as error:
-        raise UnreadableFile(f"{path.name} is no readable .npy file ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="npy", channels=required(_of_array(path, array, notes), path.name), notes=notes)
+    array = _Stored(path, dtype, offset, shape, fortran)
+    return Contents(format="npy", channels=list(_of_array(path, array, notes)), notes=notes)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class _Stored:
     """An array in a file, mapped for each slice anew: pages that stay mapped would count as memory."""
 
@@ -79,58 +76,42 @@ def read_npz(path: Path) -> Contents:
     """Each array is a channel or several; scalars named fs, dt, unit ... tell about them."""
     notes: list[str] = []
     around: dict[str, Any] = {}
-    arrays: list[tuple[str, tuple[int, ...], bool, np.dtype[Any]]] = []
-    try:
-        with zipfile.ZipFile(path) as archive:
-            for member in archive.namelist():
-                if not member.endswith(".npy"):
-                    continue
-                with archive.open(member) as file:
-                    shape, fortran, dtype = _header(file)
-                    count = int(np.prod(shape, dtype=object))
-                    name = member.removesuffix(".npy")
-                    if count <= _SMALL and dtype.kind in "iufUSM":
-                        data = file.read(count * dtype.itemsize)
-                        around[name] = np.frombuffer(data, dtype, count).reshape(shape)
-                    elif dtype.kind in "iuf":
-                        arrays.append((member, shape, fortran, dtype))
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable .npz file ({first_line(error)}); {REMEDY}") from error
+    arrays: list[tuple[str, Header]] = []
+    with refused_as(path, "no readable .npz file"), zipfile.ZipFile(path) as archive:
+        for member in archive.namelist():
+            if not member.endswith(".npy"):
+                continue
+            with archive.open(member) as file:
+                shape, fortran, dtype = _header(file)
+                count = int(np.prod(shape, dtype=object))
+                name = member.removesuffix(".npy")
+                if count <= _SMALL and dtype.kind in "iufUSM":
+                    data = file.read(count * dtype.itemsize)
+                    around[name] = np.frombuffer(data, dtype, count).reshape(shape)
+                elif dtype.kind in "iuf":
+                    arrays.append((member, (shape, fortran, dtype)))
     facts = facts_in(path.name, {key: value.item() if value.size == 1 else value for key, value in around.items()})
-    channels: list[Channel] = []
-    for member, shape, fortran, dtype in arrays:
-        channels += _of_member(path, member, shape, fortran, dtype, notes, facts)
-    return Contents(format="npz", channels=required(channels, path.name), notes=notes)
+    channels = [
+        replace(channel, **facts) for member, header in arrays for channel in _of_member(path, member, header, notes)
+    ]
+    return Contents(format="npz", channels=channels, notes=notes)
 
 
-def _of_member(
-    path: Path,
-    member: str,
-    shape: tuple[int, ...],
-    fortran: bool,
-    dtype: np.dtype[Any],
-    notes: list[str],
-    facts: dict[str, Any],
-) -> Iterator[Channel]:
+def _of_member(path: Path, member: str, header: Header, notes: list[str]) -> Iterator[Channel]:
     """A member of the archive, unpacked piece by piece: it cannot be sliced."""
+    shape, fortran, dtype = header
     name = member.removesuffix(".npy")
     long = [n for n in shape if n != 1]
     if len(long) > 2 or not long:
         return
     samples, count = max(long), min(long) if len(long) == 2 else 1
     rows_last = (len(long) == 2) and ((long[0] == samples) == fortran)  # each channel lies in one piece
-    if count > 512:
+    if count > MOST_CHANNELS:
         raise UnreadableFile(f"{path.name} holds {name} of {shape}: no recording; give one row a channel")
     for k in range(count):
         first, stride = (k * samples, 1) if rows_last else (k, count)
-        yield Channel(
-            name=name if count == 1 else f"{name}[{k + 1}]",
-            blocks=_unpacked(path, member, dtype, (first, stride, samples), notes),
-            samples=samples,
-            **facts,
-        )
+        blocks = _unpacked(path, member, dtype, (first, stride, samples), notes)
+        yield Channel(name=name if count == 1 else f"{name}[{k + 1}]", blocks=blocks, samples=samples)
 
 
 def _unpacked(
@@ -164,7 +145,7 @@ def _unpacked(
     return blocks
 
 
-def _header(file: BinaryIO | Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def _header(file: BinaryIO | Any) -> Header:
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, fortran, dtype = read(file, max_header_size=_LARGEST_HEADER)

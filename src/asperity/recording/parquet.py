@@ -9,9 +9,9 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
 from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, facts_in, required
+from asperity.recording.common import REMEDY, facts_in, refused_as
 from asperity.recording.model import Channel, Contents
-from asperity.recording.timing import Clock, is_time
+from asperity.recording.timing import is_time, timed
 from asperity.recording.units import name_and_unit
 
 
@@ -26,42 +26,26 @@ def read(path: Path) -> Contents:
     import pyarrow.parquet
 
     notes: list[str] = []
-    try:
-        with pyarrow.parquet.ParquetFile(path) as file:
-            schema, rows = file.schema_arrow, file.metadata.num_rows
-            table = {str(k): v for k, v in _decoded(schema.metadata).items() if k not in ("pandas", "ARROW:schema")}
-            numbers = [
-                entry
-                for entry in schema
-                if pyarrow.types.is_floating(entry.type) or pyarrow.types.is_integer(entry.type)
-            ]
-            labels = [(entry.name, *name_and_unit(entry.name)) for entry in numbers]
-            clock = next((label for label in labels if is_time(label[1])), None)
-            timed = {} if clock is None else _timed(path, file, clock)
-            facts = [
-                ({"unit": unit} if unit else {})
-                | timed
-                | facts_in(path.name, table | _decoded(schema.field(label).metadata))
-                for label, _, unit in labels
-            ]
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable parquet file ({first_line(error)}); {REMEDY}") from error
-    channels = (
-        Channel(name=name, blocks=_column(path, label, notes), samples=rows, **known)
-        for (label, name, _), known in zip(labels, facts, strict=True)
-        if (label != (clock or ("",))[0]) and not label.startswith("__index")
-    )
-    return Contents(format="parquet", channels=required(channels, path.name), notes=notes)
+    channels = []
+    with refused_as(path, "no readable parquet file"), pyarrow.parquet.ParquetFile(path) as file:
+        schema, rows = file.schema_arrow, file.metadata.num_rows
+        table = {k: v for k, v in _decoded(schema.metadata).items() if k not in ("pandas", "ARROW:schema")}
+        types = pyarrow.types
+        numbers = [entry.name for entry in schema if types.is_floating(entry.type) or types.is_integer(entry.type)]
+        labels = [(label, *name_and_unit(label)) for label in numbers]
+        clock, name, unit = next((label for label in labels if is_time(label[1])), ("", "", None))
+        first = next(file.iter_batches(batch_size=1 << 16, columns=[clock]), None) if clock else None
+        rate = {} if first is None else timed(name, unit, _values(first))
+        for label, name, unit in labels:
+            facts = facts_in(path.name, table | _decoded(schema.field(label).metadata))
+            facts = ({"unit": unit} if unit else {}) | rate | facts
+            if label != clock and not label.startswith("__index"):
+                channels.append(Channel(name=name, blocks=_column(path, label, notes), samples=rows, **facts))
+    return Contents(format="parquet", channels=channels, notes=notes)
 
 
-def _timed(path: Path, file: Any, column: tuple[str, str, str | None]) -> dict[str, Any]:
-    clock = Clock(path.name, column[1], column[2])
-    for batch in file.iter_batches(batch_size=1 << 16, columns=[column[0]]):
-        clock.tick(np.asarray(batch.column(0).to_numpy(zero_copy_only=False), dtype=np.float64))
-        break
-    return clock.facts()
+def _values(batch: Any) -> Field:
+    return np.asarray(batch.column(0).to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
 def _column(path: Path, label: str, notes: list[str]) -> Callable[[int], Iterator[Field]]:
@@ -72,7 +56,7 @@ def _column(path: Path, label: str, notes: list[str]) -> Callable[[int], Iterato
         try:
             with pyarrow.parquet.ParquetFile(path) as file:
                 for batch in file.iter_batches(batch_size=size, columns=[label]):
-                    values = np.asarray(batch.column(0).to_numpy(zero_copy_only=False), dtype=np.float64)
+                    values = _values(batch)
                     done += values.size
                     yield values
         except Exception as error:

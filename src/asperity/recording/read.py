@@ -5,7 +5,7 @@ Nothing is guessed: what neither the file, nor a sidecar beside it, nor the call
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from asperity.recording.model import (
     Contents,
     Fact,
     OpenRecording,
+    ReadOptions,
     Recording,
 )
 from asperity.recording.sidecar import stated_beside
@@ -82,33 +83,21 @@ def read_recording(
     return open_recording(path, rate_hz=rate_hz, unit=unit, channel=channel, scale=scale).read()
 
 
-def open_recording(
-    path: str | Path,
-    *,
-    rate_hz: float | None = None,
-    unit: str | None = None,
-    channel: str | None = None,
-    scale: float | None = None,
-) -> OpenRecording:
+def open_recording(path: str | Path, **stated: Any) -> OpenRecording:
     """Open one channel of a recording, its samples still in the file; otherwise as `read_recording`."""
-    path = Path(path)
     with quietly():
-        contents = read_contents(path)
-        return _chosen(path, contents, rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
+        return _chosen(Path(path), read_contents(Path(path)), ReadOptions(**stated))
 
 
-def open_channels(path: str | Path, **given: Any) -> list[OpenRecording]:
+def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
     """Every channel of a recording, opened as by `open_recording`; only the one named, where one is."""
-    path = Path(path)
+    path, options = Path(path), ReadOptions(**stated)
     with quietly():
         contents = read_contents(path)
-        stated, _ = stated_beside(path)
-        if given.get("channel") is not None or "channel" in stated or len(contents.channels) == 1:
-            return [_chosen(path, contents, **given)]
-        every = [_chosen(path, contents, **given | {"channel": opened.name}) for opened in contents.channels]
-        return [
-            replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")}) for opened in every
-        ]
+        if options.channel is not None or "channel" in stated_beside(path)[0] or len(contents.channels) == 1:
+            return [_chosen(path, contents, options)]
+        every = [_chosen(path, contents, replace(options, channel=channel.name)) for channel in contents.channels]
+    return [replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")}) for opened in every]
 
 
 def read_contents(path: Path) -> Contents:
@@ -142,8 +131,8 @@ def read_contents(path: Path) -> Contents:
             )
     reader, library = (text.read, None) if chosen is None else (chosen.read, chosen.library)
     try:
-        return reader(path)
-    except (UnreadableFile, BadInput):
+        contents = reader(path)
+    except BadInput:
         raise
     except ImportError:
         raise UnreadableFile(f"{path.name} needs {library} to be read; pip install 'asperity[recordings]'") from None
@@ -151,41 +140,38 @@ def read_contents(path: Path) -> Contents:
         raise UnreadableFile(f"{path.name} claims more data than fits into memory; {REMEDY}") from None
     except Exception as error:
         raise UnreadableFile(f"{path.name} is damaged ({first_line(error)}); {REMEDY}") from error
+    if not contents.channels:
+        raise UnreadableFile(f"{path.name} holds no row of samples; give a file with a recording in it")
+    return contents
 
 
-def _chosen(
-    path: Path,
-    contents: Contents,
-    *,
-    rate_hz: float | None = None,
-    unit: str | None = None,
-    channel: str | None = None,
-    scale: float | None = None,
-) -> OpenRecording:
-    stated, sidecar = stated_beside(path)
-    requested, stated_by = (channel, "command line") if channel is not None else (stated.get("channel"), sidecar)
-    selected = _channel(path, contents, requested)
-    facts = {
-        "format": Fact(contents.format, "file"),
-        "channel": Fact(selected.name, stated_by if requested is not None else "file (its only one)"),
-    }
+def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecording:
+    beside, sidecar = stated_beside(path)
+    stated = {key: Fact(value, sidecar) for key, value in beside.items()}
+    given = {key: value for key, value in asdict(options).items() if value is not None}
+    stated |= {key: Fact(value, "command line") for key, value in given.items()}
+    selected = _channel(path, contents, stated["channel"].value if "channel" in stated else None)
+    source = stated["channel"].source if "channel" in stated else "file (its only one)"
+    facts = {"format": Fact(contents.format, "file"), "channel": Fact(selected.name, source)}
     notes: list[str] = []
-    facts["rate"] = _rate(path, selected, rate_hz, (stated.get("rate_hz"), sidecar))
-    factor = scale if scale is not None else stated.get("scale")
-    if factor is not None:
-        facts["scale"] = Fact(float(factor), "command line" if scale is not None else sidecar)
-    facts["unit"] = _unit(path, selected, unit, (stated.get("unit"), sidecar), scaled=factor is not None)
+    facts["rate"] = _rate(path, selected, stated.get("rate_hz"))
+    total = 1.0
+    if "scale" in stated:
+        total = float(stated["scale"].value)
+        facts["scale"] = Fact(total, stated["scale"].source)
+    facts["unit"] = _unit(path, selected, stated.get("unit"), scaled="scale" in stated)
     unit_text = str(facts["unit"].value)
-    total = 1.0 if factor is None else float(factor)
     metres = None if _is_force(selected.name, unit_text) else acceleration_scale(unit_text)
     if metres is not None:
         total, unit_text = total * metres, ACCELERATION
     elif unit_text == "g":
         unit_text = "gram-force"
         notes.append(f"g is taken as grams of force, because the channel is called {selected.name}")
-    began = _start(path, selected, (stated.get("started"), sidecar))
-    if began is not None:
-        facts["started"] = began
+    named = parse_time(path.name) or parse_time(path.stem)
+    if "started" in stated:
+        facts["started"] = stated["started"]
+    elif selected.started is not None or named is not None:
+        facts["started"] = Fact(selected.started or named, "file" if selected.started is not None else "file name")
     return OpenRecording(
         path=path,
         channel=selected,
@@ -236,45 +222,42 @@ def _listed(names: list[str]) -> str:
     return listed if len(names) <= 8 else f"{listed} and {len(names) - 8} more"
 
 
-def _rate(path: Path, channel: Channel, given: float | None, sidecar: tuple[float | None, str]) -> Fact:
-    if given is not None:
-        require_positive("sampling rate", given, "Hz")
-    others = [(given, "command line"), sidecar]
-    rate, source = next(((value, name) for value, name in others if value is not None), (None, ""))
+def _rate(path: Path, channel: Channel, stated: Fact | None) -> Fact:
+    rate = None if stated is None else require_positive("sampling rate", float(stated.value), "Hz")
     if channel.rate_hz is not None:
-        if rate is not None and abs(rate / channel.rate_hz - 1.0) > _SAME:
+        if stated is not None and rate is not None and abs(rate / channel.rate_hz - 1.0) > _SAME:
             raise BadInput(
                 f"{path.name} states {channel.rate_hz:g} Hz in its "
-                f"{channel.rate_source.removeprefix('file ').strip('()')}, the {source} says {rate:g} Hz; "
+                f"{channel.rate_source.removeprefix('file ').strip('()')}, the {stated.source} says {rate:g} Hz; "
                 "leave out the wrong one"
             )
         return Fact(float(channel.rate_hz), channel.rate_source)
-    if rate is None:
+    if stated is None:
         raise BadInput(
             f"{path.name} states no sampling rate{channel.rate_hint}; give rate_hz, "
             f"or state it as rate_hz in {path.name}.toml beside it"
         )
-    return Fact(float(rate), source)
+    return Fact(rate, stated.source)
 
 
-def _unit(path: Path, channel: Channel, given: str | None, sidecar: tuple[str | None, str], *, scaled: bool) -> Fact:
-    others = [(given, "command line"), sidecar]
-    unit, source = next(((value, name) for value, name in others if value is not None), (None, ""))
-    if channel.full_scale:
-        if unit is not None and not scaled:
-            raise BadInput(
-                f"{path.name} holds shares of full scale, so a unit needs its scale; "
-                f"give scale, the {unit} at full scale"
-            )
-        return Fact(unit or FULL_SCALE, source or "file (integer samples)")
-    if channel.unit is not None and unit is not None and not scaled and not _same_unit(channel.unit, unit):
+def _unit(path: Path, channel: Channel, stated: Fact | None, *, scaled: bool) -> Fact:
+    if stated is None:
+        if channel.full_scale:
+            return Fact(FULL_SCALE, "file (integer samples)")
+        return Fact(UNKNOWN, "nobody") if channel.unit is None else Fact(channel.unit, "file")
+    if channel.full_scale and not scaled:
         raise BadInput(
-            f"{path.name} states its unit as {channel.unit}, the {source} says {unit}; "
+            f"{path.name} holds shares of full scale, so a unit needs its scale; "
+            f"give scale, the {stated.value} at full scale"
+        )
+    if channel.full_scale or channel.unit is None or scaled:
+        return stated
+    if not _same_unit(channel.unit, stated.value):
+        raise BadInput(
+            f"{path.name} states its unit as {channel.unit}, the {stated.source} says {stated.value}; "
             "leave it out, or give its scale too"
         )
-    if unit is not None:
-        return Fact(unit, source if channel.unit is None or scaled else "file")
-    return Fact(UNKNOWN, "nobody") if channel.unit is None else Fact(channel.unit, "file")
+    return Fact(stated.value, "file")
 
 
 def _same_unit(unit: str, other: str) -> bool:
@@ -286,12 +269,3 @@ def _is_force(name: str, unit: str) -> bool:
     """Friction testers write forces in g: not an acceleration where the channel is called a force."""
     last = name.split("/")[-1].split(".")[-1]
     return unit == "g" and re.fullmatch(r"(?i)F[xyznfrt]?|.*(force|load|kraft).*", last) is not None
-
-
-def _start(path: Path, channel: Channel, sidecar: tuple[Any, str]) -> Fact | None:
-    if sidecar[0] is not None:
-        return Fact(*sidecar)
-    if channel.started is not None:
-        return Fact(channel.started, "file")
-    named = parse_time(path.name) or parse_time(path.stem)
-    return None if named is None else Fact(named, "file name")

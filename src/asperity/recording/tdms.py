@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, Reader, facts_in, required, sliced
+from asperity.recording.common import Reader, facts_in, numeric, refused_as, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -20,32 +18,18 @@ def read(path: Path) -> Contents:
 
     notes: list[str] = []
     channels = []
-    try:
-        with nptdms.TdmsFile.open(path) as opened:
-            if opened.file_status.incomplete_final_segment:
-                notes.append("cut short: its last segment is not complete")
-            for group in opened.groups():
-                for channel in group.channels():
-                    if (
-                        channel.data_type is None
-                        or len(channel) == 0
-                        or getattr(channel.dtype, "kind", "") not in "iuf"
-                    ):
-                        continue
-                    properties = dict(opened.properties) | dict(group.properties) | dict(channel.properties)
-                    name = f"{group.name}/{channel.name}"
-                    reader = _slices(path, group.name, channel.name)
-                    facts = facts_in(path.name, properties)
-                    channels.append(
-                        Channel(
-                            name=name, blocks=sliced(reader, len(channel), notes, name), samples=len(channel), **facts
-                        )
-                    )
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable TDMS file ({first_line(error)}); {REMEDY}") from error
-    return Contents(format="tdms", channels=required(channels, path.name), notes=notes)
+    with refused_as(path, "no readable TDMS file"), nptdms.TdmsFile.open(path) as opened:
+        if opened.file_status.incomplete_final_segment:
+            notes.append("cut short: its last segment is not complete")
+        for group in opened.groups():
+            for channel in group.channels():
+                if channel.data_type is None or len(channel) == 0 or not numeric(channel):
+                    continue
+                facts = facts_in(path.name, {**opened.properties, **group.properties, **channel.properties})
+                name, samples = f"{group.name}/{channel.name}", len(channel)
+                blocks = sliced(_slices(path, group.name, channel.name), samples, notes, name)
+                channels.append(Channel(name=name, blocks=blocks, samples=samples, **facts))
+    return Contents(format="tdms", channels=channels, notes=notes)
 
 
 def _slices(path: Path, group: str, channel: str) -> Reader:

@@ -17,9 +17,9 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.dialect import MISSING, Dialect, sniff_dialect
 from asperity.errors import UnreadableFile
-from asperity.recording.common import MOST_CHANNELS, facts_in, parse_time, required
+from asperity.recording.common import MOST_CHANNELS, facts_in, parse_time
 from asperity.recording.model import Channel, Contents
-from asperity.recording.timing import Clock, from_stamps, is_time
+from asperity.recording.timing import is_time, timed
 from asperity.recording.units import known_unit, name_and_unit
 
 SUFFIXES = {"", "txt", "csv", "tsv", "asc", "dat", "lvm", "prn"}
@@ -85,7 +85,7 @@ def read(path: Path) -> Contents:
         prefix = f"{number}/" if len(tables) > 1 else ""
         channels += _channels(path, table, prefix, notes, open_bytes if large else None)
     blocks = f", {len(tables)} blocks" if len(tables) > 1 else ""
-    return Contents(format=f"text{blocks}", channels=required(channels, path.name), notes=notes)
+    return Contents(format=f"text{blocks}", channels=channels, notes=notes)
 
 
 def _opener(path: Path) -> Callable[[], BinaryIO]:
@@ -321,13 +321,13 @@ def _channels(
     spread: Callable[[Field], Field] = _as_they_are
     if clock_at is not None:
         name, unit = table.names[clock_at], table.units[clock_at]
-        times = from_stamps(table.stamps) if table.stamped and table.stamps else rows[:, clock_at]
-        watch = Clock(path.name, name, "s" if table.stamped else unit)
-        watch.tick(times)
-        clock = watch.facts()
+        times = rows[:, clock_at]
+        if table.stamps:
+            times = np.array([(stamp - table.stamps[0]).total_seconds() for stamp in table.stamps])
+        clock = timed(name, "s" if table.stamped else unit, times)
         if open_bytes is None and "rate_hz" in clock and times.size == rows.shape[0]:
             spread = _onto_grid(times, prefix, notes)
-        if table.stamped and table.stamps:
+        if table.stamps:
             clock.setdefault("started", table.stamps[0])
     if table.odd:
         notes.append(f"{prefix}{table.odd} rows hold text instead of numbers; they count as missing")

@@ -1,6 +1,5 @@
 """A column of times: what rate it states, and where samples are missing."""
 
-from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -19,44 +18,27 @@ def is_time(name: str) -> bool:
     return name.strip().lower() in TIME_NAMES
 
 
-class Clock:
-    """The times of a table, or the first of them."""
-
-    def __init__(self, file: str, column: str, unit: str | None) -> None:
-        self.file, self.column, self.unit = file, column, unit
-        self.times = np.empty(0)
-
-    def tick(self, times: Field) -> None:
-        """Take in times."""
-        self.times = np.concatenate([self.times, times[np.isfinite(times)]])
-
-    def facts(self) -> dict[str, Any]:
-        """Rate and its source as a channel takes them; a hint where the column names no unit of time."""
-        if self.times.size < 3:
-            return {}
-        steps = np.diff(self.times)
-        step = float(np.median(steps))
-        if not np.isfinite(step) or step <= 0.0:
-            return {"rate_hint": f" (its column {self.column!r} does not rise)"}
-        rounding = 1e-4
-        if np.max(np.abs(steps - step)) < 0.5 * step:  # no gap: the whole column tells the mean step
-            number = np.arange(self.times.size)
-            slope, start = np.polyfit(number, self.times, 1)
-            stray = float(np.max(np.abs(self.times - (start + slope * number))))
-            if stray < _EVEN * step:
-                step = float(slope)
-                rounding = 2.0 * stray / (step * self.times.size) + 1e-12
-        scale = 1.0 if self.unit is None and self.column == "seconds" else time_scale(self.unit or "")
-        if scale is None:
-            if self.unit is None:
-                hint = f" (its column {self.column!r} names no unit; were it seconds, {1.0 / step:.6g} Hz)"
-            else:
-                hint = f" (its column {self.column!r} is in {self.unit!r}, which is no unit of time)"
-            return {"rate_hint": hint}
-        rate = 1.0 / (step * scale)
-        return {"rate_hz": whole_rate(rate, rounding), "rate_source": f"file (column {self.column!r})"}
-
-
-def from_stamps(stamps: list[datetime]) -> Field:
-    """Seconds since the first of several time stamps."""
-    return np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])
+def timed(column: str, unit: str | None, times: Field) -> dict[str, Any]:
+    """Rate and its source as a channel takes them, of a column of times; a hint where it names no unit of time."""
+    times = times[np.isfinite(times)]
+    if times.size < 3:
+        return {}
+    steps = np.diff(times)
+    step = float(np.median(steps))
+    if not np.isfinite(step) or step <= 0.0:
+        return {"rate_hint": f" (its column {column!r} does not rise)"}
+    rounding = 1e-4
+    if np.max(np.abs(steps - step)) < 0.5 * step:  # no gap: the whole column tells the mean step
+        number = np.arange(times.size)
+        slope, start = np.polyfit(number, times, 1)
+        stray = float(np.max(np.abs(times - (start + slope * number))))
+        if stray < _EVEN * step:
+            step = float(slope)
+            rounding = 2.0 * stray / (step * times.size) + 1e-12
+    scale = 1.0 if unit is None and column == "seconds" else time_scale(unit or "")
+    if scale is not None:
+        rate = whole_rate(1.0 / (step * scale), rounding)
+        return {"rate_hz": rate, "rate_source": f"file (column {column!r})"}
+    if unit is None:
+        return {"rate_hint": f" (its column {column!r} names no unit; were it seconds, {1.0 / step:.6g} Hz)"}
+    return {"rate_hint": f" (its column {column!r} is in {unit!r}, which is no unit of time)"}

@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, parse_time, required, sliced, whole_rate
+from asperity.recording.common import parse_time, refused_as, sliced, whole_rate
 from asperity.recording.model import Channel, Contents
 
 TIME_RESPONSE = 1
@@ -30,24 +29,20 @@ def read(path: Path) -> Contents:
     import pyuff
 
     notes: list[str] = []
-    try:
+    with refused_as(path, "no readable universal file"):
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable universal file ({first_line(error)}); {REMEDY}") from error
     if not sets:
         raise UnreadableFile(f"{path.name} holds data sets {sorted(set(kinds))} and no 58; export the time record")
     channels: list[Channel] = []
     others: list[str] = []
-    for record in sets:
-        try:
+    with refused_as(path, "a damaged universal file"):
+        for record in sets:
             if int(record["func_type"]) != TIME_RESPONSE:
                 others.append(_FUNCTIONS.get(int(record["func_type"]), f"function type {record['func_type']}"))
             else:
                 channels.append(_channel(path, record, notes, taken=[channel.name for channel in channels]))
-        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-            raise UnreadableFile(f"{path.name} is a damaged universal file ({first_line(error)}); {REMEDY}") from error
     if not channels:
         raise UnreadableFile(
             f"{path.name} holds {' and '.join(dict.fromkeys(others))}, not a time record; "
@@ -55,7 +50,7 @@ def read(path: Path) -> Contents:
         )
     if others:
         notes.append(f"left out {' and '.join(dict.fromkeys(others))}: no time record")
-    return Contents(format="uff 58", channels=required(channels, path.name), notes=notes)
+    return Contents(format="uff 58", channels=channels, notes=notes)
 
 
 def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[str]) -> Channel:

@@ -1,15 +1,14 @@
 """WAV and its kin, by soundfile (libsndfile)."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, required
+from asperity.recording.common import REMEDY, refused_as
 from asperity.recording.model import Channel, Contents
 
 
@@ -23,43 +22,31 @@ def read(path: Path) -> Contents:
     import soundfile
 
     notes: list[str] = []
-    try:
-        with soundfile.SoundFile(path) as opened:
-            rate, count, frames, kind = opened.samplerate, opened.channels, opened.frames, opened.subtype
-    except (soundfile.SoundFileError, RuntimeError, TypeError) as error:
-        raise UnreadableFile(f"{path.name} is no readable sound file ({first_line(error)}); {REMEDY}") from error
+    with refused_as(path, "no readable sound file"), soundfile.SoundFile(path) as opened:
+        rate, count, frames, kind = opened.samplerate, opened.channels, opened.frames, opened.subtype
     if rate <= 0 or not 0 < count <= 64:
         raise UnreadableFile(f"{path.name} states {rate} Hz and {count} channels, which cannot be; {REMEDY}")
     whole = _stated_frames(path)
     if whole is not None and frames < whole:
         notes.append(f"cut short: {frames} of {whole} samples are there")
-    integer = kind not in ("FLOAT", "DOUBLE")
 
-    def blocks(number: int) -> Any:
-        def read_blocks(size: int) -> Iterator[Field]:
-            with soundfile.SoundFile(path) as sound:
-                while True:
-                    block = sound.read(size, dtype="float64", always_2d=True)
-                    if block.shape[0] == 0:
-                        return
-                    yield np.ascontiguousarray(block[:, number])
+    def blocks(number: int, size: int) -> Iterator[Field]:
+        with soundfile.SoundFile(path) as sound:
+            while (block := sound.read(size, dtype="float64", always_2d=True)).size:
+                yield np.ascontiguousarray(block[:, number])
 
-        return read_blocks
-
-    channels = (
+    channels = [
         Channel(
             name=str(number + 1),
-            blocks=blocks(number),
+            blocks=partial(blocks, number),
             samples=frames,
             rate_hz=float(rate),
             rate_source="file (header)",
-            full_scale=integer,
+            full_scale=kind not in ("FLOAT", "DOUBLE"),
         )
         for number in range(count)
-    )
-    return Contents(
-        format=f"wav, {kind.lower().replace('_', ' ')}", channels=required(channels, path.name), notes=notes
-    )
+    ]
+    return Contents(format=f"wav, {kind.lower().replace('_', ' ')}", channels=channels, notes=notes)
 
 
 def _stated_frames(path: Path) -> int | None:

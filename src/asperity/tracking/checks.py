@@ -21,6 +21,7 @@ class CheckedRecording(NamedTuple):
     def scalars(self) -> dict[str, Any]:
         """Its line of `asperity check --json`."""
         recording, quality = self
+        numbers = ("samples", "duration_s", "rms", "peak", "offset", "missing", "gaps", "clipped", "stuck")
         return {
             "file": str(recording.path),
             "channel": recording.channel.name,
@@ -28,15 +29,7 @@ class CheckedRecording(NamedTuple):
             "off": quality.off,
             "rate_hz": recording.rate_hz,
             "unit": recording.unit,
-            "samples": quality.samples,
-            "duration_s": quality.duration_s,
-            "rms": quality.rms,
-            "peak": quality.peak,
-            "offset": quality.offset,
-            "missing": quality.missing,
-            "gaps": quality.gaps,
-            "clipped": quality.clipped,
-            "stuck": quality.stuck,
+            **{name: getattr(quality, name) for name in numbers},
             "crfa_comparable": recording.comparable,
             "facts": {
                 name: {"value": str(fact.value), "source": fact.source} for name, fact in recording.facts.items()
@@ -108,11 +101,9 @@ def check_recordings(
     refused: list[tuple[Path, str]] = []
     for path in [*(recordings_in(there) if there else []), *absent]:
         try:
-            channels = open_channels(path, rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
-            checked += [
-                CheckedRecording(opened, check_recording(opened, width_hz=target.width_hz, band_hz=target.band_hz))
-                for opened in channels
-            ]
+            for opened in open_channels(path, rate_hz=rate_hz, unit=unit, channel=channel, scale=scale):
+                quality = check_recording(opened, width_hz=target.width_hz, band_hz=target.band_hz)
+                checked.append(CheckedRecording(opened, quality))
         except BadInput as error:
             refused.append((path, str(error)))
     return RecordingChecks(checked=tuple(checked), refused=tuple(refused), target=target)

@@ -1,6 +1,7 @@
 """Which files are recordings, in what order, and the table that says where each belongs."""
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -111,25 +112,26 @@ def read_table(path: str | Path) -> Table:
         if not name:
             continue
 
-        def value(column: str, row: dict[str, str] = row, number: int = number) -> float | None:
-            text = (row.get(column) or "").strip()
-            if not text:
-                return None
-            try:
-                number_read = float(text.replace(",", ".") if delimiter == ";" else text)
-            except ValueError:
-                number_read = float("nan")
-            if not abs(number_read) < float("inf"):
-                raise BadInput(f"{path}, line {number}: {column} must be a number, got {text!r}")
-            return number_read
-
-        x = value(x_name)
+        x, x_std, load_n, speed_hz = (
+            _number((row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}")
+            for column in (x_name, f"{x_name}_std", *_KNOWN)
+        )
         if x is None:
             raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
-        places[Path(name).name] = Place(
-            x=x, x_std=value(f"{x_name}_std"), load_n=value("load_n"), speed_hz=value("speed_hz")
-        )
+        places[Path(name).name] = Place(x=x, x_std=x_std, load_n=load_n, speed_hz=speed_hz)
     return Table(name=path.name, x_name=x_name, places=places)
+
+
+def _number(text: str, delimiter: str, where: str) -> float | None:
+    if not text:
+        return None
+    try:
+        number = float(text.replace(",", ".") if delimiter == ";" else text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise BadInput(f"{where} must be a number, got {text!r}")
+    return number
 
 
 def _heading(path: Path) -> list[str]:

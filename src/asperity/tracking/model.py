@@ -131,9 +131,7 @@ class Track:
             "stages": {
                 "kind": None if stages is None else stages.kind,
                 "split": None if stages is None else finite_or_none(stages.split),
-                "interval": list(stages.interval)
-                if stages is not None and np.isfinite(stages.interval).all()
-                else None,
+                "interval": list(stages.interval) if stages is not None and stages.found else None,
                 "probability": [finite_or_none(recording.severe_probability) for recording in self.recordings],
                 "labels": [recording.label for recording in self.recordings],
                 "evidence": {} if stages is None else {k: finite_or_none(v) for k, v in stages.evidence.items()},
@@ -195,8 +193,7 @@ class Track:
             "density": (("recording", "frequency"), density, spectral),
             "kept": (("recording", "frequency"), kept, {"long_name": "line of the spectrum counts", **flags}),
         }
-        axis = {"long_name": "frequency", "units": "Hz"}
-        return variables, {"frequency": ("frequency", first.frequency_hz, axis)}
+        return variables, {"frequency": ("frequency", first.frequency_hz, {"long_name": "frequency", "units": "Hz"})}
 
     def save(self, path: str | Path) -> Path:
         """Write the series whole or not at all: .csv or .parquet the table, .nc the spectra too.
@@ -214,8 +211,11 @@ class Track:
             if suffix == ".csv":
                 self.table.to_csv(part, index=False, lineterminator="\n")
             elif suffix == ".parquet":
-                _require_pyarrow(path)
-                self.table.to_parquet(part, index=False)
+                try:
+                    self.table.to_parquet(part, index=False)
+                except ImportError:
+                    remedy = "pip install 'asperity[recordings]', or write a .csv"
+                    raise BadInput(f"{path.name} needs pyarrow; {remedy}") from None
             else:
                 packed = {"zlib": True, "complevel": 1, "shuffle": True}
                 dataset = self.to_dataset()
@@ -227,10 +227,3 @@ class Track:
 def _without_numbers(reason: str) -> str:
     """A reason without its numbers, so that equal ones can be counted."""
     return re.sub(r"[-+]?\d[\d.]*", "#", reason)
-
-
-def _require_pyarrow(path: Path) -> None:
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        raise BadInput(f"{path.name} needs pyarrow; pip install 'asperity[recordings]', or write a .csv") from None

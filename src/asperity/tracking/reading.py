@@ -6,7 +6,7 @@ What the spectra mean together is left to `track`.
 import json
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from multiprocessing import get_context
 from pathlib import Path
@@ -18,7 +18,7 @@ import scipy
 
 from asperity.errors import BadInput, UnreadableFile
 from asperity.processes import leave_interrupts_to_the_parent
-from asperity.recording import Gauge, Quality, open_recording
+from asperity.recording import Gauge, Quality, ReadOptions, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
 from asperity.tracking.target import Target
 
@@ -30,16 +30,6 @@ WORTH_A_POOL = 32 << 20  # bytes in all; starting processes takes a second
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReadOptions:
-    """What the caller states about all recordings alike; None leaves it to the files."""
-
-    rate_hz: float | None = None
-    unit: str | None = None
-    channel: str | None = None
-    scale: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
     """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
@@ -47,13 +37,13 @@ class Reading:
     """
 
     file: str
-    spectrum: Spectrum | None
-    quality: Quality | None
-    rate_hz: float
-    unit: str
-    facts: dict[str, tuple[str, str]]
-    started: str
-    reason: str
+    spectrum: Spectrum | None = None
+    quality: Quality | None = None
+    rate_hz: float = np.nan
+    unit: str = ""
+    facts: dict[str, tuple[str, str]] = field(default_factory=dict)
+    started: str = ""
+    reason: str = ""
 
     @property
     def usable(self) -> bool:
@@ -68,15 +58,12 @@ class Reading:
 
 def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: float) -> Reading:
     """Read a file once: its facts, its quality, its averaged spectrum. What is wrong with it becomes the reason."""
-    nothing = Reading(
-        file=str(path), spectrum=None, quality=None, rate_hz=np.nan, unit="", facts={}, started="", reason=""
-    )
     try:
         opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
-        return replace(nothing, reason=str(refusal))
-    known = replace(
-        nothing,
+        return Reading(file=str(path), reason=str(refusal))
+    known = Reading(
+        file=str(path),
         rate_hz=opened.rate_hz,
         unit=opened.unit,
         facts={name: (_text(fact.value), fact.source) for name, fact in opened.facts.items()},
@@ -166,10 +153,8 @@ def save_reading(reading: Reading, path: Path) -> None:
     density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
     content: dict[str, Any] = asdict(replace(reading, spectrum=None))
     if reading.spectrum is not None:
-        content["spectrum"] = {
-            name: getattr(reading.spectrum, name)
-            for name in ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
-        }
+        kept = ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
+        content["spectrum"] = {name: getattr(reading.spectrum, name) for name in kept}
     with path.open("wb") as file:
         np.savez(file, density=density, told=json.dumps(content))
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from asperity.case import Case
-from asperity.coupling import BAND_MARGIN, VibrationModel, search_band
+from asperity.coupling import BAND_MARGIN, search_band
 from asperity.errors import BadInput, require_positive
 from asperity.paper import papers_case
 
@@ -38,19 +38,18 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
         low, high = (require_positive("band", end, "Hz") for end in band_hz)
         if not low < high:
             raise BadInput(f"band must go from low to high, got {low:g} to {high:g} Hz; swap them")
-    if case is None and band_hz is not None:
         source = f"{low:.0f} to {high:.0f} Hz, as given"
-        return Target(band_hz=(low, high), width_hz=2.0 * USUAL_DAMPING * low, full_load_crf_hz=None, source=source)
-    contact = case if case is not None else papers_case()
+        if case is None:
+            return Target(band_hz=(low, high), width_hz=2.0 * USUAL_DAMPING * low, full_load_crf_hz=None, source=source)
+    contact = case or papers_case()
     if contact.vibration is None:
         raise BadInput(
             f"{contact.source}: vibration is left out; add [vibration] with mass and damping_ratio, or a band"
         )
-    model: VibrationModel = contact.vibration
-    searched = search_band(contact.conditions, model)
+    searched = search_band(contact.conditions, contact.vibration)
     full_load = None if case is None else searched[1] / (1.0 + BAND_MARGIN)
     if band_hz is not None:
-        searched, source = (low, high), f"{low:.0f} to {high:.0f} Hz, as given"
+        searched = (low, high)
     elif case is not None:
         source = f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}"
     else:
@@ -60,7 +59,7 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
         )
     return Target(
         band_hz=searched,
-        width_hz=2.0 * model.damping_ratio * searched[0],
+        width_hz=2.0 * contact.vibration.damping_ratio * searched[0],
         full_load_crf_hz=full_load,
         source=source,
         assumed=case is None and band_hz is None,

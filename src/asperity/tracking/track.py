@@ -14,11 +14,11 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import BadInput
-from asperity.recording import ACCELERATION
+from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
 from asperity.tracking.files import Place, Table, read_table, recordings_in
 from asperity.tracking.model import Track, TrackedRecording
-from asperity.tracking.reading import WINDOW, Reading, ReadOptions, common_spacing, read_spectra
+from asperity.tracking.reading import WINDOW, Reading, common_spacing, read_spectra
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
     FEWEST_RECORDINGS,
@@ -127,7 +127,7 @@ def judge(
         notes.append(f"{len(spectra)} recordings were separated in {groups} groups, each spread over the whole series.")
     resonances = _resonances(cleaned, target, chosen, groups)
     if method is None and chosen == ALONE:
-        resonances = [_not_the_contacts(resonance) for resonance in resonances]
+        resonances = [_not_the_contacts(line) if line.found else line for line in resonances]
     used = dict(zip(spectra, zip(cleaned, resonances, strict=True), strict=True))
     tracked = []
     for number, reading in enumerate(series):
@@ -198,22 +198,22 @@ def _staged(
         stages=stages,
         alarm=alarm,
         comparable=comparable,
-        problems=comparability([_facts(recording) for recording in used]),
+        problems=comparability(
+            [
+                RecordingFacts(
+                    name=Path(recording.file).name,
+                    rate_hz=recording.reading.rate_hz,
+                    segment=_spectrum(recording.reading).segment,
+                    window=WINDOW,
+                    unit=recording.reading.unit,
+                    duration_s=_spectrum(recording.reading).duration_s,
+                    speed_hz=recording.speed_hz,
+                    load_n=recording.load_n,
+                )
+                for recording in used
+            ]
+        ),
         notes=(*notes, *_copies(tracked)),
-    )
-
-
-def _facts(recording: TrackedRecording) -> RecordingFacts:
-    spectrum = _spectrum(recording.reading)
-    return RecordingFacts(
-        name=Path(recording.file).name,
-        rate_hz=recording.reading.rate_hz,
-        segment=spectrum.segment,
-        window=WINDOW,
-        unit=recording.reading.unit,
-        duration_s=spectrum.duration_s,
-        speed_hz=recording.speed_hz,
-        load_n=recording.load_n,
     )
 
 
@@ -264,11 +264,11 @@ def _without_silence(series: list[Reading]) -> list[Reading]:
     for reading in series:
         if reading.usable and reading.quality is not None:
             by_unit.setdefault(reading.unit, []).append(reading.quality.rms)
+    usual = {unit: float(np.median(levels)) for unit, levels in by_unit.items()}
     judged = []
     for reading in series:
-        usual = float(np.median(by_unit[reading.unit])) if reading.usable else 0.0
-        if reading.usable and reading.quality is not None and reading.quality.rms < QUIET_SHARE * usual:
-            share = 100.0 * reading.quality.rms / usual
+        if reading.usable and reading.quality is not None and reading.quality.rms < QUIET_SHARE * usual[reading.unit]:
+            share = 100.0 * reading.quality.rms / usual[reading.unit]
             reason = f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of the series' median"
             reading = replace(reading, reason=reason)
         judged.append(reading)
@@ -277,29 +277,27 @@ def _without_silence(series: list[Reading]) -> list[Reading]:
 
 def _on_one_grid(series: list[Reading]) -> tuple[list[Reading], list[str]]:
     """All usable spectra on the frequencies that most of them have; the others are left out, with the reason."""
-    grids = [(_spectrum(reading).segment, round(reading.rate_hz)) for reading in series if reading.usable]
-    if not grids:
+    spectra = {number: _spectrum(reading) for number, reading in enumerate(series) if reading.usable}
+    if not spectra:
         return series, []
+    grids = [(spectrum.segment, round(series[number].rate_hz)) for number, spectrum in spectra.items()]
     (common, _), *_ = Counter(grids).most_common(1)
-    first = [_spectrum(reading) for reading in series if reading.usable][grids.index(common)]
-    aligned: list[Reading] = []
+    first = [*spectra.values()][grids.index(common)]
+    aligned = list(series)
     left_out = 0
-    for reading in series:
-        if not reading.usable:
-            aligned.append(reading)
-            continue
-        spectrum = _spectrum(reading)
+    for number, spectrum in spectra.items():
         same = spectrum.frequency_hz.shape == first.frequency_hz.shape
         apart = abs(spectrum.frequency_hz[-1] - first.frequency_hz[-1]) if same else np.inf
         if apart <= SAME_LINES * first.spacing_hz:
-            aligned.append(replace(reading, spectrum=replace(spectrum, frequency_hz=first.frequency_hz)))
+            on_it = replace(spectrum, frequency_hz=first.frequency_hz)
+            aligned[number] = replace(aligned[number], spectrum=on_it)
         else:
-            reason = f"sampled at {reading.rate_hz:g} Hz where the series has {common[1]:g} Hz; track it apart"
-            aligned.append(replace(reading, reason=reason))
+            rate = aligned[number].rate_hz
+            reason = f"sampled at {rate:g} Hz where the series has {common[1]:g} Hz; track it apart"
+            aligned[number] = replace(aligned[number], reason=reason)
             left_out += 1
-    if not left_out:
-        return aligned, []
-    return aligned, [f"{left_out} of {len(series)} recordings have another sampling rate and were left out."]
+    notes = [f"{left_out} of {len(series)} recordings have another sampling rate and were left out."]
+    return aligned, notes if left_out else []
 
 
 def _spectrum(reading: Reading) -> Spectrum:
@@ -309,28 +307,23 @@ def _spectrum(reading: Reading) -> Spectrum:
 
 def _resonances(cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod, groups: int) -> list[Resonance]:
     """One a spectrum; each group takes every so-manieth spectrum, so that all see the whole series."""
-    resonances: list[Resonance | None] = [None] * len(cleaned)
+    resonances: dict[int, Resonance] = {}
     for first in range(min(groups, len(cleaned))):
         group = cleaned[first::groups]
-        resonances[first::groups] = series_resonances(
-            [clean.spectrum for clean in group],
-            band_hz=target.band_hz,
-            method=method,
-            kept=[clean.kept for clean in group],
-        )
-    return [resonance for resonance in resonances if resonance is not None]
+        spectra, kept = [clean.spectrum for clean in group], [clean.kept for clean in group]
+        found = series_resonances(spectra, band_hz=target.band_hz, method=method, kept=kept)
+        resonances |= zip(range(first, len(cleaned), groups), found, strict=True)
+    return [resonances[number] for number in range(len(cleaned))]
 
 
 def _not_the_contacts(resonance: Resonance) -> Resonance:
     """A line that stands out of one spectrum may as well be a structure's: on real bearings it mostly is."""
-    if not resonance.found:
-        return resonance
     reason = (
         f"a line at {resonance.crf_hz:.0f} Hz stands out, but one spectrum cannot tell whether it is the contact's or "
         "the machine's"
     )
-    nothing = no_resonance(reason, resonance.band_hz, resonance.method, resonance.floor, resonance.evidence)
-    return replace(nothing, background=resonance.background)
+    kept = {name: getattr(resonance, name) for name in ("floor", "evidence", "background")}
+    return no_resonance(reason, resonance.band_hz, resonance.method, **kept)
 
 
 def _unit_of(x_name: str) -> str:

@@ -5,6 +5,7 @@ What was read is kept in files of its own, so that a watch can stop at any momen
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -14,9 +15,10 @@ from typing import Any
 from asperity.case import Case
 from asperity.errors import BadInput, UnreadableFile
 from asperity.files import make_folder, whole_file
+from asperity.recording import ReadOptions
 from asperity.tracking.files import read_table, recordings_in
 from asperity.tracking.model import Track
-from asperity.tracking.reading import Reading, ReadOptions, common_spacing, load_reading, read_spectra, save_reading
+from asperity.tracking.reading import Reading, common_spacing, load_reading, read_spectra, save_reading
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
 from asperity.wear import Detector, SeriesMethod
@@ -86,8 +88,7 @@ def watch_folder(
         new = memory.read(arrived, workers, progress)
         readings = [reading for path in present if (reading := memory.recall(path)) is not None]
         if new or first:
-            track = None
-            known, x_name = None, ""
+            track, known, x_name = None, None, ""
             if table is not None and readings:
                 places = read_table(table)
                 readings = [reading for reading in readings if Path(reading.file).name in places.places]
@@ -107,22 +108,17 @@ class _Memory:
     def __init__(self, out: Path, target: Target, options: ReadOptions) -> None:
         self.folder, self.target, self.options = out / MEMORY, target, options
         self.settings = out / SETTINGS
-        self.spacing_hz: float | None = None
         self._loaded: dict[str, Reading] = {}
         make_folder(self.folder)
-        expected = self._settings()
-        if self.settings.is_file():
-            begun = _read_json(self.settings)
-            self.spacing_hz = begun.get("spacing_hz")
-            differing = next((name for name in expected if begun.get(name) != expected[name]), None)
-            if differing is not None:
+        self.expected = {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options)
+        begun = _read_json(self.settings) if self.settings.is_file() else self.expected
+        self.spacing_hz: float | None = begun.get("spacing_hz")
+        for name, value in self.expected.items():
+            if begun.get(name) != value:
                 raise BadInput(
-                    f"{out} was begun with {differing} {begun.get(differing)}, now it is {expected[differing]}; "
+                    f"{out} was begun with {name} {begun.get(name)}, now it is {value}; "
                     "go on with the same, or choose another out"
                 )
-
-    def _settings(self) -> dict[str, Any]:
-        return {"band_hz": [round(end, 6) for end in self.target.band_hz]} | asdict(self.options)
 
     def recall(self, path: Path) -> Reading | None:
         """What this version of the file gave; None for one not read yet."""
@@ -134,20 +130,17 @@ class _Memory:
                 (self.folder / key).unlink()  # cut short by a crash: read it again
         return self._loaded.get(key)
 
-    def read(
-        self, paths: Sequence[Path], workers: int, progress: Callable[[Reading], None] | None
-    ) -> tuple[Reading, ...]:
+    def read(self, paths: list[Path], workers: int, progress: Callable[[Reading], None] | None) -> tuple[Reading, ...]:
         """Read files, and keep what each gave as soon as it is there."""
         if not paths:
             return ()
         if self.spacing_hz is None:
             self.spacing_hz = common_spacing(paths, self.options, self.target)
             with whole_file(self.settings) as part:
-                part.write_text(json.dumps(self._settings() | {"spacing_hz": self.spacing_hz}, indent=2), "utf-8")
+                part.write_text(json.dumps(self.expected | {"spacing_hz": self.spacing_hz}, indent=2), "utf-8")
         keys = [_key(path) for path in paths]  # before reading: what changes meanwhile is read again
-        for number, reading in read_spectra(
-            paths, self.options, self.target, self.spacing_hz, workers=workers, progress=progress
-        ):
+        reader = read_spectra(paths, self.options, self.target, self.spacing_hz, workers=workers, progress=progress)
+        for number, reading in reader:
             with whole_file(self.folder / keys[number]) as part:
                 save_reading(reading, part)
             self._loaded[keys[number]] = reading
@@ -173,10 +166,8 @@ def _settled(path: Path, seconds: float) -> bool:
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    try:
+    with suppress(OSError, ValueError):
         content = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError):
-        content = None
-    if not isinstance(content, dict):
-        raise UnreadableFile(f"{path} is damaged; delete its folder, and recordings are read again")
-    return content
+        if isinstance(content, dict):
+            return content
+    raise UnreadableFile(f"{path} is damaged; delete its folder, and recordings are read again")

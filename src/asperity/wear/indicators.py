@@ -106,6 +106,25 @@ class _Band(NamedTuple):
         """Of a line's height, f0 and damping ratio."""
         return np.array([self.scale, 1.0, 1.0])
 
+    @property
+    def price(self) -> float:
+        """Of the three parameters of a line, by BIC."""
+        return 3.0 * float(np.log(max(self.data.weight * self.frequency.size, math.e)))
+
+    def ends(self, floor: Field) -> tuple[float, float]:
+        """The density of a fitted floor at both ends."""
+        return self.scale * float(floor[0]), self.scale * float(floor[1])
+
+    def averaged(self, size: int) -> "_Band":
+        """The band in blocks of `size` lines, but for the floor alone."""
+        count = self.frequency.size // size
+
+        def mean(values: Field) -> Field:
+            return np.asarray(values[: count * size].reshape(count, size, *values.shape[1:]).mean(axis=1))
+
+        data = Data(mean(self.data.density), self.data.weight * size)
+        return self._replace(data=data, frequency=mean(self.frequency), floors=mean(self.floors))
+
 
 def _band(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> _Band | None:
     """The band's ordinates and the floor alone; None for a band without any vibration."""
@@ -122,9 +141,12 @@ def _band(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> _Ba
     data = Data(spectrum.density[inside] / scale, spectrum.averages)
     share = (frequency - low) / (high - low)
     floors = np.stack([1.0 - share, share], axis=1)
+    return _Band(data, scale, frequency, floors, _floor_only(floors, data, np.ones(2)))
+
+
+def _floor_only(floors: Field, data: Data, start: Field) -> Fit:
     any_floor = Bounds(np.zeros(2), np.full(2, np.inf))
-    floor_only = fit_spectrum(lambda theta: (floors @ theta, floors), np.ones(2), any_floor, data)
-    return _Band(data, scale, frequency, floors, floor_only)
+    return fit_spectrum(lambda theta: (floors @ theta, floors), start, any_floor, data)
 
 
 def _objection(f0: float, f0_std: float, zeta: float, spectrum: Spectrum, band_hz: tuple[float, float]) -> str | None:
@@ -149,9 +171,8 @@ def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     if band is None:
         return no_resonance("the band holds no vibration at all", band_hz, "likelihood")
     low, high = band_hz
-    fit = _fit_line(band.frequency, band.floors, band.data, spectrum, band_hz)
-    independent = spectrum.averages * band.frequency.size
-    evidence = 2.0 * (band.floor_only.cost - fit.cost) - 3.0 * float(np.log(max(independent, math.e)))
+    fit = _fit_line(band, spectrum, band_hz)
+    evidence = 2.0 * (band.floor_only.cost - fit.cost) - band.price
     line = np.exp(fit.parameters[:3])
     std = fit.std[:3] * line
     _, f0, zeta = (float(value) for value in line)
@@ -164,20 +185,17 @@ def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     else:
         objection = _objection(f0, float(std[1]), zeta, spectrum, band_hz)
     if objection is not None:
-        return no_resonance(objection, band_hz, "likelihood", _ends(band, band.floor_only.parameters), evidence)
+        floor = band.ends(band.floor_only.parameters)
+        return no_resonance(objection, band_hz, "likelihood", floor=floor, evidence=evidence)
     return fitted_resonance(
         line * band.scales,
         std * band.scales,
         reason=f"a line {2.0 * zeta * f0:.0f} Hz wide stands out of the floor (BIC {evidence:+.0f})",
         band_hz=band_hz,
         method="likelihood",
-        floor=_ends(band, fit.parameters[3:]),
+        floor=band.ends(fit.parameters[3:]),
         evidence=evidence,
     )
-
-
-def _ends(band: _Band, floor: Field) -> tuple[float, float]:
-    return band.scale * float(floor[0]), band.scale * float(floor[1])
 
 
 def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
@@ -189,16 +207,15 @@ def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     leakage = _leakage(spectrum)
     size = -(-band.frequency.size // MODE_BLOCKS)
     if size > 1:  # blocks far narrower than a line lose nothing, and blur it more than the window does
-        band, leakage = _averaged(band, size), np.ones(1)
+        band, leakage = band.averaged(size), np.ones(1)
+        band = band._replace(floor_only=_floor_only(band.floors, band.data, band.floor_only.parameters))
     fit = _fit_modes(band, band_hz, leakage)
     count = (fit.parameters.size - 2) // 3
-    floor = _ends(band, fit.parameters[3 * count :])
-    independent = band.data.weight * band.frequency.size
-    price = 3.0 * float(np.log(max(independent, math.e)))
+    floor = band.ends(fit.parameters[3 * count :])
     if count == 0:
-        better = 2.0 * (band.floor_only.cost - fit.cost)
-        reason = f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {better - price:+.1f})"
-        return no_resonance(reason, band_hz, "modes", floor, better - price)
+        evidence = 2.0 * (band.floor_only.cost - fit.cost) - band.price
+        reason = f"nothing stands out of the floor between {low:.0f} and {high:.0f} Hz (BIC {evidence:+.1f})"
+        return no_resonance(reason, band_hz, "modes", floor=floor, evidence=evidence)
     lines = np.exp(fit.parameters[: 3 * count]).reshape(count, 3)
     deviations = fit.std[: 3 * count].reshape(count, 3) * lines
     power = np.prod(lines, axis=1)  # A ζ f0, but for a factor the line's mean square
@@ -209,19 +226,16 @@ def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     beside = floor[0] + (floor[1] - floor[0]) * (band.frequency - low) / (high - low)
     for number in others:
         beside = beside + band.scale * lines[number, 0] * line_shape(band.frequency, *lines[number, 1:])
-    without = whittle_cost(beside / band.scale, band.data)
-    evidence = 2.0 * (without - fit.cost) - price
-    objection = (
-        "the fit did not settle"
-        if not fit.settled
-        else _objection(f0, float(deviations[strongest, 1]), zeta, spectrum, band_hz)
-    )
+    evidence = 2.0 * (whittle_cost(beside / band.scale, band.data) - fit.cost) - band.price
+    objection = _objection(f0, float(deviations[strongest, 1]), zeta, spectrum, band_hz)
+    if not fit.settled:
+        objection = "the fit did not settle"
     if objection is None and count > 1 and power[order[1]] > AMBIGUOUS * power[strongest]:
         rivals = [number for number in order if power[number] > AMBIGUOUS * power[strongest]]
         places = ", ".join(f"{place:.0f}" for place in sorted(lines[rivals, 1]))
         objection = f"lines at {places} Hz are about as strong: one spectrum cannot tell which is the contact's"
     if objection is not None:
-        return no_resonance(objection, band_hz, "modes", floor, evidence)
+        return no_resonance(objection, band_hz, "modes", floor=floor, evidence=evidence)
     rest = f"; {count - 1} weaker beside it" if count > 1 else ""
     return fitted_resonance(
         lines[strongest] * band.scales,
@@ -235,28 +249,13 @@ def _strongest_mode(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
     )
 
 
-def _averaged(band: _Band, size: int) -> _Band:
-    """The band in blocks of `size` lines."""
-    count = band.frequency.size // size
-
-    def mean(values: Field) -> Field:
-        return np.asarray(values[: count * size].reshape(count, size, -1).mean(axis=1))
-
-    data = Data(mean(band.data.density)[:, 0], band.data.weight * size)
-    floors = mean(band.floors)
-    start, bounds = band.floor_only.parameters, Bounds(np.zeros(2), np.full(2, np.inf))
-    floor_only = fit_spectrum(lambda theta: (floors @ theta, floors), start, bounds, data)
-    return _Band(data, band.scale, mean(band.frequency)[:, 0], floors, floor_only)
-
-
 def _fit_modes(band: _Band, band_hz: tuple[float, float], leakage: Field) -> Fit:
     """Lines added one by one where the spectrum is farthest above the fit, all fitted anew, while BIC says so."""
     low, high = band_hz
-    best = band.floor_only
-    price = 3.0 * float(np.log(max(band.data.weight * band.frequency.size, math.e))) + STRONG_EVIDENCE
+    best, model = band.floor_only, _lines_model(band.frequency, band.floors, leakage)
     spacing = (band.frequency[-1] - band.frequency[0]) / (band.frequency.size - 1)
     for count in range(1, MOST_MODES + 1):
-        expected = _lines_model(band.frequency, band.floors, leakage)(best.parameters)[0]
+        expected = model(best.parameters)[0]
         trials = []
         for zeta in START_DAMPINGS:
             width = min(max(1, round(2.0 * zeta * 0.5 * (low + high) / spacing)), band.frequency.size // 4)
@@ -265,16 +264,21 @@ def _fit_modes(band: _Band, band_hz: tuple[float, float], leakage: Field) -> Fit
             level = max(float(excess[at] * expected[at]), 1e-3)
             added = np.array([np.log(level), np.log(band.frequency[at]), np.log(zeta)])
             start = np.concatenate([best.parameters[:-2], added, best.parameters[-2:]])
-            bounds = Bounds(
-                np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING)] * count + [0.0, 0.0]),
-                np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING)] * count + [np.inf, np.inf]),
-            )
-            trials.append(fit_spectrum(_lines_model(band.frequency, band.floors, leakage), start, bounds, band.data))
+            trials.append(fit_spectrum(model, start, _bounds(count, band_hz), band.data))
         trial = min(trials, key=lambda fit: fit.cost)
-        if 2.0 * (best.cost - trial.cost) < price:
+        if 2.0 * (best.cost - trial.cost) < band.price + STRONG_EVIDENCE:
             break
         best = trial
     return best
+
+
+def _bounds(lines: int, band_hz: tuple[float, float]) -> Bounds:
+    """Of (ln level, ln f0, ln ζ) of each line, and of the floor at the band's low and high end."""
+    low, high = band_hz
+    return Bounds(
+        np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING)] * lines + [0.0, 0.0]),
+        np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING)] * lines + [np.inf, np.inf]),
+    )
 
 
 def _lines_model(frequency: Field, floors: Field, leakage: Field) -> Model:
@@ -302,27 +306,18 @@ INDICATOR_METHODS: dict[IndicatorMethod, Callable[[Spectrum, Mask, tuple[float, 
 }
 
 
-def _fit_line(frequency: Field, floors: Field, data: Data, spectrum: Spectrum, band_hz: tuple[float, float]) -> Fit:
-    """Line and floor, parameters (ln level, ln f0, ln ζ, floor at the band's low end, at its high end).
+def _fit_line(band: _Band, spectrum: Spectrum, band_hz: tuple[float, float]) -> Fit:
+    """Line and floor, started from blocks of the spectrum at several widths.
 
-    Started from blocks of the spectrum at several widths: the likelihood has a side maximum at every scatter peak.
+    The likelihood has a side maximum at every scatter peak.
     """
-    low, high = band_hz
-    bounds = Bounds(
-        np.array([-30.0, np.log(0.9 * low), np.log(SMALLEST_DAMPING), 0.0, 0.0]),
-        np.array([30.0, np.log(1.1 * high), np.log(LARGEST_DAMPING), np.inf, np.inf]),
-    )
-    size = -(-frequency.size // MOST_BLOCKS)
-    count = frequency.size // size
-    blocks = Data(data.density[: count * size].reshape(count, size).mean(axis=1), data.weight * size)
-    centres = frequency[: count * size].reshape(count, size).mean(axis=1)
-    block_floors = floors[: count * size].reshape(count, size, 2).mean(axis=1)
-    coarse = [
-        fit_spectrum(_lines_model(centres, block_floors, np.ones(1)), start, bounds, blocks)
-        for start in _starts(centres, blocks.density)
-    ]
-    best = min(coarse, key=lambda fit: fit.cost)
-    return fit_spectrum(_lines_model(frequency, floors, _leakage(spectrum)), best.parameters, bounds, data)
+    bounds = _bounds(1, band_hz)
+    blocks = band.averaged(-(-band.frequency.size // MOST_BLOCKS))
+    model = _lines_model(blocks.frequency, blocks.floors, np.ones(1))
+    starts = _starts(blocks.frequency, blocks.data.density)
+    best = min((fit_spectrum(model, start, bounds, blocks.data) for start in starts), key=lambda fit: fit.cost)
+    model = _lines_model(band.frequency, band.floors, _leakage(spectrum))
+    return fit_spectrum(model, best.parameters, bounds, band.data)
 
 
 def _starts(frequency: Field, density: Field) -> list[Field]:

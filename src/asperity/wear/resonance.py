@@ -21,14 +21,14 @@ class Resonance:
     The paper's peak has no standard deviation, damping, floor or evidence: nan.
     """
 
-    crf_hz: float
-    crfa: float
-    crf_std: float
-    crfa_std: float
     found: bool
     reason: str
     band_hz: tuple[float, float]
     method: str
+    crf_hz: float = np.nan
+    crfa: float = np.nan
+    crf_std: float = np.nan
+    crfa_std: float = np.nan
     damping_ratio: float = np.nan
     damping_ratio_std: float = np.nan
     floor: tuple[float, float] = (np.nan, np.nan)
@@ -78,39 +78,13 @@ def line_and_slopes(
     return line, by_f0, by_damping
 
 
-def no_resonance(
-    reason: str,
-    band_hz: tuple[float, float],
-    method: str,
-    floor: tuple[float, float] = (np.nan, np.nan),
-    evidence: float = np.nan,
-) -> Resonance:
-    """A resonance that is not there, or that could not even be looked for, and why."""
-    return Resonance(
-        crf_hz=np.nan,
-        crfa=np.nan,
-        crf_std=np.nan,
-        crfa_std=np.nan,
-        found=False,
-        reason=reason,
-        band_hz=band_hz,
-        method=method,
-        floor=floor,
-        evidence=evidence,
-    )
+def no_resonance(reason: str, band_hz: tuple[float, float], method: str, **known: Any) -> Resonance:
+    """A resonance that is not there, or that could not even be looked for, and why; what is `known` by field."""
+    return Resonance(found=False, reason=reason, band_hz=band_hz, method=method, **known)
 
 
 def fitted_resonance(line: Field, std: Field, **known: Any) -> Resonance:
     """The resonance of a fitted line: height, f0 and damping ratio with their deviations; the rest by field."""
-    level, f0, zeta = (float(value) for value in line)
-    level_std, f0_std, zeta_std = (float(value) for value in std)
-    return Resonance(
-        crf_hz=f0,
-        crfa=level,
-        crf_std=f0_std,
-        crfa_std=level_std,
-        found=True,
-        damping_ratio=zeta,
-        damping_ratio_std=zeta_std,
-        **known,
-    )
+    names = ("crfa", "crf_hz", "damping_ratio", "crfa_std", "crf_std", "damping_ratio_std")
+    known |= zip(names, map(float, (*line, *std)), strict=True)
+    return Resonance(found=True, **known)

@@ -211,10 +211,14 @@ def expected_density(blocks: Blocks, at: Parameters) -> Field:
     return np.asarray(lines_and_slopes(blocks.centre, at)[0] + np.exp(at.own[:, 3, None] + at.base))
 
 
+def whittle_costs(blocks: Blocks, expected: Field) -> Field:
+    """-ln likelihood of each recording."""
+    return np.asarray(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1))
+
+
 def _costs(blocks: Blocks, at: Parameters) -> Field:
     """-ln likelihood of each recording, its prior included."""
-    expected = expected_density(blocks, at)
-    return np.asarray(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1) + _prior(at.own))
+    return np.asarray(whittle_costs(blocks, expected_density(blocks, at)) + _prior(at.own))
 
 
 def _prior(own: Field) -> Field:

@@ -5,7 +5,6 @@ found is judged here. docs/theory/indicators.md has the equations and how often 
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -24,6 +23,7 @@ from asperity.wear.separation import (
     expected_density,
     lines_and_slopes,
     separate,
+    whittle_costs,
 )
 
 SeriesMethod = Literal["joint", IndicatorMethod]
@@ -144,20 +144,17 @@ def _judged(blocks: Blocks, separation: Separation, band_hz: tuple[float, float]
     joint = separation.joint
     own, base, _ = joint.parameters
     expected = expected_density(blocks, joint.parameters)
-    with_line = np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1)
+    with_line = whittle_costs(blocks, expected)
     bare = np.exp(base)
     relative = np.sum(blocks.weight * blocks.density / bare, axis=1) / blocks.weight.sum(axis=1)
     alone = relative[:, None] * bare
-    without = np.sum(blocks.weight * (np.log(alone) + blocks.density / alone), axis=1)
-    evidence = 2.0 * (without - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1))
+    evidence = 2.0 * (whittle_costs(blocks, alone) - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1))
 
     std = np.hypot(joint.std, _misfit(blocks, joint, separation.witnesses))
     off = blocks.density / expected - 1.0
     counted = blocks.weight > 0.0
-    chance = np.sum(counted, axis=1)
-    misfit = np.sqrt(
-        np.maximum(np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / chance, 0.0)
-    )
+    excess = np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / np.sum(counted, axis=1)
+    misfit = np.sqrt(np.maximum(excess, 0.0))
 
     significant = evidence > STRONG_EVIDENCE
     places, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
@@ -172,8 +169,8 @@ def _judged(blocks: Blocks, separation: Separation, band_hz: tuple[float, float]
         line = _Line(f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival)
         objection = _objection(line, band_hz)
         if objection is not None:
-            silent = no_resonance(objection, band_hz, "joint", evidence=line.evidence)
-            resonances.append(replace(silent, background=(blocks.centre, alone[i])))
+            background = (blocks.centre, alone[i])
+            resonances.append(no_resonance(objection, band_hz, "joint", evidence=line.evidence, background=background))
             continue
         resonances.append(
             fitted_resonance(

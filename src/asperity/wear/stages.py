@@ -46,12 +46,12 @@ class Stages:
     """
 
     kind: StageKind
-    split: float
-    interval: tuple[float, float]
+    split: float = np.nan
+    interval: tuple[float, float] = (np.nan, np.nan)
     probability: Field
     labels: tuple[str, ...]
     evidence: dict[str, float]
-    slopes: tuple[float, float]
+    slopes: tuple[float, float] = (np.nan, np.nan)
     scatter_hz: float
     verdict: str
 
@@ -127,14 +127,13 @@ class _Places(NamedTuple):
 class _Candidate(NamedTuple):
     """A model with its one bend parameter k (break, or length of saturation) on a grid, linear in all else.
 
-    `columns(k)` gives the expected columns at the places, errors in x included, (grid, places, linear parameters);
-    `slopes(k)` their derivatives by x.
+    `model(k, places)` gives the expected columns at the places, errors in x included, (grid, places, linear
+    parameters), and their derivatives by x.
     """
 
     name: str
     bends: Field
-    columns: Callable[[Field, _Places], Field]
-    slopes: Callable[[Field, _Places], Field]
+    model: Callable[[Field, _Places], tuple[Field, Field]]
     parameters: int
 
 
@@ -154,7 +153,7 @@ def _bayesian(x: Field, crf: Field, crfa: Field | None, crf_std: Field, x_std: F
     places = _places(x[known], crf[known], crf_std[known], x_std[known])
     if places.x.size < FEWEST_PLACES:
         verdict = f"Too few to tell: a stage needs CRFs at {FEWEST_PLACES} different places, got {places.x.size}."
-        return _without_stage("too few", verdict, x.size, {}, np.full(x.size, np.nan), np.nan)
+        return _without_stage("too few", verdict, {}, np.full(x.size, np.nan), np.nan)
     compared = _compared(places)
     evidence, stick = compared.evidence, compared.fits["broken stick"]
     log_break = _log_sum(stick.marginal)
@@ -175,14 +174,14 @@ def _bayesian(x: Field, crf: Field, crfa: Field | None, crf_std: Field, x_std: F
     if evidence["no change"] - min(smooth, evidence["broken stick"]) < STRONG_EVIDENCE:
         mean, error = float(np.mean(places.y)), float(np.std(places.y, ddof=1))
         verdict = f"No change: CRF holds at {mean:.0f} ± {error:.0f} Hz over {over}."
-        return _without_stage("no change", verdict, x.size, evidence, severe, compared.scatter)
+        return _without_stage("no change", verdict, evidence, severe, compared.scatter)
     if smooth - evidence["broken stick"] < STRONG_EVIDENCE:
         verdict = (
             f"No distinct stage: CRF changes over {over}, but a smooth curve explains it "
             f"{'better' if smooth < evidence['broken stick'] else 'as well'} (BIC of a break "
             f"{evidence['broken stick'] - smooth:+.1f} against it, {-STRONG_EVIDENCE:.0f} needed)."
         )
-        return _without_stage("no distinct stage", verdict, x.size, evidence, severe, compared.scatter)
+        return _without_stage("no distinct stage", verdict, evidence, severe, compared.scatter)
     names = ("normal", "severe") if rising else ("running-in", "steady")
     per = f" Hz per {unit}" if unit else " Hz per unit of x"
     before, behind = (f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope) / reach:.3g}" for slope in slopes)
@@ -239,16 +238,13 @@ STAGE_DETECTORS: dict[Detector, Callable[[Field, Field, Field | None, Field, Fie
 
 
 def _without_stage(
-    kind: StageKind, verdict: str, recordings: int, evidence: dict[str, float], probability: Field, scatter: float
+    kind: StageKind, verdict: str, evidence: dict[str, float], probability: Field, scatter: float
 ) -> Stages:
     return Stages(
         kind=kind,
-        split=np.nan,
-        interval=(np.nan, np.nan),
         probability=probability,
-        labels=("none",) * recordings,
+        labels=("none",) * probability.size,
         evidence=evidence,
-        slopes=(np.nan, np.nan),
         scatter_hz=scatter,
         verdict=verdict,
     )
@@ -287,68 +283,52 @@ def _candidates(places: _Places) -> list[_Candidate]:
     lengths = np.ptp(x) * np.geomspace(0.05, 5.0, CURVATURES)
     none = np.zeros(1)
     return [
-        _Candidate("broken stick", breaks, _stick, _stick_slopes, 4),
-        _Candidate("saturating exponential", lengths, _exponential, _exponential_slopes, 4),
-        _Candidate("saturating hyperbola", lengths, _hyperbola, _hyperbola_slopes, 4),
-        _Candidate("straight line", none, _line, _line_slopes, 2),
-        _Candidate(
-            "no change", none, lambda _, at: _line(_, at)[..., :1], lambda _, at: np.zeros((1, at.x.size, 1)), 1
-        ),
+        _Candidate("broken stick", breaks, _stick, 4),
+        _Candidate("saturating exponential", lengths, _exponential, 4),
+        _Candidate("saturating hyperbola", lengths, _hyperbola, 4),
+        _Candidate("straight line", none, _line, 2),
+        _Candidate("no change", none, _constant, 1),
     ]
 
 
-def _stick(k: Field, at: _Places) -> Field:
+def _beside_constant(column: Field, slope: Field) -> tuple[Field, Field]:
+    """A constant and one column, and their derivatives by x."""
+    return np.stack([np.ones_like(column), column], axis=-1), np.stack([np.zeros_like(slope), slope], axis=-1)
+
+
+def _stick(k: Field, at: _Places) -> tuple[Field, Field]:
     """1, x and the hinge max(x - k, 0), in the mean over the error of x: (x - k) Φ(z) + s φ(z), z = (x - k)/s."""
-    over, bent = _over(k, at)
-    return np.stack([np.ones_like(over), np.broadcast_to(at.x - at.x[0], over.shape), bent], axis=-1)
-
-
-def _over(k: Field, at: _Places) -> tuple[Field, Field]:
-    """P(true x > k), and the mean hinge, shape (breaks, places)."""
     ahead = at.x[None, :] - k[:, None]
     blur = np.maximum(at.x_std, 1e-12)[None, :]
     z = ahead / blur
-    over = scipy.special.ndtr(z)
-    return over, ahead * over + blur * np.exp(-0.5 * np.minimum(z**2, 1400.0)) / np.sqrt(2.0 * np.pi)
+    over = scipy.special.ndtr(z)  # P(true x > k), shape (breaks, places)
+    bent = ahead * over + blur * np.exp(-0.5 * np.minimum(z**2, 1400.0)) / np.sqrt(2.0 * np.pi)
+    straight = np.broadcast_to(at.x - at.x[0], over.shape)
+    one = np.ones_like(over)
+    return np.stack([one, straight, bent], axis=-1), np.stack([np.zeros_like(over), one, over], axis=-1)
 
 
-def _stick_slopes(k: Field, at: _Places) -> Field:
-    over, _ = _over(k, at)
-    return np.stack([np.zeros_like(over), np.ones_like(over), over], axis=-1)
-
-
-def _exponential(k: Field, at: _Places) -> Field:
+def _exponential(k: Field, at: _Places) -> tuple[Field, Field]:
     along = np.exp(-(at.x - at.x[0])[None, :] / k[:, None])
-    return np.stack([np.ones_like(along), along], axis=-1)
+    return _beside_constant(along, -along / k[:, None])
 
 
-def _exponential_slopes(k: Field, at: _Places) -> Field:
-    along = np.exp(-(at.x - at.x[0])[None, :] / k[:, None])
-    return np.stack([np.zeros_like(along), -along / k[:, None]], axis=-1)
-
-
-def _hyperbola(k: Field, at: _Places) -> Field:
+def _hyperbola(k: Field, at: _Places) -> tuple[Field, Field]:
     along = 1.0 / (1.0 + (at.x - at.x[0])[None, :] / k[:, None])
-    return np.stack([np.ones_like(along), along], axis=-1)
+    return _beside_constant(along, -(along**2) / k[:, None])
 
 
-def _hyperbola_slopes(k: Field, at: _Places) -> Field:
-    along = 1.0 / (1.0 + (at.x - at.x[0])[None, :] / k[:, None])
-    return np.stack([np.zeros_like(along), -(along**2) / k[:, None]], axis=-1)
+def _line(_: Field, at: _Places) -> tuple[Field, Field]:
+    return _beside_constant((at.x - at.x[0])[None], np.ones_like(at.x)[None])
 
 
-def _line(_: Field, at: _Places) -> Field:
-    return np.stack([np.ones_like(at.x), at.x - at.x[0]], axis=-1)[None]
-
-
-def _line_slopes(_: Field, at: _Places) -> Field:
-    return np.stack([np.zeros_like(at.x), np.ones_like(at.x)], axis=-1)[None]
+def _constant(_: Field, at: _Places) -> tuple[Field, Field]:
+    return np.ones((1, at.x.size, 1)), np.zeros((1, at.x.size, 1))
 
 
 def _fit(candidate: _Candidate, places: _Places, scatters: Field) -> _Fitted:
     """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
-    columns = candidate.columns(candidate.bends, places)[:, None]  # (bends, 1, places, linear)
-    slopes = candidate.slopes(candidate.bends, places)[:, None]
+    columns, slopes = (part[:, None] for part in candidate.model(candidate.bends, places))  # (bends, 1, places, linear)
     own = places.variance + scatters[:, None] ** 2  # (scatters, places)
     variance = np.broadcast_to(own, (columns.shape[0], *own.shape))
     uncertain = bool(np.any(places.x_std > 0.0))
@@ -373,16 +353,12 @@ def _sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
     if places.x.size < FEWEST_PLACES:
         return np.zeros(breaks.size)
 
-    def columns(k: Field, at: _Places) -> Field:
-        stick = _stick(k, at)
-        return np.concatenate([stick, stick[..., 1:2] ** 2], axis=-1)
+    def model(k: Field, at: _Places) -> tuple[Field, Field]:
+        stick, sloped = _stick(k, at)
+        x = stick[..., 1:2]
+        return np.concatenate([stick, x**2], axis=-1), np.concatenate([sloped, 2.0 * x], axis=-1)
 
-    def slopes(k: Field, at: _Places) -> Field:
-        sloped = _stick_slopes(k, at)
-        along = np.broadcast_to(2.0 * (at.x - at.x[0]), sloped.shape[:-1])
-        return np.concatenate([sloped, along[..., None]], axis=-1)
-
-    candidate = _Candidate("ln CRFA", breaks, columns, slopes, 5)
+    candidate = _Candidate("ln CRFA", breaks, model, 5)
     return _log_sum(_fit(candidate, places, _scatters(places)).marginal)
 
 
