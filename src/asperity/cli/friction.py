@@ -113,9 +113,9 @@ def _friction_command(
 def _points(curve: "FrictionCurve") -> Block:
     """A row a point, in the catalogue's units."""
     rows = curve.scalars()["points"]
-    shown = [quantity(key) for key in rows[0] if key != "converged"]
+    selected = [quantity(key) for key in rows[0] if key != "converged"]
     yield f"  Sq {text('sq_m', curve.sq)}{', heat fed back' if curve.feedback else ''}"
     yield from columns(
-        [*(entry.label for entry in shown), ""],
-        ([*(entry.number_in(row) for entry in shown), "" if row["converged"] else "NOT CONVERGED"] for row in rows),
+        [*(entry.label for entry in selected), ""],
+        ([*(entry.number_in(row) for entry in selected), "" if row["converged"] else "NOT CONVERGED"] for row in rows),
     )

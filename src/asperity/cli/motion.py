@@ -50,10 +50,10 @@ def run(
         raise BadInput(f"--steps {steps} and --passes {passes:g} both say how long to run; leave one out")
     failure = None
     try:
-        with progress(path.name, COMPILES, quiet=quiet) as shown:
+        with progress(path.name, COMPILES, quiet=quiet) as display:
 
             def step(taken: "HistoryProgress") -> None:
-                shown(f"step {taken.number} of {taken.steps}, {_clr(taken)}", taken.number, taken.steps)
+                display(f"step {taken.number} of {taken.steps}, {_clr(taken)}", taken.number, taken.steps)
 
             moved = history.run_history(
                 chosen, steps=steps, passes=passes, out=out, every=every, strict=not keep_going, progress=step
@@ -108,8 +108,8 @@ def _history_table(moved: "History") -> Block:
             rows.append((entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})"))
     passes = values.get("passes", [])
     for lap in passes[:: max(1, len(passes) - 1)]:
-        shown = [quantity(key) for key in ("clr", "car", "track_sq_m")]
-        rows.append((f"pass {lap['pass']}", ", ".join(f"{entry.short} {entry.text_in(lap)}" for entry in shown)))
+        selected = [quantity(key) for key in ("clr", "car", "track_sq_m")]
+        rows.append((f"pass {lap['pass']}", ", ".join(f"{entry.short} {entry.text_in(lap)}" for entry in selected)))
     if values["crf_hz"] is not None:
         rows.append((f"{quantity('crf_hz').title}, of the mean contact", text("crf_hz", values["crf_hz"])))
     yield from table(rows, moved.notes)

@@ -79,8 +79,8 @@ def _report_study(
 ) -> None:
     chosen = None if anchors is None else paper.load_anchors(anchors)
     result = study.load_study(folder)
-    with progress("the study's page", quiet=quiet) as shown:
-        report.write_study_report(result, out, figures=figures, anchors=chosen, progress=shown)
+    with progress("the study's page", quiet=quiet) as display:
+        report.write_study_report(result, out, figures=figures, anchors=chosen, progress=display)
     paths = {"report": str(out), "figures": None if figures is None else str(figures)}
     show(
         study.study_verdict(result),

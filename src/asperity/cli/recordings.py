@@ -78,17 +78,17 @@ def _in_full(checked: "CheckedRecording") -> Block:
 
 def _in_lines(checks: "RecordingChecks") -> Block:
     """A line a recording, and what was found wrong once."""
-    shown = [quantity(key) for key in ("rate_hz", "duration_s", "rms")]
+    selected = [quantity(key) for key in ("rate_hz", "duration_s", "rms")]
     rows: list[list[str]] = []
     holders: dict[str, list[str]] = {}
     for checked in checks.checked:
         values, quality = checked.scalars(), checked.quality
         name = f"{checked.recording.path.name}, {values['channel']}"
         state = "usable" if quality.usable else "NOT USABLE"
-        rows.append([name, *(entry.number_in(values) for entry in shown), values["unit"], state])
+        rows.append([name, *(entry.number_in(values) for entry in selected), values["unit"], state])
         for sentence in (*quality.faults, *quality.remarks):
             holders.setdefault(sentence, []).append(name)
-    yield from columns(["recording", *(entry.label for entry in shown), "unit", ""], rows, left=1)
+    yield from columns(["recording", *(entry.label for entry in selected), "unit", ""], rows, left=1)
     for sentence, names in holders.items():
         everywhere = len(names) == len(checks.checked)
         more = f" and {len(names) - 3} more" if len(names) > 3 else ""
@@ -234,17 +234,18 @@ def _show_update(
 
 def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
     rows = {row["file"]: row for row in recordings}
+    selected = [quantity(key) for key in ("crf_hz", "severe_probability")]
     for arrived in new:
         row = rows.get(arrived.file)
         if row is None:
-            said = arrived.reason
+            outcome = arrived.reason
         elif not row["found"]:
-            said = f"no contact resonance: {row['reason']}"
+            outcome = f"no contact resonance: {row['reason']}"
         else:
-            severe = [f"{quantity(key).title} {quantity(key).text_in(row)}" for key in ("severe_probability",)]
-            crf = f"{quantity('crf_hz').short} {quantity('crf_hz').text_in(row)}"
-            said = ", ".join([crf, *(severe if row["severe_probability"] is not None else [])])
-        yield f"  {Path(arrived.file).name}: {said}"
+            outcome = ", ".join(
+                f"{entry.short} {entry.text_in(row)}" for entry in selected if row[entry.key] is not None
+            )
+        yield f"  {Path(arrived.file).name}: {outcome}"
     yield f"  {len(recordings)} recordings so far; results in {results}"
 
 
@@ -255,17 +256,17 @@ def _write(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Pat
 
 def _series(tracked: "Track") -> Block:
     """A row a recording, in the order of x."""
-    shown = [quantity(key) for key in ("crf_hz", "crfa", "severe_probability")]
+    selected = [quantity(key) for key in ("crf_hz", "crfa", "severe_probability")]
     rows = [
         [
             Path(row["file"]).name,
             NO_VALUE if row["x"] is None else f"{row['x']:.4g}",
-            *(entry.number_in(row) if row["found"] else NO_VALUE for entry in shown),
+            *(entry.number_in(row) if row["found"] else NO_VALUE for entry in selected),
             "" if row["found"] else f"not found: {row['reason']}",
         ]
         for row in tracked.scalars()["recordings"]
     ]
-    titles = ["recording", tracked.x_name, *(entry.label for entry in shown), ""]
+    titles = ["recording", tracked.x_name, *(entry.label for entry in selected), ""]
     yield from columns(titles, rows, left=1)
 
 
@@ -282,11 +283,11 @@ def _searched(tracked: "Track") -> Block:
 def _files_read(doing: str, *, quiet: bool) -> "Iterator[Callable[[Reading], None]]":
     """Count files on a terminal as they are read."""
     count = 0
-    with progress("recordings", doing, quiet=quiet) as shown:
+    with progress("recordings", doing, quiet=quiet) as display:
 
         def step(recording: "Reading") -> None:
             nonlocal count
             count += 1
-            shown(f"{count} read, last {Path(recording.file).name}")
+            display(f"{count} read, last {Path(recording.file).name}")
 
         yield step

@@ -39,7 +39,7 @@ def rig(
     """Simulate the paper's wear test: recordings to try asperity track on, and the truth to judge it by."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out} is there already and not an empty folder; name a new one")
-    with progress("rig", "simulating ...", quiet=quiet) as shown:
+    with progress("rig", "simulating ...", quiet=quiet) as display:
         made = paper.simulate_rig(
             samples=samples,
             repeats=repeats,
@@ -54,7 +54,7 @@ def rig(
             made,
             out,
             file_format=file_format,  # type: ignore[arg-type]
-            progress=lambda done, total: shown(f"{done} of {total} recordings written", done, total),
+            progress=lambda done, total: display(f"{done} of {total} recordings written", done, total),
         )
     shafts = " and ".join(f"{speed:g}" for speed in made.shaft_hz)
     rows = [

@@ -92,7 +92,7 @@ def written(name: str, *paths: Path | None) -> Block:
     return [f"{name}: {path}" for path in paths if path is not None]
 
 
-class Report(Protocol):
+class Display(Protocol):
     """Takes how far the work is: in words, and as a number of things done, of how many."""
 
     def __call__(self, doing: str, done: int | None = None, total: int | None = None) -> None:
@@ -100,7 +100,7 @@ class Report(Protocol):
 
 
 @contextmanager
-def progress(label: str, doing: str = "", *, quiet: bool, compiles: bool = False) -> Iterator[Report]:
+def progress(label: str, doing: str = "", *, quiet: bool, compiles: bool = False) -> Iterator[Display]:
     """Show on a terminal how far the work is.
 
     With `compiles`, the compilation that makes the first solve ever slow is announced after a while without a report,
@@ -122,38 +122,41 @@ def progress(label: str, doing: str = "", *, quiet: bool, compiles: bool = False
     announcement.daemon = True
     if compiles:
         announcement.start()
-    display = Progress(
-        *(TextColumn("{task.description}"), BarColumn(20), TextColumn("{task.fields[doing]}"), TimeElapsedColumn()),
+    label_column, doing_column = (
+        TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[doing]")
+    )
+    bar = Progress(
+        *(label_column, BarColumn(20), doing_column, TimeElapsedColumn()),
         console=console,
         transient=True,
         disable=not console.is_terminal,
         redirect_stdout=sys.stdout.isatty(),  # what goes to a file must not end beside the bar
     )
     try:
-        with display:
-            task = display.add_task(label, total=None, doing=doing)
+        with bar:
+            task = bar.add_task(label, total=None, doing=doing)
 
-            def report(doing: str, done: int | None = None, total: int | None = None) -> None:
+            def show_progress(doing: str, done: int | None = None, total: int | None = None) -> None:
                 announcement.cancel()
-                display.update(task, doing=doing, completed=done, total=total)
+                bar.update(task, doing=doing, completed=done, total=total)
 
-            yield report
+            yield show_progress
     finally:
         announcement.cancel()
 
 
 def _unseen(doing: str, done: int | None = None, total: int | None = None) -> None:
-    """Nobody looks."""
+    """What a display does that nobody sees."""
 
 
 @contextmanager
 def solver_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], None]]":
     """Show the solver's steps."""
-    with progress(label, "setting up ...", quiet=quiet, compiles=True) as report:
+    with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
 
         def step(iteration: "Iteration") -> None:
             if iteration.number > 0:  # the start is known before all is compiled
                 nx, ny = iteration.cells
-                report(f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}")
+                display(f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}")
 
         yield step

@@ -21,7 +21,7 @@ from asperity.cli.options import (
     chosen_case,
     require_output,
 )
-from asperity.cli.show import Block, columns, progress, show, table
+from asperity.cli.show import Block, columns, progress, show, table, text
 from asperity.errors import AsperityError, BadInput
 from asperity.quantities import quantity
 
@@ -105,13 +105,13 @@ def _require_whole(result: "StudyResult", part: tuple[int, int]) -> None:
 @contextmanager
 def study_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[StudyProgress], None]]":
     """Show cases done, rate, failures and time left on a terminal."""
-    with progress(label, "starting workers ...", quiet=quiet) as shown:
+    with progress(label, "starting workers ...", quiet=quiet) as display:
 
         def step(state: "StudyProgress") -> None:
             left = "" if state.seconds_left is None else f", {study.duration_text(state.seconds_left)} left"
             rate = f"{state.rate:.2g} cases/s" if state.done else "starting workers ..."
             done = state.kept + state.done
-            shown(f"{done}/{state.total}, {rate}, {state.failed} failed{left}", done, state.total)
+            display(f"{done}/{state.total}, {rate}, {state.failed} failed{left}", done, state.total)
 
         yield step
 
@@ -142,8 +142,8 @@ def _make_page(result: "StudyResult", page: Path | None, figures: Path | None, *
         return {}
     assert result.folder is not None
     page = page or result.folder / "report.html"
-    with progress("the study's page", "drawing ...", quiet=quiet) as shown:
-        report.write_study_report(result, page, figures=figures, progress=shown)
+    with progress("the study's page", "drawing ...", quiet=quiet) as display:
+        report.write_study_report(result, page, figures=figures, progress=display)
     return {"report": str(page), **({} if figures is None else {"figures": str(figures)})}
 
 
@@ -151,10 +151,10 @@ def _curve(curve: "WearCurve | None") -> Block:
     """A row a level: means over its surfaces, with their deviations."""
     if curve is None:
         return
-    sq, shown = quantity("sq_m"), [quantity(key) for key in CURVE if key in curve.table]
-    means = [(entry, curve.mean(entry.key), curve.std(entry.key)) for entry in shown]
+    sq, selected = quantity("sq_m"), [quantity(key) for key in CURVE if key in curve.table]
+    means = [(entry, curve.mean(entry.key), curve.std(entry.key)) for entry in selected]
     yield from columns(
-        [entry.label for entry in (sq, *shown)],
+        [entry.label for entry in (sq, *selected)],
         (
             [sq.number(level), *(entry.number(mean[at], deviation[at]) for entry, mean, deviation in means)]
             for at, level in enumerate(curve.sq)
@@ -177,7 +177,7 @@ def _show_estimate(plan: "StudyPlan", cost: "StudyCost", *, as_json: bool, quiet
     rows = [
         ("points", f"{len(plan.points)}, over {', '.join(plan.axes) or 'seeds alone'}"),
         ("surfaces a point", str(plan.realisations)),
-        ("a case takes", f"{cost.case_s:.3g} s on one worker, mean of {cost.tried} tried"),
+        ("a case takes", f"{text('seconds', cost.case_s)} on one worker, mean of {cost.tried} tried"),
     ]
     show(
         study.estimate_verdict(cost),

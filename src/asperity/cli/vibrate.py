@@ -104,7 +104,9 @@ def _table1(preset: str, records: int | None, figures: Path | None, *, as_json: 
 
 
 def _printed_and_ours(rows: "Sequence[Table1Row]") -> Block:
-    shown = [quantity(key) for key in TABLE1]
+    selected = [quantity(key) for key in TABLE1]
     values = [{**asdict(row), "sq_m": row.height_m} for row in rows]
-    yield from columns([entry.label for entry in shown], ([entry.number_in(row) for entry in shown] for row in values))
+    yield from columns(
+        [entry.label for entry in selected], ([entry.number_in(row) for entry in selected] for row in values)
+    )
     yield "  medians of single records; E 207 GPa, R 5.4 mm, m 0.1 kg, not the case's"
