@@ -1,10 +1,14 @@
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
+import x3pio
 
 import asperity
 
+PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 HEAVY = ("numpy", "scipy", "numba", "matplotlib", "xarray", "pandas", "pint", "pydantic", "plotly", "SurfaceTopography")
 
 
@@ -31,6 +35,41 @@ def test_help_imports_nothing_heavy():
     done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
     assert "solve" in done.stdout
     assert done.stdout.splitlines()[-1] == ""
+
+
+SMALL = ("--set", "grid.cells=[32, 24]", "--set", "surface.correlation_length=40 um", "--set", "vibration=none")
+COMPUTE = {"numba", "scipy.optimize"}
+DRAW = {"matplotlib", "plotly"}  # jinja2 comes with pint, by way of dask
+STUDY = {"distributed", "SALib", "zarr"}
+READ = {"SurfaceTopography", "soundfile", "nptdms", "pyuff", "idelib"}  # libraries of single formats
+TABLES = {"pandas", "pyarrow", "xarray"}
+NOT_LOADED = {  # a command, and what it must not load
+    ("--version",): {"numpy", "scipy", "pydantic", "pint", "rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
+    ("solve", "absent.toml"): {"rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
+    ("surface", "ring.x3p"): {"rich", "numba", "xarray", "jinja2"} | STUDY,  # SurfaceTopography brings matplotlib
+    ("check", "noise.npy", "--rate", "20000"): {"rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
+    ("track", "noise.npy", "--rate", "20000", "--method", "peak"): {"numba", "rich"} | DRAW | STUDY | READ | TABLES,
+    ("rig", "--out", "rig", "--samples", "1", "--repeats", "1", "--duration", "1 s"): {"rich", "numba"}
+    | DRAW
+    | STUDY
+    | TABLES,
+    ("solve", str(PAPER), *SMALL, "--quiet"): {"rich"} | DRAW | STUDY | READ | TABLES,
+    ("vibrate", str(PAPER), "--quiet"): {"rich"} | DRAW | STUDY | READ | TABLES,
+}
+
+
+@pytest.mark.parametrize("arguments", NOT_LOADED, ids=lambda arguments: " ".join(arguments)[:40])
+def test_a_command_loads_only_what_it_needs(tmp_path, arguments):
+    heights = np.random.default_rng(5).standard_normal((32, 48)) * 1e-6
+    x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=3e-6)
+    np.save(tmp_path / "noise.npy", np.random.default_rng(0).standard_normal(40_000))
+    names = sorted(NOT_LOADED[arguments])
+    probe = (
+        f"import atexit, sys\natexit.register(lambda: print('loaded', *[m for m in {names!r} if m in sys.modules]))\n"
+        f"from asperity.cli import main\nmain({list(arguments)!r})"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
 def test_numba_waits_for_a_solve():

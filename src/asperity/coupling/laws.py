@@ -10,8 +10,9 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
+from asperity import ehl
 from asperity.conditions import ContactConditions
-from asperity.ehl import ContactSolution, ContactState, roller_depth, tangent_stiffness
+from asperity.ehl import ContactSolution, ContactState
 from asperity.errors import BadInput, require_positive
 from asperity.hertz import line_stiffness, point_stiffness
 from asperity.quantities import Parameter
@@ -96,7 +97,7 @@ class HertzLine(_LineApproach, StiffnessLaw):
             conditions.length,
             conditions.radius_along_rolling,
             conditions.pair.reduced_modulus,
-            self.reference_depth or roller_depth(conditions),
+            self.reference_depth or ehl.roller_depth(conditions),
         )
 
 
@@ -136,7 +137,7 @@ class Tangent(_LineApproach, StiffnessLaw):
 
     def of(self, solution: ContactSolution) -> float:
         """dF/dδ of a solved contact [N/m]."""
-        return tangent_stiffness(solution, reference_depth=self.reference_depth).total
+        return ehl.tangent_stiffness(solution, reference_depth=self.reference_depth).total
 
     def at_full_load(self, conditions: ContactConditions) -> StiffnessLaw:
         """That of the smooth, dry contact: a tangent belongs to its own load share."""

@@ -18,8 +18,8 @@ from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import Earlier, OilBalance, Unknowns, evaluate
 from asperity.ehl.conserving_iterate import OilStep
 from asperity.ehl.conserving_solve import Climb, require_conserving, unknowns_of
-from asperity.ehl.motion import Memory, Snapshot, Start, step_seconds
-from asperity.ehl.outcome import CONSERVING, UNIFIED, Options
+from asperity.ehl.motion import Memory, Snapshot, step_seconds
+from asperity.ehl.outcome import CONSERVING, UNIFIED, Options, Start
 from asperity.ehl.posing import contact_problem
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales

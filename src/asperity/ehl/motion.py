@@ -11,29 +11,27 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
-from asperity.ehl.outcome import ATTEMPTS, Options
+from asperity.ehl.outcome import ATTEMPTS, LONGEST_STEP, ContactState, Options, Start
 from asperity.ehl.posing import contact_problem
 from asperity.ehl.problem import Balance, Past, Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import Progress, Search
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import ContactState, state_of
+from asperity.ehl.state import state_of
 from asperity.errors import BadInput, require_positive
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces, Surface
 
-Start = Literal["steady", "stationary"]
 Memory = Mapping[str, "np.ndarray[Any, Any]"]
 
-LONGEST_STEP = 8.0  # cells that the oil may travel in one
 HELD = ATTEMPTS[2]
 _LOWERED = ("lowered_first", "lowered_second")
 

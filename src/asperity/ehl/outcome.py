@@ -9,6 +9,8 @@ from asperity.errors import BadInput, require_positive
 
 ContactModel = Literal["unified", "conserving"]
 UNIFIED, CONSERVING = MODELS = get_args(ContactModel)
+Start = Literal["steady", "stationary"]
+LONGEST_STEP = 8.0  # cells that the oil may travel in one step of time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,3 +144,37 @@ class Convergence:
             f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change {last.change:.1e}; "
             f"tolerance {self.tolerance:.0e}"
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactState:
+    """Scalars of a solved contact, SI.
+
+    The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others. `car` contact cells in it
+    over all cells there; `car_domain` contact area of the whole domain over the Hertz area; `clr` load on contact cells
+    over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap without touching, over the load:
+    oil that the model holds at the hardness, which a coarser contact threshold would count as contact; `sq` composite
+    roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies touch), `h_central` mean
+    over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the usual fit of the
+    smooth contact's least film over Sq (`smooth_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
+    `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
+    relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
+    equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when
+    dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream;
+    `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch).
+    """
+
+    car: float
+    car_domain: float
+    clr: float
+    capped_oil_load_ratio: float
+    sq: float
+    h_min: float
+    h_central: float
+    h_mean: float
+    lambda_ratio: float | None
+    p_max: float
+    reynolds_residual: float
+    load_error: float
+    mass_flux_imbalance: float
+    contact_slope: float | None = None

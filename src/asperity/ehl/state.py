@@ -1,12 +1,11 @@
 """What a tribologist reads off a solved contact: load and area shares, film, and how well the equations are met."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import OilBalance, evaluate
 from asperity.ehl.conserving_solve import unknowns_of
+from asperity.ehl.outcome import ContactState
 from asperity.ehl.posing import contact_problem, smooth_film
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
@@ -14,40 +13,6 @@ from asperity.ehl.shares import CENTRE, area_share, carried_share
 from asperity.ehl.solution import ContactSolution
 from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactState:
-    """Scalars of a solved contact, SI.
-
-    The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others. `car` contact cells in it
-    over all cells there; `car_domain` contact area of the whole domain over the Hertz area; `clr` load on contact cells
-    over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap without touching, over the load:
-    oil that the model holds at the hardness, which a coarser contact threshold would count as contact; `sq` composite
-    roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies touch), `h_central` mean
-    over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the usual fit of the
-    smooth contact's least film over Sq (`smooth_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
-    `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
-    relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
-    equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when
-    dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream;
-    `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch).
-    """
-
-    car: float
-    car_domain: float
-    clr: float
-    capped_oil_load_ratio: float
-    sq: float
-    h_min: float
-    h_central: float
-    h_mean: float
-    lambda_ratio: float | None
-    p_max: float
-    reynolds_residual: float
-    load_error: float
-    mass_flux_imbalance: float
-    contact_slope: float | None = None
 
 
 def contact_state(solution: ContactSolution) -> ContactState:

@@ -11,7 +11,6 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import require_positive
-from asperity.kernels.shear import carried_stress
 from asperity.quantities import Parameter
 
 FREEZING = 273.15  # of water [K]
@@ -122,6 +121,8 @@ class LinearBairWiner:
 
 
 def _carried(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
+    from asperity.kernels.shear import carried_stress  # numba, for solved films only
+
     stress = np.empty_like(film.pressure)
     carried_stress(film.rate, film.viscosity, limit, modulus, film.transit, stress)
     return stress

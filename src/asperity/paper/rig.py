@@ -13,11 +13,12 @@ from typing import Literal
 import numpy as np
 import scipy
 
+from asperity import ehl
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.conditions import ContactConditions
 from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, oscillator, search_band
-from asperity.ehl import ContactState, contact_state, solve_contact
+from asperity.ehl import ContactState
 from asperity.errors import BadInput, require_positive
 from asperity.files import whole_file
 from asperity.paper.contact import papers_contact, rig_case
@@ -223,8 +224,8 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
 def _solved(case: Case, sq: float) -> ContactState:
     """The case's contact at another roughness."""
     rough = case.with_overrides({"surface.sq": f"{sq * 1e6!r} um"})
-    solution = solve_contact(rough.conditions, rough.lubricant, rough.surface(), options=rough.options)
-    state = contact_state(solution)
+    solution = ehl.solve_contact(rough.conditions, rough.lubricant, rough.surface(), options=rough.options)
+    state = ehl.contact_state(solution)
     if state.clr <= 0.0 or state.car <= 0.0:
         raise BadInput(
             f"{case.source}: no asperity touches at Sq {sq * 1e6:.2f} um, and a rig without contact has no truth to "
