@@ -1,6 +1,8 @@
 """The commands as a user types them, on the real solver and small grids."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +51,26 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     assert f"{100 * scalars['clr']:.1f} % of the load on {100 * scalars['car']:.1f} %" in out.splitlines()[0]
     assert f"{scalars['crf_hz']:.1f} ± {scalars['crf_std_hz']:.1f} Hz" in out
     assert asp("solve", "case.toml", "--quiet")[1:] == (out.splitlines()[0] + "\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "plain"),
+    [
+        (("solve", "case.toml", "--set", "vibration.duration=0.2 s"), "(m/s^2)^2/Hz"),
+        (("vibrate", "case.toml"), "damping ratio, zeta"),
+        (("surface", "ring.x3p", "absent.x3p"), "arithmetic mean height, Sa"),
+    ],
+)
+def test_a_terminal_without_our_signs_shows_plain_ones(asp, monkeypatch, arguments, plain):
+    x3pio.write("ring.x3p", np.random.default_rng(5).standard_normal((32, 48)) * 1e-6, x_scale=2e-6, y_scale=3e-6)
+    code, out, _ = asp(*arguments)
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    command = [sys.executable, "-m", "asperity", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, encoding="ascii", check=False)
+    assert done.returncode == code
+    assert plain in done.stdout
+    assert "?" not in done.stdout
+    assert len(done.stdout.splitlines()) == len(out.splitlines())
 
 
 def test_solving_a_run_again_gives_the_same_numbers(asp):

@@ -1,5 +1,8 @@
-"""The wait for the compiler is announced; that of a solver at work is not."""
+"""Progress: on a terminal only, beside the output; the wait for the compiler is announced, a solver at work is not."""
 
+import os
+import subprocess
+import sys
 from time import sleep
 
 import pytest
@@ -15,3 +18,26 @@ def test_the_first_step_ends_the_wait_not_the_start(monkeypatch, capsys, number,
         step(Iteration((8, 8), number, 1.0, 1.0, float("inf")))
         sleep(0.3)
     assert ("compiles the solver" in capsys.readouterr().err) is announced
+
+
+def test_a_file_gets_the_output_while_a_terminal_shows_progress():
+    program = (
+        "from asperity.cli.show import progress\n"
+        "with progress('in [brackets/]', quiet=False) as display:\n"
+        "    display('2 read', 2, 4)\n"
+        "    print('{}')\n"
+    )
+    terminal, end = os.openpty()
+    done = subprocess.run([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=end, text=True, check=True)
+    os.close(end)
+    shown = os.read(terminal, 100_000).decode()
+    os.close(terminal)
+    assert done.stdout == "{}\n"
+    assert "in [brackets/]" in shown
+    assert "2 read" in shown
+
+
+def test_quiet_shows_nothing(capsys):
+    with show.progress("case", quiet=True, compiles=True) as display:
+        display("step 1")
+    assert capsys.readouterr() == ("", "")
