@@ -18,7 +18,7 @@ PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8
 KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of friction, shear, the last two's deviations
     *("car", "car_error", "car_domain", "clr", "clr_error", "capped_oil_load_ratio"),
     *("load_below_20nm", "load_below_50nm", "load_below_100nm", "load_below_200nm", "load_at_floor"),
-    *("cavitated_share", "oil_film_m", "sq_m"),
+    *("cavitated_share", "oil_film_m", "sq_m", "contact_slope"),
     *("h_min_m", "h_min_error_m", "h_central_m", "h_central_error_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
     *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
     *("flash_temperature_max_k", "film_temperature_max_k"),
