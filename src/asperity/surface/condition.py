@@ -78,23 +78,19 @@ def condition_surface(
             f"s_filter must be shorter than l_filter, got {length_text(s_filter)} and {length_text(l_filter)}; "
             "swap them"
         )
-    before = measured.sq
-    if s_filter is not None:
-        measured = replace(measured, heights=_low_pass(measured, s_filter))
-        steps.append(_filtering("shorter", s_filter, before, measured.sq))
-    before = measured.sq
-    if l_filter is not None:
-        rough = measured.heights - _low_pass(measured, l_filter)
-        measured = replace(measured, heights=rough - np.nanmean(rough))
-        steps.append(_filtering("longer", l_filter, before, measured.sq))
+    for which, cutoff in (("shorter", s_filter), ("longer", l_filter)):
+        if cutoff is None:
+            continue
+        before, heights = measured.sq, _low_pass(measured, cutoff)
+        if which == "longer":
+            heights = measured.heights - heights
+            heights -= np.nanmean(heights)
+        measured = replace(measured, heights=heights)
+        steps.append(
+            f"removed waves {which} than {length_text(cutoff)} by the Gaussian filter of ISO 16610 "
+            f"(Sq {length_text(before)} before, {length_text(measured.sq)} after)"
+        )
     return measured, tuple(steps)
-
-
-def _filtering(which: str, cutoff: float, before: float, after: float) -> str:
-    return (
-        f"removed waves {which} than {length_text(cutoff)} by the Gaussian filter of ISO 16610 "
-        f"(Sq {length_text(before)} before, {length_text(after)} after)"
-    )
 
 
 def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
@@ -161,13 +157,10 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
         bow = across * (2.0 * slope - curvature * across) / (flat + round_)
         return np.asarray(z0 + tilt * along + np.sqrt(1.0 + tilt**2) * bow)
 
-    powers = [
-        (i, j)
-        for i, j in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-        if measured.uniform is None or (i, j)[measured.uniform] == 0
-    ]
+    quadratic = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    powers = [power for power in quadratic if measured.uniform is None or power[measured.uniform] == 0]
     fitted, *_ = np.linalg.lstsq(np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None)
-    c = dict.fromkeys(((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)), 0.0) | dict(zip(powers, fitted, strict=True))
+    c = dict.fromkeys(quadratic, 0.0) | dict(zip(powers, fitted, strict=True))
     gradient = np.array([c[1, 0], c[0, 1]])
     bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
     steep = int(np.argmax(np.abs(bends)))

@@ -45,9 +45,14 @@ def gaussian_surface(
         for a correlation length below 2 cells, which the grid cannot show, or above half the domain, which then
         holds no sample of the roughness.
     """
-    lengths = correlation_length if isinstance(correlation_length, tuple) else (correlation_length, correlation_length)
-    require_lengths(grid, lengths, direction)
+    lengths = _lengths(grid, correlation_length, direction)
     return _filtered_noise(grid, sq, *_gaussian_spectrum(lengths, direction), rng)
+
+
+def _lengths(grid: Grid, length: float | tuple[float, float], direction: float) -> tuple[float, float]:
+    lengths = length if isinstance(length, tuple) else (length, length)
+    require_lengths(grid, lengths, direction)
+    return lengths
 
 
 def require_lengths(
@@ -125,8 +130,7 @@ def non_gaussian_surface(
             f"kurtosis must be above 1 + skewness^2 = {1.0 + skewness**2:.4g}, got {kurtosis:g}; raise it, or bring "
             "the skewness nearer to 0"
         )
-    lengths = correlation_length if isinstance(correlation_length, tuple) else (correlation_length, correlation_length)
-    require_lengths(grid, lengths, direction)
+    lengths = _lengths(grid, correlation_length, direction)
     stretch = johnson.stretch(skewness, kurtosis)
     longer = (lengths[0] * stretch, lengths[1] * stretch)
     gaussian = _filtered_noise(grid, 1.0, *_gaussian_spectrum(longer, direction), rng).heights
@@ -136,9 +140,7 @@ def non_gaussian_surface(
             f"this sample cannot take a skewness of {skewness:g} and a kurtosis of {kurtosis:g} (nearest: "
             f"{reached[0]:.3g} and {reached[1]:.3g}); use a larger domain, shorter correlation lengths or milder values"
         )
-    heights = curve(gaussian)
-    heights -= heights.mean()
-    return Surface(heights * (sq / np.std(heights)), grid)
+    return Surface.scaled(curve(gaussian), grid, sq)
 
 
 def run_in_surface(
@@ -172,14 +174,12 @@ def run_in_surface(
         raise BadInput(f"plateau_share must lie between 0 and 1, got {plateau_share:g}; a run-in surface has about 0.4")
     if not 0.0 <= plateau_roughness <= 1.0:
         raise BadInput(f"plateau_roughness must lie between 0 and 1, got {plateau_roughness:g}; 0.1 is usual")
-    lengths = correlation_length if isinstance(correlation_length, tuple) else (correlation_length, correlation_length)
-    require_lengths(grid, lengths, direction)
+    lengths = _lengths(grid, correlation_length, direction)
     rough = _filtered_noise(grid, 1.0, *_gaussian_spectrum(lengths, direction), rng).heights
     finer = (lengths[0] / 2.0, lengths[1] / 2.0)
     fine = _filtered_noise(grid, 1.0, *_gaussian_spectrum(finer, direction), rng).heights
     heights = np.minimum(rough, np.quantile(rough, 1.0 - plateau_share) + plateau_roughness * fine)
-    heights -= heights.mean()
-    return Surface(heights * (require_positive("sq", sq, "m") / np.std(heights)), grid)
+    return Surface.scaled(heights, grid, sq)
 
 
 def self_affine_surface(
@@ -232,14 +232,11 @@ def _filtered_noise(
     """White noise on as many samples as the spectrum needs, filtered, then evaluated at the grid's cell centres."""
     require_positive("sq", sq, "m")
     # an odd count has no Nyquist wave, so every wave of the noise has its conjugate
-    highest = [
-        int(np.ceil(k * extent / (2.0 * np.pi))) for k, extent in zip(largest_wavenumbers, grid.extent, strict=True)
-    ]
+    sides = list(zip(largest_wavenumbers, grid.extent, strict=True))
+    highest = [int(np.ceil(k * extent / (2.0 * np.pi))) for k, extent in sides]
     noise = rng.standard_normal([2 * m + 1 for m in highest])
     modes = [np.fft.ifftshift(np.arange(-m, m + 1)) for m in highest]
-    wavenumbers = [
-        np.asarray(2.0 * np.pi / extent * m, dtype=np.float64) for m, extent in zip(modes, grid.extent, strict=True)
-    ]
+    wavenumbers: list[Field] = [2.0 * np.pi / extent * m for m, extent in zip(modes, grid.extent, strict=True)]
     # samples sit at cell centres, half a cell from the corner that the noise starts at
     phases = [np.exp(0.5j * k * spacing) for k, spacing in zip(wavenumbers, grid.spacing, strict=True)]
     waves = np.fft.fft2(noise) * amplitude(wavenumbers[0][:, None], wavenumbers[1][None, :]) * np.outer(*phases)
@@ -247,6 +244,4 @@ def _filtered_noise(
     kept = [np.abs(m) < cells / 2.0 for m, cells in zip(modes, grid.cells, strict=True)]
     spectrum = np.zeros(grid.cells, dtype=complex)
     spectrum[np.ix_(modes[0][kept[0]], modes[1][kept[1]])] = waves[np.ix_(*kept)]
-    heights = np.fft.ifft2(spectrum).real
-    heights -= heights.mean()
-    return Surface(heights * (sq / np.std(heights)), grid)
+    return Surface.scaled(np.fft.ifft2(spectrum).real, grid, sq)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
 from asperity.surface.generate import require_lengths
@@ -81,7 +80,7 @@ def ground_surface(
         where = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)
         np.minimum.at(heights, where.ravel(), deep.ravel())
     field = heights.reshape(nx, ny)
-    return _scaled(field.T if steep else field, grid, sq)
+    return Surface.scaled(field.T if steep else field, grid, sq)
 
 
 def sandblasted_surface(grid: Grid, *, sq: float, crater_radius: float, rng: np.random.Generator) -> Surface:
@@ -130,7 +129,7 @@ def sandblasted_surface(grid: Grid, *, sq: float, crater_radius: float, rng: np.
         crater = -radii[marks, None, None] * (1.0 - u) ** 2 * (1.0 - 4.0 * u)
         where = np.mod(i, nx)[:, :, None] * ny + np.mod(j, ny)[:, None, :]
         np.add.at(heights, where.ravel(), crater.ravel())
-    return _scaled(heights.reshape(nx, ny), grid, sq)
+    return Surface.scaled(heights.reshape(nx, ny), grid, sq)
 
 
 def _rows(width: float, cosine: float, dy: float) -> int:
@@ -149,8 +148,3 @@ def _batches(order: npt.NDArray[np.intp], cells: Callable[[int], int]) -> Iterat
             last = min(2 * last - first, order.size)
         yield order[first:last]
         first = last
-
-
-def _scaled(heights: Field, grid: Grid, sq: float) -> Surface:
-    heights = np.ascontiguousarray(heights - heights.mean())
-    return Surface(heights * (require_positive("sq", sq, "m") / np.std(heights)), grid)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import BadInput
+from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
 
 
@@ -31,6 +31,12 @@ class Surface:
         missing = int(np.count_nonzero(~np.isfinite(self.heights)))
         if missing:
             raise BadInput(f"surface has {missing} heights that are not finite; fill or crop them first")
+
+    @classmethod
+    def scaled(cls, heights: Field, grid: Grid, sq: float) -> "Surface":
+        """Heights of any size, less their mean and scaled to an `sq` [m]."""
+        heights = np.ascontiguousarray(heights - heights.mean())
+        return cls(heights * (require_positive("sq", sq, "m") / np.std(heights)), grid)
 
     @property
     def sq(self) -> float:

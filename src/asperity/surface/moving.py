@@ -102,8 +102,7 @@ class MovingSurfaces:
         """
         surface = (self.first, self.second)[index]
         cells = self.speeds[index] * time / self.grid.spacing[0]
-        whole = round(cells)
-        part = 0.0
+        whole, part = round(cells), 0.0
         if abs(cells - whole) >= WHOLE:
             whole = int(np.floor(cells))
             part = cells - whole

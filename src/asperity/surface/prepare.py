@@ -98,17 +98,15 @@ def prepare_surface(
     levelled, conditioning = condition_surface(
         measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
     )
-    steps = [*conditioning]
     overlap = tuple(
         max(4, round(n * _OVERLAP)) if ends and axis != levelled.uniform else 0
         for axis, (n, ends) in enumerate(zip(grid.cells, grid.periodic, strict=True))
     )
-    steps.append(_fitting(levelled, grid, fit))
+    fitting = _fitting(levelled, grid, fit)
     heights, positions = _cut(levelled, grid, overlap)
     heights, filling = _fill(heights, levelled, most_missing)
-    steps.append(filling)
     heights, resampling = _resample(heights, positions, levelled.grid, grid, overlap)
-    steps.append(resampling)
+    steps = [*conditioning, fitting, filling, resampling]
     for axis, (cells, shared) in enumerate(zip(grid.cells, overlap, strict=True)):
         if shared:
             before = _shape_inside(heights, grid)
@@ -184,9 +182,8 @@ def _fill(heights: Field, measured: MeasuredSurface, most_missing: float) -> tup
         )
     sizes = (float(heights.shape[0]), float(heights.shape[1]))
     filled = surface_topography().Topography(np.ma.masked_array(heights, missing), sizes).interpolate_undefined_data()
-    return np.ma.filled(
-        filled.heights(), np.nan
-    ), f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"
+    whole = np.ma.filled(filled.heights(), np.nan)
+    return whole, f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"
 
 
 def _resample(

@@ -6,8 +6,8 @@ tables. Nothing is corrected here: levelling, filling and resampling are left to
 
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -175,7 +175,12 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
     suffixes = {reader.format(): set(reader.file_extensions()) for reader in surface_topography().IO.readers}
     formats = [form for form, known in suffixes.items() if suffix in known]
     if not formats and suffix not in TABLES:
-        return _read_by_content(path)
+        try:
+            return _topography(path, None)
+        except UnreadableFile:
+            raise
+        except Exception as error:
+            raise UnreadableFile(f"{name} is in no format that can be read; {_REMEDY}") from error
     if _TEXT.intersection(formats):
         formats = [form for form in suffixes if form in _TEXT.union(formats)]
     reason: Exception | None = None
@@ -199,16 +204,9 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
     if actual is not None and actual not in formats:
         remedy = f"rename it to .{min(suffixes[actual])} if that is right"
         raise UnreadableFile(f"{name} is called .{suffix} but looks like {actual} inside; {remedy}") from reason
-    raise UnreadableFile(f"{name} is no readable .{suffix} file ({_why(reason)}); {_REMEDY}") from reason
-
-
-def _read_by_content(path: Path) -> RawMap:
-    try:
-        return _topography(path, None)
-    except UnreadableFile:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path.name} is in no format that can be read; {_REMEDY}") from error
+    mismatch = surface_topography().Exceptions.FileFormatMismatch  # speaks of bytes that it did not expect
+    why = "its content is something else" if isinstance(reason, mismatch) else first_line(reason)
+    raise UnreadableFile(f"{name} is no readable .{suffix} file ({why}); {_REMEDY}") from reason
 
 
 def _format_of(path: Path) -> str | None:
@@ -217,16 +215,12 @@ def _format_of(path: Path) -> str | None:
         try:
             form = str(surface_topography().open_topography(str(path)).format())
         except Exception:  # noqa: BLE001 - as above
-            form = next((known for known in ("x3p", "sdf") if _readable(_LAST_RESORTS[known], path)), "")
+            form = ""
+        for known in () if form else ("x3p", "sdf"):
+            with suppress(Exception):
+                _LAST_RESORTS[known](path)
+                return known
     return form if form and form not in _UNMARKED | _TEXT else None
-
-
-def _readable(read: Callable[[Path], RawMap], path: Path) -> bool:
-    try:
-        read(path)
-    except Exception:  # noqa: BLE001 - as above
-        return False
-    return True
 
 
 def _topography(path: Path, form: str | None) -> RawMap:
@@ -239,15 +233,11 @@ def _topography(path: Path, form: str | None) -> RawMap:
             line = reader.topography()
             x, z = line.positions_and_heights()
             return _profile(path, x, z, str(reader.format()), line.unit)
-        if channel.physical_sizes is None:
-            topography = reader.topography(physical_sizes=channel.nb_grid_pts)
-        else:
-            topography = reader.topography()
+        bare = channel.physical_sizes is None
+        topography = reader.topography(physical_sizes=channel.nb_grid_pts) if bare else reader.topography()
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
-        sizes, unit = topography.physical_sizes, topography.unit
-    pixel = None
-    if channel.physical_sizes is not None:
-        pixel = (float(sizes[0]) / heights.shape[0], float(sizes[1]) / heights.shape[1])
+        (width, length), unit = topography.physical_sizes, topography.unit
+    pixel = None if bare else (float(width) / heights.shape[0], float(length) / heights.shape[1])
     maps = [other.name for other in reader.channels if other.dim == 2]
     if len(maps) > 1:
         notes.append(f"of the {len(maps)} maps in the file, the first, {channel.name!r}, was read")
@@ -324,19 +314,10 @@ def _loose_x3p(path: Path) -> RawMap | None:
         kind = {"D": "<f8", "F": "<f4"}[root.findtext(".//{*}CZ/{*}DataType") or ""]
         cells = int(elements["SizeX"]), int(elements["SizeY"])
         rows = np.frombuffer(data, dtype=kind).reshape(cells[1], cells[0]) * steps[2]
-    except (
-        zipfile.BadZipFile,
-        ElementTree.ParseError,
-        OSError,
-        ValueError,
-        LookupError,
-        NotImplementedError,
-        zlib.error,
-    ):
+    except Exception:  # noqa: BLE001 - whatever damage makes of an archive and of its XML
         return None
-    return RawMap(
-        _x_first(rows), (steps[0], steps[1]), "x3p", "m", ("the x3p archive strays from the standard, yet holds a map",)
-    )
+    notes = ("the x3p archive strays from the standard, yet holds a map",)
+    return RawMap(_x_first(rows), (steps[0], steps[1]), "x3p", "m", notes)
 
 
 def _sdf(path: Path) -> RawMap:
@@ -364,10 +345,3 @@ def surface_topography() -> Any:
         warnings.simplefilter("ignore", ImportWarning)
         import SurfaceTopography
     return SurfaceTopography
-
-
-def _why(reason: Exception | None) -> str:
-    """The reader's own words, unless they only speak of bytes that it did not expect at the start."""
-    if isinstance(reason, surface_topography().Exceptions.FileFormatMismatch):
-        return "its content is something else"
-    return first_line(reason)
