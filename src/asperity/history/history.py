@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas
 
-from asperity.arrays import Field, Mask
+from asperity.arrays import Field, Mask, finite_or_none
 from asperity.case import Case
 from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import ContactState, Memory, step_seconds
@@ -148,16 +148,16 @@ class History:
             "folder": None if self.folder is None else str(self.folder),
         }
         for key in SUMMARISED:
-            scalars[key] = _number(rows[key].mean())
-            scalars[f"{key}_std"] = _number(rows[key].std(ddof=0))
-            scalars[f"{key}_start"] = _number(first[key])
+            scalars[key] = finite_or_none(rows[key].mean())
+            scalars[f"{key}_std"] = finite_or_none(rows[key].std(ddof=0))
+            scalars[f"{key}_start"] = finite_or_none(first[key])
         if self.case.motion.flattening:
             passes = self.by_pass()[list(OVER_PASSES)].astype(object)
             scalars["passes"] = passes.where(passes.notna(), None).to_dict("records")
         resonance = None if self.vibration is None else self.vibration.resonance
         contact = resonance if resonance is not None and resonance.found else None
-        scalars["crf_hz"] = None if contact is None else _number(contact.crf_hz)
-        scalars["crfa"] = None if contact is None else _number(contact.crfa)
+        scalars["crf_hz"] = None if contact is None else finite_or_none(contact.crf_hz)
+        scalars["crfa"] = None if contact is None else finite_or_none(contact.crfa)
         return scalars
 
     def verdict(self) -> str:
@@ -181,7 +181,3 @@ def steps_a_pass(case: Case, surfaces: MovingSurfaces) -> float:
     rough = surfaces.rough if any(surfaces.rough) else (True, True)
     passage = max(surfaces.passage(index) for index in (0, 1) if rough[index])
     return passage / step_seconds(case.conditions, surfaces, case.motion.time_step)
-
-
-def _number(value: Any) -> float | None:
-    return float(value) if math.isfinite(value) else None

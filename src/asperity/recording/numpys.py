@@ -1,8 +1,9 @@
 """NumPy's .npy and .npz: rows of samples, rate and unit as scalars beside them in the .npz."""
 
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -110,39 +111,35 @@ def _of_member(path: Path, member: str, header: Header, notes: list[str]) -> Ite
         raise UnreadableFile(f"{path.name} holds {name} of {shape}: no recording; give one row a channel")
     for k in range(count):
         first, stride = (k * samples, 1) if rows_last else (k, count)
-        blocks = _unpacked(path, member, dtype, (first, stride, samples), notes)
+        blocks = partial(_unpacked, path, member, dtype, (first, stride, samples), notes)
         yield Channel(name=name if count == 1 else f"{name}[{k + 1}]", blocks=blocks, samples=samples)
 
 
 def _unpacked(
-    path: Path, member: str, dtype: np.dtype[Any], where: tuple[int, int, int], notes: list[str]
-) -> Callable[[int], Iterator[Field]]:
+    path: Path, member: str, dtype: np.dtype[Any], where: tuple[int, int, int], notes: list[str], size: int
+) -> Iterator[Field]:
     first, stride, samples = where
-
-    def blocks(size: int) -> Iterator[Field]:
-        done = 0
-        try:
-            with zipfile.ZipFile(path) as archive, archive.open(member) as file:
-                _header(file)
-                left = (first if stride == 1 else 0) * dtype.itemsize
-                while left > 0:
-                    left -= len(file.read(min(left, 1 << 20))) or left
-                while done < samples:
-                    wanted = min(size, samples - done) * stride * dtype.itemsize
-                    data = file.read(wanted)
-                    whole = len(data) // (stride * dtype.itemsize)
-                    if whole == 0:
-                        break
-                    values = np.frombuffer(data, dtype, whole * stride)
-                    done += whole
-                    yield (values if stride == 1 else values[first::stride]).astype(np.float64)
-        except (zipfile.BadZipFile, OSError, ValueError, EOFError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
-            if done == 0:
-                raise UnreadableFile(f"{path.name} cannot be unpacked ({first_line(error)}); {REMEDY}") from error
-        if done < samples:
-            notes.append(f"damaged after sample {done} of {samples}; what comes before was read")
-
-    return blocks
+    done = 0
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(member) as file:
+            _header(file)
+            left = (first if stride == 1 else 0) * dtype.itemsize
+            while left > 0:
+                left -= len(file.read(min(left, 1 << 20))) or left
+            while done < samples:
+                wanted = min(size, samples - done) * stride * dtype.itemsize
+                data = file.read(wanted)
+                whole = len(data) // (stride * dtype.itemsize)
+                if whole == 0:
+                    break
+                values = np.frombuffer(data, dtype, whole * stride)
+                done += whole
+                yield (values if stride == 1 else values[first::stride]).astype(np.float64)
+    except (zipfile.BadZipFile, OSError, ValueError, EOFError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        if done == 0:
+            raise UnreadableFile(f"{path.name} cannot be unpacked ({first_line(error)}); {REMEDY}") from error
+    if done < samples:
+        notes.append(f"damaged after sample {done} of {samples}; what comes before was read")
 
 
 def _header(file: BinaryIO | Any) -> Header:

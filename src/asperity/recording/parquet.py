@@ -1,6 +1,7 @@
 """Parquet tables, by pyarrow: a channel a column; rate and unit in the metadata of the table or of its column."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def read(path: Path) -> Contents:
             facts = facts_in(path.name, table | _decoded(schema.field(label).metadata))
             facts = ({"unit": unit} if unit else {}) | rate | facts
             if label != clock and not label.startswith("__index"):
-                channels.append(Channel(name=name, blocks=_column(path, label, notes), samples=rows, **facts))
+                channels.append(Channel(name=name, blocks=partial(_column, path, label, notes), samples=rows, **facts))
     return Contents(format="parquet", channels=channels, notes=notes)
 
 
@@ -48,23 +49,20 @@ def _values(batch: Any) -> Field:
     return np.asarray(batch.column(0).to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
-def _column(path: Path, label: str, notes: list[str]) -> Callable[[int], Iterator[Field]]:
-    def blocks(size: int) -> Iterator[Field]:
-        import pyarrow.parquet
+def _column(path: Path, label: str, notes: list[str], size: int) -> Iterator[Field]:
+    import pyarrow.parquet
 
-        done = 0
-        try:
-            with pyarrow.parquet.ParquetFile(path) as file:
-                for batch in file.iter_batches(batch_size=size, columns=[label]):
-                    values = _values(batch)
-                    done += values.size
-                    yield values
-        except Exception as error:
-            if done == 0:
-                raise UnreadableFile(f"{path.name} cannot be read ({first_line(error)}); {REMEDY}") from error
-            notes.append(f"damaged after sample {done}; what comes before was read")
-
-    return blocks
+    done = 0
+    try:
+        with pyarrow.parquet.ParquetFile(path) as file:
+            for batch in file.iter_batches(batch_size=size, columns=[label]):
+                values = _values(batch)
+                done += values.size
+                yield values
+    except Exception as error:
+        if done == 0:
+            raise UnreadableFile(f"{path.name} cannot be read ({first_line(error)}); {REMEDY}") from error
+        notes.append(f"damaged after sample {done}; what comes before was read")
 
 
 def _decoded(metadata: dict[bytes, bytes] | None) -> dict[str, str]:

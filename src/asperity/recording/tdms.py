@@ -1,9 +1,10 @@
 """National Instruments TDMS, by npTDMS."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from asperity.recording.common import Reader, facts_in, numeric, refused_as, sliced
+from asperity.recording.common import facts_in, numeric, refused_as, sliced
 from asperity.recording.model import Channel, Contents
 
 
@@ -27,16 +28,13 @@ def read(path: Path) -> Contents:
                     continue
                 facts = facts_in(path.name, {**opened.properties, **group.properties, **channel.properties})
                 name, samples = f"{group.name}/{channel.name}", len(channel)
-                blocks = sliced(_slices(path, group.name, channel.name), samples, notes, name)
+                blocks = sliced(partial(_slice, path, group.name, channel.name), samples, notes, name)
                 channels.append(Channel(name=name, blocks=blocks, samples=samples, **facts))
     return Contents(format="tdms", channels=channels, notes=notes)
 
 
-def _slices(path: Path, group: str, channel: str) -> Reader:
-    def piece(first: int, last: int) -> Any:
-        import nptdms
+def _slice(path: Path, group: str, channel: str, first: int, last: int) -> Any:
+    import nptdms
 
-        with nptdms.TdmsFile.open(path) as opened:
-            return opened[group][channel].read_data(first, last - first)
-
-    return piece
+    with nptdms.TdmsFile.open(path) as opened:
+        return opened[group][channel].read_data(first, last - first)

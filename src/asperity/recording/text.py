@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -54,8 +55,7 @@ def looks_like_text(head: bytes) -> bool:
     """Whether there are no bytes in it that text has not."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return True
-    control = sum(head.count(bytes([code])) for code in (*range(9), *range(14, 27), *range(28, 32)))
-    return control == 0
+    return not any(code in head for code in (*range(9), *range(14, 27), *range(28, 32)))
 
 
 def read(path: Path) -> Contents:
@@ -71,11 +71,13 @@ def read(path: Path) -> Contents:
             if table is None:
                 break
             if large:
-                _peek(stream, table)
+                table.rows = next(_tables(stream, table))  # for its clock
                 tables.append(table)
                 break
-            _load(stream, table)
-            if table.rows is not None and table.rows.shape[0] >= _FEWEST_ROWS:
+            table.rows = np.concatenate([np.empty((0, table.columns)), *_tables(stream, table)])
+            while table.rows.shape[0] and np.isnan(table.rows[-1]).all():
+                table.rows = table.rows[:-1]
+            if table.rows.shape[0] >= _FEWEST_ROWS:
                 tables.append(table)
             at = table.end
     if not tables:
@@ -122,14 +124,13 @@ def _header(stream: BinaryIO, at: int) -> _Table | None:
         if len(row) > MOST_CHANNELS:
             raise UnreadableFile(f"a row of {len(row)} numbers is no row of samples; give one column a channel")
         names, units = _labels(texts[:number], len(row), dialect)
-        declared = _declared(texts[:number])
         return _Table(
             offset=at + sum(map(len, lines[:number])),
             dialect=dialect,
             columns=len(row),
             names=names,
             units=units,
-            declared=declared,
+            declared=_declared(texts[:number]),
             started=_started(texts[:number]),
             stamped=stamped,
         )
@@ -296,18 +297,6 @@ def _picked(rows: list[list[float]], table: _Table, column: int | None) -> Field
     return array if column is None else array[:, column : column + 1]
 
 
-def _load(stream: BinaryIO, table: _Table) -> None:
-    parts = list(_tables(stream, table))
-    table.rows = np.concatenate(parts) if parts else np.empty((0, table.columns))
-    while table.rows.shape[0] and np.isnan(table.rows[-1]).all():
-        table.rows = table.rows[:-1]
-
-
-def _peek(stream: BinaryIO, table: _Table) -> None:
-    """The first rows of a large block, for its clock."""
-    table.rows = next(_tables(stream, table))
-
-
 # Channels ------------------------------------------------------------------------------------------------------------
 
 
@@ -342,36 +331,28 @@ def _channels(
         known = facts | ({"unit": table.units[k]} if table.units[k] else {})
         if open_bytes is None:
             values = spread(rows[:, k])
-            blocks: Callable[[int], Iterator[Field]] = _pieces(values)
-            yield Channel(name=prefix + names[k], blocks=blocks, samples=values.size, **known)
+            yield Channel(name=prefix + names[k], blocks=partial(_pieces, values), samples=values.size, **known)
         else:
-            yield Channel(name=prefix + names[k], blocks=_streamed(open_bytes, table, k, notes), **known)
+            yield Channel(name=prefix + names[k], blocks=partial(_streamed, open_bytes, table, k, notes), **known)
 
 
 def _unique(names: list[str]) -> list[str]:
     return [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
 
 
-def _pieces(values: Field) -> Callable[[int], Iterator[Field]]:
-    def blocks(size: int) -> Iterator[Field]:
-        for first in range(0, values.size, size):
-            yield values[first : first + size]
-
-    return blocks
+def _pieces(values: Field, size: int) -> Iterator[Field]:
+    for first in range(0, values.size, size):
+        yield values[first : first + size]
 
 
 def _streamed(
-    open_bytes: Callable[[], BinaryIO], table: _Table, column: int, notes: list[str]
-) -> Callable[[int], Iterator[Field]]:
-    def blocks(size: int) -> Iterator[Field]:
-        with open_bytes() as stream:
-            for rows in _tables(stream, table, column):
-                for first in range(0, rows.shape[0], size):
-                    yield rows[first : first + size, 0]
-        if table.end is not None:
-            notes.append("another block of rows follows, which was not read; split the file")
-
-    return blocks
+    open_bytes: Callable[[], BinaryIO], table: _Table, column: int, notes: list[str], size: int
+) -> Iterator[Field]:
+    with open_bytes() as stream:
+        for rows in _tables(stream, table, column):
+            yield from _pieces(rows[:, 0], size)
+    if table.end is not None:
+        notes.append("another block of rows follows, which was not read; split the file")
 
 
 def _as_they_are(values: Field) -> Field:

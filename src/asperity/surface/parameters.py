@@ -128,10 +128,9 @@ def describe_surface(
     levelled, steps = condition_surface(
         measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
     )
-    if levelled.uniform is None:
-        return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps)
-    spacing = levelled.grid.spacing[1 - levelled.uniform]
-    profile = profile_parameters(levelled.profile, spacing)
+    profile = None
+    if levelled.uniform is not None:
+        profile = profile_parameters(levelled.profile, levelled.grid.spacing[1 - levelled.uniform])
     return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps, profile)
 
 

@@ -153,8 +153,7 @@ def trend_alarm(values: Field, *, alert: float, danger: float, in_a_row: int = 3
     values = np.asarray(values, dtype=float)
     thresholds = np.array([alert, danger])
     raised = np.zeros(2, dtype=bool)
-    raised_at = np.zeros(2, dtype=int)
-    above, below = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
+    raised_at, above, below = np.zeros((3, 2), dtype=int)
     levels = []
     for number, value in enumerate(values):
         if np.isfinite(value):
@@ -163,16 +162,12 @@ def trend_alarm(values: Field, *, alert: float, danger: float, in_a_row: int = 3
             raised_at[~raised & (above >= in_a_row)] = number
             raised = (raised | (above >= in_a_row)) & (below < in_a_row)
         levels.append(LEVELS[int(np.sum(raised))])
-    state = int(np.sum(raised))
-    if state == 0:
-        verdict = f"No alarm: {thing} does not stand at {alert:g} or above by {in_a_row} recordings in a row."
-        return Alarm(level="none", levels=tuple(levels), since=None, verdict=verdict)
-    return Alarm(
-        level=LEVELS[state],
-        levels=tuple(levels),
-        since=int(raised_at[state - 1]),
-        verdict=(
+    state, since = int(np.sum(raised)), None
+    verdict = f"No alarm: {thing} does not stand at {alert:g} or above by {in_a_row} recordings in a row."
+    if state > 0:
+        since = int(raised_at[state - 1])
+        verdict = (
             f"{LEVELS[state].capitalize()}: {thing} was at {thresholds[state - 1]:g} or above {in_a_row} times in a "
             f"row, last {values[np.isfinite(values)][-1]:.3g}."
-        ),
-    )
+        )
+    return Alarm(level=LEVELS[state], levels=tuple(levels), since=since, verdict=verdict)
