@@ -6,17 +6,16 @@ Parameters of laws say their unit and symbol beside the parameter, as `Parameter
 
 import csv
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.resources import files
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
+
+from asperity.errors import require_positive
 
 NO_VALUE = "–"
-DIMENSIONLESS = "1"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# display units over their SI unit; any other display unit is the SI unit itself
-_FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
 # display units over their SI unit; any other display unit is the SI unit itself
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
 _FACTORS |= {"1/µm": 1e-6, "1/GPa": 1e9, "mm/s": 1e3, "N/µm": 1e-6, "N/mm": 1e-3, "mJ": 1e3}
@@ -122,11 +121,9 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
     if not form.endswith("e") and -3 <= exponent < 6:
         exponent = 0
     scaled, power = value / 10.0**exponent, f"×10{str(exponent).translate(SUPERSCRIPTS)}" if exponent else ""
-    known = deviation is not None and math.isfinite(deviation) and deviation > 0.0
-    if not known:
-        number = f"{scaled:{form.replace('e', 'f')}}"
-        return f"{number}{power}".replace("-", "−")
-    spread = (deviation or 0.0) / 10.0**exponent
+    if deviation is None or not 0.0 < deviation < math.inf:
+        return f"{scaled:{form.replace('e', 'f')}}{power}".replace("-", "−")
+    spread = deviation / 10.0**exponent
     decimals = max(0, 1 - math.floor(math.log10(spread)))
     if form.endswith("f"):
         decimals = min(decimals, int(form.strip(".f")))
@@ -163,10 +160,8 @@ def lines(*groups: str) -> list[Quantity]:
 
 def read(owner: object, entries: Iterable[Quantity]) -> dict[str, Any]:
     """Numbers by key, each at the `source` that its line names in the owner; None where there is none or it is nan."""
-    numbers = {entry.key: entry.at(owner) for entry in entries if entry.source}
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value for key, value in numbers.items()
-    }
+    numbers = ((entry.key, entry.at(owner)) for entry in entries if entry.source)
+    return {key: None if isinstance(n, float) and not math.isfinite(n) else n for key, n in numbers}
 
 
 def select(*groups: str, detail: bool = False) -> list[Quantity]:
@@ -177,10 +172,14 @@ def select(*groups: str, detail: bool = False) -> list[Quantity]:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """Unit [SI] and symbol of a law's parameter, beside it: `eta0: Annotated[float, Parameter("Pa s", "η₀")]`."""
+    """Unit [SI] and symbol of a law's parameter, beside it: `eta0: Annotated[float, Parameter("Pa s", "η₀")]`.
+
+    `positive` is what messages call a parameter that has to be positive; see `Parametric`.
+    """
 
     unit: str = ""
     symbol: str = ""
+    positive: str = ""
 
     def text(self, value: object) -> str:
         """A value in SI as people read it, with its unit: "18.2 1/GPa"; what is no number as it stands."""
@@ -190,10 +189,20 @@ class Parameter:
         return f"{value * _FACTORS.get(display, 1.0):.4g} {display}".rstrip()
 
 
-def parameters(law: type) -> Iterator[tuple[str, Parameter]]:
+def parameters(law: type) -> dict[str, Parameter]:
     """The fields of a law by name, each with its unit and symbol; a field that states none is a plain number."""
     hints = get_type_hints(law, include_extras=True)
-    for entry in fields(law):
-        hint = hints[entry.name]
-        marks = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
-        yield entry.name, next((mark for mark in marks if isinstance(mark, Parameter)), Parameter())
+    marks = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(law)}
+    return {name: next((mark for mark in of if isinstance(mark, Parameter)), Parameter()) for name, of in marks.items()}
+
+
+class Parametric:
+    """A dataclass with parameters; BadInput for one that has to be positive and is not, where it is not left out."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for name, parameter in parameters(type(self)).items():
+            value = getattr(self, name)
+            if parameter.positive and value is not None:
+                require_positive(parameter.positive, value, parameter.unit)

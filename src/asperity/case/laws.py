@@ -34,8 +34,10 @@ def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
 
 def section_fields(law: type) -> dict[str, Any]:
     """A dataclass's fields as fields of a section."""
-    types, units = get_type_hints(law), {name: parameter.unit for name, parameter in parameters(law)}
-    return {entry.name: section_field(types[entry.name], entry.default, units[entry.name]) for entry in fields(law)}
+    types, marks = get_type_hints(law), parameters(law)
+    return {
+        entry.name: section_field(types[entry.name], entry.default, marks[entry.name].unit) for entry in fields(law)
+    }
 
 
 @cache

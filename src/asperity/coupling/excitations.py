@@ -12,7 +12,7 @@ from asperity.coupling.laws import LoadedContact
 from asperity.ehl import ContactState
 from asperity.errors import BadInput, require_choice, require_positive
 from asperity.hertz import point_contact
-from asperity.quantities import Parameter
+from asperity.quantities import Parameter, Parametric
 from asperity.vibration import Excitation, FilteredNoise, NoiseFilter, PatchAverage, SurfaceTrack
 
 Coefficient: TypeAlias = Literal["readjusted", "kept"]
@@ -40,20 +40,19 @@ class ExcitationLaw(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CutoffLaw:
+class CutoffLaw(Parametric):
     """Cut-off of the profile: fc = fc_ref (CAR/CAR_ref)^q.
 
     The paper names no law. 30 Hz is the base case of its dry section 2, in which everything touches, hence CAR_ref = 1;
     q = 0.18 is where its "the two effects offset" holds (in proportion, q = 1, CRFA would grow 60 000-fold).
     """
 
-    cutoff_reference_hz: Annotated[float, Parameter("Hz", "fc_ref")] = 30.0
-    car_reference: Annotated[float, Parameter("", "CAR_ref")] = 1.0
+    cutoff_reference_hz: Annotated[float, Parameter("Hz", "fc_ref", "cut-off reference frequency")] = 30.0
+    car_reference: Annotated[float, Parameter("", "CAR_ref", "reference CAR")] = 1.0
     cutoff_exponent: Annotated[float, Parameter("", "q")] = 0.18
 
     def __post_init__(self) -> None:
-        require_positive("cut-off reference frequency", self.cutoff_reference_hz, "Hz")
-        require_positive("reference CAR", self.car_reference)
+        super().__post_init__()
         if not 0.0 <= self.cutoff_exponent <= 2.0:
             raise BadInput(
                 f"cut-off exponent must lie between 0 and 2, got {self.cutoff_exponent:g}; 0.18 is the default"
@@ -80,8 +79,8 @@ class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
 
     def __post_init__(self) -> None:
         CutoffLaw.__post_init__(self)
-        require_choice("noise coefficient", self.coefficient, get_args(Coefficient))
         NoiseFilter.__post_init__(self)
+        require_choice("noise coefficient", self.coefficient, get_args(Coefficient))
 
     def __call__(self, contact: LoadedContact) -> Excitation:
         """The noise behind the cut-off of this CAR; raises BadInput for a flat surface or where nothing touches."""
@@ -104,25 +103,20 @@ class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
         """Height, filter and cut-off."""
         height = {"rms": "RMS", "ra": "Ra"}[self.height_as]
         of = "" if self.height_of == "process" else f" of the {self.height_of}"
-        low_pass = "low pass" if self.filter_order == 2 else f"low pass of order {self.filter_order}"
-        if self.filter != "continuous":
-            low_pass = f"{self.filter} {low_pass}"
+        kind = "" if self.filter == "continuous" else f"{self.filter} "
+        order = "" if self.filter_order == 2 else f" of order {self.filter_order}"
         kept = ", coefficient kept" if self.coefficient == "kept" else ""
         return (
-            f"white noise of {height} height Sq{of} behind a {low_pass} at {self.cutoff_reference_hz:.4g} Hz × "
-            f"(CAR/{self.car_reference:.3g})^{self.cutoff_exponent:.3g}{kept}"
+            f"white noise of {height} height Sq{of} behind a {kind}low pass{order} at {self.cutoff_reference_hz:.4g} Hz"
+            f" × (CAR/{self.car_reference:.3g})^{self.cutoff_exponent:.3g}{kept}"
         )
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Passing:
+class _Passing(Parametric):
     """Roughness passes the contact at this speed; None: the sliding speed."""
 
-    passing_speed: Annotated[float | None, Parameter("m/s", "v")] = None
-
-    def __post_init__(self) -> None:
-        if self.passing_speed is not None:
-            require_positive("passing speed", self.passing_speed, "m/s")
+    passing_speed: Annotated[float | None, Parameter("m/s", "v", "passing speed")] = None
 
     def speed(self, conditions: ContactConditions) -> float:
         """Speed [m/s]; raises BadInput where nothing passes."""
@@ -147,10 +141,7 @@ class SurfaceExcitation(_Passing, ExcitationLaw):
             raise BadInput("excitation surface needs the solved contact's surface; solve the case, or take noise")
         return SurfaceTrack.of(contact.solution.surface, speed)
 
-    @property
-    def summary(self) -> str:
-        """What it is."""
-        return "the surface's own spectrum run over"
+    summary = "the surface's own spectrum run over"
 
 
 EXCITATIONS: dict[str, type[ExcitationLaw]] = {law.name: law for law in (NoiseExcitation, SurfaceExcitation)}
@@ -181,10 +172,7 @@ class NoPatch(PatchLaw):
         """The excitation itself."""
         return source
 
-    @property
-    def summary(self) -> str:
-        """Nothing to say."""
-        return ""
+    summary = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,13 +183,8 @@ class LinePatch(_Passing, PatchLaw):
 
     def __call__(self, source: Excitation, contact: LoadedContact) -> Excitation:
         """Averaged over the line; raises BadInput where nothing passes."""
-        conditions = contact.conditions
-        return PatchAverage(
-            source=source,
-            shape="line",
-            half_width=conditions.hertz.half_widths[0],
-            speed=self.speed(conditions),
-        )
+        half_width, speed = contact.conditions.hertz.half_widths[0], self.speed(contact.conditions)
+        return PatchAverage(source=source, shape="line", half_width=half_width, speed=speed)
 
 
 @dataclass(frozen=True, kw_only=True)

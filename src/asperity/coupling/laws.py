@@ -13,9 +13,9 @@ import numpy as np
 from asperity import ehl
 from asperity.conditions import ContactConditions
 from asperity.ehl import ContactSolution, ContactState
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput
 from asperity.hertz import line_stiffness, point_stiffness
-from asperity.quantities import Parameter
+from asperity.quantities import Parameter, Parametric
 
 FILM_EXPONENT = 0.13  # h ~ load^-0.13: Dowson and Higginson's film of a line contact
 ROUGHNESS_FACTOR = 0.48  # γ in K = F/(γ Sq): S. Akarapu, T. Sharp, M. O. Robbins, Phys. Rev. Lett. 106 (2011) 204301
@@ -70,14 +70,11 @@ class HertzPoint(StiffnessLaw):
 
 
 @dataclass(frozen=True, slots=True)
-class _LineApproach:
+class _LineApproach(Parametric):
     """A line contact's approach depends on the depth that it is measured from."""
 
-    reference_depth: Annotated[float | None, Parameter("m", "d")] = None  # None: 2R/e, a roller held at its centre
-
-    def __post_init__(self) -> None:
-        if self.reference_depth is not None:
-            require_positive("reference depth", self.reference_depth, "m")
+    # None: 2R/e, a roller held at its centre
+    reference_depth: Annotated[float | None, Parameter("m", "d", "reference depth")] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +111,7 @@ class ParallelFilm(StiffnessLaw):
     def __call__(self, contact: LoadedContact) -> float:
         """S [N/m]."""
         state = contact.state
-        layers = 0.0
-        if state.sq > 0.0:
-            layers += contact.asperity_load / (ROUGHNESS_FACTOR * state.sq)
+        layers = contact.asperity_load / (ROUGHNESS_FACTOR * state.sq) if state.sq > 0.0 else 0.0
         if state.h_mean > 0.0:
             layers += (1.0 - contact.clr) * contact.conditions.load / (FILM_EXPONENT * state.h_mean)
         bodies = HertzPoint()(contact._replace(clr=1.0))
@@ -179,15 +174,12 @@ class RatioDamping(DampingLaw):
 
 
 @dataclass(frozen=True, slots=True)
-class ConstantDamping(DampingLaw):
+class ConstantDamping(Parametric, DampingLaw):
     """C is the same at any load: ζ = C / (2 sqrt(S m))."""
 
-    damping: Annotated[float, Parameter("N s/m", "C")]
+    damping: Annotated[float, Parameter("N s/m", "C", "damping")]
 
     name = "constant"
-
-    def __post_init__(self) -> None:
-        require_positive("damping", self.damping, "N s/m")
 
     def __call__(self, *, mass: float, stiffness: float, damping_ratio: float) -> float:  # noqa: ARG002
         """ζ of this C."""

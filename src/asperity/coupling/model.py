@@ -4,8 +4,8 @@ A law can be chosen by its name, with its parameters beside it as the case file 
 are not in use is kept, so that another law can be tried.
 """
 
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from typing import Annotated, Any, Literal, NamedTuple, get_origin, get_type_hints
 
 from asperity.coupling.excitations import (
@@ -16,16 +16,9 @@ from asperity.coupling.excitations import (
     NoPatch,
     PatchLaw,
 )
-from asperity.coupling.laws import (
-    DAMPING_LAWS,
-    STIFFNESS_LAWS,
-    DampingLaw,
-    HertzPoint,
-    RatioDamping,
-    StiffnessLaw,
-)
-from asperity.errors import BadInput, require_choice, require_positive
-from asperity.quantities import Parameter, parameters
+from asperity.coupling.laws import DAMPING_LAWS, STIFFNESS_LAWS, DampingLaw, HertzPoint, RatioDamping, StiffnessLaw
+from asperity.errors import BadInput, require_choice
+from asperity.quantities import Parameter, Parametric, parameters
 from asperity.vibration import RESPONSE_METHODS, SUBSTEPS, ResponseMethod, require_damping_ratio
 from asperity.wear import INDICATOR_METHODS, IndicatorMethod
 
@@ -61,7 +54,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True, kw_only=True, init=False)
-class VibrationModel:
+class VibrationModel(Parametric):
     """How a contact state becomes a vibration record. The defaults are the preset `sound`; `preset` makes the other.
 
     Parameters
@@ -87,40 +80,34 @@ class VibrationModel:
         for a quantity out of range or a name that is not in its table.
     """
 
-    mass: Annotated[float, Parameter("kg", "m")]
+    mass: Annotated[float, Parameter("kg", "m", "oscillator mass")]
     damping_ratio: Annotated[float, Parameter("", "ζ")]
-    damping_law: DampingLaw = field(default_factory=RatioDamping)
-    stiffness_law: StiffnessLaw = field(default_factory=HertzPoint)
-    excitation: ExcitationLaw = field(default_factory=NoiseExcitation)
-    patch: PatchLaw = field(default_factory=NoPatch)
+    damping_law: DampingLaw = field(default=RatioDamping())
+    stiffness_law: StiffnessLaw = field(default=HertzPoint())
+    excitation: ExcitationLaw = field(default=NoiseExcitation())
+    patch: PatchLaw = field(default=NoPatch())
     response: ResponseMethod = "exact"
     substeps: int = SUBSTEPS
-    rate_hz: Annotated[float, Parameter("Hz")] = 100e3
+    rate_hz: Annotated[float, Parameter("Hz", positive="vibration sampling rate")] = 100e3
     samples_per_period: float = SAMPLES_PER_PERIOD
-    duration_s: Annotated[float, Parameter("s")] = 4.0
+    duration_s: Annotated[float, Parameter("s", positive="vibration duration")] = 4.0
     seed: int = 1
     method: IndicatorMethod = "likelihood"
     stated: Mapping[str, Any] = field(init=False, repr=False, compare=False)  # every keyword by name, used or not
 
     def __init__(self, *, mass: float, damping_ratio: float, **choices: Any) -> None:
-        stated = _by_name({"mass": mass, "damping_ratio": damping_ratio, **choices})
-        laws: list[type[Any]] = [VibrationModel, *(law for table in LAWS.values() for law in table.values())]
-        unknown = sorted(stated.keys() - {entry.name for law in laws for entry in fields(law) if entry.init})
-        if unknown:
+        choices = _by_name({"mass": mass, "damping_ratio": damping_ratio, **choices})
+        stated = {name: value for name, value in choices.items() if value is not None}
+        if unknown := sorted(stated.keys() - vibration_choices().keys()):
             raise TypeError(f"VibrationModel has no keyword {', '.join(unknown)}")
-        for entry in fields(self):
-            if entry.name in LAWS:
-                object.__setattr__(self, entry.name, _law(entry.name, stated))
-            elif entry.init:
-                object.__setattr__(self, entry.name, stated.get(entry.name, entry.default))
-        object.__setattr__(self, "stated", stated)
-        self._check()
+        values = {entry.name: stated.get(entry.name, entry.default) for entry in fields(self) if entry.init}
+        for name, value in {**values, **{slot: _law(slot, stated) for slot in LAWS}, "stated": stated}.items():
+            object.__setattr__(self, name, value)
+        self.__post_init__()
 
-    def _check(self) -> None:
-        require_positive("oscillator mass", self.mass, "kg")
+    def __post_init__(self) -> None:
+        super().__post_init__()
         require_damping_ratio(self.damping_ratio)
-        require_positive("vibration sampling rate", self.rate_hz, "Hz")
-        require_positive("vibration duration", self.duration_s, "s")
         if not self.samples_per_period >= 2.0:
             raise BadInput(
                 f"samples per period must be at least 2, got {self.samples_per_period:g}; "
@@ -150,8 +137,7 @@ class VibrationModel:
 
     def with_choices(self, **choices: Any) -> "VibrationModel":
         """The model with other keywords; parameters stated for laws that were not in use count if they now are."""
-        kept = {name: value for name, value in self.stated.items() if name not in choices}
-        return VibrationModel(**kept | _by_name(choices))
+        return VibrationModel(**{**self.stated, **_by_name(choices)})
 
     @classmethod
     def preset(cls, name: str, **choices: Any) -> "VibrationModel":
@@ -187,61 +173,44 @@ def vibration_choices() -> dict[str, Choice]:
     """Every keyword that a model can be stated with by names and numbers, laws' parameters behind their law."""
     choices: dict[str, Choice] = {}
     for name, choice in _choices(VibrationModel):
-        if name not in LAWS:
-            choices[name] = choice
-            continue
-        choices[name] = Choice(str, _default_law(name), "")
-        for law in LAWS[name].values():
-            for parameter, (kind, default, unit) in _choices(law):
+        choices[name] = choice._replace(kind=str, default=choice.default.name) if name in LAWS else choice
+        for law in LAWS.get(name, {}).values():
+            for parameter, own in _choices(law):
                 choices.pop(parameter, None)  # one that two laws share stands behind the latter
-                choices[parameter] = Choice(kind, None if default is MISSING else default, unit)
+                choices[parameter] = own._replace(default=None) if own.default is MISSING else own
     return choices
 
 
-def _choices(law: type) -> list[tuple[str, Choice]]:
-    kinds, marks = get_type_hints(law), dict(parameters(law))
-    return [
-        (
-            entry.name,
-            Choice(
-                str if get_origin(kinds[entry.name]) is Literal else kinds[entry.name],
-                entry.default,
-                marks[entry.name].unit,
-            ),
-        )
-        for entry in fields(law)
-        if entry.init
-    ]
+def _choices(law: type) -> Iterator[tuple[str, Choice]]:
+    kinds, marks = get_type_hints(law), parameters(law)
+    for entry in fields(law):
+        if entry.init:
+            kind = str if get_origin(kinds[entry.name]) is Literal else kinds[entry.name]
+            yield entry.name, Choice(kind, entry.default, marks[entry.name].unit)
 
 
 def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:
-    """Keywords with every law as its name and its parameters; what is None is left out."""
-    stated = {name: value for name, value in choices.items() if value is not None}
+    """Keywords with every law as its name and its parameters."""
+    stated = dict(choices)
     for slot in LAWS:
-        law = stated.get(slot)
+        law = choices.get(slot)
         if law is not None and not isinstance(law, str):
-            own = {entry.name: getattr(law, entry.name) for entry in fields(law)}
-            stated = {name: value for name, value in own.items() if value is not None} | stated | {slot: law.name}
+            own = {name: value for name, value in asdict(law).items() if value is not None}
+            stated = {**own, **stated, slot: law.name}
     return stated
-
-
-def _default_law(slot: str) -> str:
-    factory: Any = next(entry.default_factory for entry in fields(VibrationModel) if entry.name == slot)
-    return str(factory.name)
 
 
 def _law(slot: str, stated: Mapping[str, Any]) -> Any:
     """The law stated for a slot; parameters stated for its neighbours are checked too."""
-    default, thing, laws = _default_law(slot), _NAMES.get(slot, slot.replace("_", " ")), LAWS[slot]
+    default, thing, laws = getattr(VibrationModel, slot).name, _NAMES.get(slot, slot.replace("_", " ")), LAWS[slot]
     chosen = stated.get(slot, default)
     require_choice(thing, chosen, laws)
     made = {}
     for name, law in laws.items():
-        own = {entry.name: stated[entry.name] for entry in fields(law) if entry.name in stated}
-        missing = [entry.name for entry in fields(law) if entry.default is MISSING and entry.name not in own]
+        missing = [entry.name for entry in fields(law) if entry.default is MISSING and entry.name not in stated]
         if not missing:
-            made[name] = law(**own)
+            made[name] = law(**{entry.name: stated[entry.name] for entry in fields(law) if entry.name in stated})
         elif name == chosen:
-            unit = dict(parameters(law))[missing[0]].unit
+            unit = parameters(law)[missing[0]].unit
             raise BadInput(f"{thing} {name} needs {missing[0]}, in {unit}; add it, or take the law {default}")
     return made[chosen]

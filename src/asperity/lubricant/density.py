@@ -6,8 +6,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import require_positive
-from asperity.quantities import Parameter
+from asperity.quantities import Parameter, Parametric
 
 
 class DensityLaw(Protocol):
@@ -16,25 +15,19 @@ class DensityLaw(Protocol):
     @property
     def rho0(self) -> float:
         """Density at ambient pressure [kg/m^3]."""
-        ...
 
     def __call__(self, pressure: Field) -> Field:
         """Density [kg/m^3] at a pressure [Pa]."""
-        ...
 
     def slope(self, pressure: Field) -> Field:
         """d(rho)/dp [kg/m^3/Pa] at a pressure [Pa]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
-class DowsonHigginson:
+class DowsonHigginson(Parametric):
     """Density that levels off at high pressure: ρ = ρ₀ (1 + 0.6e-9 p/(1 + 1.7e-9 p)). Source: the paper's Eq 8."""
 
-    rho0: Annotated[float, Parameter("kg/m^3", "ρ₀")]  # density at ambient pressure
-
-    def __post_init__(self) -> None:
-        require_positive("density rho0", self.rho0, "kg/m^3")
+    rho0: Annotated[float, Parameter("kg/m^3", "ρ₀", "density rho0")]  # at ambient pressure
 
     def __call__(self, pressure: Field) -> Field:
         """ρ(p) [kg/m^3]."""
@@ -46,13 +39,10 @@ class DowsonHigginson:
 
 
 @dataclass(frozen=True, slots=True)
-class Incompressible:
+class Incompressible(Parametric):
     """Density that does not change: ρ = ρ₀."""
 
-    rho0: Annotated[float, Parameter("kg/m^3", "ρ₀")]  # density
-
-    def __post_init__(self) -> None:
-        require_positive("density rho0", self.rho0, "kg/m^3")
+    rho0: Annotated[float, Parameter("kg/m^3", "ρ₀", "density rho0")]
 
     def __call__(self, pressure: Field) -> Field:
         """ρ [kg/m^3]."""

@@ -10,8 +10,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import require_positive
-from asperity.quantities import Parameter
+from asperity.quantities import Parameter, Parametric
 
 FREEZING = 273.15  # of water [K]
 
@@ -36,7 +35,6 @@ class FrictionLaw(Protocol):
 
     def __call__(self, film: ShearedFilm) -> Field:
         """Shear stress [Pa], shape (nx, ny), not negative."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +47,10 @@ class NewtonianShear:
 
 
 @dataclass(frozen=True, slots=True)
-class EyringShear:
+class EyringShear(Parametric):
     """Shear stress that grows with the logarithm of the rate: τ = τ₀ asinh(η γ'/τ₀)."""
 
-    tau0: Annotated[float, Parameter("Pa", "τ₀")]  # Eyring stress
-
-    def __post_init__(self) -> None:
-        require_positive("Eyring stress tau0", self.tau0, "Pa")
+    tau0: Annotated[float, Parameter("Pa", "τ₀", "Eyring stress tau0")]
 
     def __call__(self, film: ShearedFilm) -> Field:
         """τ [Pa]."""
@@ -63,7 +58,7 @@ class EyringShear:
 
 
 @dataclass(frozen=True, slots=True)
-class BairWiner:
+class BairWiner(Parametric):
     """Shear stress with a limit: γ' = (dτ/dt)/G - (τ_L/η) ln(1 - τ/τ_L). Source: the paper's Eq 14.
 
     dτ/dt is that of oil carried through the contact at the mean of the surface speeds. Limits are Dyson's for mineral
@@ -72,12 +67,9 @@ class BairWiner:
     266 (1970) 1, as used by Zhu and Hu, Tribol. Trans. 44 (2001) 383; recollected, not checked against either.
     """
 
-    floor: Annotated[float, Parameter("Pa", "least limit")] = 2e6  # τ_L of mineral oils at ambient: 1 to 5 MPa
-    ratio: Annotated[float, Parameter("", "τ_L/G")] = 0.25
-
-    def __post_init__(self) -> None:
-        require_positive("floor of the limiting stress", self.floor, "Pa")
-        require_positive("ratio of limiting stress to modulus", self.ratio)
+    # τ_L of mineral oils at ambient: 1 to 5 MPa
+    floor: Annotated[float, Parameter("Pa", "least limit", "floor of the limiting stress")] = 2e6
+    ratio: Annotated[float, Parameter("", "τ_L/G", "ratio of limiting stress to modulus")] = 0.25
 
     def limits(self, pressure: Field, temperature: Field) -> tuple[Field, Field]:
         """τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""
@@ -91,23 +83,16 @@ class BairWiner:
 
 
 @dataclass(frozen=True, slots=True)
-class LinearBairWiner:
+class LinearBairWiner(Parametric):
     """Bair and Winer's law with a limit linear in pressure: τ_L = (τ_L0 + ξ p) exp(-b (T - 313 K)), G = τ_L/ratio.
 
     For measured limits: ξ of mineral oils lies between 0.03 and 0.1.
     """
 
-    tau_l0: Annotated[float, Parameter("Pa", "τ_L0")]  # limiting stress at ambient pressure
-    slope: Annotated[float, Parameter("", "ξ")]
-    softening: Annotated[float | None, Parameter("1/K", "b")] = None  # None: 0
-    ratio: Annotated[float, Parameter("", "τ_L/G")] = 0.25
-
-    def __post_init__(self) -> None:
-        require_positive("limiting stress tau_l0", self.tau_l0, "Pa")
-        require_positive("slope of the limiting stress", self.slope)
-        if self.softening is not None:
-            require_positive("softening of the limiting stress", self.softening, "1/K")
-        require_positive("ratio of limiting stress to modulus", self.ratio)
+    tau_l0: Annotated[float, Parameter("Pa", "τ_L0", "limiting stress tau_l0")]  # at ambient pressure
+    slope: Annotated[float, Parameter("", "ξ", "slope of the limiting stress")]
+    softening: Annotated[float | None, Parameter("1/K", "b", "softening of the limiting stress")] = None  # None: 0
+    ratio: Annotated[float, Parameter("", "τ_L/G", "ratio of limiting stress to modulus")] = 0.25
 
     def limits(self, pressure: Field, temperature: Field) -> tuple[Field, Field]:
         """τ_L and G [Pa] at a pressure [Pa] and a temperature [K]."""

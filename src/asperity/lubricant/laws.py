@@ -23,13 +23,7 @@ LAWS: dict[LawFamily, Mapping[str, type]] = {
 
 
 def law_name(family: LawFamily, law: object) -> str:
-    """What its family's table calls a law.
-
-    Raises
-    ------
-    BadInput
-        for a law that is not in the table.
-    """
+    """What its family's table calls a law; raises BadInput for one that is not in it."""
     name = next((name for name, kind in LAWS[family].items() if type(law) is kind), None)
     if name is None:
         raise BadInput(f"{type(law).__name__} is not a {family} law that can be kept; add it to its table of laws")
@@ -43,5 +37,4 @@ def describe_law(family: LawFamily, law: Any) -> dict[str, Any]:
 
 def make_law(family: LawFamily, description: Mapping[str, Any]) -> Any:
     """The law that `describe_law` describes."""
-    parameters = dict(description)
-    return LAWS[family][parameters.pop("law")](**parameters)
+    return LAWS[family][description["law"]](**{name: value for name, value in description.items() if name != "law"})

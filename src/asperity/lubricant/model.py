@@ -25,13 +25,7 @@ _FAMILIES: tuple[LawFamily, ...] = ("viscosity", "density", "rheology", "frictio
 
 
 def describe_lubricant(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
-    """Name and parameters [SI] of each law, as run files keep them.
-
-    Raises
-    ------
-    BadInput
-        for a law that is not in its family's table.
-    """
+    """Name and parameters [SI] of each law, as run files keep them; BadInput for one that is not in its table."""
     return {family: describe_law(family, getattr(lubricant, family)) for family in _FAMILIES}
 
 

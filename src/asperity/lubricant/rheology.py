@@ -6,8 +6,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import require_positive
-from asperity.quantities import Parameter
+from asperity.quantities import Parameter, Parametric
 
 
 class RheologyLaw(Protocol):
@@ -15,7 +14,6 @@ class RheologyLaw(Protocol):
 
     def thinning(self, shear: Field) -> tuple[Field, Field]:
         """Effective over Newtonian viscosity, and d(ln of it)/d(ln shear), at the shear stress η Δu/h [Pa]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,17 +26,14 @@ class Newtonian:
 
 
 @dataclass(frozen=True, slots=True)
-class ReeEyring:
+class ReeEyring(Parametric):
     """Viscosity that falls once shear passes a stress: 1/η* = (1/η)(τ₀/τ₁) sinh(τ₁/τ₀). Source: the paper's Eq 9.
 
     τ₁ is the shear stress on the surface that sliding alone would cause, τ₁ = τ₀ asinh(η Δu/(τ₀ h)): the part of the
     pressure gradient is left out, so that η* = η asinh(S)/S with S = η Δu/(τ₀ h). In pure rolling the oil is Newtonian.
     """
 
-    tau0: Annotated[float, Parameter("Pa", "τ₀")]  # Eyring stress, where thinning sets in
-
-    def __post_init__(self) -> None:
-        require_positive("Eyring stress tau0", self.tau0, "Pa")
+    tau0: Annotated[float, Parameter("Pa", "τ₀", "Eyring stress tau0")]  # where thinning sets in
 
     def thinning(self, shear: Field) -> tuple[Field, Field]:
         """asinh(S)/S and S/(√(1 + S²) asinh S) - 1."""

@@ -9,8 +9,8 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
-from asperity.quantities import Parameter
+from asperity.errors import BadInput
+from asperity.quantities import Parameter, Parametric
 
 AMBIENT = 313.15  # 40 °C [K]
 ROELANDS_ZERO = 138.0  # temperature that Roelands counts from [K]
@@ -21,20 +21,16 @@ class WarmthLaw(Protocol):
 
     def factor(self, viscosity: Field, temperature: Field, ambient: float) -> Field:
         """Viscosity at `temperature` over that at `ambient` [K], at one pressure; `viscosity` is the latter [Pa s]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
-class ExponentialWarmth:
+class ExponentialWarmth(Parametric):
     """Viscosity that falls at one rate at every pressure: η(p, T) = η(p, T₀) exp(-β (T - T₀)). Source: Reynolds (1886).
 
     An ISO VG 100 mineral oil falls from 100 to 11 mm²/s between 40 and 100 °C: ln(100/11)/60 K = 0.037/K.
     """
 
-    beta: Annotated[float, Parameter("1/K", "β")] = 0.037
-
-    def __post_init__(self) -> None:
-        require_positive("temperature coefficient beta", self.beta, "1/K")
+    beta: Annotated[float, Parameter("1/K", "β", "temperature coefficient beta")] = 0.037
 
     def factor(self, viscosity: Field, temperature: Field, ambient: float) -> Field:
         """exp(-β (T - T₀))."""
@@ -42,16 +38,13 @@ class ExponentialWarmth:
 
 
 @dataclass(frozen=True, slots=True)
-class RoelandsWarmth:
+class RoelandsWarmth(Parametric):
     """Viscosity that falls faster the thicker it is: ln η + 9.67 goes as ((T - 138)/(T₀ - 138))^-S₀, T in kelvin.
 
     Source: Roelands (1966). S₀ of mineral oils lies between 1 and 1.5.
     """
 
-    s0: Annotated[float, Parameter("", "S₀")]
-
-    def __post_init__(self) -> None:
-        require_positive("Roelands' exponent s0", self.s0)
+    s0: Annotated[float, Parameter("", "S₀", "Roelands' exponent s0")]
 
     def factor(self, viscosity: Field, temperature: Field, ambient: float) -> Field:
         """exp((ln η + 9.67)(((T - 138)/(T₀ - 138))^-S₀ - 1))."""
@@ -63,20 +56,15 @@ WARMTH_LAWS: dict[str, type[WarmthLaw]] = {"exponential": ExponentialWarmth, "ro
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Solid:
+class Solid(Parametric):
     """A body that takes up heat: conductivity, density and heat capacity; default 45 steel.
 
     Density is the paper's; the others are handbook values of plain carbon steels, which lie within 10 % of them.
     """
 
-    conductivity: Annotated[float, Parameter("W/m/K", "k")] = 46.0
-    density: Annotated[float, Parameter("kg/m^3", "ρ")] = 7800.0
-    heat_capacity: Annotated[float, Parameter("J/kg/K", "c")] = 460.0
-
-    def __post_init__(self) -> None:
-        require_positive("thermal conductivity", self.conductivity, "W/m/K")
-        require_positive("density", self.density, "kg/m^3")
-        require_positive("heat capacity", self.heat_capacity, "J/kg/K")
+    conductivity: Annotated[float, Parameter("W/m/K", "k", "thermal conductivity")] = 46.0
+    density: Annotated[float, Parameter("kg/m^3", "ρ", "density")] = 7800.0
+    heat_capacity: Annotated[float, Parameter("J/kg/K", "c", "heat capacity")] = 460.0
 
     @property
     def diffusivity(self) -> float:
@@ -85,7 +73,7 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Thermal:
+class Thermal(Parametric):
     """The thermal side of a contact.
 
     Parameters
@@ -105,13 +93,13 @@ class Thermal:
 
     ambient: Annotated[float, Parameter("K", "T₀")] = AMBIENT
     bulk: Annotated[tuple[float, float] | None, Parameter("K")] = None
-    oil_conductivity: Annotated[float, Parameter("W/m/K")] = 0.14
+    oil_conductivity: Annotated[float, Parameter("W/m/K", positive="conductivity of the oil")] = 0.14
     warmth: WarmthLaw = ExponentialWarmth()
     solids: tuple[Solid, Solid] = (Solid(), Solid())
     feedback: bool = False
 
     def __post_init__(self) -> None:
-        require_positive("conductivity of the oil", self.oil_conductivity, "W/m/K")
+        Parametric.__post_init__(self)
         for temperature in (self.ambient, *(self.bulk or ())):
             if not 213.15 <= temperature <= 773.15:
                 raise BadInput(

@@ -6,8 +6,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import require_positive
-from asperity.quantities import Parameter
+from asperity.quantities import Parameter, Parametric
 
 LARGEST_EXPONENT = 400.0  # of an exponential law: glass long before, and e^709 is no longer a number
 
@@ -18,27 +17,20 @@ class ViscosityLaw(Protocol):
     @property
     def eta0(self) -> float:
         """Viscosity at ambient pressure [Pa s]."""
-        ...
 
     def __call__(self, pressure: Field) -> Field:
         """Viscosity [Pa s] at a pressure [Pa]."""
-        ...
 
     def log_slope(self, pressure: Field) -> Field:
         """d(ln eta)/dp [1/Pa] at a pressure [Pa]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
-class Barus:
+class Barus(Parametric):
     """Viscosity that grows exponentially with pressure: η = η₀ exp(α p). Source: the paper's Eq 10."""
 
-    eta0: Annotated[float, Parameter("Pa s", "η₀")]  # viscosity at ambient pressure
-    alpha: Annotated[float, Parameter("1/Pa", "α")]  # pressure-viscosity coefficient
-
-    def __post_init__(self) -> None:
-        require_positive("viscosity eta0", self.eta0, "Pa s")
-        require_positive("pressure-viscosity coefficient alpha", self.alpha, "1/Pa")
+    eta0: Annotated[float, Parameter("Pa s", "η₀", "viscosity eta0")]  # at ambient pressure
+    alpha: Annotated[float, Parameter("1/Pa", "α", "pressure-viscosity coefficient alpha")]
 
     def __call__(self, pressure: Field) -> Field:
         """η(p) [Pa s]."""
@@ -50,20 +42,15 @@ class Barus:
 
 
 @dataclass(frozen=True, slots=True)
-class Roelands:
+class Roelands(Parametric):
     """Viscosity that levels off against Barus: η = η₀ exp((ln η₀ + 9.67) ((1 + p/p₀)^z − 1)), z = α p₀/(ln η₀ + 9.67).
 
     Source: Roelands (1966), isothermal form with α matched at ambient pressure.
     """
 
-    eta0: Annotated[float, Parameter("Pa s", "η₀")]  # viscosity at ambient pressure
-    alpha: Annotated[float, Parameter("1/Pa", "α")]  # pressure-viscosity coefficient at ambient pressure
-    p0: Annotated[float, Parameter("Pa", "p₀")] = 1.96e8  # Roelands' reference pressure
-
-    def __post_init__(self) -> None:
-        require_positive("viscosity eta0", self.eta0, "Pa s")
-        require_positive("pressure-viscosity coefficient alpha", self.alpha, "1/Pa")
-        require_positive("Roelands' reference pressure p0", self.p0, "Pa")
+    eta0: Annotated[float, Parameter("Pa s", "η₀", "viscosity eta0")]  # at ambient pressure
+    alpha: Annotated[float, Parameter("1/Pa", "α", "pressure-viscosity coefficient alpha")]  # at ambient pressure
+    p0: Annotated[float, Parameter("Pa", "p₀", "Roelands' reference pressure p0")] = 1.96e8
 
     @property
     def _scale(self) -> float:

@@ -48,7 +48,7 @@ def _conditions(run: Run) -> dict[str, str]:
 
 
 def _law(family: LawFamily, law: object) -> str:
-    values = ((name, mark, getattr(law, name)) for name, mark in parameters(type(law)))
+    values = ((name, mark, getattr(law, name)) for name, mark in parameters(type(law)).items())
     stated = (f"{mark.symbol or name} = {mark.text(value)}" for name, mark, value in values if value is not None)
     return ", ".join([law_name(family, law), *stated])
 
@@ -109,7 +109,7 @@ def _thermal_rows(run: Run) -> dict[str, str]:
     thermal, temperature = run.case.thermal, quantity("temperature_k")
     solids = [
         f"{name.replace('_', ' ')} {_both([mark.text(getattr(solid, name)) for solid in thermal.solids])}"
-        for name, mark in parameters(Solid)
+        for name, mark in parameters(Solid).items()
     ]
     rows = {"Boundary friction": f"{run.case.boundary_friction:g}", "Bodies": ", ".join(solids)}
     if run.solution.lubricant is None:
