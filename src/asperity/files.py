@@ -18,12 +18,7 @@ MANIFEST = "manifest.json"
 def whole_file(path: Path) -> Iterator[Path]:
     """Yield a temporary path in the same folder, renamed to `path` when all went well and removed when not.
 
-    Raises
-    ------
-    BadInput
-        if the folder does not exist or cannot be written to.
-    AsperityError
-        if the system refuses to write, as on a full disk.
+    Raises BadInput as `require_writable`, AsperityError if the system refuses to write, as on a full disk.
     """
     require_writable(path)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -33,9 +28,8 @@ def whole_file(path: Path) -> Iterator[Path]:
             os.fsync(written.fileno())
         part.replace(path)
     except OSError as error:
-        raise AsperityError(
-            f"{path} could not be written: {error.strerror or error}; nothing was left behind"
-        ) from error
+        reason = error.strerror or error
+        raise AsperityError(f"{path} could not be written: {reason}; nothing was left behind") from error
     finally:
         part.unlink(missing_ok=True)
 
@@ -47,13 +41,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def require_writable(path: Path) -> None:
-    """Refuse a path that could not be written, before the work that would be lost.
-
-    Raises
-    ------
-    BadInput
-        if the folder is missing or not writable, or `path` is a folder.
-    """
+    """Raise BadInput for a path that could not be written, before the work that would be lost."""
     folder = path.parent
     if not folder.is_dir():
         raise BadInput(f"cannot write {path}: the folder {folder} does not exist; make it first")
@@ -64,13 +52,7 @@ def require_writable(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder to write into, if it is not there.
-
-    Raises
-    ------
-    BadInput
-        where that cannot be.
-    """
+    """Make a folder to write into, if it is not there; raises BadInput where that cannot be."""
     if path.exists() and not path.is_dir():
         raise BadInput(f"cannot write into {path}: it is a file; name a folder")
     try:
@@ -87,10 +69,7 @@ def versions() -> dict[str, str]:
 def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
     """What a folder that holds a study or a history (`of`) in a layout of that number says about itself.
 
-    Raises
-    ------
-    UnreadableFile
-        where it says nothing that can be read.
+    Raises UnreadableFile where it says nothing that can be read.
     """
     path = folder / MANIFEST
     try:

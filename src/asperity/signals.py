@@ -73,15 +73,9 @@ class Spectrum:
 def power_spectrum(signal: Signal, *, segment: int | None = None, window: str = "hann") -> Spectrum:
     """Power spectral density by Welch's method: means removed, pieces overlapping by half (not at all for a boxcar).
 
-    Parameters
-    ----------
-    segment : samples in each piece; None takes the record whole (the raw periodogram when `window` is "boxcar")
-    window : taper, as scipy.signal.get_window names it
-
-    Raises
-    ------
-    BadInput
-        for values that are not finite, a piece longer than the record or shorter than 8 samples, an unknown window.
+    A piece has `segment` samples; None takes the record whole (the raw periodogram when `window` is "boxcar"). `window`
+    is its taper, as scipy.signal.get_window names it. Raises BadInput for values that are not finite, a piece longer
+    than the record or shorter than 8 samples, an unknown window.
     """
     samples = signal.values.size
     length = samples if segment is None else segment
@@ -96,18 +90,10 @@ def power_spectrum(signal: Signal, *, segment: int | None = None, window: str = 
 def averaged_spectrum(
     blocks: Iterable[Field], rate_hz: float, unit: str, *, segment: int, window: str = "hann"
 ) -> Spectrum:
-    """The same of a record that comes block by block and need never be in memory whole.
+    """The same of a record that comes block by block, each of any length, and need never be in memory whole.
 
-    Parameters
-    ----------
-    blocks : the record's values in their order, each of any length; pieces with a value that is not finite, such as a
-        gap marked by NaN, are left out
-    segment : samples in each piece
-
-    Raises
-    ------
-    BadInput
-        for a record without a single whole piece, a piece shorter than 8 samples, an unknown window.
+    Pieces with a value that is not finite, such as a gap marked by NaN, are left out. Raises BadInput for a record
+    without a single whole piece, a piece shorter than 8 samples, an unknown window.
     """
     require_positive("sampling rate", rate_hz, "Hz")
     if segment < 8:
@@ -118,8 +104,7 @@ def averaged_spectrum(
         raise BadInput(f"spectrum window {window!r} is unknown ({error}); try hann or boxcar") from None
 
     step = segment if window == "boxcar" else segment - segment // 2
-    total, kept, samples = _summed_periodograms(blocks, taper, step)
-    complete = np.concatenate(kept) if kept else np.zeros(0, bool)
+    total, complete, samples = _summed_periodograms(blocks, taper, step)
     if not complete.any():
         gaps = " without a gap" if complete.size else ""
         raise BadInput(
@@ -142,13 +127,13 @@ def averaged_spectrum(
     )
 
 
-def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tuple[Field, list[Mask], int]:
+def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tuple[Field, Mask, int]:
     """Sum over the pieces of |rfft|^2, which of the pieces were whole, and how many samples there were."""
     segment = taper.size
     many = max(1, SAMPLES_AT_ONCE // segment)
     work = np.empty((many, segment))  # used again and again: fresh memory costs more than the arithmetic
     total = np.zeros(segment // 2 + 1)
-    kept: list[Mask] = []
+    kept: list[Mask] = [np.zeros(0, bool)]
     samples = 0
     waiting: Field = np.empty(0)
     for block in blocks:
@@ -168,7 +153,7 @@ def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tu
             total += np.einsum("ij,ij->j", lines.real, lines.real) + np.einsum("ij,ij->j", lines.imag, lines.imag)
             kept.append(finite)
         waiting = waiting[whole * step :]
-    return total, kept, samples
+    return total, np.concatenate(kept), samples
 
 
 def _averages(taper: Field, kept: Mask, step: int) -> float:
@@ -195,8 +180,7 @@ def smooth(spectrum: Spectrum, passes: int) -> Spectrum:
         raise BadInput(f"smoothing needs at least 1 pass, got {passes}; leave it out for none")
     if spectrum.density.size < 5:
         raise BadInput(f"five-point smoothing needs at least 5 lines, got {spectrum.density.size}; lengthen the record")
-    density = spectrum.density
-    reach = np.ones(1)
+    density, reach = spectrum.density, np.ones(1)
     for _ in range(passes):
         density = scipy.signal.savgol_filter(density, 5, 3, mode="interp")
         reach = np.convolve(reach, scipy.signal.savgol_coeffs(5, 3))

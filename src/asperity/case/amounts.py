@@ -91,13 +91,7 @@ def _split(value: object) -> tuple[str, str] | None:
 
 
 def parse_amount(unit: str, value: object) -> Amount:
-    """A positive quantity with its unit, in `unit`, an SI one.
-
-    Raises
-    ------
-    BadInput
-        for what is none of that kind; the message begins with what it must be.
-    """
+    """A positive quantity with its unit, in `unit`, an SI one; the BadInput it raises begins with what it must be."""
     measure, example = _MEASURES.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
     expected = f'must be {measure} such as "{example}"'
     if isinstance(value, Amount):
@@ -122,13 +116,7 @@ def parse_amount(unit: str, value: object) -> Amount:
 
 
 def read_amount(name: str, unit: str, text: str) -> float:
-    """A positive quantity on the command line, such as "300 s", in `unit`, an SI one.
-
-    Raises
-    ------
-    BadInput
-        for what is none with a unit of that kind; the message begins with `name`.
-    """
+    """A positive quantity on the command line, such as "300 s", in `unit`, an SI one; BadInput begins with `name`."""
     try:
         return float(parse_amount(unit, text))
     except BadInput as error:
@@ -143,18 +131,13 @@ def read_length(name: str, text: str) -> float:
 def split_amount(value: object, unit: str | None = None) -> tuple[Decimal, str]:
     """A number and its unit as written, or the number in `unit`; a bare number has the unit "".
 
-    Raises
-    ------
-    BadInput
-        for what is neither, or cannot be had in `unit`.
+    Raises BadInput for what is neither, or cannot be had in `unit`.
     """
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-        number, own = str(value), ""
-    else:
-        parts = _split(value)
-        if parts is None:
-            raise BadInput(f'must be a number, or a quantity such as "0.5 um", got {quoted(value)}')
-        number, own = parts
+    bare = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    parts = (str(value), "") if bare else _split(value)
+    if parts is None:
+        raise BadInput(f'must be a number, or a quantity such as "0.5 um", got {quoted(value)}')
+    number, own = parts
     if unit is None or own == unit:
         return Decimal(number), own
     try:

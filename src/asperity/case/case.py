@@ -6,7 +6,7 @@ Solving a case is left to `asperity.results`.
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -43,20 +43,13 @@ class Case:
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
-        built = {
-            "contact and material": "conditions",
-            "lubricant": "lubricant",
-            "grid": "grid",
-            "solver": "options",
-            "thermal": "thermal",
-            "vibration": "vibration",
-        }
-        for part, name in built.items():
-            with self.naming(part):
+        for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration"):
+            with self.naming({"conditions": "contact and material", "options": "solver"}.get(name, name)):
                 getattr(self, name)
 
     def __reduce__(self) -> tuple[Any, ...]:  # the sections of laws are made at run time, which pickle cannot follow
-        return _case_again, (self.text, self.folder, self.source, self.stored, self.stored_notes)
+        again = partial(load_case, folder=self.folder, name=self.source, stored=self.stored)
+        return again, (self.text,), {"stored_notes": self.stored_notes}
 
     @contextmanager
     def naming(self, part: str) -> Iterator[None]:
@@ -213,7 +206,7 @@ class Case:
             for a key or value that the case file would be refused for.
         """
         tables = replaced(parse_toml(self.text, self.source), overrides, self.source)
-        case = _case(tables, self.folder, self.source)
+        case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface
         return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case
 
@@ -238,16 +231,8 @@ def load_case(
         for a key, law, unit or value that cannot be meant; one sentence that says which.
     """
     if isinstance(source, str) and "\n" in source:
-        name = name or "case"
-        return _case(parse_toml(source, name), folder or Path(), name, stored)
-    path = Path(source)
-    text, name = read_text(path), name or str(path)
-    return _case(parse_toml(text, name), folder or path.parent, name, stored)
-
-
-def _case(tables: dict[str, Any], folder: Path, source: str, stored: Surface | None = None) -> Case:
-    return Case(parse_section(CaseFile, tables, source), folder, source, stored)
-
-
-def _case_again(text: str, folder: Path, source: str, stored: Surface | None, stored_notes: tuple[str, ...]) -> Case:
-    return replace(load_case(text, folder=folder, name=source, stored=stored), stored_notes=stored_notes)
+        text, name, folder = source, name or "case", folder or Path()
+    else:
+        path = Path(source)
+        text, name, folder = read_text(path), name or str(path), folder or path.parent
+    return Case(parse_section(CaseFile, parse_toml(text, name), name), folder, name, stored)

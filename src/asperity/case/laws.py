@@ -6,18 +6,11 @@ a law needs nothing here.
 
 from dataclasses import MISSING, fields
 from functools import cache, partial
-from typing import Annotated, Any, TypeAlias, cast, get_type_hints
+from typing import Annotated, Any, cast, get_type_hints
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
-from asperity.case.amounts import (
-    OPTIONAL,
-    PAIRED,
-    Amount,
-    amount_in,
-    default_amount,
-    plain,
-)
+from asperity.case.amounts import OPTIONAL, PAIRED, amount_in, default_amount, plain
 from asperity.case.refusals import Section, choose, validated
 from asperity.lubricant import LAWS, LawFamily, Lubricant, Solid, Thermal, make_law, make_lubricant
 from asperity.quantities import parameters
@@ -45,12 +38,11 @@ def _law_section(name: str, law: type) -> type[Section]:
     return create_model(name, __base__=Section, law=(str, ...), **section_fields(law))
 
 
-def _law_sections(family: LawFamily) -> dict[str, type[Section]]:
-    return {name: _law_section(name, law) for name, law in LAWS[family].items()}
-
-
 def _one_of(family: LawFamily) -> PlainValidator:
-    return PlainValidator(partial(choose, "law", partial(_law_sections, family)))
+    def sections() -> dict[str, type[Section]]:
+        return {name: _law_section(name, law) for name, law in LAWS[family].items()}
+
+    return PlainValidator(partial(choose, "law", sections))
 
 
 def _description(section: Section) -> dict[str, Any]:
@@ -75,39 +67,29 @@ def parse_lubricant(value: object) -> LubricantSection | None:
     return None if value == "none" else validated(LubricantSection, value)
 
 
-def _unit(law: type, name: str) -> str:
-    return dict(parameters(law))[name].unit
+def _both(kind: Any, default: Any) -> Any:
+    return Annotated[tuple[kind, kind], PAIRED], (default, default)
 
 
-def _default(law: type, name: str) -> Amount:
-    return default_amount(getattr(law(), name), _unit(law, name))
+_THERMAL, _SOLID = section_fields(Thermal), section_fields(Solid)
+_NUMBERS: dict[str, Any] = {
+    "ambient": _THERMAL["ambient"],
+    "bulk": (Annotated[_both(*_THERMAL["ambient"])[0] | None, PAIRED, OPTIONAL], None),  # of the bodies
+    **{name: _both(*field) for name, field in _SOLID.items()},
+    "oil_conductivity": _THERMAL["oil_conductivity"],
+}
+_Numbers: Any = create_model("thermal", __base__=Section, **_NUMBERS)
 
 
-_Temperature: TypeAlias = Annotated[float, amount_in(_unit(Thermal, "ambient"))]
-_OilConductivity: TypeAlias = Annotated[float, amount_in(_unit(Thermal, "oil_conductivity"))]
-_Conductivity: TypeAlias = Annotated[float, amount_in(_unit(Solid, "conductivity"))]
-_Density: TypeAlias = Annotated[float, amount_in(_unit(Solid, "density"))]
-_HeatCapacity: TypeAlias = Annotated[float, amount_in(_unit(Solid, "heat_capacity"))]
-
-
-class ThermalSection(Section):
+class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those of `Thermal` and of both its `Solid`s
     """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
 
-    ambient: _Temperature = _default(Thermal, "ambient")
-    bulk: Annotated[tuple[_Temperature, _Temperature] | None, PAIRED, OPTIONAL] = None  # of the bodies
-    conductivity: Annotated[tuple[_Conductivity, _Conductivity], PAIRED] = 2 * (_default(Solid, "conductivity"),)
-    density: Annotated[tuple[_Density, _Density], PAIRED] = 2 * (_default(Solid, "density"),)
-    heat_capacity: Annotated[tuple[_HeatCapacity, _HeatCapacity], PAIRED] = 2 * (_default(Solid, "heat_capacity"),)
-    oil_conductivity: _OilConductivity = _default(Thermal, "oil_conductivity")
     warmth: Annotated[Section, _one_of("warmth"), Field(validate_default=True)] = cast(Section, "exponential")
     feedback: Annotated[bool, Strict()] = Thermal().feedback
 
     def thermal(self) -> Thermal:
         """The thermal side of the contact."""
-        first, second = (
-            Solid(conductivity=plain(k), density=plain(rho), heat_capacity=plain(c))
-            for k, rho, c in zip(self.conductivity, self.density, self.heat_capacity, strict=True)
-        )
+        first, second = (Solid(**{name: plain(getattr(self, name))[body] for name in _SOLID}) for body in (0, 1))
         return Thermal(
             ambient=plain(self.ambient),
             bulk=plain(self.bulk),

@@ -39,10 +39,7 @@ def none_from_word(value: object) -> object:
 def parse_section(model: type[S], table: object, source: str) -> S:
     """A table with units, of a case or of another file, as the section that it is meant to be.
 
-    Raises
-    ------
-    BadInput
-        for what the section refuses; the sentence begins with `source` and names the key.
+    Raises BadInput for what the section refuses; the sentence begins with `source` and names the key.
     """
     try:
         return validated(model, table)

@@ -1,16 +1,16 @@
 """[surface] of a case file: roughness made from numbers or read from a file, at rest on the grid and on moving tracks.
 
-A section of generated roughness says itself what makes its surface; `GENERATED_SECTIONS` lists them by `kind`.
+`KINDS` has a line for every generated surface: what makes it, and its keys.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Strict
+from pydantic import Strict, create_model
 
 from asperity.case.amounts import OPTIONAL, PAIRED, Length, Number, Seed, plain
 from asperity.case.refusals import Section, choose, validated
@@ -47,15 +47,56 @@ class SurfaceSection(Section):
     """[surface]."""
 
 
-class GeneratedSection(SurfaceSection):
-    """Roughness made from numbers: the fields are keywords of `generator`; a `seed` draws it where it is random."""
+_LENGTH: Any = (Length, ...)
+_LENGTHS: Any = (tuple[Length, Length], ...)
+_PAIR: Any = (Annotated[tuple[Length, Length], PAIRED], ...)
+_NUMBER: Any = (Number, ...)
+_DIRECTION: Any = (Number, 0.0)  # of the first correlation length, or of the lay, from x towards y
+_SEED: Any = (Seed, 0)
 
-    generator: ClassVar[Callable[..., Surface]]  # of the grid, the fields and an rng
+
+class _Kind(NamedTuple):
+    """A kind of generated surface: what makes it of the grid, the section's fields and an rng; and the fields."""
+
+    generator: Callable[..., Surface]
+    fields: dict[str, Any]
+
+
+KINDS: dict[str, _Kind] = {
+    "gaussian": _Kind(
+        gaussian_surface,
+        {"sq": _LENGTH, "correlation_length": _PAIR, "direction_deg": _DIRECTION, "seed": _SEED},
+    ),
+    "non-gaussian": _Kind(
+        non_gaussian_surface,
+        {"sq": _LENGTH, "skewness": _NUMBER, "kurtosis": _NUMBER, "correlation_length": _PAIR}
+        | {"direction_deg": _DIRECTION, "seed": _SEED},
+    ),
+    "self-affine": _Kind(  # cut-offs: shortest and longest wavelength
+        self_affine_surface, {"sq": _LENGTH, "hurst": _NUMBER, "cutoffs": _LENGTHS, "seed": _SEED}
+    ),
+    "ground": _Kind(
+        ground_surface,
+        {"sq": _LENGTH, "groove_width": _LENGTH, "groove_length": _LENGTH, "direction_deg": _DIRECTION, "seed": _SEED},
+    ),
+    "sandblasted": _Kind(sandblasted_surface, {"sq": _LENGTH, "crater_radius": _LENGTH, "seed": _SEED}),
+    "run-in": _Kind(  # plateau_roughness: Sq of the plateau over that of the surface before it was worn
+        run_in_surface,
+        {"sq": _LENGTH, "correlation_length": _PAIR, "plateau_share": _NUMBER, "plateau_roughness": (Number, 0.1)}
+        | {"direction_deg": _DIRECTION, "seed": _SEED},
+    ),
+    "flat": _Kind(lambda grid, rng: flat_surface(grid), {}),  # noqa: ARG005
+}
+
+
+class GeneratedSection(SurfaceSection):
+    """Roughness made from numbers: the fields are keywords of its generator; a `seed` draws it where it is random."""
+
+    kind: str
 
     def arguments(self) -> dict[str, Any]:
         """The fields as the generator takes them: SI, an angle in radians."""
-        names = [name for name in type(self).model_fields if name not in ("kind", "seed")]
-        values = {name: plain(getattr(self, name)) for name in names}
+        values = {name: plain(getattr(self, name)) for name in KINDS[self.kind].fields if name != "seed"}
         if "direction_deg" in values:
             values["direction"] = math.radians(values.pop("direction_deg"))
         return values
@@ -64,18 +105,12 @@ class GeneratedSection(SurfaceSection):
         """The surface on a grid; another `stream` of the seed is an independent one."""
         seed: int = getattr(self, "seed", 0)
         rng = np.random.default_rng([seed, *stream] if stream else seed)
-        return type(self).generator(grid, **self.arguments(), rng=rng)
-
-    def notes(self, surface: Surface) -> tuple[str, ...]:  # noqa: ARG002
-        """Where a surface made so strays from what the section states."""
-        return ()
-
-
-class CorrelatedSection(GeneratedSection):
-    """Roughness with correlation lengths, which a sample of it need not have."""
+        return KINDS[self.kind].generator(grid, **self.arguments(), rng=rng)
 
     def notes(self, surface: Surface) -> tuple[str, ...]:
-        """How far the sample's correlation lengths stray."""
+        """How far the correlation lengths of a sample stray from those of a (non-)Gaussian section."""
+        if self.kind not in ("gaussian", "non-gaussian"):
+            return ()
         arguments = self.arguments()
         stated, lengths = arguments["correlation_length"], correlation_lengths(surface, arguments["direction"])
         if all(abs(sample / mean - 1.0) <= SAMPLE_DEVIATION for sample, mean in zip(lengths, stated, strict=True)):
@@ -86,94 +121,9 @@ class CorrelatedSection(GeneratedSection):
         )
 
 
-class GaussianSection(CorrelatedSection):
-    """[surface] kind = "gaussian"."""
-
-    generator = staticmethod(gaussian_surface)
-    kind: Literal["gaussian"]
-    sq: Length
-    correlation_length: Annotated[tuple[Length, Length], PAIRED]
-    direction_deg: Number = 0.0  # of the first correlation length, from x towards y
-    seed: Seed = 0
-
-
-class NonGaussianSection(CorrelatedSection):
-    """[surface] kind = "non-gaussian"."""
-
-    generator = staticmethod(non_gaussian_surface)
-    kind: Literal["non-gaussian"]
-    sq: Length
-    skewness: Number
-    kurtosis: Number
-    correlation_length: Annotated[tuple[Length, Length], PAIRED]
-    direction_deg: Number = 0.0
-    seed: Seed = 0
-
-
-class SelfAffineSection(GeneratedSection):
-    """[surface] kind = "self-affine"."""
-
-    generator = staticmethod(self_affine_surface)
-    kind: Literal["self-affine"]
-    sq: Length
-    hurst: Number
-    cutoffs: tuple[Length, Length]  # shortest and longest wavelength
-    seed: Seed = 0
-
-
-class GroundSection(GeneratedSection):
-    """[surface] kind = "ground"."""
-
-    generator = staticmethod(ground_surface)
-    kind: Literal["ground"]
-    sq: Length
-    groove_width: Length
-    groove_length: Length
-    direction_deg: Number = 0.0  # of the lay, from x towards y
-    seed: Seed = 0
-
-
-class SandblastedSection(GeneratedSection):
-    """[surface] kind = "sandblasted"."""
-
-    generator = staticmethod(sandblasted_surface)
-    kind: Literal["sandblasted"]
-    sq: Length
-    crater_radius: Length
-    seed: Seed = 0
-
-
-class RunInSection(GeneratedSection):
-    """[surface] kind = "run-in"."""
-
-    generator = staticmethod(run_in_surface)
-    kind: Literal["run-in"]
-    sq: Length
-    correlation_length: Annotated[tuple[Length, Length], PAIRED]
-    plateau_share: Number
-    plateau_roughness: Number = 0.1  # Sq of the plateau over that of the surface before it was worn
-    direction_deg: Number = 0.0
-    seed: Seed = 0
-
-
-class FlatSection(GeneratedSection):
-    """[surface] kind = "flat", or surface = "flat"."""
-
-    generator = staticmethod(lambda grid, rng: flat_surface(grid))  # noqa: ARG005
-    kind: Literal["flat"]
-
-
 GENERATED_SECTIONS: dict[str, type[GeneratedSection]] = {
-    get_args(section.model_fields["kind"].annotation)[0]: section
-    for section in (
-        GaussianSection,
-        NonGaussianSection,
-        SelfAffineSection,
-        GroundSection,
-        SandblastedSection,
-        RunInSection,
-        FlatSection,
-    )
+    name: create_model(name, __base__=GeneratedSection, **{"kind": (Literal[name], ...), **kind.fields})
+    for name, kind in KINDS.items()
 }
 
 
@@ -232,7 +182,7 @@ def two_bodies(
     section: SurfaceSection, grid: Grid, folder: Path, speeds: tuple[float, float]
 ) -> CompositeSurface | None:
     """Two measured surfaces apart, each with its speed [m/s]; None where the section has no second one."""
-    if not (isinstance(section, MeasuredSection) and section.second is not None):
+    if not (isinstance(section, MeasuredSection) and section.second):
         return None
     first, second = section.prepare(grid, folder), section.second.prepare(grid, folder)
     return CompositeSurface(first.surface, second.surface, speeds)
@@ -247,7 +197,7 @@ def composite_roughness(
         return surface, section.notes(surface)
     assert isinstance(section, FileSection)
     first = section.prepare(grid, folder)
-    if not (isinstance(section, MeasuredSection) and section.second is not None):
+    if not (isinstance(section, MeasuredSection) and section.second):
         return first.surface, first.steps
     second = section.second.prepare(grid, folder)
     combined = CompositeSurface(first.surface, second.surface, speeds).surface

@@ -18,13 +18,7 @@ from asperity.errors import BadInput, UnreadableFile
 
 
 def read_text(path: Path) -> str:
-    """A case file's text.
-
-    Raises
-    ------
-    UnreadableFile
-        if the file is missing or no text.
-    """
+    """A case file's text; `UnreadableFile` if it is missing or no text."""
     try:
         return path.read_text("utf-8")
     except FileNotFoundError:
@@ -54,12 +48,7 @@ def restated(contents: CaseFile) -> str:
 def replaced(tables: dict[str, Any], overrides: Mapping[str, object], source: str) -> dict[str, Any]:
     """The tables with values replaced by their dotted keys; text is read as TOML where it is TOML.
 
-    `vibration.preset` replaces all that presets choose.
-
-    Raises
-    ------
-    BadInput
-        for what is no dotted key.
+    `vibration.preset` replaces all that presets choose. Raises BadInput for what is no dotted key.
     """
     if "vibration.preset" in overrides:  # what the old preset chose is written out, and would stand above the new
         for choice in preset_keys():

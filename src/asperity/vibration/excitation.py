@@ -29,16 +29,14 @@ class Excitation(Protocol):
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
         """Expected one-sided spectrum at `frequency_hz` (any shape), for records of that sampling rate [m^2/Hz]."""
-        ...
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
         """One record [m]; one seed, one record."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseFilter:
-    """A Butterworth low pass, and what of the noise has the stated height.
+    """A Butterworth low pass, and what of the noise has the stated height; BadInput for an order or a name not known.
 
     Parameters
     ----------
@@ -49,11 +47,6 @@ class NoiseFilter:
     height_of : what has that height. "process": the filtered noise at large, so that one record scatters about it.
         "record": this very record is scaled to it; chance in the few slow waves of a record then passes to every other
         frequency. "noise": the noise before the filter, sample by sample; what is left behind depends on the rate
-
-    Raises
-    ------
-    BadInput
-        for an order out of range or a name that is not known.
     """
 
     filter: FilterName = "continuous"
@@ -73,18 +66,11 @@ class NoiseFilter:
 
 @dataclass(frozen=True, kw_only=True)
 class FilteredNoise(NoiseFilter):
-    """Gaussian white noise behind a Butterworth low pass.
+    """Gaussian white noise behind a Butterworth low pass: `height` of the profile [m], `cutoff_hz` of the filter [Hz].
 
-    Parameters
-    ----------
-    height, cutoff_hz : of the profile [m], of the filter [Hz]
-    reference_cutoff_hz : the cut-off [Hz] at which the noise's coefficient is set so that the height comes out, and
-        then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at each cut-off, ^3
-
-    Raises
-    ------
-    BadInput
-        for a quantity out of range.
+    `reference_cutoff_hz` is the cut-off [Hz] at which the noise's coefficient is set so that the height comes out, and
+    then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at each cut-off, ^3. Raises
+    BadInput for a quantity out of range.
     """
 
     height: float
@@ -114,10 +100,8 @@ class FilteredNoise(NoiseFilter):
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
         """Record of `samples` heights [m].
 
-        Raises
-        ------
-        BadInput
-            for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record shorter than one of its periods.
+        Raises BadInput for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record shorter than one of
+        its periods.
         """
         for cutoff in {self.cutoff_hz, self.reference_cutoff_hz or self.cutoff_hz}:
             top = rate_hz / (10.0 if self.filter == "continuous" else 2.0)
@@ -240,7 +224,7 @@ class PatchAverage:
     def weight(self, frequency_hz: Field) -> Field:
         """What is left of a wave's height, 1 at 0 Hz, sign included."""
         ka = 2.0 * np.pi * np.asarray(frequency_hz) * self.half_width / self.speed
-        return np.asarray(PATCHES[self.shape](ka))
+        return np.asarray(PATCHES[self.shape](np.maximum(ka, 1e-6)))
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
         """The source's, times the weight squared [m^2/Hz]."""
@@ -256,17 +240,10 @@ class PatchAverage:
         return Signal(np.ascontiguousarray(averaged[reach : reach + samples]), rate_hz, "m")
 
 
-def _line_patch(ka: Field) -> Field:
-    safe = np.maximum(ka, 1e-6)
-    return np.asarray(2.0 * scipy.special.j1(safe) / safe)
-
-
-def _point_patch(ka: Field) -> Field:
-    safe = np.maximum(ka, 1e-6)
-    return np.asarray(3.0 * scipy.special.spherical_jn(1, safe) / safe)
-
-
-PATCHES: dict[PatchShape, Callable[[Field], Field]] = {"line": _line_patch, "point": _point_patch}
+PATCHES: dict[PatchShape, Callable[[Field], Field]] = {  # what is left of a wave's height, of ka > 0
+    "line": lambda ka: 2.0 * scipy.special.j1(ka) / ka,
+    "point": lambda ka: 3.0 * scipy.special.spherical_jn(1, ka) / ka,
+}
 
 
 def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:

@@ -2,8 +2,7 @@
 
 Knows nothing of oil: how stiff the spring is comes from `asperity.coupling`, what it rides over from
 `asperity.vibration.excitation`. Source: the paper's section 2, with the damping of its Eq 5 taken at the angular
-frequency.
-docs/theory/vibration.md sets every equation beside its function and its test.
+frequency. docs/theory/vibration.md sets every equation beside its function and its test.
 """
 
 from dataclasses import dataclass, replace
@@ -89,9 +88,8 @@ class ContactOscillator:
 
     def _recursion(self, rate_hz: float, read: Field) -> tuple[Field, Field]:
         """Denominator and numerator of the filter from the profile's kinks to read · (r, r'); see `_exact`."""
-        step = scipy.linalg.expm(
-            np.array([[0.0, 1.0], [-self.stiffness / self.mass, -self.damping / self.mass]]) / rate_hz
-        )
+        drift = np.array([[0.0, 1.0], [-self.stiffness / self.mass, -self.damping / self.mass]])
+        step = scipy.linalg.expm(drift / rate_hz)
         determinant = float(step[0, 0] * step[1, 1] - step[0, 1] * step[1, 0])
         denominator = np.array([1.0, -(step[0, 0] + step[1, 1]), determinant])
         # read (zI - step)^-1 step (0, 1), with Cayley-Hamilton for step^2, and half a jump passed straight on
@@ -162,7 +160,7 @@ def mass_motion(
     _check(profile, method)
     slopes: Field = np.diff(profile.values) * profile.rate_hz
     if method == "exact":
-        compression: Field = _exact(oscillator, profile, np.array([1.0, 0.0]))
+        compression = _exact(oscillator, profile, np.array([1.0, 0.0]))
         rate = _exact(oscillator, profile, np.array([0.0, 1.0]))
         velocity: Field = _mean_of_both_sides(slopes) - rate
         pushed: Field = (oscillator.stiffness * compression + oscillator.damping * rate) / oscillator.mass
@@ -232,10 +230,7 @@ def _runge_kutta(
 
 def _mean_of_both_sides(slopes: Field) -> Field:
     """Slope at each sample from the slopes between them."""
-    both = np.empty(slopes.size + 1)
-    both[0], both[-1] = slopes[0], slopes[-1]
-    both[1:-1] = (slopes[:-1] + slopes[1:]) / 2.0
-    return both
+    return np.concatenate([slopes[:1], (slopes[:-1] + slopes[1:]) / 2.0, slopes[-1:]])
 
 
 def expected_spectrum(oscillator: ContactOscillator, profile: Spectrum, *, rate_hz: float | None = None) -> Spectrum:
