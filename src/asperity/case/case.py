@@ -110,13 +110,8 @@ class Case:
     @cached_property
     def options(self) -> Options:
         """How hard to solve."""
-        section = self.contents.solver
-        return Options(
-            tolerance=section.tolerance,
-            max_iterations=section.max_iterations,
-            contact_film=plain(section.contact_film),
-            model=self.contents.model,
-        )
+        solver = {name: plain(value) for name, value in self.contents.solver}
+        return Options(model=self.contents.model, **solver)
 
     @cached_property
     def vibration(self) -> VibrationModel | None:
@@ -144,13 +139,8 @@ class Case:
 
         Roughness that is generated, or measured on one surface only, lies on the body that `motion.rough` names; "both"
         bodies carry independent samples of Sq/√2 each, of which the first has the case's seed. Two measured surfaces
-        lie on one body each. A measured surface's ends are joined.
-
-        Raises
-        ------
-        BadInput
-            for one measured surface that shall be on both bodies, a track that it does not cover, or roughness kept in
-            a run, which is on neither track.
+        lie on one body each. A measured surface's ends are joined. Raises BadInput for one measured surface that shall
+        be on both bodies, a track that it does not cover, or roughness kept in a run, which is on neither track.
         """
         section, rough, speeds = self.contents.surface, self.motion.rough, self.conditions.surface_speeds
         track = track_grid(self.grid, self.motion.track)
@@ -162,12 +152,8 @@ class Case:
     def surface(self) -> Surface:
         """The composite roughness on the grid: generated, read and prepared, or as stored in the run.
 
-        Raises
-        ------
-        BadInput
-            for a surface that the grid cannot carry, or a measurement that does not cover the contact.
-        UnreadableFile
-            for a surface file that cannot be read.
+        Raises BadInput for a surface that the grid cannot carry or a measurement that does not cover the contact,
+        UnreadableFile for a surface file that cannot be read.
         """
         with self.naming("surface"):
             return self._roughness[0]
@@ -199,11 +185,7 @@ class Case:
 
         Text is read as a TOML value where it is one and taken as it stands where not. Stored roughness is kept
         as long as neither the surface nor the grid changes. `vibration.preset` replaces all that presets choose.
-
-        Raises
-        ------
-        BadInput
-            for a key or value that the case file would be refused for.
+        Raises BadInput for a key or value that the case file would be refused for.
         """
         tables = replaced(parse_toml(self.text, self.source), overrides, self.source)
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)

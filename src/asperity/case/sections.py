@@ -29,11 +29,11 @@ from asperity.errors import BadInput
 
 def _parse_radius(value: object) -> Amount | tuple[Amount, Amount]:
     """One radius, or [Rx, Ry] of an elliptic contact."""
-    if isinstance(value, list | tuple):
-        if len(value) != 2:
-            raise BadInput(f"must be one length or a pair [Rx, Ry], got {len(value)} values")
-        return parse_amount("m", value[0]), parse_amount("m", value[1])
-    return parse_amount("m", value)
+    if not isinstance(value, list | tuple):
+        return parse_amount("m", value)
+    if len(value) != 2:
+        raise BadInput(f"must be one length or a pair [Rx, Ry], got {len(value)} values")
+    return parse_amount("m", value[0]), parse_amount("m", value[1])
 
 
 class ContactSection(Section):

@@ -74,10 +74,7 @@ class VibrationModel(Parametric):
         in acceleration, as noise behind a filter of order 2 is; over a surface's own spectrum, or averaged by a patch,
         take "peak", or `Vibration.expected`
 
-    Raises
-    ------
-    BadInput
-        for a quantity out of range or a name that is not in its table.
+    Raises BadInput for a quantity out of range or a name that is not in its table.
     """
 
     mass: Annotated[float, Parameter("kg", "m", "oscillator mass")]

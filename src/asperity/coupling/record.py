@@ -52,11 +52,8 @@ def excitation(
 ) -> Excitation:
     """What passes under the mass, by the model's excitation and averaged over its patch.
 
-    Raises
-    ------
-    BadInput
-        for a flat surface, noise behind a contact without touching asperities, roughness that has to pass at a speed
-        and does not, a surface that is not known because there is no solution.
+    Raises BadInput for a flat surface, noise behind a contact without touching asperities, roughness that has to pass
+    at a speed and does not, a surface that is not known because there is no solution.
     """
     contact = LoadedContact(state.clr, state, conditions, solution)
     return model.patch(model.excitation(contact), contact)
@@ -71,16 +68,9 @@ def contact_vibration(
 ) -> Vibration:
     """Ride over the contact, record the acceleration and look for its resonance.
 
-    Parameters
-    ----------
-    state, conditions, model : the contact, as scalars, and how it vibrates
-    solution : the solved contact, for the stiffness law "tangent" and the excitation "surface"
-
-    Raises
-    ------
-    BadInput
-        for a sampling rate below `samples_per_period` times the full-load resonance, or what `oscillator`,
-        `excitation` and its records refuse.
+    The stiffness law "tangent" and the excitation "surface" need the `solution` itself. Raises BadInput for a sampling
+    rate below `samples_per_period` times the full-load resonance, or what `oscillator`, `excitation` and its records
+    refuse.
     """
     full_load_crf_hz = require_sampling(conditions, model, state.sq)
     objection, spring = _objection(state, model), None
@@ -94,14 +84,15 @@ def contact_vibration(
     else:
         band_hz = band_about(full_load_crf_hz if spring is None else spring.natural_frequency_hz, model.rate_hz / 2.0)
     if spring is None:
-        return Vibration(
-            resonance=no_resonance(objection or "", band_hz, model.method),
-            band_hz=band_hz,
-            full_load_crf_hz=full_load_crf_hz,
-        )
+        silent = no_resonance(objection or "", band_hz, model.method)
+        return Vibration(resonance=silent, band_hz=band_hz, full_load_crf_hz=full_load_crf_hz)
     below = excitation(state, conditions, model, solution=solution)
     profile = below.profile(round(model.duration_s * model.rate_hz), model.rate_hz, model.seed)
-    response, contact_loss = _response(spring, profile, model)
+    if model.linear:
+        response, contact_loss = acceleration(spring, profile, method=model.response, substeps=model.substeps), 0.0
+    else:
+        motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
+        response, contact_loss = Signal(motion.acceleration, profile.rate_hz, "m/s^2"), motion.contact_loss
     spectrum = power_spectrum(response, window="boxcar")
     heights = below.density(spectrum.frequency_hz, model.rate_hz)
     f0 = np.array(spring.natural_frequency_hz)
@@ -127,11 +118,3 @@ def _objection(state: ContactState, model: VibrationModel) -> str | None:
     if state.clr == 0.0 and model.stiffness_law.asperities_alone:
         return "no asperity carries load: the oil separates the surfaces, and there is no contact spring to resonate"
     return model.excitation.objection(state)
-
-
-def _response(spring: ContactOscillator, profile: Signal, model: VibrationModel) -> tuple[Signal, float]:
-    """Acceleration of the mass [m/s^2], and the share of the time in which it touches nothing."""
-    if model.linear:
-        return acceleration(spring, profile, method=model.response, substeps=model.substeps), 0.0
-    motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
-    return Signal(motion.acceleration, profile.rate_hz, "m/s^2"), motion.contact_loss
