@@ -76,6 +76,10 @@ def test_numba_waits_for_a_solve():
     assert "numba" not in loaded_after("import asperity; asperity.read_surface; asperity.power_spectrum")
 
 
+def test_a_case_is_read_without_numba():
+    assert "numba" not in loaded_after(f"import asperity; asperity.load_case({str(PAPER)!r})")
+
+
 def test_every_public_name_is_there():
     assert len(asperity.__all__) < 55
     for name in asperity.__all__:
