@@ -355,8 +355,8 @@ def test_a_picture_shows_what_the_step_has(history):
 
     from PIL import Image
 
-    from asperity.report.drawing import CONTACT_COLOUR
     from asperity.report.motion.exhibits import frame_picture, ranges
+    from asperity.report.style import CONTACT_COLOUR
 
     frame = history.frames[1]
     packed, (width, height) = frame_picture(frame, ranges(history))

@@ -19,9 +19,9 @@ from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure
 from asperity.quantities import catalogue, quantity
 from asperity.report import base, surface_map, write_report
-from asperity.report.drawing import CONTACT_COLOUR, svg
 from asperity.report.run import contact, page, rubbing, vibration
 from asperity.report.run import several as against_roughness
+from asperity.report.style import CONTACT_COLOUR, svg
 from asperity.results import Run
 from asperity.surface import MeasuredSurface, Surface, SurfaceDescription, flat_surface, surface_parameters
 

@@ -21,12 +21,12 @@ from asperity.cli import main
 from asperity.errors import BadInput
 from asperity.paper import PAPER_ANCHORS, Anchor, is_papers_contact
 from asperity.report import write_study_report
-from asperity.report.drawing import CONTACT_COLOUR, ON_PAGE, ON_PAPER
-from asperity.report.study import maps
+from asperity.report.study import contacts
 from asperity.report.study.curve import resonance, rig, shares
 from asperity.report.study.page import render_study_page, study_exhibits
 from asperity.report.study.sweep import against
 from asperity.report.study.tables import anchor_rows
+from asperity.report.style import CONTACT_COLOUR, ON_PAGE, ON_PAPER
 from asperity.study import (
     StudyOverview,
     StudyResult,
@@ -304,7 +304,7 @@ def test_rings_of_the_rig_stand_beside_the_prediction():
 
 
 def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):
-    figure = maps.contact_maps(overview_of_wear.runs).figure(ON_PAPER)
+    figure = contacts.contact_maps(overview_of_wear.runs).figure(ON_PAPER)
     panels = [axes for axes in figure.axes if axes.images]
     firsts = wear.table.groupby("surface.sq").first()
     assert len(panels) == len(LEVELS_UM)
@@ -321,7 +321,7 @@ def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):
 
 
 def test_surfaces_share_one_scale(overview_of_wear):
-    figure = maps.surfaces(overview_of_wear.runs).figure(ON_PAPER)
+    figure = contacts.surfaces(overview_of_wear.runs).figure(ON_PAPER)
     images = [axes.images[0] for axes in figure.axes if axes.images]
     assert len({image.get_clim() for image in images}) == 1
     spread = [float(np.std(image.get_array())) for image in images]

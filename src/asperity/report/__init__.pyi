@@ -1,5 +1,3 @@
-from .drawing import Medium as Medium
-from .drawing import write_figure as write_figure
 from .motion.page import write_motion_report as write_motion_report
 from .run.curves import friction_figure as friction_figure
 from .run.page import write_report as write_report
@@ -11,4 +9,6 @@ from .run.vibration import table1_figure as table1_figure
 from .study.exploration import calibration_figure as calibration_figure
 from .study.exploration import sensitivity_figure as sensitivity_figure
 from .study.page import write_study_report as write_study_report
+from .style import Medium as Medium
+from .style import write_figure as write_figure
 from .track.page import write_track_report as write_track_report

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 
 from asperity.files import require_writable, whole_file
 from asperity.paper import CITATION
-from asperity.quantities import Quantity, with_deviation
-from asperity.report.drawing import ON_PAGE, ON_PAPER, Medium, svg, write_figure
+from asperity.quantities import Quantity, quantity, with_deviation
+from asperity.report.style import ON_PAGE, ON_PAPER, Medium, svg, write_figure
 
 
 class Picture(NamedTuple):
@@ -115,15 +115,14 @@ def in_print(text: str) -> str:
 
 
 def render(template: str, **values: Any) -> str:
-    """A page as HTML text, escaped and complete."""
+    """A page as HTML text, escaped and complete; quantities are asked for their names and numbers where they stand."""
     environment = Environment(
-        loader=PackageLoader("asperity.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
+        loader=PackageLoader("asperity.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
-    )
-    return environment.get_template(template).render(version=version("asperity"), paper=CITATION, **values)
+    )  # fmt: skip
+    environment.filters.update(in_print=in_print, capitalised=capitalised)
+    shared = {"version": version("asperity"), "paper": CITATION, "quantity": quantity, "heading": heading}
+    return environment.get_template(template).render(**shared, **values)
 
 
 def write_page(path: str | Path, page: Callable[[], str]) -> Path:

@@ -25,20 +25,9 @@ from asperity.ehl import hertz_zone
 from asperity.history import Frame, History
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import (
-    BLUE,
-    CAVITY_COLOUR,
-    CONTACT_COLOUR,
-    GREEN,
-    GREY,
-    OIL_COLOUR,
-    VERMILION,
-    Medium,
-    colour_bar_axes,
-    display,
-    map_figure,
-    name_axes,
-)
+from asperity.report.drawing import display, name_axes
+from asperity.report.maps import colour_bar, map_figure
+from asperity.report.style import BLUE, CAVITY_COLOUR, CONTACT_COLOUR, GREEN, GREY, OIL_COLOUR, VERMILION, Medium
 
 SHADES = 56  # of a map: few enough for small files, fine enough for the eye
 MOST_PIXELS = 160  # along an axis of a map
@@ -83,8 +72,7 @@ def empty_map(history: History, kind: Kind, reach: Ranges) -> Exhibit:
             figure.legend(handles=keys, loc="lower center", ncols=3, borderaxespad=0.2)
         else:
             shades = ScalarMappable(Normalize(0.0, display(kind, getattr(reach, kind))), COLOURS[kind])
-            bar, extend = colour_bar_axes(figure, axes), "max" if kind == "gap" else "neither"
-            figure.colorbar(shades, cax=bar, orientation="horizontal", label=quantity(kind).axis, extend=extend)
+            colour_bar(figure, axes, shades, kind, extend="max" if kind == "gap" else "neither")
         return figure
 
     return Exhibit(f"map-{kind}", draw, caption, f"Moving map: {caption}")
@@ -195,9 +183,9 @@ def running_in(history: History) -> Exhibit:
                 values, title = display(key, table[key].to_numpy()), quantity(key).title
                 axes.plot(table["pass"], values, marker=marker, markersize=3.5, color=colour, label=title)
             if len(keys) > 1:
-                axes.set_ylim(bottom=0.0)
+                axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])  # room for the key
             if keys != (side,):  # else the axis says it
-                axes.legend(loc="upper right")
+                axes.legend(loc="best")
             axes.set(ylabel=quantity(side).label, xlabel="pass")
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         return figure

@@ -7,29 +7,18 @@ import json
 from base64 import b64encode
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from asperity.errors import BadInput
 from asperity.history import History, HistoryVibration
-from asperity.quantities import Quantity, quantity
-from asperity.report.base import Picture, heading, in_print, render, tile, write_page
+from asperity.quantities import quantity
+from asperity.report.base import Picture, in_print, render, tile, write_page
 from asperity.report.motion import exhibits
 
 NUMBERS = (
-    "clr",
-    "car",
-    "car_domain",
-    "contact_force_n",
-    "h_min_m",
-    "h_central_m",
-    "h_mean_m",
-    "p_max_pa",
-    "friction_coefficient",
-    "friction_power_w",
-    "flow_power_w",
-    "resonance_hz",
-    "mass_flux_imbalance",
-)
+    "clr", "car", "car_domain", "contact_force_n", "h_min_m", "h_central_m", "h_mean_m", "p_max_pa",
+    "friction_coefficient", "friction_power_w", "flow_power_w", "resonance_hz", "mass_flux_imbalance",
+)  # fmt: skip
 TILES = ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz")
 
 
@@ -68,40 +57,24 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
     return render(
         "motion/page.html.j2",
         title="A contact in motion",
-        vibration=None if vibration is None else in_print(vibration.verdict()),
-        verdict=in_print(history.verdict()),
-        failed=history.failed,
-        steps=history.steps,
-        tiles=[tile(_over_time(key), values) for key in TILES if values[key] is not None],
+        history=history,
+        vibration=vibration,
+        tiles=[
+            tile(replace(quantity(key), deviation=f"{key}_std"), values) for key in TILES if values[key] is not None
+        ],
         maps=[_map(history, kind, reach) for kind in exhibits.KINDS],
         curves=over_time.picture_of(figure),
         begins=100.0 * box.x0,
         ends=100.0 * box.x1,
         running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
-        flattening=motion.flattening,
-        numbers=[_row(quantity(key), values) for key in NUMBERS],
+        motion=motion,
+        numbers=[quantity(key) for key in NUMBERS],
+        values=values,
         settled_from=int(rows["step"].iloc[0]),
-        start=motion.start,
-        characteristic=motion.time_step == 1.0,
-        time_step=motion.time_step,
         model=history.case.contents.model,
         imbalance=quantity("mass_flux_imbalance").text(rows["mass_flux_imbalance"].mean()),
-        notes=[in_print(note) for note in history.notes],
-        case_text=history.case.text,
         script_data=_script_data(history, reach),
     )
-
-
-def _over_time(key: str) -> Quantity:
-    """A quantity whose deviation is that over time."""
-    return replace(quantity(key), deviation=f"{key}_std")
-
-
-def _row(entry: Quantity, values: dict[str, Any]) -> dict[str, str]:
-    """A line of the table: at the start, mean and standard deviation over the steps that count."""
-    columns = {"start": f"{entry.key}_start", "mean": entry.key, "std": f"{entry.key}_std"}
-    cells = {column: entry.number(values[key]) for column, key in columns.items()}
-    return {"name": heading(entry), "unit": entry.display, **cells}
 
 
 def _map(history: History, kind: exhibits.Kind, reach: exhibits.Ranges) -> MovingMap:

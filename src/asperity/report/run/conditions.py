@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from asperity.conditions import ContactConditions
@@ -10,29 +9,18 @@ from asperity.coupling import VibrationModel
 from asperity.ehl import ContactSolution
 from asperity.lubricant import LawFamily, Lubricant, Solid, law_name
 from asperity.quantities import NO_VALUE, parameters, quantity, with_deviation
+from asperity.report.base import heading
 from asperity.results import Run
 
 TACIT = {"direction_deg": 0.0, "turn": False, "outliers": "keep"}  # of a surface: what goes without saying
 
 
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A row: what every run was given."""
-
-    name: str
-    cells: list[str]
-
-    @property
-    def varies(self) -> bool:
-        """Whether runs differ in it."""
-        return len(set(self.cells)) > 1
-
-
-def conditions_table(runs: Sequence[Run]) -> list[Condition]:
-    """The conditions of the runs side by side."""
+def conditions_table(runs: Sequence[Run]) -> dict[str, list[str]]:
+    """What each run was given, by the name of the condition; a single cell where it is the same for all."""
     columns = [_conditions(run) for run in runs]
     names = dict.fromkeys(name for column in columns for name in column)
-    return [Condition(name, [column.get(name, NO_VALUE) for column in columns]) for name in names]
+    rows = {name: [column.get(name, NO_VALUE) for column in columns] for name in names}
+    return {name: cells if len(set(cells)) > 1 else cells[:1] for name, cells in rows.items()}
 
 
 def _conditions(run: Run) -> dict[str, str]:
@@ -70,20 +58,15 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         load += f" ({quantity('line_load_n_per_m').text(conditions.line_load)})"
     half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
     across = "" if conditions.geometry == "line" else f", across rolling b = {half_widths[1]}"
-    speed, modulus = quantity("surface_speed_m_s"), quantity("reduced_modulus_pa")
+    speeds = " and ".join(map(quantity("surface_speed_m_s").text, conditions.surface_speeds))
+    mean, slip, modulus = map(quantity, ("entrainment_speed_m_s", "slide_to_roll", "reduced_modulus_pa"))
     return {
         "Contact": contact,
         "Load": load,
-        "Speeds": f"{' and '.join(map(speed.text, conditions.surface_speeds))}: "
-        + ", ".join(
-            f"{quantity(key).name} {quantity(key).text(value)}"
-            for key, value in (
-                ("entrainment_speed_m_s", conditions.entrainment_speed),
-                ("slide_to_roll", conditions.slide_to_roll),
-            )
-        ),
+        "Speeds": f"{speeds}: {mean.name} {mean.text(conditions.entrainment_speed)}, "
+        f"{slip.name} {slip.text(conditions.slide_to_roll)}",
         "Young's moduli": _both([quantity("youngs_modulus_pa").text(each) for each in pair.youngs_moduli]),
-        "Poisson's ratios": _both([f"{each:.4g}" for each in pair.poisson_ratios]),
+        "Poisson's ratios": _both([quantity("poisson_ratio").text(each) for each in pair.poisson_ratios]),
         "Reduced modulus": f"E* = {modulus.text(pair.reduced_modulus)} "
         f"(E′ = 2 E* = {modulus.text(pair.effective_modulus)})",
         "Pressure cap (hardness)": "none: purely elastic"
@@ -111,7 +94,8 @@ def _thermal_rows(run: Run) -> dict[str, str]:
         f"{name.replace('_', ' ')} {_both([mark.text(getattr(solid, name)) for solid in thermal.solids])}"
         for name, mark in parameters(Solid).items()
     ]
-    rows = {"Boundary friction": f"{run.case.boundary_friction:g}", "Bodies": ", ".join(solids)}
+    boundary = quantity("boundary_friction")
+    rows = {heading(boundary): boundary.text(run.case.boundary_friction), "Bodies": ", ".join(solids)}
     if run.solution.lubricant is None:
         return rows
     bulk = "" if thermal.bulk is None else f", bodies at {_both([temperature.text(each) for each in thermal.bulk])}"
@@ -119,19 +103,16 @@ def _thermal_rows(run: Run) -> dict[str, str]:
     return {
         **rows,
         "Temperature": f"{temperature.text(thermal.ambient)} ambient{bulk}; {feedback}",
-        "Oil and heat": f"conductivity {thermal.oil_conductivity:g} W/m/K, viscosity falls by the law "
-        f"{_law('warmth', thermal.warmth)}",
+        "Oil and heat": f"conductivity {quantity('oil_conductivity_w_m_k').text(thermal.oil_conductivity)}, viscosity "
+        f"falls by the law {_law('warmth', thermal.warmth)}",
     }
 
 
 def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
     grid, a, cell = solution.grid, solution.conditions.hertz.half_widths[0], quantity("cell_m")
     (nx, ny), (dx, dy) = grid.cells, grid.spacing
-    sides = (
-        f"{name} from {' a to '.join(with_deviation(corner[axis] / a, None, '.2f') for corner in corners)} a"
-        for axis, name in enumerate("xy")
-        for corners in [(grid.lower, grid.upper)]
-    )
+    ends = [[with_deviation(end / a, None, ".2f") for end in corner] for corner in (grid.lower, grid.upper)]
+    sides = (f"{axis} from {lower} a to {upper} a" for axis, lower, upper in zip("xy", *ends, strict=True))
     return {
         "Grid": f"{nx} × {ny} cells of {cell.number(dx)} × {cell.text(dy)}",
         "Domain": ", ".join(sides) + (", repeating in y" if grid.periodic[1] else ""),
@@ -146,7 +127,8 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     damping = model.damping_law.summary(model.damping_ratio)
     duration, rate = quantity("duration_s").text(model.duration_s), quantity("record_rate_hz").text(model.rate_hz)
     return {
-        "Oscillator": f"mass {model.mass:.4g} kg, {damping}, stiffness law {model.stiffness_law.name}",
+        "Oscillator": f"{quantity('mass_kg').name} {quantity('mass_kg').text(model.mass)}, {damping}, "
+        f"stiffness law {model.stiffness_law.name}",
         "Excitation": f"{model.excitation.summary}{model.patch.summary}, seed {model.seed}",
         "Record": f"{duration} at {rate}; resonance by {model.method}"
         + ("" if model.response == "exact" else f"; response {model.response}"),
@@ -157,8 +139,8 @@ def _roughness(case_text: str) -> str:
     """The case's [surface] in one line: which surface it was belongs beside every CAR."""
     surface = tomllib.loads(case_text)["surface"]
     second = surface.pop("second", None)
-    first = _table_in_words(surface)
-    return first if second is None else f"{first}; on the other body: {_table_in_words(second)}"
+    other = f"; on the other body: {_table_in_words(second)}" if second is not None else ""
+    return f"{_table_in_words(surface)}{other}"
 
 
 def _table_in_words(table: dict[str, Any]) -> str:

@@ -11,23 +11,9 @@ from asperity.ehl import ContactSolution, hertz_zone
 from asperity.hertz import line_pressure
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import (
-    BLUE,
-    CONTACT_COLOUR,
-    GREEN,
-    GREY,
-    VERMILION,
-    Medium,
-    contact_colours,
-    contact_keys,
-    display,
-    draw_map,
-    legend_below,
-    map_figure,
-    mark_hertz_zone,
-    name_axes,
-    show_map,
-)
+from asperity.report.drawing import display, legend_below, name_axes, one_panel
+from asperity.report.maps import contact_colours, contact_keys, drawn_map, map_figure, mark_hertz_zone, show_map
+from asperity.report.style import BLUE, CONTACT_COLOUR, GREEN, GREY, VERMILION, Medium
 from asperity.results import Run
 
 
@@ -64,16 +50,12 @@ def contact_map(run: Run) -> Exhibit:
 def film_map(run: Run) -> Exhibit:
     """Gap between the deformed surfaces; the colours end where the Hertz zone's gaps do (its 99th percentile)."""
     solution, state = run.solution, run.state
-
-    def draw(medium: Medium) -> Figure:
-        zone = hertz_zone(solution.conditions, solution.grid)
-        top = display("gap", float(np.percentile(solution.gap[zone], 99.0))) or 1.0
-        title = "Gap between the surfaces" if solution.lubricant is None else "Film thickness"
-        return draw_map(medium, solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top)
-
+    zone = hertz_zone(solution.conditions, solution.grid)
+    top = display("gap", float(np.percentile(solution.gap[zone], 99.0))) or 1.0
+    title = "Gap between the surfaces" if solution.lubricant is None else "Film thickness"
     return Exhibit(
         "film",
-        draw,
+        drawn_map(solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top),
         "Gap between the deformed surfaces. The colours end at the Hertz zone's 99th percentile.",
         f"Map of the film thickness: mean {quantity('h_mean_m').text(state.h_mean)} in the Hertz zone, "
         f"smallest {quantity('h_min_m').text(state.h_min)}.",
@@ -88,14 +70,10 @@ def pressure_map(run: Run) -> Exhibit:
     if solution.p_cap is not None and solution.lubricant is not None:  # what CLR leaves out
         share = quantity("capped_oil_load_ratio").text(run.state.capped_oil_load_ratio)
         capped = f" Cells that stand at the hardness without touching carry {share} of the load; CLR leaves them out."
-
-    def draw(medium: Medium) -> Figure:
-        title = f"Pressure, at most {largest}"
-        return draw_map(medium, solution, "pressure", solution.pressure, title, cmap="inferno", vmin=0.0)
-
+    title = f"Pressure, at most {largest}"
     return Exhibit(
         "pressure",
-        draw,
+        drawn_map(solution, "pressure", solution.pressure, title, cmap="inferno", vmin=0.0),
         f"Pressure of oil and asperities together.{capped}",
         f"Map of the pressure: at most {largest}; Hertz's would be {pressure.text(solution.conditions.hertz.p_max)}.",
     )
@@ -127,14 +105,11 @@ def centre_line(run: Run) -> Exhibit:
 
 
 def _draw_pressure_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
-    x, hertz = solution.grid.x, solution.conditions.hertz
+    x, hertz = display("x_m", solution.grid.x), solution.conditions.hertz
     pressure = solution.pressure[:, row]
-    smooth = line_pressure(x, hertz.half_widths[0], hertz.p_max)
-    for values, stroke, style in (
-        (pressure, "-", {"color": BLUE, "linewidth": 1.1, "label": "pressure p, solved"}),
-        (smooth, "--", {"color": "black", "label": "p, Hertz (smooth, dry)"}),
-    ):
-        axes.plot(display("x_m", x), display("pressure", values), stroke, **style)
+    smooth = line_pressure(solution.grid.x, hertz.half_widths[0], hertz.p_max)
+    axes.plot(x, display("pressure", pressure), color=BLUE, linewidth=1.1, label="pressure p, solved")
+    axes.plot(x, display("pressure", smooth), "--", color="black", label="p, Hertz (smooth, dry)")
     if solution.p_cap is not None and pressure.max() > 0.5 * solution.p_cap:
         axes.axhline(display("pressure", solution.p_cap), color=VERMILION, linestyle=":", label="hardness")
     axes.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
@@ -149,23 +124,18 @@ def _draw_gap_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
         x, 0.0, 0.06 * top, where=solution.in_contact[:, row], color=CONTACT_COLOUR, edgecolor="black", linewidth=0.3,
         step="mid", label="asperity contact",
     )  # fmt: skip
-    name_axes(axes, "x_m")
-    axes.set(ylabel=quantity("gap").label, ylim=(0.0, top))
+    name_axes(axes, "x_m", ylabel=quantity("gap").label, ylim=(0.0, top))
 
 
 def roughness_map(run: Run) -> Exhibit:
     """The roughness that was pressed into the contact, before it deformed."""
     solution, sq = run.solution, quantity("sq_m")
-
-    def draw(medium: Medium) -> Figure:
-        heights, title = solution.surface.heights, f"Composite roughness, {sq.named(solution.surface.sq)}"
-        reach = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
-        colours: Any = {"cmap": "cividis", "vmin": -reach, "vmax": reach}
-        return draw_map(medium, solution, "surface_height", heights, title, extend="both", **colours)
-
+    heights, title = solution.surface.heights, f"Composite roughness, {sq.named(solution.surface.sq)}"
+    reach = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
+    colours: Any = {"extend": "both", "cmap": "cividis", "vmin": -reach, "vmax": reach}
     return Exhibit(
         "roughness",
-        draw,
+        drawn_map(solution, "surface_height", heights, title, **colours),
         "The composite roughness of both surfaces before they deform, material up.",
         f"Map of the roughness heights, {sq.named(run.state.sq)}.",
     )
@@ -173,15 +143,9 @@ def roughness_map(run: Run) -> Exhibit:
 
 def height_distribution(run: Run) -> Exhibit:
     """How often each height occurs, beside the Gaussian of the same Sq."""
-
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
-        draw_height_distribution(axes, run.solution.surface.heights)
-        return figure
-
     return Exhibit(
         "heights",
-        draw,
+        one_panel(3.1, key=0)(lambda axes: draw_height_distribution(axes, run.solution.surface.heights)),
         "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
         f"Histogram of the heights, {quantity('sq_m').named(run.state.sq)}, beside a Gaussian curve.",
     )
@@ -209,8 +173,8 @@ def convergence_history(run: Run) -> Exhibit:
     convergence = run.solution.convergence
     history = convergence.history
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
+    @one_panel(3.1, key=4)
+    def draw(axes: Axes) -> None:
         steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
         for name, stroke, colour in (
             ("residual", "-o", BLUE), ("load_error", "--s", VERMILION), ("change", ":^", GREEN),
@@ -232,8 +196,6 @@ def convergence_history(run: Run) -> Exhibit:
         outcome = "converged" if convergence.converged else f"NOT CONVERGED ({convergence.status})"
         axes.set(xlabel="Newton step", ylabel="relative size [-]", title=f"Convergence: {outcome}")
         axes.set_xlim(0.5, len(history) + 0.5)
-        legend_below(figure, 4)
-        return figure
 
     return Exhibit(
         "convergence",

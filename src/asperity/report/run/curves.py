@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from asperity.quantities import quantity
-from asperity.report.drawing import BLUE, GREEN, GREY, ON_PAGE, VERMILION, display, name_axes
+from asperity.report.drawing import display, name_axes
+from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, VERMILION
 from asperity.results import FrictionCurve
 
 STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
@@ -19,28 +20,28 @@ PARTS = {  # of a single curve, left and right: the quantity, what it is of, its
 }
 
 
+@ON_PAGE.drawing()
 def friction_figure(curves: Sequence[FrictionCurve]) -> Figure:
     """Friction and temperature over speed or slip, for curves of one kind; of a single curve its parts too."""
     kind = f"{curves[0].kind.capitalize()} curve"
     of = f", {_name(curves[0])}" if len(curves) == 1 else ""
-    with ON_PAGE.drawing():
-        figure = Figure(figsize=(ON_PAGE.double, 4.0), layout="constrained")
-        left, right = figure.subplots(1, 2)
-        _draw_panel(left, curves, "friction_coefficient", "coefficient")
-        _draw_panel(right, curves, "flash_temperature_max_k", "hotter surface")
-        limits = {curve.boundary_friction for curve in curves}
-        for limit in limits:
-            left.axhline(limit, color="black", linewidth=0.8, linestyle=(0, (1, 2)))
-            left.annotate(
-                f"boundary friction {limit:g}", (0.99, limit), xycoords=("axes fraction", "data"),
-                xytext=(0, 3), textcoords="offset points", ha="right", fontsize=8.5,
-            )  # fmt: skip
-        left.set(ylabel=quantity("friction_coefficient").axis, title=f"{kind}: friction{of}")
-        right.set(ylabel=quantity("temperature_rise_k").axis, title=f"{kind}: temperature{of}")
-        left.set_ylim(0.0, max(1.12 * max(limits), left.get_ylim()[1]))
-        unfinished = any(not point.converged for curve in curves for point in curve.points)
-        left.legend(title="crosses: not converged" if unfinished else None, loc="best")
-        right.legend(loc="best")
+    figure = Figure(figsize=(ON_PAGE.double, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _draw_panel(left, curves, "friction_coefficient", "coefficient")
+    _draw_panel(right, curves, "flash_temperature_max_k", "hotter surface")
+    limits = {curve.boundary_friction for curve in curves}
+    for limit in limits:
+        left.axhline(limit, color="black", linewidth=0.8, linestyle=(0, (1, 2)))
+        left.annotate(
+            f"boundary friction {limit:g}", (0.99, limit), xycoords=("axes fraction", "data"),
+            xytext=(0, 3), textcoords="offset points", ha="right", fontsize=8.5,
+        )  # fmt: skip
+    left.set(ylabel=quantity("friction_coefficient").axis, title=f"{kind}: friction{of}")
+    right.set(ylabel=quantity("temperature_rise_k").axis, title=f"{kind}: temperature{of}")
+    left.set_ylim(0.0, max(1.12 * max(limits), left.get_ylim()[1]))
+    unfinished = any(not point.converged for curve in curves for point in curve.points)
+    left.legend(title="crosses: not converged" if unfinished else None, loc="best")
+    right.legend(loc="best")
     return figure
 
 

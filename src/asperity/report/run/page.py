@@ -1,28 +1,20 @@
 """One HTML page from solved runs: what was found, how, how well, and what the model leaves out."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
+from asperity.ehl import Convergence
 from asperity.errors import BadInput
 from asperity.lubricant import Newtonian
-from asperity.quantities import Quantity, quantity, select
-from asperity.report.base import Exhibit, capitalised, heading, in_print, render, span, tile, write_page
+from asperity.quantities import quantity, select
+from asperity.report.base import Exhibit, Picture, Tile, render, span, tile, write_page
 from asperity.report.run import contact, rubbing, several
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.vibration import spectrum
 from asperity.results import RUN_GROUPS, Run
 
-TILES = (
-    "clr",
-    "car",
-    "h_mean_m",
-    "lambda_ratio",
-    "friction_coefficient",
-    "flash_temperature_max_k",
-    "crf_hz",
-    "crfa",
-)
+TILES = ("clr", "car", "h_mean_m", "lambda_ratio", "friction_coefficient", "flash_temperature_max_k", "crf_hz", "crfa")
 
 
 def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = None) -> Path:
@@ -51,15 +43,13 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
 
 def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     """The page as HTML text."""
-    views = [_view(run, number if len(runs) > 1 else None) for number, run in enumerate(runs, 1)]
-    scalars = [view["scalars"] for view in views]
     oils = [run.solution.lubricant for run in runs]
     return render(
         "run/page.html.j2",
         title=title or _title(runs),
-        runs=views,
+        runs=[_view(run, number, len(runs) > 1) for number, run in enumerate(runs, 1)],
         overview=[exhibit.picture() for exhibit in _overview(runs)] if len({run.state.sq for run in runs}) > 1 else [],
-        numbers=[_row(entry, scalars) for group in RUN_GROUPS for entry in select(group)],
+        numbers=[entry for group in RUN_GROUPS for entry in select(group)],
         conditions=conditions_table(runs),
         lubricated=any(oil is not None for oil in oils),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
@@ -70,37 +60,36 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     )
 
 
-def _row(entry: Quantity, scalars: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """A line of the table of numbers."""
-    cells = [entry.number_in(values) for values in scalars]
-    return {"name": heading(entry), "meaning": entry.meaning, "cells": cells, "unit": entry.display}
-
-
 def _title(runs: Sequence[Run]) -> str:
     several_runs = f": {len(runs)} runs" if len(runs) > 1 else ""
     return f"Rough lubricated contact{several_runs}, Sq {span(quantity('sq_m'), [run.state.sq for run in runs])}"
 
 
-def _label(run: Run, number: int | None) -> str:
-    rough = quantity("sq_m").named(run.state.sq)
-    return rough if number is None else f"{number}. {rough}"
-
-
-def _view(run: Run, number: int | None) -> dict[str, Any]:
+class _RunView(NamedTuple):
     """What the template shows of one run."""
-    scalars, convergence = run.scalars(), run.solution.convergence
-    return {
-        "label": _label(run, number),
-        "anchor": f"run-{number or 1}",
-        "scalars": scalars,
-        "verdict": in_print(run.verdict()),
-        "converged": convergence.converged,
-        "ending": in_print(convergence.explain()).capitalize(),
-        "tiles": [tile(quantity(key), scalars) for key in TILES],
-        "pictures": [exhibit.picture() for exhibit in _exhibits(run)],
-        "notes": [in_print(capitalised(note)) for note in (*run.remarks, *_missing_exhibits(run))],
-        "case_text": run.case.text,
-    }
+
+    label: str
+    anchor: str
+    run: Run
+    scalars: dict[str, float | int | bool | None]
+    convergence: Convergence
+    tiles: list[Tile]
+    pictures: list[Picture]
+    notes: list[str]
+
+
+def _view(run: Run, number: int, several_runs: bool) -> _RunView:
+    scalars, rough = run.scalars(), quantity("sq_m").named(run.state.sq)
+    return _RunView(
+        label=f"{number}. {rough}" if several_runs else rough,
+        anchor=f"run-{number}",
+        run=run,
+        scalars=scalars,
+        convergence=run.solution.convergence,
+        tiles=[tile(quantity(key), scalars) for key in TILES],
+        pictures=[exhibit.picture() for exhibit in _exhibits(run)],
+        notes=[*run.remarks, *_missing_exhibits(run)],
+    )
 
 
 def _exhibits(run: Run) -> Iterator[Exhibit]:

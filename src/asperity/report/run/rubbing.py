@@ -3,26 +3,16 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
-from asperity.arrays import Field
 from asperity.ehl import FlashTemperature, Friction, hertz_stress
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import (
-    BLUE,
-    DASHED,
-    GREEN,
-    VERMILION,
-    Medium,
-    colour_bar_axes,
-    display,
-    draw_map,
-    legend_below,
-    map_figure,
-    name_axes,
-)
+from asperity.report.drawing import display, name_axes, one_panel
+from asperity.report.maps import colour_bar, drawn_map, map_figure
+from asperity.report.style import BLUE, DASHED, GREEN, VERMILION, Medium
 from asperity.results import Run
 
 DEEP = 1.6  # half-widths: how far the section reaches down, and to both sides
@@ -31,42 +21,29 @@ SECTION_ROWS = 160
 
 def traction_map(run: Run, friction: Friction) -> Exhibit:
     """Shear stress on the surfaces; colours go with its root, or the oil's could not be seen beside the asperities'."""
-    solution, coefficient = run.solution, quantity("friction_coefficient")
-
-    def draw(medium: Medium) -> Figure:
-        values = np.abs(friction.shear)
-        top = float(display("shear", values).max()) or 1.0
-        title = f"Shear stress, friction coefficient {coefficient.text(friction.coefficient)}"
-        ticks = [float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)]
-        norm = PowerNorm(0.5, 0.0, top)
-        return draw_map(medium, solution, "shear", values, title, ticks=ticks, cmap="magma", norm=norm)
-
-    speed = quantity("sliding_speed_m_s").text(solution.conditions.sliding_speed)
+    values, coefficient = np.abs(friction.shear), quantity("friction_coefficient").text(friction.coefficient)
+    top = float(display("shear", values).max()) or 1.0
+    ticks = [float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)]
+    title, norm = f"Shear stress, friction coefficient {coefficient}", PowerNorm(0.5, 0.0, top)
+    speed = quantity("sliding_speed_m_s").text(run.solution.conditions.sliding_speed)
     return Exhibit(
         "traction",
-        draw,
+        drawn_map(run.solution, "shear", values, title, ticks=ticks, cmap="magma", norm=norm),
         f"Shear stress of sliding at {speed} on both surfaces: {friction.boundary_friction:g} times the pressure where "
         f"they touch (friction {quantity('friction_asperity_part').text(friction.asperity_part)}), the oil's own "
         f"elsewhere ({quantity('friction_oil_part').text(friction.oil_part)}).",
-        f"Map of the shear stress: friction coefficient {coefficient.text(friction.coefficient)}.",
+        f"Map of the shear stress: friction coefficient {coefficient}.",
     )
 
 
 def temperature_map(run: Run, friction: Friction, heat: FlashTemperature) -> Exhibit:
     """The hotter of the two surfaces."""
     largest = quantity("flash_temperature_max_k").text(heat.max_k)
-
-    def draw(medium: Medium) -> Figure:
-        hotter = np.maximum(heat.surface_1, heat.surface_2)
-        title = f"Flash temperature, at most {largest}"
-        return draw_map(medium, run.solution, "surface_temperature", hotter, title, cmap="inferno")
-
-    whole, first, second = (
-        quantity("friction_power_w").text(power) for power in (friction.power, heat.heat_1_w, heat.heat_2_w)
-    )
+    hotter, title = np.maximum(heat.surface_1, heat.surface_2), f"Flash temperature, at most {largest}"
+    whole, first, second = map(quantity("friction_power_w").text, (friction.power, heat.heat_1_w, heat.heat_2_w))
     return Exhibit(
         "temperature",
-        draw,
+        drawn_map(run.solution, "surface_temperature", hotter, title, cmap="inferno"),
         f"Temperature of the hotter surface. Friction makes {whole}; {first} flow into body 1 and {second} into body "
         "2.",
         f"Map of the flash temperature: at most {largest} above the body.",
@@ -77,10 +54,10 @@ def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
     """Both surfaces and the film along rolling, through the hottest cell."""
     solution = run.solution
 
-    def draw(medium: Medium) -> Figure:
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
         hotter = np.maximum(heat.surface_1, heat.surface_2)
         row = int(np.unravel_index(hotter.argmax(), hotter.shape)[1])
-        figure, axes = medium.panel(3.1)
         x, half_width = display("x_m", solution.grid.x), display("x_m", solution.conditions.hertz.half_widths[0])
         first, second = (quantity("surface_speed_m_s").text(speed) for speed in solution.conditions.surface_speeds)
         axes.plot(x, heat.surface_1[:, row], color=VERMILION, label=f"surface 1, {first}")
@@ -92,8 +69,6 @@ def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
         name_axes(axes, "x_m", "temperature_rise_k")
         axes.set_title(f"Temperatures along rolling at y = {quantity('y_m').text(solution.grid.y[row])}")
         axes.set_xlim(max(x[0], -2.5 * half_width), x[-1])
-        legend_below(figure)
-        return figure
 
     return Exhibit(
         "temperature-line",
@@ -107,15 +82,10 @@ def temperature_line(run: Run, heat: FlashTemperature) -> Exhibit:
 
 def stress_map(run: Run) -> Exhibit:
     """The largest von Mises stress below every cell, at whatever depth."""
-    stress = run.stress
-
-    def draw(medium: Medium) -> Figure:
-        title = f"Largest von Mises stress below, {quantity('von_mises_max_pa').text(stress.peak.value)}"
-        return draw_map(medium, run.solution, "von_mises_stress_pa", stress.largest, title, cmap="viridis", vmin=0.0)
-
+    title = f"Largest von Mises stress below, {quantity('von_mises_max_pa').text(run.stress.peak.value)}"
     return Exhibit(
         "stress",
-        draw,
+        drawn_map(run.solution, "von_mises_stress_pa", run.stress.largest, title, cmap="viridis", vmin=0.0),
         "The largest von Mises stress below each cell, of sixteen depths in body 1. Pressure and "
         "friction load an elastic, smooth half-space: above its yield stress the material would flow.",
         f"Map of the largest von Mises stress below the surface: {_peak(run)}.",
@@ -130,10 +100,11 @@ def stress_section(run: Run) -> Exhibit:
         x, dx, reach = stress.grid.x, stress.grid.spacing[0], DEEP * run.solution.conditions.hertz.half_widths[0]
         seen = (x >= min(-reach, peak.x - reach / 4.0)) & (x <= max(reach, peak.x + reach / 4.0))
         left, right, bottom = x[seen][0] - dx / 2.0, x[seen][-1] + dx / 2.0, min(reach, float(stress.depths[-1]))
-        even = _at_even_depths(stress.von_mises[seen, stress.row], stress.depths, bottom)
+        even = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
+        values = np.stack([np.interp(even, stress.depths, column) for column in stress.von_mises[seen, stress.row]])
         figure, axes = map_figure(medium, (right - left, bottom))
         image = axes.imshow(
-            display("von_mises_stress_pa", even.T), extent=display("x_m", np.array([left, right, bottom, 0.0])),
+            display("von_mises_stress_pa", values.T), extent=display("x_m", np.array([left, right, bottom, 0.0])),
             cmap="viridis", vmin=0.0, interpolation="none", aspect="equal", origin="upper",
         )  # fmt: skip
         axes.plot(
@@ -144,8 +115,7 @@ def stress_section(run: Run) -> Exhibit:
         axes.spines[:].set_visible(False)
         depth = quantity("von_mises_depth_m").text(peak.depth)
         axes.set_title(f"Section at y = {quantity('y_m').text(peak.y)}, peak {depth} deep")
-        bar, label = colour_bar_axes(figure, axes), quantity("von_mises_stress_pa").axis
-        figure.colorbar(image, cax=bar, orientation="horizontal", label=label)
+        colour_bar(figure, axes, image, "von_mises_stress_pa")
         return figure
 
     return Exhibit(
@@ -157,18 +127,12 @@ def stress_section(run: Run) -> Exhibit:
     )
 
 
-def _at_even_depths(values: Field, depths: Field, bottom: float) -> Field:
-    """Stresses at even depths, straight lines between those known, shape (nx, rows)."""
-    even = (np.arange(SECTION_ROWS) + 0.5) * bottom / SECTION_ROWS
-    return np.stack([np.interp(even, depths, column) for column in values])
-
-
 def stress_over_depth(run: Run) -> Exhibit:
     """The largest von Mises stress of each depth, with that below Hertz's contact."""
     solution, stress = run.solution, run.stress
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
         depths = display("depth_m", stress.depths)
         below = depths > 0.0
         smooth = hertz_stress(solution.conditions, stress.depths, body=stress.body)
@@ -181,8 +145,6 @@ def stress_over_depth(run: Run) -> Exhibit:
         circle: Any = {"color": VERMILION, "markerfacecolor": "none", "markersize": 9, "label": "largest"}
         axes.plot(max(depth, depths[below][0]), value, "o", **circle)
         name_axes(axes, "depth_m", "von_mises_stress_pa", ylim=(0.0, None), title="Largest stress at each depth")
-        legend_below(figure)
-        return figure
 
     dx, dy = (quantity("cell_m").number(side) for side in solution.grid.spacing)
     return Exhibit(

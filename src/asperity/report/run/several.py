@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit, capitalised
-from asperity.report.drawing import BLUE, VERMILION, Medium, display, legend_below, name_axes
+from asperity.report.drawing import display, name_axes, one_panel
+from asperity.report.style import BLUE, VERMILION
 
 Points = Sequence[Mapping[str, Any]]  # the scalars of each run
 
@@ -16,13 +16,11 @@ Points = Sequence[Mapping[str, Any]]  # the scalars of each run
 def shares_against_roughness(points: Points) -> Exhibit:
     """CLR and CAR against Sq."""
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.3)
+    @one_panel(3.3, key=1)
+    def draw(axes: Axes) -> None:
         _draw(axes, points, "clr", "-o", VERMILION)
         _draw(axes, points, "car", "--s", BLUE)
         name_axes(axes, "sq_m", "share", title="Load and area share of asperities", ylim=(0.0, 100.0))
-        legend_below(figure, 1)
-        return figure
 
     return Exhibit(
         "shares-against-roughness",
@@ -35,10 +33,11 @@ def shares_against_roughness(points: Points) -> Exhibit:
 
 def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) -> Exhibit:
     """CRF against Sq, with two standard deviations."""
+    line = quantity("crf_hz")
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
-        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{quantity('crf_hz').short} ± 2 std of its fit")
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
+        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{line.short} ± 2 std of its fit")
         for point in points:
             if point["crf_hz"] is not None and point["crf_std_hz"] is not None:
                 place, reach = display("sq_m", point["sq_m"]), 2.0 * point["crf_std_hz"]
@@ -46,9 +45,7 @@ def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) 
         if full_load_crf_hz is not None:
             label = "asperities carry all the load"
             axes.axhline(full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label=label)
-        axes.set(ylabel=quantity("crf_hz").label, title=capitalised(quantity("crf_hz").name))
-        legend_below(figure)
-        return figure
+        axes.set(ylabel=line.label, title=capitalised(line.name))
 
     return Exhibit(
         "resonance-against-roughness",
@@ -61,14 +58,12 @@ def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) 
 def friction_against_roughness(points: Points) -> Exhibit:
     """Friction coefficient against Sq: asperities' and oil's parts."""
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
         _draw(axes, points, "friction_coefficient", "-o", "black")
         _draw(axes, points, "friction_asperity_part", "--s", VERMILION)
         _draw(axes, points, "friction_oil_part", ":^", BLUE)
         axes.set(ylabel=quantity("friction_coefficient").label, title="Friction", ylim=(0.0, None))
-        legend_below(figure)
-        return figure
 
     return Exhibit(
         "friction-against-roughness",
@@ -84,8 +79,7 @@ def _draw(axes: Axes, points: Points, key: str, stroke: str, colour: str, label:
     sq, values = ([display(name, point[name]) for point in known] for name in ("sq_m", key))
     axes.plot(sq, values, stroke, color=colour, markersize=6, label=label or quantity(key).title)
     doubtful = [i for i, point in enumerate(known) if not point["converged"]]
-    places, heights = ([column[i] for i in doubtful] for column in (sq, values))
-    axes.plot(places, heights, stroke[-1], color=colour, markerfacecolor="white", markersize=6)
+    axes.plot(sq, values, stroke[-1], color=colour, markerfacecolor="white", markersize=6, markevery=doubtful)
     every = [display("sq_m", point["sq_m"]) for point in points]
     margin = max(0.06 * (max(every) - min(every)), 0.1 * max(every)) or 0.5
     name_axes(axes, "sq_m", xlim=(min(every) - margin, max(every) + margin))
@@ -98,8 +92,8 @@ def _unfinished(points: Points) -> str:
 
 def _values(points: Points, *keys: str) -> str:
     """The points of the curves in words."""
-    texts = []
-    for point in points:
-        values = [quantity(key).named(point[key]) for key in keys]
-        texts.append(f"at {quantity('sq_m').text(point['sq_m'])} {' and '.join(values)}")
+    texts = (
+        f"at {quantity('sq_m').text(point['sq_m'])} {' and '.join(quantity(key).named(point[key]) for key in keys)}"
+        for point in points
+    )
     return f"{' and '.join(quantity(key).name for key in keys)} against Sq: {'; '.join(texts)}."

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 
 from asperity.errors import BadInput
 from asperity.quantities import quantity
-from asperity.report.drawing import BLUE, DASHED, GREEN, GREY, ON_PAGE, VERMILION, display, name_axes, write_figure
+from asperity.report.drawing import display, name_axes
 from asperity.report.run.contact import draw_height_distribution
+from asperity.report.style import BLUE, DASHED, GREEN, GREY, ON_PAGE, VERMILION, write_figure
 from asperity.surface import MeasuredSurface, SurfaceDescription, SurfaceSpectrum, bearing_curve, surface_spectrum
 
 
@@ -24,11 +25,10 @@ def surface_map(description: SurfaceDescription, path: Path) -> Path:
     """
     if path.suffix.lower() != ".png":
         raise BadInput(f"the map is written as PNG, got {path.name}; name a file that ends in .png")
-    with ON_PAGE.drawing():
-        figure = _surface_figure(description)
-    return write_figure(figure, path, dpi=130)
+    return write_figure(_surface_figure(description), path, dpi=130)
 
 
+@ON_PAGE.drawing()
 def _surface_figure(description: SurfaceDescription) -> Figure:
     levelled, spectrum = description.levelled, surface_spectrum(description.levelled)
     figure = Figure(figsize=(11.0, 7.4), layout="constrained")

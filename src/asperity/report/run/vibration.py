@@ -14,19 +14,8 @@ from asperity.errors import BadInput
 from asperity.paper import Table1Row, continuous_crfa, expected_crfa
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import (
-    BAND_COLOUR,
-    BLUE,
-    GREEN,
-    GREY,
-    ON_PAGE,
-    VERMILION,
-    Medium,
-    display,
-    legend_below,
-    mean_of_neighbours,
-    name_axes,
-)
+from asperity.report.drawing import display, legend_below, name_axes, neighbours, one_panel
+from asperity.report.style import BAND_COLOUR, BLUE, GREEN, GREY, ON_PAGE, VERMILION
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.vibration import mass_motion, white_noise
 from asperity.wear import Resonance
@@ -48,34 +37,28 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
     density, resonance = vibration.spectrum, vibration.resonance
     if density is None:
         raise BadInput(f"there is no spectrum to draw: {resonance.reason}")
-    low, high = vibration.band_hz
+    (low, high), line = vibration.band_hz, quantity("crf_hz")
+    margin = 0.35 * (high - low)
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.5)
-        margin = 0.35 * (high - low)
+    @one_panel(3.5)
+    def draw(axes: Axes) -> None:
         _draw_band(axes, density, (low - margin, high + margin), (low, high))
-        axes.set_title(_resonance_title(resonance))
+        found = f"Contact resonance at {line.text(resonance.crf_hz)}" if resonance.found else "No resonance found"
+        axes.set_title(found)
         if resonance.found:
             _mark_resonance(axes, resonance, np.linspace(low, high, 600))
         axes.axvline(vibration.full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label="CRF at full load")
         axes.set_xlim(low - margin, high + margin)
-        legend_below(figure)
-        return figure
 
-    band, full_load = f"{low:.0f} to {high:.0f} Hz", f"{vibration.full_load_crf_hz:.0f} Hz"
+    ends = quantity("band_hz")
+    band, full_load = f"{ends.number(low)} to {ends.text(high)}", ends.text(vibration.full_load_crf_hz)
     return Exhibit(
         "spectrum",
         draw,
         f"Acceleration spectrum of a simulated record of {quantity('duration_s').text(density.duration_s)}, resolution "
-        f"{density.resolution_hz:.3g} Hz: {resonance_in_words}. Searched from {band}, where this contact can "
-        f"resonate; asperities that carry the whole load would give {full_load}.",
+        f"{quantity('resolution_hz').text(density.resolution_hz)}: {resonance_in_words}. Searched from {band}, where "
+        f"this contact can resonate; asperities that carry the whole load would give {full_load}.",
         f"Acceleration spectrum around the search band {band}: {resonance_in_words}.",
-    )
-
-
-def _resonance_title(resonance: Resonance) -> str:
-    return (
-        f"Contact resonance at {quantity('crf_hz').text(resonance.crf_hz)}" if resonance.found else "No resonance found"
     )
 
 
@@ -85,7 +68,7 @@ def _draw_band(axes: Axes, density: Spectrum, ends: tuple[float, float], band: t
     together = max(int(np.count_nonzero(near)) // 400, 1)
     axes.axvspan(*band, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="search band")
     frequency, level = (
-        mean_of_neighbours(values[near], together) for values in (density.frequency_hz, density.density)
+        neighbours(values[near], together).mean(axis=1) for values in (density.frequency_hz, density.density)
     )
     name = "spectrum" if together == 1 else f"spectrum, mean of {together} lines"
     axes.semilogy(frequency, level, color=GREY, linewidth=0.7, label=name)
@@ -95,16 +78,17 @@ def _draw_band(axes: Axes, density: Spectrum, ends: tuple[float, float], band: t
 def _mark_resonance(axes: Axes, resonance: Resonance, frequency: Field) -> None:
     if np.isfinite(resonance.damping_ratio):  # a highest point has no curve
         axes.semilogy(frequency, resonance.curve(frequency), color=VERMILION, label="fitted resonance")
-    reach = 2.0 * resonance.crf_std
-    interval = " ± 2 std" if np.isfinite(reach) else ""
-    if interval:
-        axes.axvspan(resonance.crf_hz - reach, resonance.crf_hz + reach, color=BLUE, alpha=0.35, linewidth=0)
-    axes.axvline(resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label=f"CRF{interval}")
+    crf, reach = resonance.crf_hz, 2.0 * resonance.crf_std
+    if np.isfinite(reach):
+        axes.axvspan(crf - reach, crf + reach, color=BLUE, alpha=0.35, linewidth=0)
+    label = "CRF ± 2 std" if np.isfinite(reach) else "CRF"
+    axes.axvline(crf, color=BLUE, linestyle="--", linewidth=1.0, label=label)
 
 
 # The paper's Figs 3 and 4 --------------------------------------------------------------------------------------------
 
 
+@ON_PAGE.drawing()
 def excitation_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     """White noise, its spectrum, the profile and its spectrum: the paper's Fig 3.
 
@@ -113,25 +97,25 @@ def excitation_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     profile = vibration.profile
     if profile is None:
         raise BadInput(f"there is no profile to draw: {vibration.resonance.reason}")
-    with ON_PAGE.drawing():
-        figure, (a, b, c, d) = _four_panels()
-        noise = Signal(white_noise(profile.values.size, model.seed), profile.rate_hz, "m")
-        _draw_record(a, noise, "noise_height_m", "(a) white noise, before any coefficient", GREY)
-        _draw_spectrum(b, noise, "(b) its spectrum", GREY)
-        b.axhline(2.0 / profile.rate_hz, color="black", linestyle="--", linewidth=1.0, label="2 / rate")
-        _draw_record(c, profile, "profile_height_m", f"(c) profile, {model.excitation.label}", BLUE)
-        _draw_spectrum(d, profile, "(d) its spectrum", BLUE)
-        if vibration.oscillator is not None and vibration.expected is not None:
-            f = vibration.expected.frequency_hz[1:]
-            gain = vibration.oscillator.sampled_gain(f, profile.rate_hz)
-            density = vibration.expected.density[1:] / gain
-            d.loglog(f, density, "--", color="black", linewidth=1.0, label="closed form")
-        d.set_ylim(1e-11 * float(np.max(power_spectrum(profile).density)), None)
-        for axes in (b, d):
-            axes.legend(loc="lower left")
+    figure, (a, b, c, d) = _four_panels()
+    noise = Signal(white_noise(profile.values.size, model.seed), profile.rate_hz, "m")
+    _draw_record(a, noise, "noise_height_m", "(a) white noise, before any coefficient", GREY)
+    _draw_spectrum(b, noise, "(b) its spectrum", GREY)
+    b.axhline(2.0 / profile.rate_hz, color="black", linestyle="--", linewidth=1.0, label="2 / rate")
+    _draw_record(c, profile, "profile_height_m", f"(c) profile, {model.excitation.label}", BLUE)
+    _draw_spectrum(d, profile, "(d) its spectrum", BLUE)
+    if vibration.oscillator is not None and vibration.expected is not None:
+        f = vibration.expected.frequency_hz[1:]
+        gain = vibration.oscillator.sampled_gain(f, profile.rate_hz)
+        density = vibration.expected.density[1:] / gain
+        d.loglog(f, density, "--", color="black", linewidth=1.0, label="closed form")
+    d.set_ylim(1e-11 * float(np.max(power_spectrum(profile).density)), None)
+    for axes in (b, d):
+        axes.legend(loc="lower left")
     return figure
 
 
+@ON_PAGE.drawing()
 def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     """Displacement, velocity, acceleration and the acceleration's spectrum: the paper's Fig 4.
 
@@ -141,25 +125,24 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     if profile is None or oscillator is None or density is None or vibration.expected is None:
         raise BadInput(f"there is no response to draw: {vibration.resonance.reason}")
     motion = mass_motion(oscillator, profile, method=model.response, substeps=model.substeps)
-    with ON_PAGE.drawing():
-        figure, (a, b, c, d) = _four_panels()
-        for axes, letter, key, colour in (
-            (a, "a", "displacement", BLUE), (b, "b", "velocity", GREEN), (c, "c", "acceleration", VERMILION),
-        ):  # fmt: skip
-            record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
-            _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
-        f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
-        near = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
-        f = density.frequency_hz[near]
-        d.plot(f, density.density[near], color=GREY, linewidth=0.7, label="raw periodogram")
-        d.plot(f, vibration.expected.density[near], color="black", linewidth=1.2, label="closed form")
-        if resonance.found:
-            label = f"{quantity('crf_hz').named(resonance.crf_hz)}, CRFA {quantity('crfa').number(resonance.crfa)}"
-            d.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
-        d.axvline(f0, color=BLUE, linestyle=":", linewidth=1.2, label=f"f0 {quantity('frequency_hz').text(f0)}")
-        name_axes(d, "frequency_hz", "acceleration_density", title="(d) spectrum of the acceleration")
-        d.set_ylim(0.0, None)
-        d.legend(loc="upper right" if resonance.found and resonance.crf_hz < f0 else "upper left")
+    figure, (a, b, c, d) = _four_panels()
+    for axes, letter, key, colour in (
+        (a, "a", "displacement", BLUE), (b, "b", "velocity", GREEN), (c, "c", "acceleration", VERMILION),
+    ):  # fmt: skip
+        record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
+        _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
+    f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
+    near = np.abs(density.frequency_hz / f0 - 1.0) < 0.1
+    f = density.frequency_hz[near]
+    d.plot(f, density.density[near], color=GREY, linewidth=0.7, label="raw periodogram")
+    d.plot(f, vibration.expected.density[near], color="black", linewidth=1.2, label="closed form")
+    if resonance.found:
+        label = f"{quantity('crf_hz').named(resonance.crf_hz)}, CRFA {quantity('crfa').number(resonance.crfa)}"
+        d.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
+    d.axvline(f0, color=BLUE, linestyle=":", linewidth=1.2, label=f"f0 {quantity('frequency_hz').text(f0)}")
+    name_axes(d, "frequency_hz", "acceleration_density", title="(d) spectrum of the acceleration")
+    d.set_ylim(0.0, None)
+    d.legend(loc="upper right" if resonance.found and resonance.crf_hz < f0 else "upper left")
     return figure
 
 
@@ -189,6 +172,7 @@ def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
 # Its Table 1 ---------------------------------------------------------------------------------------------------------
 
 
+@ON_PAGE.drawing()
 def table1_figure(rows: Sequence[Table1Row]) -> Figure:
     """CRFA over load, height and cut-off: the printed values, and the median and 5 to 95 % range of our records."""
     parts = (
@@ -196,43 +180,40 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
         (rows[4:8], "height_m", "profile_height_m", "height"),
         (rows[8:], "cutoff_hz", "cutoff_hz", "cut-off"),
     )
-    with ON_PAGE.drawing():
-        figure = Figure(figsize=(ON_PAGE.double, 3.9), layout="constrained")
-        panels = figure.subplots(1, 3)
-        for axes, (part, name, key, word) in zip(panels, parts, strict=True):
-            x = display(key, np.array([getattr(row, name) for row in part]))
-            median, low, high = (
-                np.array([getattr(row, f"crfa{end}") for row in part]) for end in ("", "_low", "_high")
-            )
-            axes.errorbar(
-                x, median, [median - low, high - median], fmt="o", color=BLUE, capsize=5,
-                label="ours: median, 5 to 95 % of single records",
-            )  # fmt: skip
-            axes.plot(x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="printed")
-            axes.set(xscale="log", yscale="log", title=f"median ~ {_power(word, x, median)}")
-            name_axes(axes, key)
-            _tick_at(axes, x)
-        panels[0].set_ylabel(quantity("crfa").label)
-        legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
+    figure = Figure(figsize=(ON_PAGE.double, 3.9), layout="constrained")
+    panels = figure.subplots(1, 3)
+    for axes, (part, name, key, word) in zip(panels, parts, strict=True):
+        x = display(key, np.array([getattr(row, name) for row in part]))
+        median, low, high = (np.array([getattr(row, f"crfa{end}") for row in part]) for end in ("", "_low", "_high"))
+        axes.errorbar(
+            x, median, [median - low, high - median], fmt="o", color=BLUE, capsize=5,
+            label="ours: median, 5 to 95 % of single records",
+        )  # fmt: skip
+        axes.plot(x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="printed")
+        axes.set(xscale="log", yscale="log", title=f"median ~ {_power(word, x, median)}")
+        name_axes(axes, key)
+        _tick_at(axes, x)
+    panels[0].set_ylabel(quantity("crfa").label)
+    legend_below(figure, 2, handles=panels[0].get_legend_handles_labels()[0])
     return figure
 
 
+@ON_PAGE.drawing()
 def load_trend_figure(model: VibrationModel) -> Figure:
     """CRFA over load at several sampling rates, in closed form: what of the paper's trend is sampling, what physics."""
     strokes = (("-o", VERMILION), ("--s", BLUE), ("-.^", GREEN), (":D", GREY))
-    with ON_PAGE.drawing():
-        figure = Figure(figsize=(5.6, 4.4), layout="constrained")
-        axes = figure.add_subplot()
-        for (stroke, colour), rate in zip(strokes, RATES, strict=True):
-            sampled = replace(model, rate_hz=rate)
-            crfa = np.array([expected_crfa(sampled, CUTOFF, HEIGHT, load) for load in LOADS])
-            label = f"{quantity('record_rate_hz').text(rate)}: {_power('load', np.array(LOADS), crfa)}"
-            axes.loglog(LOADS, crfa, stroke, color=colour, label=label)
-        continuous = [continuous_crfa(model, CUTOFF, HEIGHT, load) for load in LOADS]
-        axes.loglog(LOADS, continuous, color="black", linewidth=1.0, label="not sampled: load^0")
-        name_axes(axes, "load_n", "expected_crfa", title="CRFA falls with load: the sampling")
-        _tick_at(axes, np.array(LOADS))
-        legend_below(figure)
+    figure = Figure(figsize=(5.6, 4.4), layout="constrained")
+    axes = figure.add_subplot()
+    for (stroke, colour), rate in zip(strokes, RATES, strict=True):
+        sampled = replace(model, rate_hz=rate)
+        crfa = np.array([expected_crfa(sampled, CUTOFF, HEIGHT, load) for load in LOADS])
+        label = f"{quantity('record_rate_hz').text(rate)}: {_power('load', np.array(LOADS), crfa)}"
+        axes.loglog(LOADS, crfa, stroke, color=colour, label=label)
+    continuous = [continuous_crfa(model, CUTOFF, HEIGHT, load) for load in LOADS]
+    axes.loglog(LOADS, continuous, color="black", linewidth=1.0, label="not sampled: load^0")
+    name_axes(axes, "load_n", "expected_crfa", title="CRFA falls with load: the sampling")
+    _tick_at(axes, np.array(LOADS))
+    legend_below(figure)
     return figure
 
 

@@ -14,18 +14,8 @@ from asperity.arrays import Field
 from asperity.paper import PAPER_ANCHORS, RIG_SPLIT_UM, SPLIT_ANCHOR, Anchor, rig_deviation, rig_prediction
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit, in_print
-from asperity.report.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    SPLIT_COLOUR,
-    SPLIT_STRIP,
-    VERMILION,
-    Medium,
-    display,
-    legend_below,
-    name_axes,
-)
+from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes
+from asperity.report.style import BLUE, GREEN, GREY, SPLIT_COLOUR, VERMILION, Medium
 from asperity.study import StudyOverview, WearCurve
 from asperity.wear import Stages
 
@@ -156,16 +146,12 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
             sq, label = display("sq_m", curve.sq), f"ours, preset {other}"
             axes.plot(sq, curve.mean(f"crf_{other}_hz"), "--", color=GREEN, linewidth=1.0, label=label)
         rings = rig_prediction(curve, f"crf_{first}_hz")
-        ours = rings["crf_hz"].to_numpy()
-        axes.errorbar(
-            rings["sq_um"], ours, _reach(ours - rings["low"].to_numpy()), rings["sq_std_um"], fmt="o", color=BLUE,
-            markerfacecolor="white", markersize=4, capsize=2, elinewidth=0.9, label="ours at a ring's Sq",
-        )  # fmt: skip
+        sq, ours, low, std = (rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um"))
+        ring: Any = {"color": BLUE, "markerfacecolor": "white", "markersize": 4, "label": "ours at a ring's Sq"}
+        draw_intervals(axes, sq, ours, ours - low, "o", xerr=std, **ring)
         known = rings[rings["printed_hz"].notna()]
-        axes.errorbar(
-            known["sq_um"], known["printed_hz"], xerr=known["sq_std_um"], fmt="D", color="black", markersize=4.5,
-            capsize=2, elinewidth=0.9, label="rings, CRF printed", zorder=4,
-        )  # fmt: skip
+        ring = {"color": "black", "markersize": 4.5, "label": "rings, CRF printed", "zorder": 4}
+        draw_intervals(axes, known["sq_um"], known["printed_hz"], None, "D", xerr=known["sq_std_um"], **ring)
         _draw_full_load(axes, curve)
         name_axes(axes, "sq_m", ylabel=quantity("crf_hz").label)
         stay_near(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]]))
@@ -219,15 +205,9 @@ def _draw_anchors(axes: Axes, anchors: Sequence[Anchor], keys: Sequence[str], ma
     for number, anchor in enumerate(places.values()):
         assert anchor.sq is not None
         value, tolerance = (display(anchor.quantity, value) for value in (anchor.value, anchor.tolerance))
-        axes.errorbar(
-            display("sq_m", anchor.sq), value, tolerance, fmt=marker, color="black", markersize=5, capsize=2,
-            elinewidth=0.9, markerfacecolor="white", zorder=4, label="_" if number else label,
-        )  # fmt: skip
-
-
-def _reach(half_widths: Field) -> Field:
-    """Lengths of error bars; none where there is no interval."""
-    return np.where(np.isfinite(half_widths), half_widths, 0.0)
+        style: Any = {"color": "black", "markersize": 5, "markerfacecolor": "white", "zorder": 4}
+        style["label"] = "_" if number else label
+        draw_intervals(axes, display("sq_m", anchor.sq), value, tolerance, marker, **style)
 
 
 def stay_near(axes: Axes, values: Field) -> None:
@@ -259,9 +239,8 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
     stages = curve.stages[preset]
     low, high = display("sq_m", curve.sq[[0, -1]])
     names: dict[str, Any] = {stages.kind: 0.5 * (low + high)}
+    mark_split(axes, stages, "split, 90 %")
     if stages.found:
-        axes.axvspan(*stages.interval, color=SPLIT_STRIP, linewidth=0, zorder=0, label="split, 90 %")
-        axes.axvline(stages.split, color=SPLIT_COLOUR, linewidth=1.0, zorder=0)
         before, after = stage_names(stages)
         names = {before: 0.5 * (low + stages.split), after: 0.5 * (stages.split + high)}
     for name, middle in names.items() if named else ():

@@ -9,8 +9,9 @@ from matplotlib.lines import Line2D
 
 from asperity.quantities import quantity
 from asperity.report.base import in_print
-from asperity.report.drawing import BLUE, GREEN, GREY, ON_PAGE, STYLE, VERMILION, display, name_axes
+from asperity.report.drawing import display, name_axes
 from asperity.report.study.keys import NAMES
+from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, STYLE, VERMILION
 from asperity.study import CalibratedParameter, Calibration, Sensitivity, SensitivityOutcome
 
 DARK = 0.55  # share from which a cell's number is white
@@ -18,21 +19,21 @@ FARTHEST_MISS = 8.0  # tolerances: what is farther off stands at the edge, with 
 OUTCOMES = ("car", "clr", "crf_hz", "log10_crfa", "knee_m")
 
 
+@ON_PAGE.drawing()
 def sensitivity_figure(result: Sensitivity) -> Figure:
     """Factors over outcomes, dark where a factor moves an outcome most, with the size of its effect."""
     overall, outcomes = result.overall(), result.outcomes
     order = [str(name) for name in overall.index]
-    with ON_PAGE.drawing():
-        figure = Figure(figsize=(2.6 + 0.52 * len(outcomes), 1.55 + 0.34 * len(order)), layout="constrained")
-        axes, side = figure.subplots(1, 2, width_ratios=(0.52 * len(outcomes), 1.3), sharey=True)
-        _draw_effects(axes, result, order)
-        side.barh(range(len(order)), [display("share", overall[name]) for name in order], color=BLUE, height=0.7)
-        side.tick_params(left=False, labelleft=False)
-        side.set(xlabel=f"mean {quantity('share').label}")
-        morris = result.method == "morris"
-        what = "mean effect of crossing the range (Morris' μ*)" if morris else "total Sobol index"
-        title: Any = {"fontsize": STYLE["axes.titlesize"], "fontweight": "bold"}
-        figure.suptitle(f"What moves the curves: {what}", x=0.01, ha="left", **title)
+    figure = Figure(figsize=(2.6 + 0.52 * len(outcomes), 1.55 + 0.34 * len(order)), layout="constrained")
+    axes, side = figure.subplots(1, 2, width_ratios=(0.52 * len(outcomes), 1.3), sharey=True)
+    _draw_effects(axes, result, order)
+    side.barh(range(len(order)), [display("share", overall[name]) for name in order], color=BLUE, height=0.7)
+    side.tick_params(left=False, labelleft=False)
+    side.set(xlabel=f"mean {quantity('share').label}")
+    morris = result.method == "morris"
+    what = "mean effect of crossing the range (Morris' μ*)" if morris else "total Sobol index"
+    title: Any = {"fontsize": STYLE["axes.titlesize"], "fontweight": "bold"}
+    figure.suptitle(f"What moves the curves: {what}", x=0.01, ha="left", **title)
     return figure
 
 
@@ -72,14 +73,14 @@ def _head(axes: Axes, outcomes: tuple[SensitivityOutcome, ...]) -> None:
                 axes.axvline(first - 0.5, color="white", linewidth=3)
 
 
+@ON_PAGE.drawing()
 def calibration_figure(result: Calibration) -> Figure:
     """How far each anchor is missed before and after, each parameter in its range, the curves with the anchors."""
-    with ON_PAGE.drawing():
-        figure = Figure(figsize=(11.2, 4.3), layout="constrained")
-        left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.05, 1.1))
-        _draw_misses(left, result)
-        _draw_ranges(middle, result)
-        _draw_curves(right, result)
+    figure = Figure(figsize=(11.2, 4.3), layout="constrained")
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.05, 1.1))
+    _draw_misses(left, result)
+    _draw_ranges(middle, result)
+    _draw_curves(right, result)
     return figure
 
 

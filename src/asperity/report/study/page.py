@@ -12,11 +12,11 @@ import numpy as np
 from asperity.files import make_folder, require_writable, whole_file
 from asperity.paper import Anchor
 from asperity.quantities import quantity
-from asperity.report.base import Exhibit, Picture, Tile, heading, in_print, render, write_exhibits, write_page
-from asperity.report.study import maps, tables
+from asperity.report.base import Exhibit, Picture, Tile, heading, render, write_exhibits, write_page
+from asperity.report.study import contacts, tables
 from asperity.report.study.curve import curve_exhibits, first_to_last
 from asperity.report.study.sweep import sweep_exhibits
-from asperity.study import SEED_KEYS, FailureReason, StudyOverview, StudyResult
+from asperity.study import SEED_KEYS, StudyOverview, StudyResult
 
 TILES = ("clr", "car", "car_domain", "crf_sound_hz")
 
@@ -90,13 +90,12 @@ def study_exhibits(study: StudyOverview) -> list[Exhibit]:
         return list(sweep_exhibits(study))
     exhibits = list(curve_exhibits(study, study.curve))
     if study.runs and not isinstance(study.runs, str):
-        exhibits += [maps.contact_maps(study.runs), maps.surfaces(study.runs)]
+        exhibits += [contacts.contact_maps(study.runs), contacts.surfaces(study.runs)]
     return exhibits
 
 
 def render_study_page(study: StudyOverview, exhibits: Sequence[Exhibit], progress: Progress) -> str:
     """The page as HTML text."""
-    result = study.result
 
     def picture(exhibit: Exhibit) -> Picture:
         progress(f"drawing {exhibit.name}")
@@ -105,21 +104,16 @@ def render_study_page(study: StudyOverview, exhibits: Sequence[Exhibit], progres
     return render(
         "study/page.html.j2",
         title=_title(study),
-        verdict=in_print(study.verdict()),
-        failed=result.failed,
-        total=len(result.table),
+        study=study,
+        failed=study.result.failed,
+        total=len(study.result.table),
         tiles=_tiles(study),
-        notes=[in_print(note) for note in study.notes],
-        reasons=[FailureReason(in_print(why.text), why.number, in_print(why.cases)) for why in study.reasons],
         pictures=[picture(exhibit) for exhibit in exhibits],
-        wear=study.curve is not None,
         anchors=tables.anchor_rows(study),
-        printed=study.papers,
         levels=tables.level_rows(study),
         points=tables.point_rows(study),
         many=tables.has_many_points(study),
         facts=tables.facts(study),
-        case_text=result.plan.case.text,
     )
 
 

@@ -15,9 +15,10 @@ from matplotlib.ticker import LogLocator
 from asperity.arrays import Field
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import ACROSS, BLUE, GREY, Medium, display, legend_below, panels_in_rows
+from asperity.report.drawing import ACROSS, display, draw_intervals, legend_below, panels_in_rows
 from asperity.report.study.curve import stay_near
 from asperity.report.study.keys import axis_label, place_in_words
+from asperity.report.style import BLUE, GREY, Medium
 from asperity.study import GROUPS, MEAN_CONFIDENCE, StudyOverview, SweptAxis, group_means, pair_means
 
 MOST_DRAWN = 1500  # dots as drawings; more are a picture
@@ -72,11 +73,8 @@ def _draw_against(axes: Axes, axis: SweptAxis, values: Field) -> None:
     dots: Any = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
     axes.plot(axis.values[known], values[known], ".", rasterized=values.size > MOST_DRAWN, **dots)
     x, mean, low, high = group_means(axis.values[known], values[known], binned=axis.binned)
-    reach = np.array([mean - low, high - mean])
-    axes.errorbar(
-        x, mean, np.where(np.isfinite(reach), reach, 0.0), fmt="o", linestyle="none" if axis.names else "-", color=BLUE,
-        capsize=2, markersize=3.5, elinewidth=0.9,
-    )  # fmt: skip
+    style: Any = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
+    draw_intervals(axes, x, mean, [mean - low, high - mean], "o", **style)
     stay_near(axes, values[known])
     _scale(axes, axis)
 

@@ -12,22 +12,8 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import (
-    BAND_COLOUR,
-    BLUE,
-    DASHED,
-    GREY,
-    SPLIT_COLOUR,
-    SPLIT_STRIP,
-    VERMILION,
-    Medium,
-    display,
-    largest_of_neighbours,
-    legend_below,
-    mean_of_neighbours,
-    name_axes,
-)
-from asperity.signals import Spectrum
+from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes, neighbours, one_panel
+from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREY, VERMILION, Medium
 from asperity.tracking import ALERT, DANGER, Track, TrackedRecording
 from asperity.wear import INTERVAL
 
@@ -82,14 +68,12 @@ def trend(track: Track) -> Exhibit:
 
 
 def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> None:
-    _mark_break(axes, track)
-    reach = INTERVAL * np.array([recording.resonance.crf_std for recording in resonant])
-    sideways = INTERVAL * np.array([recording.x_std for recording in resonant])
-    x, crf = (np.array(values) for values in zip(*((one.x, one.resonance.crf_hz) for one in resonant), strict=True))
-    axes.errorbar(
-        x, crf, yerr=np.where(np.isfinite(reach), reach, 0.0), xerr=sideways if sideways.any() else None, fmt="none",
-        ecolor=GREY, elinewidth=0.9, capsize=2, zorder=1, label="90 % interval",
-    )  # fmt: skip
+    mark_split(axes, track.stages, "break, 90 %")
+    x, x_std = np.array([(recording.x, recording.x_std) for recording in resonant]).T
+    crf, crf_std = np.array([(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]).T
+    sideways: Any = {"xerr": INTERVAL * x_std} if x_std.any() else {}
+    style: Any = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
+    draw_intervals(axes, x, crf, INTERVAL * crf_std, "none", **sideways, **style)
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label=label)
@@ -106,7 +90,7 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
 
 
 def _draw_severity(axes: Axes, track: Track) -> None:
-    _mark_break(axes, track, labelled=False)
+    mark_split(axes, track.stages)
     severe = np.array([(recording.x, recording.severe_probability) for recording in track.recordings])
     axes.plot(*severe[np.isfinite(severe[:, 1])].T, "o", color=VERMILION, markersize=4)
     for threshold, name in ((ALERT, "alert"), (DANGER, "alarm")):
@@ -117,19 +101,11 @@ def _draw_severity(axes: Axes, track: Track) -> None:
     axes.set(ylim=(-0.05, 1.12), xlabel=x_label(track), ylabel="severe", yticks=(0.0, 0.5, 1.0))
 
 
-def _mark_break(axes: Axes, track: Track, *, labelled: bool = True) -> None:
-    stages = track.stages
-    if stages is None or not stages.found:
-        return
-    axes.axvspan(*stages.interval, color=SPLIT_STRIP, linewidth=0, zorder=0, label="break, 90 %" if labelled else None)
-    axes.axvline(stages.split, color=SPLIT_COLOUR, linewidth=1.0, zorder=0)
-
-
 def amplitude(track: Track) -> Exhibit:
     """CRFA over x, logarithmic, with 90 % intervals."""
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
         resonant = [one for one in track.recordings if one.resonance.found and one.resonance.crfa > 0.0]
         crfa = np.array([recording.resonance.crfa for recording in resonant])
         std = np.array([recording.resonance.crfa_std for recording in resonant])
@@ -138,8 +114,6 @@ def amplitude(track: Track) -> Exhibit:
         x = [recording.x for recording in resonant]
         _draw_intervals(axes, track, x, crfa, ends, "s", BLUE, f"{quantity('crfa').short} with 90 % interval")
         axes.set(yscale="log", ylabel=crfa_label(track), title="Contact resonance amplitude")
-        legend_below(figure)
-        return figure
 
     return Exhibit(
         "amplitude",
@@ -152,8 +126,8 @@ def amplitude(track: Track) -> Exhibit:
 def asperity_load_share(track: Track) -> Exhibit:
     """CLR read off the CRF, with 90 % intervals, over x."""
 
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.1)
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
         read = [recording for recording in track.recordings if np.isfinite(recording.clr)]
         clr = display("clr", np.array([recording.clr for recording in read]))
         low, high = display("clr", np.array([recording.clr_interval for recording in read]).reshape(-1, 2)).T
@@ -162,8 +136,6 @@ def asperity_load_share(track: Track) -> Exhibit:
         axes.axhline(display("clr", 1.0), color="black", linestyle=":", linewidth=1.0)
         axes.set(ylabel=quantity("clr").label, title="Load share, read off the CRF")
         axes.set_ylim(bottom=0.0)
-        legend_below(figure)
-        return figure
 
     return Exhibit(
         "load-share",
@@ -176,11 +148,8 @@ def asperity_load_share(track: Track) -> Exhibit:
 def _draw_intervals(
     axes: Axes, track: Track, x: list[float], values: Field, reach: list[Field], marker: str, colour: str, label: str
 ) -> None:
-    _mark_break(axes, track)
-    axes.errorbar(
-        x, values, yerr=reach, fmt=marker, color=colour, ecolor=GREY, elinewidth=0.9, capsize=2, markersize=4,
-        label=label,
-    )  # fmt: skip
+    mark_split(axes, track.stages, "break, 90 %")
+    draw_intervals(axes, x, values, reach, marker, color=colour, ecolor=GREY, markersize=4, label=label)
     axes.set_xlabel(x_label(track))
 
 
@@ -197,9 +166,8 @@ def waterfall(track: Track) -> Exhibit:
         raise BadInput("there is no waterfall to draw: no recording could be used")
     rows = usable[:: -(-len(usable) // MOST_ROWS)]
 
-    def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.single, 4.4), layout="constrained")
-        axes = figure.add_subplot()
+    @one_panel(4.4, key=0)
+    def draw(axes: Axes) -> None:
         frequency, levels = _levels(track, rows)
         reach = float(np.quantile(np.abs(levels), 0.995)) or 1.0
         image = axes.imshow(
@@ -218,8 +186,8 @@ def waterfall(track: Track) -> Exhibit:
         places = sorted({0, len(rows) // 4, len(rows) // 2, 3 * len(rows) // 4, len(rows) - 1})
         axes.set_yticks([place + 1 for place in places], [f"{rows[place].x:.3g}" for place in places])
         axes.spines[:].set_visible(False)
-        figure.colorbar(image, ax=axes, label="level over the recording's median [dB]", location="bottom", shrink=0.8)
-        return figure
+        style: Any = {"location": "bottom", "shrink": 0.8}
+        axes.figure.colorbar(image, ax=axes, label=quantity("level_db").axis, **style)
 
     return Exhibit(
         "waterfall",
@@ -234,10 +202,12 @@ def _levels(track: Track, rows: list[TrackedRecording]) -> tuple[Field, Field]:
     """Frequencies around the band, and the level of each row over its median [dB]."""
     frequency, inside = _around(track)
     together = max(1, int(np.count_nonzero(inside)) // 480)
-    density = np.array([mean_of_neighbours(_clean(row).density[inside], together) for row in rows])
+    density = np.array(
+        [neighbours(row.clean.spectrum.density[inside], together).mean(axis=1) for row in rows if row.clean is not None]
+    )
     levels = 10.0 * np.log10(np.maximum(density, 1e-300))
     levels -= np.median(levels, axis=1, keepdims=True)
-    return mean_of_neighbours(frequency[inside], together), levels
+    return neighbours(frequency[inside], together).mean(axis=1), levels
 
 
 def typical_recording(track: Track) -> TrackedRecording:
@@ -261,14 +231,13 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
         raise BadInput(f"{recording.file} has no spectrum to draw: {resonance.reason}")
     clean = recording.clean
 
-    def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.single, 4.4), layout="constrained")
-        axes = figure.add_subplot()
+    @one_panel(4.4)
+    def draw(axes: Axes) -> None:
         frequency, inside = _around(track)
         together = max(1, int(np.count_nonzero(inside)) // 700)
-        f = mean_of_neighbours(frequency[inside], together)
-        recorded = largest_of_neighbours(spectrum.density[inside], together)
-        cleaned = mean_of_neighbours(clean.spectrum.density[inside], together)
+        f = neighbours(frequency[inside], together).mean(axis=1)
+        recorded = neighbours(spectrum.density[inside], together).max(axis=1)
+        cleaned = neighbours(clean.spectrum.density[inside], together).mean(axis=1)
         axes.axvspan(*track.target.band_hz, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="band searched")
         axes.semilogy(f, recorded, color="#e3b9a0", linewidth=0.6, label="as recorded (peaks)")
         axes.semilogy(f, cleaned, color=GREY, linewidth=0.8, label="lines taken out (mean)")
@@ -281,8 +250,6 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
         unit = quantity("acceleration_density").display if track.comparable else spectrum.unit
         name_axes(axes, "frequency_hz", ylabel=f"density [{unit}]")
         axes.set_xlim(f[0], f[-1])
-        legend_below(figure)
-        return figure
 
     return Exhibit(
         "spectrum",
@@ -301,11 +268,6 @@ def _draw_fit(axes: Axes, track: Track, recording: TrackedRecording, frequency: 
     if resonance.found:
         axes.axvline(resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label=crf.short)
     axes.set_title(f"One spectrum: {crf.named(resonance.crf_hz) if resonance.found else 'no resonance found'}")
-
-
-def _clean(recording: TrackedRecording) -> Spectrum:
-    assert recording.clean is not None  # of a recording that could be used
-    return recording.clean.spectrum
 
 
 def _around(track: Track) -> tuple[Field, Any]:

@@ -37,33 +37,21 @@ def write_track_report(track: Track, path: str | Path) -> Path:
 
 def render_track_page(track: Track) -> str:
     """The page as HTML text."""
-    total = len(track.recordings)
-    low, high = track.target.band_hz
     return render(
         "track/page.html.j2",
         title=_title(track),
-        total=f"{total} {'recording' if total == 1 else 'recordings'}",
-        level=track.alarm.level,
-        verdict=in_print(track.verdict()),
-        alarm=in_print(track.alarm.verdict),
+        track=track,
         tiles=_tiles(track),
         trend=_pictures([exhibits.trend(track)] if track.resonance_count else []),
         more=_pictures(_details(track)),
         heads=_heads(track),
         rows=[_row(recording, _with_clr(track)) for recording in track.recordings],
         with_clr=_with_clr(track),
-        problems=[in_print(sentence) for sentence in track.problems],
-        notes=[in_print(sentence) for sentence in track.notes],
         remarks=_remarks(track),
         facts=_facts(track),
         lines=_lines(track),
         evidence=_evidence(track),
-        method=track.method,
         method_in_words=METHODS[track.method],
-        band=in_print(track.target.source),
-        band_short=f"{low:.0f} to {high:.0f} Hz",
-        joint=track.method == "joint",
-        comparable=track.comparable,
         resolution=_resolution(track),
         alert=ALERT,
         danger=DANGER,
@@ -196,9 +184,8 @@ def _lines(track: Track) -> list[str]:
     clean = exhibits.typical_recording(track).clean
     assert clean is not None
     strongest = sorted(clean.removed, key=lambda line: -line.mean_square)[:MOST_LINES]
-    return [
-        f"{line.frequency_hz:.2f} Hz: {line.source}" for line in sorted(strongest, key=lambda line: line.frequency_hz)
-    ]
+    strongest.sort(key=lambda line: line.frequency_hz)
+    return [f"{quantity('line_hz').text(line.frequency_hz)}: {line.source}" for line in strongest]
 
 
 def _evidence(track: Track) -> list[tuple[str, str]]:
@@ -212,7 +199,8 @@ def _resolution(track: Track) -> str:
     spectrum = next((recording.reading.spectrum for recording in track.recordings if recording.clean is not None), None)
     if spectrum is None:
         return "no spectrum"
+    spacing, resolution = (quantity(key).text(getattr(spectrum, key)) for key in ("spacing_hz", "resolution_hz"))
     return (
-        f"{spectrum.window} window, {spectrum.segment} samples a piece, lines {spectrum.spacing_hz:.3g} Hz apart "
-        f"(noise bandwidth {spectrum.resolution_hz:.3g} Hz)"
+        f"{spectrum.window} window, {spectrum.segment} samples a piece, lines {spacing} apart "
+        f"(noise bandwidth {resolution})"
     )

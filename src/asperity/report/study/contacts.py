@@ -9,17 +9,9 @@ from matplotlib.figure import Figure
 
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import (
-    ACROSS,
-    Medium,
-    contact_colours,
-    contact_keys,
-    display,
-    legend_below,
-    mark_hertz_zone,
-    panels_in_rows,
-    show_map,
-)
+from asperity.report.drawing import ACROSS, display, legend_below, panels_in_rows
+from asperity.report.maps import contact_colours, contact_keys, mark_hertz_zone, show_map
+from asperity.report.style import Medium
 from asperity.results import Run
 
 SHARES = ("clr", "car", "car_domain")

@@ -1,0 +1,103 @@
+"""Maps of a contact: a quantity in colours, what touches, the Hertz zone.
+
+All maps of a contact lie in the same place of their figures.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from asperity.arrays import Field
+from asperity.ehl import ContactSolution
+from asperity.quantities import quantity
+from asperity.report.drawing import display, name_axes
+from asperity.report.style import CAVITY_COLOUR, CAVITY_STRIPE, CONTACT_COLOUR, DASHED, GAP_COLOUR, OIL_COLOUR, Medium
+
+
+def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axes]:
+    """A figure with a map of that extent, all maps of a contact in the same place, and room for a key below."""
+    width, below, above = medium.single - 0.85, 1.0, 0.32
+    height = width * min(max(extent[1] / extent[0], 0.15), 1.4)
+    total = below + height + above
+    figure = Figure(figsize=(medium.single, total))
+    return figure, figure.add_axes((0.64 / medium.single, below / total, width / medium.single, height / total))
+
+
+def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any) -> AxesImage:
+    """Draw values of shape (nx, ny) or colours of shape (nx, ny, 3) over the contact, oil coming from the left."""
+    (x0, y0), (x1, y1) = solution.grid.lower, solution.grid.upper
+    corners = (*display("x_m", np.array([x0, x1])), *display("y_m", np.array([y0, y1])))
+    image = axes.imshow(
+        np.swapaxes(values, 0, 1), origin="lower", extent=corners, interpolation="none", aspect="equal", **style
+    )
+    name_axes(axes, "x_m", "y_m")
+    axes.spines[:].set_visible(False)
+    return image
+
+
+def drawn_map(
+    solution: ContactSolution, key: str, values: Field, title: str, *, extend: str = "neither",
+    ticks: Sequence[float] | None = None, **style: Any,
+) -> Callable[[Medium], Figure]:  # fmt: skip
+    """The map of a quantity, stored values of shape (nx, ny), with the Hertz zone and a key to the colours."""
+
+    def draw(medium: Medium) -> Figure:
+        figure, axes = map_figure(medium, solution.grid.extent)
+        image = show_map(axes, display(key, values), solution, **style)
+        mark_hertz_zone(axes, solution, "white")
+        axes.set_title(title)
+        colour_bar(figure, axes, image, key, extend=extend, ticks=ticks)
+        return figure
+
+    return draw
+
+
+def colour_bar(figure: Figure, axes: Axes, image: ScalarMappable, key: str, **settings: Any) -> None:
+    """The key to the colours of a map of that quantity, below it."""
+    box, total = axes.get_position(), figure.get_size_inches()[1]
+    place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
+    figure.colorbar(image, cax=place, orientation="horizontal", label=quantity(key).axis, **settings)
+
+
+def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
+    """The outline of the smooth, dry contact, dashed."""
+    a, b = (display("x_m", half_width) for half_width in solution.conditions.hertz.half_widths)
+    style: dict[str, Any] = {"color": colour, "linestyle": DASHED, "linewidth": 1.0}
+    if solution.conditions.geometry == "line":
+        for side in (-a, a):
+            axes.axvline(side, **style)
+    else:
+        turn = np.linspace(0.0, 2.0 * np.pi, 200)
+        axes.plot(a * np.cos(turn), b * np.sin(turn), **style)
+
+
+def contact_colours(solution: ContactSolution) -> Field:
+    """Red, green and blue of every cell, shape (nx, ny, 3): asperity contact, oil, ruptured oil; an open gap if dry."""
+    colours = np.empty((*solution.grid.cells, 3))
+    colours[:] = to_rgb(GAP_COLOUR if solution.lubricant is None else OIL_COLOUR)
+    colours[solution.cavitated] = to_rgb(CAVITY_COLOUR)
+    period = max(solution.grid.cells[0] // 20, 5)  # of diagonal lines, one part in five wide, about twenty across
+    i, j = np.indices(solution.grid.cells, sparse=True)
+    colours[solution.cavitated & ((i + j) % period < max(period // 5, 1))] = to_rgb(CAVITY_STRIPE)
+    colours[solution.in_contact] = to_rgb(CONTACT_COLOUR)
+    return colours
+
+
+def contact_keys(contact: str, rest: str, cavitated: str = "") -> list[Patch | Line2D]:
+    """The key to `contact_colours`; without a name for ruptured oil the rest is an open gap."""
+    keys: list[Patch | Line2D] = [Patch(color=CONTACT_COLOUR, label=contact)]
+    if cavitated:
+        keys.append(Patch(color=OIL_COLOUR, label=rest))
+        keys.append(Patch(facecolor=CAVITY_COLOUR, edgecolor=CAVITY_STRIPE, hatch="////", label=cavitated))
+    else:
+        keys.append(Patch(color=GAP_COLOUR, label=rest))
+    keys.append(Line2D([], [], color="black", linestyle=DASHED, linewidth=1.0, label="Hertz zone"))
+    return keys
