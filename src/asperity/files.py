@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -64,6 +64,13 @@ def make_folder(path: Path) -> None:
 def versions() -> dict[str, str]:
     """Versions of what decides numbers, to stand beside them."""
     return {**{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")}, "python": python_version()}
+
+
+def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
+    """Refuse to go on in a folder that another asperity began: its numbers would stand beside ours."""
+    theirs, ours = manifest.get("versions", {}).get("asperity"), version("asperity")
+    if theirs != ours:
+        raise BadInput(f"{folder} was computed by asperity {theirs}, this is {ours}; choose another folder")
 
 
 def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:

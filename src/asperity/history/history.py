@@ -60,8 +60,8 @@ class History:
     table: pandas.DataFrame
     frames: tuple[Frame, ...]
     folder: Path | None
-    seconds: float
-    computed: int
+    seconds: float = 0.0
+    computed: int = 0
     memory: Memory | None = field(default=None, repr=False)
 
     @property
@@ -154,11 +154,8 @@ class History:
         if self.case.motion.flattening:
             passes = self.by_pass()[list(OVER_PASSES)].astype(object)
             scalars["passes"] = passes.where(passes.notna(), None).to_dict("records")
-        resonance = None if self.vibration is None else self.vibration.resonance
-        contact = resonance if resonance is not None and resonance.found else None
-        scalars["crf_hz"] = None if contact is None else finite_or_none(contact.crf_hz)
-        scalars["crfa"] = None if contact is None else finite_or_none(contact.crfa)
-        return scalars
+        resonance = self.vibration.resonance if self.vibration is not None and self.vibration.resonance.found else None
+        return scalars | {key: finite_or_none(getattr(resonance, key, None)) for key in ("crf_hz", "crfa")}
 
     def verdict(self) -> str:
         """One sentence: what moving did to the contact."""

@@ -56,9 +56,8 @@ def run_history(
     NotConverged
         if `strict`; its `solution` is the history, the bad step the last of it.
     """
-    surfaces = _surfaces_of(case)
+    surfaces, model = _moving_parts(case)
     last = _last_step(case, surfaces, steps, passes)
-    model = _model_of(case)
     began = time.perf_counter()
     # sums over several threads depend on their number, and vectors this short are slower for it
     with open_keeper(case, surfaces, last, out, every) as keeper, threadpool_limits(1):
@@ -84,27 +83,20 @@ def run_history(
                     break
         history = keeper.history(time.perf_counter() - began, len(keeper.rows) - before)
     if strict and history.failed:
-        number = history.failed[0]
-        raise NotConverged(
-            history,
-            f"step {number} of {last} did not converge; what came before it is good, strict=False marks it and goes on",
-        )
+        where = f"step {history.failed[0]} of {last} did not converge"
+        raise NotConverged(history, f"{where}; what came before it is good, strict=False marks it and goes on")
     return history
 
 
-def _surfaces_of(case: Case) -> MovingSurfaces:
+def _moving_parts(case: Case) -> tuple[MovingSurfaces, Steps]:
     if case.lubricant is None:
         raise BadInput(f"{case.source}: a dry contact has no history; give it a [lubricant]")
     if case.thermal.feedback:
         raise BadInput(f"{case.source}: motion knows no warm film; set thermal.feedback=false")
-    return case.moving_surfaces()
-
-
-def _model_of(case: Case) -> Steps:
     name: str = case.contents.model
     if name not in MODELS:
         raise BadInput(f"{case.source}: model {name} has no steps in time; {' or '.join(MODELS)} has")
-    return MODELS[name]
+    return case.moving_surfaces(), MODELS[name]
 
 
 def _last_step(case: Case, surfaces: MovingSurfaces, steps: int | None, passes: float | None) -> int:

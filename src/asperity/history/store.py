@@ -11,7 +11,6 @@ import time
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,16 @@ from asperity.arrays import Field
 from asperity.case import Case, load_case, relative_path
 from asperity.ehl import Memory, Snapshot, save_dataset
 from asperity.errors import BadInput, UnreadableFile
-from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
+from asperity.files import (
+    MANIFEST,
+    make_folder,
+    read_manifest,
+    require_same_version,
+    require_writable,
+    versions,
+    whole_file,
+    write_text,
+)
 from asperity.history.history import Frame, History
 from asperity.history.rows import Row
 from asperity.quantities import quantity
@@ -53,15 +61,8 @@ def load_history(folder: str | Path) -> History:
     rows = _rows(folder)
     if not rows:
         raise UnreadableFile(f"{folder} holds a history without a step; run its case again")
-    return History(
-        case=case,
-        table=_table(rows),
-        frames=_frames(folder, int(rows[-1]["step"])),
-        folder=folder,
-        seconds=0.0,
-        computed=0,
-        memory=_memory(folder),
-    )
+    frames = _frames(folder, int(rows[-1]["step"]))
+    return History(case=case, table=pandas.DataFrame(rows), frames=frames, folder=folder, memory=_memory(folder))
 
 
 def is_history(folder: Path) -> bool:
@@ -70,11 +71,6 @@ def is_history(folder: Path) -> bool:
         return (folder / TABLE).exists() and json.loads((folder / MANIFEST).read_text("utf-8"))["of"] == "history"
     except (OSError, ValueError, KeyError, TypeError):
         return False
-
-
-def _table(rows: list[Row]) -> pandas.DataFrame:
-
-    return pandas.DataFrame(rows)
 
 
 class Keeper:
@@ -86,12 +82,11 @@ class Keeper:
         self.frames: list[Frame] = []
         self.memory: Memory | None = None
         self.kept_at = time.monotonic()
-        if folder is not None:
-            self.memory = _memory(folder)
-            if self.memory is not None:
-                self.rows = [row for row in _rows(folder) if row["step"] <= int(self.memory["number"])]
-                if not self.rows or self.rows[-1]["step"] != int(self.memory["number"]):
-                    raise UnreadableFile(f"{folder / TABLE} ends before {folder / MEMORY}; start another folder")
+        if folder is not None and (memory := _memory(folder)) is not None:
+            self.memory = memory
+            self.rows = [row for row in _rows(folder) if row["step"] <= int(memory["number"])]
+            if self.last != int(memory["number"]):
+                raise UnreadableFile(f"{folder / TABLE} ends before {folder / MEMORY}; start another folder")
 
     @property
     def last(self) -> int:
@@ -103,14 +98,34 @@ class Keeper:
         self.rows.append(row)
         if not bad:
             self.memory = snapshot.memory
-        if snapshot.number % self.every == 0 and not bad:
-            frame = _frame(snapshot)
-            if self.folder is None:
-                self.frames.append(frame)
-            else:
-                _write_frame(frame, snapshot, self.folder)
+            if snapshot.number % self.every == 0:
+                self._keep_frame(snapshot)
         if self.folder is not None and time.monotonic() - self.kept_at > KEPT_EVERY_S:
             self.write(self.folder)
+
+    def _keep_frame(self, snapshot: Snapshot) -> None:
+        solution, grid = snapshot.solution, snapshot.solution.grid
+        gap, pressure = solution.gap.astype(np.float32), solution.pressure.astype(np.float32)
+        if self.folder is None:
+            self.frames.append(Frame(snapshot.number, snapshot.time, gap, pressure, solution.in_contact))
+            return
+        touching, heights = solution.in_contact.astype(np.int8), solution.surface.heights.astype(np.float32)
+        maps = {"gap": gap, "pressure": pressure, "in_contact": touching, "surface_height": heights}
+        about = {"title": "Step of a moving contact", "step": snapshot.number, "time_s": snapshot.time}
+        dataset = xarray.Dataset(
+            {name: (("x", "y"), values, quantity(name).attributes) for name, values in maps.items()},
+            {
+                "x": ("x", grid.x, {"long_name": "position along rolling", "units": "m", "axis": "X"}),
+                "y": (
+                    "y",
+                    solution.grid.y,
+                    {"long_name": "position along the contact line", "units": "m", "axis": "Y"},
+                ),
+            },
+            {"Conventions": "CF-1.11", **about},
+        )
+        dataset["in_contact"].attrs |= {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "apart touching"}
+        save_dataset(dataset, self.folder / MAPS / f"step-{snapshot.number:06d}.nc")
 
     def write(self, folder: Path) -> None:
         """Rows first, then what the next step needs: a crash between them leaves rows too many, which are dropped."""
@@ -119,22 +134,19 @@ class Keeper:
         table = pyarrow.Table.from_pylist(self.rows).replace_schema_metadata({"case": self.case.text})
         with whole_file(folder / TABLE) as part:
             pyarrow.parquet.write_table(table, part)
+        arrays: dict[str, Any] = dict(self.memory)
         with whole_file(folder / MEMORY) as part, part.open("wb") as file:
-            arrays: dict[str, Any] = dict(self.memory)
             np.savez(file, **arrays)
         self.kept_at = time.monotonic()
 
     def history(self, seconds: float, computed: int) -> History:
         """All of it, written."""
-        frames = tuple(self.frames)
-        if self.folder is not None:
-            if computed:
-                self.write(self.folder)
-            frames = _frames(self.folder, self.last)
+        if self.folder is not None and computed:
+            self.write(self.folder)
         return History(
             case=self.case,
-            table=_table(self.rows),
-            frames=frames,
+            table=pandas.DataFrame(self.rows),
+            frames=tuple(self.frames) if self.folder is None else _frames(self.folder, self.last),
             folder=self.folder,
             seconds=seconds,
             computed=computed,
@@ -148,10 +160,7 @@ def open_keeper(
 ) -> Iterator[Keeper]:
     """A history's folder, made or found and held against others, or no folder.
 
-    Raises
-    ------
-    BadInput
-        for a folder that cannot be written to, that holds something else, or that another process is working in.
+    `BadInput` for a folder that cannot be written to, that holds something else, or that another process is working in.
     """
     if every is not None and every < 1:
         raise BadInput(f"maps are kept every 1 step or more, got {every}; leave it out for about {MAPS_KEPT} in all")
@@ -159,17 +168,12 @@ def open_keeper(
     if folder is None:
         yield Keeper(case, None, every or usual)
         return
-
     if folder.exists():
         make_folder(folder)  # a file is refused
     digest, manifest = _digest(case, surfaces), folder / MANIFEST
     if manifest.exists():
         kept = read_manifest(folder, of="history", layout=FORMAT)
-        if kept["versions"]["asperity"] != version("asperity"):
-            raise BadInput(
-                f"{folder} was computed by asperity {kept['versions']['asperity']}, this is {version('asperity')}; "
-                "choose another folder"
-            )
+        require_same_version(kept, folder)
         if kept["digest"] != digest:
             raise BadInput(
                 f"{folder} holds the history of another case than {case.source}; choose another folder, or the case "
@@ -184,8 +188,7 @@ def open_keeper(
         with filelock.FileLock(folder / ".lock", timeout=0):
             for left in (*folder.glob(".*.part"), *(folder / MAPS).glob(".*.part")):
                 left.unlink(missing_ok=True)
-            with whole_file(manifest) as part:
-                part.write_text(json.dumps(_manifest(case, digest, every or usual, folder), indent=1), "utf-8")
+            write_text(manifest, json.dumps(_manifest(case, digest, every or usual, folder), indent=1))
             yield Keeper(case, folder, every or usual)
     except filelock.Timeout:
         raise BadInput(f"another process computes this history in {folder}; wait for it, or stop it") from None
@@ -216,7 +219,6 @@ def _manifest(case: Case, digest: str, every: int, folder: Path) -> dict[str, An
 
 
 def _rows(folder: Path) -> list[Row]:
-
     path = folder / TABLE
     if not path.exists():
         return []
@@ -236,36 +238,6 @@ def _memory(folder: Path) -> Mapping[str, Field] | None:
             return {name: kept[name] for name in kept.files}
     except (OSError, ValueError, KeyError, EOFError) as error:
         raise UnreadableFile(f"{path} is damaged ({error}); run the case into another folder") from None
-
-
-def _frame(snapshot: Snapshot) -> Frame:
-    solution = snapshot.solution
-    gap, pressure = solution.gap.astype(np.float32), solution.pressure.astype(np.float32)
-    return Frame(snapshot.number, snapshot.time, gap, pressure, solution.in_contact)
-
-
-def _write_frame(frame: Frame, snapshot: Snapshot, folder: Path) -> None:
-
-    grid, on = snapshot.solution.grid, ("x", "y")
-    about: dict[str, dict[str, Any]] = {
-        key: dict(quantity(key).attributes) for key in ("gap", "pressure", "in_contact", "surface_height")
-    }
-    about["in_contact"] |= {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "apart touching"}
-    maps = {
-        "gap": frame.gap,
-        "pressure": frame.pressure,
-        "in_contact": frame.in_contact.astype(np.int8),
-        "surface_height": snapshot.solution.surface.heights.astype(np.float32),
-    }
-    dataset = xarray.Dataset(
-        {key: (on, values, about[key]) for key, values in maps.items()},
-        {
-            "x": ("x", grid.x, {"long_name": "position along rolling", "units": "m", "axis": "X"}),
-            "y": ("y", grid.y, {"long_name": "position along the contact line", "units": "m", "axis": "Y"}),
-        },
-        {"Conventions": "CF-1.11", "title": "Step of a moving contact", "step": frame.number, "time_s": frame.time},
-    )
-    save_dataset(dataset, folder / MAPS / f"step-{frame.number:06d}.nc")
 
 
 def _frames(folder: Path, last: int) -> tuple[Frame, ...]:

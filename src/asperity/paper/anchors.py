@@ -17,6 +17,10 @@ from asperity.paper.rig import TRENDS
 from asperity.wear import Stages
 
 AnchorSense = Literal["about", "at least", "at most"]
+COMPARED = (  # columns of the table of anchors
+    "anchor", "quantity", "sq_um", "sense", "printed", "tolerance", "ours", "low", "high", "miss", "met", "possible",
+    "source",
+)  # fmt: skip
 SPLIT_ANCHOR = "split"  # the quantity of an anchor that is a break between stages
 
 
@@ -92,34 +96,19 @@ def compare_with_anchors(curve: CurveOverSq, anchors: Sequence[Anchor] | None = 
         crossed = bool(np.isfinite(low) and low <= anchor.value <= high)
         miss = anchor.miss(ours) if np.isfinite(ours) else np.nan
         met = bool(np.isfinite(miss) and abs(miss) <= anchor.tolerance)
-        rows.append(
-            {
-                "anchor": anchor.name,
-                "quantity": anchor.quantity,
-                "sq_um": np.nan if anchor.sq is None else 1e6 * anchor.sq,
-                "sense": anchor.sense,
-                "printed": anchor.value,
-                "tolerance": anchor.tolerance,
-                "ours": ours,
-                "low": low,
-                "high": high,
-                "miss": miss,
-                "met": met,
-                "possible": met or crossed or any(end <= anchor.tolerance for end in ends),
-                "source": anchor.source,
-            }
-        )
-    return pandas.DataFrame(rows)
+        sq_um = np.nan if anchor.sq is None else 1e6 * anchor.sq
+        possible = met or crossed or any(end <= anchor.tolerance for end in ends)
+        about = (anchor.name, anchor.quantity, sq_um, anchor.sense, anchor.value, anchor.tolerance)
+        rows.append((*about, ours, low, high, miss, met, possible, anchor.source))
+    return pandas.DataFrame(rows, columns=list(COMPARED))
 
 
 def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas.DataFrame:
     """Our CRF at the rig's twelve Sq values with the spread over seeds, beside what is printed: the two ends."""
-    rows = []
-    for number, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
-        ours, low, high = curve.at(1e-6 * sq, quantity)
-        printed = {0: CRF_ENDS_HZ[0], len(SAMPLES_SQ_UM) - 1: CRF_ENDS_HZ[1]}.get(number, np.nan)
-        rows.append({"sq_um": sq, "sq_std_um": std, "crf_hz": ours, "low": low, "high": high, "printed_hz": printed})
-    return pandas.DataFrame(rows)
+    table = pandas.DataFrame({"sq_um": SAMPLES_SQ_UM, "sq_std_um": SAMPLES_STD_UM})
+    table[["crf_hz", "low", "high"]] = [curve.at(1e-6 * sq, quantity) for sq in SAMPLES_SQ_UM]
+    table["printed_hz"] = [CRF_ENDS_HZ[0], *[np.nan] * (len(table) - 2), CRF_ENDS_HZ[1]]
+    return table
 
 
 def rig_deviation(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> dict[str, float]:
@@ -167,14 +156,10 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UnreadableFile(f"{path} cannot be read as TOML: {error}") from None
     sections = parse_section(_AnchorFile, tables, str(path)).anchor
-    anchors = []
     for section in sections:
         if (section.sq is None) != (section.quantity == SPLIT_ANCHOR):
             raise BadInput(f"{path}: anchor {section.name!r} needs sq, a length; only a split has none")
-        values = {name: getattr(section, name) for name in type(section).model_fields}
-        lengths = {name: None if values[name] is None else float(values[name]) for name in ("sq", "since")}
-        anchors.append(Anchor(**{**values, **lengths}))
-    return tuple(anchors)
+    return tuple(Anchor(**dict(section)) for section in sections)
 
 
 PAPER_ANCHORS = load_anchors(Path(__file__).with_name("anchors.toml"))

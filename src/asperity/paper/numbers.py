@@ -43,7 +43,7 @@ TABLE1_PRINTED = (  # cut-off [Hz], height [um], load [N], CRF [Hz], CRFA [(m/s^
 
 # Section 4: the rig, its twelve rings in 4.1, their resonances in 4.2
 RIG_LOAD = 500.0  # [N]
-ROLLER_HZ, RING_HZ = 3375.0 / 60.0, 300.0 / 60.0
+SHAFT_HZ = (3375.0 / 60.0, 300.0 / 60.0)  # roller, ring
 SAMPLES_SQ_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)
 SAMPLES_STD_UM = (0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06)
 CRF_ENDS_HZ = (2921.93, 3811.88)  # smoothest and roughest sample; the others are drawn without numbers

@@ -19,28 +19,11 @@ from asperity.case import Case
 from asperity.conditions import ContactConditions
 from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, oscillator, search_band
 from asperity.ehl import ContactState
-from asperity.errors import BadInput, require_positive
-from asperity.files import whole_file
+from asperity.errors import BadInput, require_choice, require_positive
+from asperity.files import whole_file, write_text
 from asperity.paper.contact import papers_contact, rig_case
-from asperity.paper.numbers import (
-    CRF_ENDS_HZ,
-    DAMPING_RATIO,
-    MASS,
-    RIG_LOAD,
-    RING_HZ,
-    ROLLER_HZ,
-    SAMPLES_SQ_UM,
-    SAMPLES_STD_UM,
-)
-from asperity.paper.rig_recording import (
-    GRID_HZ,
-    Disturbance,
-    RigRecording,
-    RigTest,
-    contact_line,
-    draw_background,
-    draw_recording,
-)
+from asperity.paper.numbers import CRF_ENDS_HZ, DAMPING_RATIO, MASS, RIG_LOAD, SAMPLES_SQ_UM, SAMPLES_STD_UM, SHAFT_HZ
+from asperity.paper.rig_recording import GRID_HZ, Disturbance, RigRecording, RigTest, contact_line, draw_background
 from asperity.signals import Signal
 
 RigTrend = Literal["knee", "smooth", "constant"]
@@ -127,11 +110,12 @@ def simulate_rig(
     NotConverged
         if a contact of the case cannot be solved.
     """
-    _require_tests(samples, repeats, trend, repeat_std_hz, seed)
-    _require_record(duration_s, rate_hz)
+    _require_settings(samples, repeats, trend, repeat_std_hz, seed, duration_s, rate_hz)
     conditions, model = _contact(case)
     band_hz = _band(conditions, model, rate_hz)
-    sq, sq_std = _rings(samples)
+    positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
+    printed = np.arange(len(SAMPLES_SQ_UM))
+    sq, sq_std = (np.interp(positions, printed, of_ring) * 1e-6 for of_ring in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
     whole = replace(dry_full_load(conditions, float(sq[0])), clr=1.0)
     full_load_crf_hz = oscillator(whole, conditions, model).natural_frequency_hz
     disturbance = disturbance or Disturbance()
@@ -152,7 +136,7 @@ def simulate_rig(
             shift = repeat_std_hz * rng.standard_normal() / full_load_crf_hz
             clr = min(max(state.clr ** (1.0 / 6.0) + shift, 0.01) ** 6, 1.0)
             line = contact_line(replace(state, clr=clr), conditions, model, frequency, rate_hz)
-            recordings.append(draw_recording(test, line, background, disturbance, band_hz, rng))
+            recordings.append(background.recorded(test, line, disturbance, rng))
     return Rig(
         recordings=tuple(recordings),
         band_hz=band_hz,
@@ -160,23 +144,22 @@ def simulate_rig(
         split_sq_m=KNEE_UM * 1e-6 if trend == "knee" and case is None else None,
         disturbance=disturbance,
         load_n=conditions.load,
-        shaft_hz=(ROLLER_HZ, RING_HZ),
+        shaft_hz=SHAFT_HZ,
         case_text=(case or rig_case()).text,
     )
 
 
-def _require_tests(samples: int, repeats: int, trend: str, repeat_std_hz: float, seed: int) -> None:
+def _require_settings(
+    samples: int, repeats: int, trend: str, repeat_std_hz: float, seed: int, duration_s: float, rate_hz: float
+) -> None:
     if samples < 1 or repeats < 1:
         raise BadInput(f"a rig needs at least 1 sample and 1 repeat, got {samples} and {repeats}")
-    if trend not in TRENDS:
-        raise BadInput(f"rig trend must be one of {', '.join(TRENDS)}, got {trend!r}")
+    require_choice("rig trend", trend, TRENDS)
     if not repeat_std_hz >= 0.0:
         raise BadInput(f"CRF deviation between repeats must be 0 or more, got {repeat_std_hz:g} Hz")
     if seed < 0:
         raise BadInput(f"rig seed must be 0 or more, got {seed}")
 
-
-def _require_record(duration_s: float, rate_hz: float) -> None:
     require_positive("rig recording's duration", duration_s, "s")
     require_positive("rig sampling rate", rate_hz, "Hz")
     if round(duration_s * rate_hz) < SHORTEST_RECORD:
@@ -195,14 +178,6 @@ def _band(conditions: ContactConditions, model: VibrationModel, rate_hz: float) 
             f"search band, {band_hz[1]:.0f} Hz, got {rate_hz:g} Hz; raise it"
         )
     return band_hz
-
-
-def _rings(samples: int) -> tuple[Field, Field]:
-    """Sq of so many rings over the paper's range, and its standard deviation [m]."""
-    positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
-    printed = np.arange(len(SAMPLES_SQ_UM))
-    sq = np.interp(positions, printed, SAMPLES_SQ_UM) * 1e-6
-    return sq, np.interp(positions, printed, SAMPLES_STD_UM) * 1e-6
 
 
 def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
@@ -271,19 +246,15 @@ def write_rig(
         with whole_file(path) as part:
             WRITERS[file_format](part, recording.signal())
 
-    with ThreadPoolExecutor(max_workers=AT_ONCE) as pool:
-        writing = [pool.submit(write, *pair) for pair in zip(rig.recordings, paths, strict=True)]
-        try:
-            for number, future in enumerate(writing, 1):
-                future.result()
-                if progress is not None:
-                    progress(number, len(writing))
-        finally:
-            for future in writing:
-                future.cancel()
+    pool = ThreadPoolExecutor(max_workers=AT_ONCE)
+    try:
+        for number, _ in enumerate(pool.map(write, rig.recordings, paths), 1):
+            if progress is not None:
+                progress(number, len(paths))
+    finally:
+        pool.shutdown(cancel_futures=True)
     _write_tables(rig, paths, folder)
-    with whole_file(folder / "rig.toml") as part:
-        part.write_text(rig.case_text, "utf-8")
+    write_text(folder / "rig.toml", rig.case_text)
     return paths
 
 
@@ -298,8 +269,7 @@ def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
         figures = (true_sq, recording.clr, recording.crf_hz, recording.crfa, recording.damping_ratio, recording.snr_db)
         truth.append((path.name, str(recording.sample), str(recording.repeat), *(f"{value:.6g}" for value in figures)))
     for name, rows in (("table.csv", known), ("truth.csv", truth)):
-        with whole_file(folder / name) as part:
-            part.write_text("".join(",".join(row) + "\n" for row in rows), "utf-8")
+        write_text(folder / name, "".join(",".join(row) + "\n" for row in rows))
 
 
 def _write_hdf5(path: Path, signal: Signal) -> None:

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
 from asperity.coupling import VibrationModel, excitation, oscillator
 from asperity.ehl import ContactState
 from asperity.errors import BadInput
-from asperity.paper.numbers import RING_HZ, ROLLER_HZ
+from asperity.paper.numbers import SHAFT_HZ
 from asperity.signals import Signal, Spectrum, power_spectrum
 
 MAINS_HZ = 50.0
@@ -102,9 +102,8 @@ class RigRecording:
         at = np.rint(self.tones.frequency_hz * (length / self.rate_hz)).astype(int)
         np.add.at(waves, at, 0.5 * length * self.tones.amplitude * turns)
         waves[0] = 0.0
-        return Signal(
-            np.ascontiguousarray(scipy.fft.irfft(waves, length, overwrite_x=True)[:samples]), self.rate_hz, "m/s^2"
-        )
+        values = scipy.fft.irfft(waves, length, overwrite_x=True)[:samples]
+        return Signal(np.ascontiguousarray(values), self.rate_hz, "m/s^2")
 
     def spectrum(self, segment: int) -> Spectrum:
         """A Hann-tapered averaged spectrum, drawn without a record: mean and covariance of lines as records have them.
@@ -172,12 +171,12 @@ class RigTest(NamedTuple):
 class ContactLine(NamedTuple):
     """The contact's line: truth, and density on the grid as the accelerometer shows it."""
 
-    sq_m: float
+    true_sq_m: float
     clr: float
     crf_hz: float
     crfa: float
     damping_ratio: float
-    density: Field
+    contact_density: Field
 
 
 def contact_line(
@@ -206,6 +205,7 @@ def _accelerometer(frequency: Field, rate_hz: float) -> Field:
 class Background(NamedTuple):
     """What is common to all recordings of a rig; powers within the band, 1 in all."""
 
+    band_hz: tuple[float, float]
     frequency: Field
     mode_hz: Field
     mode_damping: Field
@@ -215,20 +215,49 @@ class Background(NamedTuple):
     source: Field  # 0 roller, 1 ring, 2 mains,
     power: Field  # and mean squares
 
+    def recorded(
+        self, test: RigTest, contact: ContactLine, disturbance: Disturbance, rng: np.random.Generator
+    ) -> RigRecording:
+        """The contact before all this, as loud as the SNR says give or take a little, its modes moved each time."""
+        inside = self._in_band(self.frequency)
+        power = float(np.sum(contact.contact_density[inside])) * GRID_HZ
+        wanted = power / 10.0 ** (disturbance.snr_db / 10.0)
+        level = wanted * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
+        gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(self.mode_hz.size) / 10.0)
+        mode_hz = self.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
+        other = self.floor.copy()
+        for f0, damping, loud in zip(mode_hz, self.mode_damping, self.mode_power * gains, strict=True):
+            # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
+            x2 = (self.frequency / f0) ** 2
+            other += loud * 4.0 * damping / (np.pi * f0) * x2**2 / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
+        sources = np.array([*SHAFT_HZ, MAINS_HZ])
+        sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
+        at = self.order * sources[self.source]
+        response = _accelerometer(at, test.rate_hz)
+        measured_other = level * other * _accelerometer(self.frequency, test.rate_hz)
+        tonal = level * float(np.sum((self.power * response)[self._in_band(at)]))
+        return RigRecording(
+            **test._asdict(),
+            **contact._asdict(),
+            snr_db=float(10.0 * np.log10(power / (np.sum(measured_other[inside]) * GRID_HZ + tonal))),
+            frequency_hz=self.frequency,
+            other_density=measured_other,
+            tones=Tones(at, np.sqrt(2.0 * level * self.power * response)),
+            seed=int(rng.integers(2**63)),
+        )
+
+    def _in_band(self, frequency: Field) -> Mask:
+        return (frequency >= self.band_hz[0]) & (frequency <= self.band_hz[1])
+
 
 def draw_background(
     frequency: Field, band_hz: tuple[float, float], disturbance: Disturbance, rng: np.random.Generator
 ) -> Background:
     """Modes, noise and tones, drawn: their shares of the power in the band 0.6, 0.3 and 0.1, give or take."""
     low, high = band_hz
-    outside = disturbance.modes  # as many below and above the band as within it
-    mode_hz = np.concatenate(
-        [
-            rng.uniform(low, high, disturbance.modes),
-            rng.uniform(0.2 * low, 0.95 * low, outside),
-            rng.uniform(1.05 * high, max(0.9 * frequency[-1], 1.1 * high), outside),
-        ]
-    )
+    # as many modes below and above the band as within it
+    spans = ((low, high), (0.2 * low, 0.95 * low), (1.05 * high, max(0.9 * float(frequency[-1]), 1.1 * high)))
+    mode_hz = np.concatenate([rng.uniform(start, end, disturbance.modes) for start, end in spans])
     damping = np.exp(rng.uniform(np.log(0.004), np.log(0.03), mode_hz.size))
     shares = rng.gamma([6.0 if disturbance.modes else 1e-9, 3.0, 1.0])
     shares /= np.sum(shares)
@@ -239,59 +268,11 @@ def draw_background(
     floor = (1.0 + (frequency / FLAT_BELOW_HZ) ** 2) ** (-0.5 * rng.uniform(0.0, 1.5))
     floor *= shares[1] / (float(np.sum(floor[inside])) * GRID_HZ)
 
-    roller = np.arange(1.0, np.floor(0.8 * frequency[-1] / ROLLER_HZ))
+    roller_hz = SHAFT_HZ[0]
+    roller = np.arange(1.0, np.floor(0.8 * frequency[-1] / roller_hz))
     order = np.concatenate([roller, np.arange(1.0, RING_HARMONICS), np.arange(1.0, MAINS_HARMONICS)])
     source = np.repeat([0, 1, 2], [roller.size, RING_HARMONICS - 1, MAINS_HARMONICS - 1])
     tone_power = rng.exponential(1.0, order.size) / order
-    in_band = (source == 0) & (order * ROLLER_HZ > low) & (order * ROLLER_HZ < high)
+    in_band = (source == 0) & (order * roller_hz > low) & (order * roller_hz < high)
     tone_power *= shares[2] / float(np.sum(tone_power[in_band]))
-    return Background(frequency, mode_hz, damping, power, floor, order, source, tone_power)
-
-
-def draw_recording(
-    test: RigTest,
-    contact: ContactLine,
-    background: Background,
-    disturbance: Disturbance,
-    band_hz: tuple[float, float],
-    rng: np.random.Generator,
-) -> RigRecording:
-    """The background as loud as the SNR says, a little louder or softer each time, with its modes moved a little."""
-    frequency = background.frequency
-    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    power = float(np.sum(contact.density[inside])) * GRID_HZ
-    wanted = power / 10.0 ** (disturbance.snr_db / 10.0)
-    level = wanted * 10.0 ** (disturbance.gain_db * rng.standard_normal() / 10.0)
-    gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(background.mode_hz.size) / 10.0)
-    mode_hz = background.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
-    other = background.floor.copy()
-    for f0, damping, loud in zip(mode_hz, background.mode_damping, background.mode_power * gains, strict=True):
-        # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
-        x2 = (frequency / f0) ** 2
-        other += loud * 4.0 * damping / (np.pi * f0) * x2**2 / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
-    sources = np.array([ROLLER_HZ, RING_HZ, MAINS_HZ])
-    sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
-    at = background.order * sources[background.source]
-    response = _accelerometer(at, test.rate_hz)
-    measured_other = level * other * _accelerometer(frequency, test.rate_hz)
-    in_band = (at >= band_hz[0]) & (at <= band_hz[1])
-    tonal = level * float(np.sum((background.power * response)[in_band]))
-    return RigRecording(
-        sample=test.sample,
-        repeat=test.repeat,
-        sq_m=test.sq_m,
-        sq_std_m=test.sq_std_m,
-        true_sq_m=contact.sq_m,
-        clr=contact.clr,
-        crf_hz=contact.crf_hz,
-        crfa=contact.crfa,
-        damping_ratio=contact.damping_ratio,
-        snr_db=float(10.0 * np.log10(power / (np.sum(measured_other[inside]) * GRID_HZ + tonal))),
-        rate_hz=test.rate_hz,
-        duration_s=test.duration_s,
-        frequency_hz=frequency,
-        contact_density=contact.density,
-        other_density=measured_other,
-        tones=Tones(at, np.sqrt(2.0 * level * background.power * response)),
-        seed=int(rng.integers(2**63)),
-    )
+    return Background(band_hz, frequency, mode_hz, damping, power, floor, order, source, tone_power)

@@ -15,11 +15,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.case import Case, load_case
-from asperity.coupling import (
-    Vibration,
-    contact_vibration,
-    require_sampling,
-)
+from asperity.coupling import Vibration, contact_vibration, require_sampling
 from asperity.ehl import (
     FILMS,
     HOT,

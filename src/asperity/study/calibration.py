@@ -131,8 +131,8 @@ def _result(
         start=_compared(start_curve, anchors),
         fit=_compared(curve, anchors),
         check=_compared(check, anchors),
-        start_misfit=float(np.sum(solver.misses(None) ** 2)),
-        misfit=float(np.sum(solver.misses(best) ** 2)),
+        start_misfit=solver.misfit(None),
+        misfit=solver.misfit(best),
         evaluations=len(solver.known),
         cases=solver.cases,
         failed=solver.failed,
@@ -159,9 +159,7 @@ def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[fl
     """Roughnesses to solve at [m]: those given, or the anchors', of near ones the outer."""
     anchored = sorted({sq for anchor in aimed for sq in (anchor.sq, anchor.since) if sq is not None})
     if levels is not None:
-        for level in levels:
-            require_positive("level", level, "m")
-        chosen = sorted(set(levels))
+        chosen = sorted({require_positive("level", level, "m") for level in levels})
         if not chosen or chosen[0] > anchored[0] * (1 + 1e-9) or chosen[-1] < anchored[-1] * (1 - 1e-9):
             raise BadInput(
                 f"levels must span the anchors' Sq from {1e6 * anchored[0]:g} to {1e6 * anchored[-1]:g} um, "
@@ -178,7 +176,7 @@ def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[fl
 
 def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Case:
     """The case with what was found, on its own cells, and a study of its wear curve where it has none."""
-    overrides = overrides_at(case, ranges, [float(share) for share in best])
+    overrides = overrides_at(case, ranges, best)
     overrides.pop("grid.cells", None)
     if case.contents.study is None:
         overrides["study"] = {"sq": {"from": "0.5 um", "to": "4 um", "step": "0.1 um"}, "seeds": CHECK_SEEDS}

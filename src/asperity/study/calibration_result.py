@@ -118,7 +118,7 @@ class Calibration:
         aimed = {anchor.name for anchor in self.aimed_at}
         met = self.fit[self.fit["anchor"].isin(aimed)]
         missed = [f"{row.anchor} ({row.ours:.4g} for {row.printed:g})" for row in met[~met["met"]].itertuples()]
-        values = ", ".join(f"{p.range.key} {p.value:.3g}{_unit(p.range)}" for p in self.parameters)
+        values = ", ".join(f"{p.range.key} {p.value:.3g} {p.range.unit}".rstrip() for p in self.parameters)
         sentence = f"{int(met['met'].sum())} of {len(met)} anchors are met within their tolerances with {values}"
         sentence += f"; missed: {', '.join(missed)}." if missed else "."
         if self.unidentifiable:
@@ -132,8 +132,9 @@ class Calibration:
         """What `asperity calibrate --json` prints; None where there is none."""
 
         def rows(table: pandas.DataFrame) -> list[dict[str, Any]]:
-            return [{str(key): _or_none(value) for key, value in row.items()} for row in table.to_dict("records")]
+            return [{str(key): as_json(value) for key, value in row.items()} for row in table.to_dict("records")]
 
+        names = ("start", "value", "low", "high", "std_share", "learnt", "identifiable", "at_end")
         return {
             "verdict": self.verdict(),
             "parameters": [
@@ -141,14 +142,7 @@ class Calibration:
                     "key": p.range.key,
                     "unit": p.range.unit,
                     "searched": [p.range.low, p.range.high],
-                    "start": p.start,
-                    "value": p.value,
-                    "low": p.low,
-                    "high": p.high,
-                    "std_share": p.std_share,
-                    "learnt": p.learnt,
-                    "identifiable": p.identifiable,
-                    "at_end": p.at_end,
+                    **{name: getattr(p, name) for name in names},
                 }
                 for p in self.parameters
             ],
@@ -156,7 +150,7 @@ class Calibration:
             "directions": [
                 {
                     "weights": dict(zip((p.range.key for p in self.parameters), d.weights, strict=True)),
-                    "std": _or_none(d.std),
+                    "std": as_json(d.std),
                     "determined": d.determined,
                 }
                 for d in self.directions
@@ -164,21 +158,13 @@ class Calibration:
             "trade_offs": [trade._asdict() for trade in self.trade_offs],
             "misfit": self.misfit,
             "start_misfit": self.start_misfit,
-            "start": rows(self.start),
-            "fit": rows(self.fit),
-            "check": rows(self.check),
-            "evaluations": self.evaluations,
-            "cases": self.cases,
-            "failed": self.failed,
-            "seconds": self.seconds,
+            **{name: rows(getattr(self, name)) for name in ("start", "fit", "check")},
+            **{name: getattr(self, name) for name in ("evaluations", "cases", "failed", "seconds")},
         }
 
 
-def _unit(entry: ParameterRange) -> str:
-    return f" {entry.unit}" if entry.unit else ""
-
-
-def _or_none(value: Any) -> Any:
+def as_json(value: Any) -> Any:
+    """A value of a table as JSON holds it: None for nan and infinity."""
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -78,9 +78,8 @@ class WearCurve:
         mean, reach = self.mean(quantity), np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0
         if not self.sq[0] * (1 - 1e-9) <= sq <= self.sq[-1] * (1 + 1e-9):
             return np.nan, np.nan, np.nan
-        if self.sq.size == 1:
-            weights = np.ones(1)
-        else:
+        weights = np.ones(1)
+        if self.sq.size > 1:
             right = int(np.clip(np.searchsorted(self.sq, sq), 1, self.sq.size - 1))
             share = float(np.clip((sq - self.sq[right - 1]) / (self.sq[right] - self.sq[right - 1]), 0.0, 1.0))
             weights = np.zeros(self.sq.size)
@@ -93,18 +92,12 @@ class WearCurve:
     @cached_property
     def stages(self) -> dict[str, Stages]:
         """Stages along Sq in micrometres, from the CRF and CRFA of each vibration preset; empty without vibration."""
-        stages = {}
-        rows = self.table[self.table["status"] == DONE]
+        rows, stages = self.table[self.table["status"] == DONE], {}
         for preset in BOTH_PRESETS:
             if f"crf_{preset}_hz" in rows:
-                std = rows[f"crf_std_{preset}_hz"].to_numpy(dtype=float)
-                stages[preset] = split_stages(
-                    1e6 * rows[SQ_KEY].to_numpy(dtype=float),
-                    rows[f"crf_{preset}_hz"].to_numpy(dtype=float),
-                    rows[f"crfa_{preset}"].to_numpy(dtype=float),
-                    crf_std_hz=np.nan_to_num(std),
-                    unit="um",
-                )
+                keys = (SQ_KEY, f"crf_{preset}_hz", f"crfa_{preset}", f"crf_std_{preset}_hz")
+                sq, crf_hz, crfa, std = (rows[key].to_numpy(dtype=float) for key in keys)
+                stages[preset] = split_stages(1e6 * sq, crf_hz, crfa, crf_std_hz=np.nan_to_num(std), unit="um")
         return stages
 
     def summary(self) -> pandas.DataFrame:
@@ -124,16 +117,14 @@ class WearCurve:
 
     def verdict(self) -> str:
         """One sentence: where load sharing and resonance go, and where wear turns severe."""
-        first, last = 1e6 * self.sq[0], 1e6 * self.sq[-1]
-        sentence = "Between Sq "
-        clr = 100.0 * self.mean("clr")
-        sentence += (
-            f"{first:.3g} and {last:.3g} um the asperities' share of the load goes from {clr[0]:.0f} to {clr[-1]:.0f} %"
+        sq, clr = 1e6 * self.sq, 100.0 * self.mean("clr")
+        sentence = (
+            f"Between Sq {sq[0]:.3g} and {sq[-1]:.3g} um the asperities' share of the load goes from {clr[0]:.0f} to "
+            f"{clr[-1]:.0f} %"
         )
         if "crf_sound_hz" in self.table:
             crf = self.mean("crf_sound_hz")
-            sentence += f", the contact resonance from {crf[0]:.0f} to {crf[-1]:.0f} Hz"
-            sentence += f". {self.stages['sound'].verdict}"
+            sentence += f", the contact resonance from {crf[0]:.0f} to {crf[-1]:.0f} Hz. {self.stages['sound'].verdict}"
         sentence = f"{sentence.rstrip('.')}."
         return f"{self.left_out} CASES FAILED and are left out: {sentence}" if self.left_out else sentence
 
@@ -172,9 +163,13 @@ def wear_curve(
     """
     for sq in sq_values:
         require_positive("Sq", sq, "m")
-    points = [{SQ_KEY: f"{1e6 * sq:.9g} um"} for sq in sorted(set(sq_values))]
-    plan = plan_points(case, points, seeds=seeds)
+    plan = plan_points(case, sq_points(sorted(set(sq_values))), seeds=seeds)
     return curve_of(run_study(plan, executor=executor, workers=workers, progress=progress))
+
+
+def sq_points(levels: Sequence[float]) -> list[dict[str, str]]:
+    """Points of a study at these roughnesses [m]."""
+    return [{SQ_KEY: f"{1e6 * sq:.9g} um"} for sq in levels]
 
 
 def curve_of(result: StudyResult) -> WearCurve:
@@ -186,10 +181,9 @@ def curve_of(result: StudyResult) -> WearCurve:
         if the study varies something else, or holds no finished case.
     """
     if not is_wear_study(result):
-        raise BadInput(
-            f"a wear curve needs a study that varies {SQ_KEY} alone, got {', '.join(result.plan.axes) or 'none'}"
-        )
-    if not len(result.table) or not (result.table["status"] == DONE).any():
+        swept = ", ".join(result.plan.axes) or "none"
+        raise BadInput(f"a wear curve needs a study that varies {SQ_KEY} alone, got {swept}")
+    if not (result.table["status"] == DONE).any():
         raise BadInput("a wear curve needs finished cases, got none; run the study first")
     return WearCurve(np.sort(result.table[SQ_KEY].unique().astype(float)), result.table)
 

@@ -4,7 +4,6 @@ Runs in worker processes: takes and gives only what can be sent, raises nothing 
 """
 
 import logging
-import math
 import multiprocessing
 import os
 import threading
@@ -15,18 +14,16 @@ from typing import Any, Literal, get_args
 
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field
+from asperity.arrays import Field, finite_or_none
 from asperity.case import Case
-from asperity.coupling import contact_vibration
+from asperity.coupling import Vibration, contact_vibration
 from asperity.errors import AsperityError
 from asperity.processes import leave_interrupts_to_the_parent
 from asperity.results import Run, solve_case, vibrate_case
-from asperity.wear import Resonance
 
 CaseStatus = Literal["done", "not converged", "failed"]
 StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
-STATUSES: tuple[CaseStatus, ...] = get_args(CaseStatus)
-DONE, NOT_CONVERGED, FAILED = STATUSES
+DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
 
@@ -67,10 +64,8 @@ def evaluate(
 def _solved(case: Case, wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
     run = solve_case(case, strict=False)
     convergence = run.solution.convergence
-    row: Row = {"status": DONE, "reason": ""}
-    if not convergence.converged:
-        row = {"status": NOT_CONVERGED, "reason": convergence.explain()}
-    row |= run.scalars()
+    status, reason = (DONE, "") if convergence.converged else (NOT_CONVERGED, convergence.explain())
+    row: Row = {"status": status, "reason": reason, **run.scalars()}
     if run.vibration is not None:
         row["full_load_crf_hz"] = run.vibration.full_load_crf_hz
         row |= _both_presets(case, run)
@@ -99,21 +94,16 @@ def _both_presets(case: Case, run: Run) -> Row:
     for preset in BOTH_PRESETS:
         model = case.with_overrides({"vibration.preset": preset}).vibration
         assert model is not None
-        assert run.vibration is not None
+        vibration: Vibration | None = run.vibration
         row[f"reason_{preset}"] = ""
-        resonance: Resonance | None = None
-        if model == case.vibration:
-            resonance = run.vibration.resonance
-        else:
+        if model != case.vibration:
             try:
-                resonance = contact_vibration(run.state, case.conditions, model, solution=run.solution).resonance
+                vibration = contact_vibration(run.state, case.conditions, model, solution=run.solution)
             except AsperityError as refusal:
-                row[f"reason_{preset}"] = str(refusal)
-        if resonance is not None and not resonance.found:
-            resonance = None
+                vibration, row[f"reason_{preset}"] = None, str(refusal)
+        resonance = vibration.resonance if vibration is not None and vibration.resonance.found else None
         for name, unit in (("crf", "_hz"), ("crfa", ""), ("crf_std", "_hz"), ("crfa_std", "")):
-            value = math.nan if resonance is None else float(getattr(resonance, f"{name}{unit}"))
-            row[f"{name}_{preset}{unit}"] = value if math.isfinite(value) else None
+            row[f"{name}_{preset}{unit}"] = finite_or_none(getattr(resonance, f"{name}{unit}", None))
     return row
 
 

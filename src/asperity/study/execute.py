@@ -20,6 +20,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from itertools import chain
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -32,18 +33,7 @@ from asperity.files import MANIFEST, versions
 from asperity.processes import cores
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker, timed_batch
 from asperity.study.plan import StudyCase, StudyPlan
-from asperity.study.store import (
-    TABLE,
-    Store,
-    failed,
-    in_order,
-    kept_versions,
-    open_read,
-    open_store,
-    read_plan,
-    require_zarr,
-    table_of,
-)
+from asperity.study.store import Store, in_order, manifest_of, open_read, open_store, read_plan, require_zarr, table_of
 
 BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose
 LARGEST_BATCH = 200
@@ -87,7 +77,8 @@ class StudyResult:
     @property
     def failures(self) -> pandas.DataFrame:
         """The rows that must not be used, each with its reason."""
-        return failed(self.table)
+        rows: pandas.DataFrame = self.table[self.table["status"] != DONE]
+        return rows
 
     @property
     def failed(self) -> int:
@@ -102,7 +93,7 @@ class StudyResult:
     @property
     def versions(self) -> dict[str, str]:
         """Of asperity and what it stands on, when the folder was begun; in memory, those of now."""
-        return versions() if self.folder is None else kept_versions(self.folder)
+        return versions() if self.folder is None else dict(manifest_of(self.folder)["versions"])
 
 
 def run_study(
@@ -150,8 +141,7 @@ def run_study(
     if fields:
         require_zarr()
     begun = time.perf_counter()
-    out = None if out is None else Path(out)
-    with nullcontext() if out is None else open_store(out, plan, shard) as store:
+    with nullcontext() if out is None else open_store(Path(out), plan, shard) as store:
         for other in merge_from:
             assert store is not None
             store.take_from(Path(other))
@@ -161,9 +151,9 @@ def run_study(
         seconds = time.perf_counter() - begun
         if store is None:
             table = in_order([table_of(work.rows)] if work.rows else [], plan)
-            return StudyResult(plan, table, None, None, seconds, work.done)
+            return StudyResult(plan, table, seconds=seconds, computed=work.done)
         path = store.merge()
-        return StudyResult(plan, store.table(), out, path, seconds, work.done)
+        return StudyResult(plan, store.table(), store.folder, path, seconds, work.done)
 
 
 def load_study(folder: str | Path) -> StudyResult:
@@ -174,11 +164,8 @@ def load_study(folder: str | Path) -> StudyResult:
     UnreadableFile
         if the folder holds no study, or something in it is damaged.
     """
-    folder = Path(folder)
-    plan = read_plan(folder)
-    path = folder / TABLE
-    table = Store(folder, plan).table()
-    return StudyResult(plan, table, folder, path if path.exists() else None)
+    store = Store(Path(folder), read_plan(Path(folder)))
+    return StudyResult(store.plan, store.table(), store.folder, store.merged)
 
 
 @contextmanager
@@ -247,7 +234,7 @@ class _Work:
         known = {} if store is None else store.finished()
         self.plan, self.store, self.fields, self.begun, self.progress = plan, store, fields, begun, progress
         self.attempts = {case_id: attempt + 1 for case_id, (_, attempt) in known.items()}
-        share = {case.id: case for case in plan.cases if case.number % shard[1] == shard[0] - 1}
+        share = {case.id: case for case in _share(plan, shard)}
         kept = {case_id for case_id, (status, _) in known.items() if status == DONE or not retry_failed}
         self.waiting = deque(case for case in share.values() if case.id not in kept)
         self.total, self.kept = len(share), len(share) - len(self.waiting)
@@ -271,14 +258,14 @@ class _Work:
         self, batch: Sequence[StudyCase], results: Sequence[tuple[Row, dict[str, Field]]], seconds: float
     ) -> None:
         """Keep what a worker brings back."""
-        rows = [
-            {"case_id": case.id, "attempt": self.attempts.get(case.id, 1), **row}
-            for case, (row, _) in zip(batch, results, strict=True)
-        ]
+        rows, fields = [], {}
+        for case, (row, maps) in zip(batch, results, strict=True):
+            rows.append({"case_id": case.id, "attempt": self.attempts.get(case.id, 1), **row})
+            fields[case.id] = maps
         if self.store is None:
             self.rows += rows
         else:
-            self.store.keep(rows, {case.id: maps for case, (_, maps) in zip(batch, results, strict=True)})
+            self.store.keep(rows, fields)
         pace = seconds / len(batch)
         self.case_s = pace if self.case_s is None else 0.7 * self.case_s + 0.3 * pace
         self.done += len(batch)
@@ -293,7 +280,7 @@ class _Work:
 
     def bury(self, batches: Sequence[Sequence[StudyCase]], *, certain: bool) -> None:
         """Take back the cases whose process died; where it is `certain` that one killed it, that case has failed."""
-        for case in (case for batch in batches for case in batch):
+        for case in chain(*batches):
             self.deaths[case.id] += 1
             if certain:
                 row = {"status": FAILED, "reason": "the process that computed it died: killed, or out of memory"}
@@ -354,11 +341,8 @@ def _spread(work: _Work, executor: Executor, workers: int) -> None:
 def _hand_out(work: _Work, executor: Executor, workers: int, pending: dict[Future[Any], list[StudyCase]]) -> bool:
     """Keep every worker supplied; False if the executor takes nothing any more."""
     while work.waiting and len(pending) < BATCHES_AHEAD * workers:
-        suspects = (
-            work.deaths[work.waiting[0].id],
-            *(work.deaths[case.id] for cases in pending.values() for case in cases),
-        )
-        if pending and any(suspects):
+        cases = (work.waiting[0], *chain(*pending.values()))
+        if pending and any(work.deaths[case.id] for case in cases):
             return True  # a case that may have killed its process has the executor to itself
         batch = work.batch(workers)
         job = (work.plan.case, work.plan.kind, [case.overrides for case in batch], work.fields)
@@ -416,14 +400,16 @@ def estimate_study(
     BadInput
         for a folder that holds another study.
     """
-    kept = 0
-    if out is not None and (Path(out) / MANIFEST).exists():
-        known = open_read(Path(out), plan).finished()
-        kept = sum(case.id in known for case in plan.cases if case.number % shard[1] == shard[0] - 1)
-    share = [case for case in plan.cases if case.number % shard[1] == shard[0] - 1]
+    known = open_read(Path(out), plan).finished() if out is not None and (Path(out) / MANIFEST).exists() else {}
+    share = _share(plan, shard)
     if not share:
         return StudyCost(0, 0, 0.0, 0, workers or cores())
-    chosen = [share[round(part * (len(share) - 1))] for part in (0.0, 0.5, 1.0)]
-    evaluate_batch(plan.case, plan.kind, [chosen[1].overrides])  # loads and compiles
-    _, seconds = timed_batch(plan.case, plan.kind, [case.overrides for case in chosen])
+    chosen = [share[round(part * (len(share) - 1))].overrides for part in (0.0, 0.5, 1.0)]
+    evaluate_batch(plan.case, plan.kind, [chosen[1]])  # loads and compiles
+    _, seconds = timed_batch(plan.case, plan.kind, chosen)
+    kept = sum(case.id in known for case in share)
     return StudyCost(len(share), kept, seconds / len(chosen), len(chosen), workers or cores())
+
+
+def _share(plan: StudyPlan, shard: tuple[int, int]) -> list[StudyCase]:
+    return [case for case in plan.cases if case.number % shard[1] == shard[0] - 1]

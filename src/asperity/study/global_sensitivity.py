@@ -16,8 +16,9 @@ import pandas
 
 from asperity.arrays import Field
 from asperity.case import Case
-from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.errors import AsperityError, BadInput, require_choice, require_positive
 from asperity.quantities import quantity
+from asperity.study.calibration_result import as_json
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
 from asperity.study.indices import SIZES, SampleDesign, SensitivityMethod, indices, sample_design
@@ -38,6 +39,9 @@ SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
 CELLS = 128
 SEED_FACTOR = "seed"  # the factor's name
+RANKED_BY: dict[SensitivityMethod, str] = {"morris": "mu_star", "sobol": "st"}
+ABOUT = ("outcome", "quantity", "sq_m")  # columns of `effects` that say which outcome
+FACTOR_KEYS = ("key", "low", "high", "unit", "log", "reason")
 RESERVED = {
     "surface.sq": "it is what the curves run along; give sq",
     "surface.seed": "the surface is a factor by itself",
@@ -91,7 +95,7 @@ class Sensitivity:
     @property
     def measure(self) -> str:
         """The column of `effects` that ranks factors."""
-        return "mu_star" if self.method == "morris" else "st"
+        return RANKED_BY[self.method]
 
     def ranking(self, outcome: str) -> pandas.DataFrame:
         """The rows of `effects` of one outcome, the factor that moves it most first."""
@@ -134,38 +138,26 @@ class Sensitivity:
         return {
             "verdict": self.verdict(),
             "method": self.method,
-            "factors": [
-                {
-                    "key": entry.key,
-                    "low": entry.low,
-                    "high": entry.high,
-                    "unit": entry.unit,
-                    "log": entry.log,
-                    "reason": entry.reason,
-                }
-                for entry in self.ranges
-            ],
+            "factors": [{name: getattr(entry, name) for name in FACTOR_KEYS} for entry in self.ranges],
             "points": len(self.values),
             "cases": len(self.result.plan.cases),
             "failed": self.result.failed,
             "left_out": self.left_out,
             "silent": self.silent,
-            "distinct": _or_none(self.distinct),
+            "distinct": as_json(self.distinct),
             "seconds": self.result.seconds,
             "outcomes": [
                 {
                     "outcome": outcome.name,
                     "quantity": outcome.quantity,
-                    "sq_m": _or_none(outcome.sq),
+                    "sq_m": as_json(outcome.sq),
                     "p05": ends[outcome.name][0],
                     "p95": ends[outcome.name][1],
                     "effects": [
-                        {
-                            key: _or_none(value)
-                            for key, value in row.items()
-                            if key not in ("outcome", "quantity", "sq_m")
-                        }
-                        for row in self.ranking(outcome.name).to_dict("records")
+                        {key: as_json(value) for key, value in row.items()}
+                        for row in self.ranking(outcome.name)
+                        .drop(columns=["outcome", "quantity", "sq_m"])
+                        .to_dict("records")
                     ],
                 }
                 for outcome in self.outcomes
@@ -214,8 +206,7 @@ def sensitivity(
     AsperityError
         if contacts failed in all blocks of the sample but one.
     """
-    if method not in SIZES:
-        raise BadInput(f"method must be one of {', '.join(SIZES)}, got {method!r}")
+    require_choice("method", method, SIZES)
     if seeds < 1:
         raise BadInput(f"seeds must be 1 or more, got {seeds}")
     case = at_cells(case, cells)
@@ -228,9 +219,7 @@ def sensitivity(
     factors = (*(entry.key for entry in ranges), *([SEED_FACTOR] if seeded else []))
     design = sample_design(method, len(factors), size or SIZES[method], sample_seed)
     plan = _plan(case, ranges, seeded, design, curve, seeds, sample_seed)
-    result = run_study(
-        plan, out=None if out is None else Path(out), executor=executor, workers=workers, progress=progress
-    )
+    result = run_study(plan, out=out, executor=executor, workers=workers, progress=progress)
     return _analysed(case, ranges, factors, design, result, sq, curve, seeds)
 
 
@@ -260,7 +249,7 @@ def _plan(
 ) -> StudyPlan:
     points = []
     for number, shares in enumerate(design.shares):
-        chosen = overrides_at(case, ranges, [float(share) for share in shares[: len(ranges)]])
+        chosen = overrides_at(case, ranges, shares[: len(ranges)])
         for level in curve:
             for surface in range(seeds):
                 point = {**chosen, "surface.sq": f"{1e6 * level:g} um"}
@@ -293,31 +282,22 @@ def _analysed(
     curve: Sequence[float],
     seeds: int,
 ) -> Sensitivity:
-
     shape = (len(design.shares), len(curve), seeds)
     curves, silent_share = _curves(result, shape)
     outcomes, columns = _outcomes(curves, sq, curve)
-    values = pandas.DataFrame(
-        {
-            **{name: design.shares[:, i] for i, name in enumerate(factors)},
-            **{outcome.name: column for outcome, column in zip(outcomes, columns, strict=True)},
-        }
-    )
+    names = [*factors, *(outcome.name for outcome in outcomes)]
+    values = pandas.DataFrame(dict(zip(names, [*design.shares.T, *columns], strict=True)))
     effects = []
     for outcome, column in zip(outcomes, columns, strict=True):
         measures = indices(design, column)
-        ranked = measures["mu_star" if design.method == "morris" else "st"]
-        whole = float(np.sum(np.maximum(ranked, 0.0)))
+        ranked = np.maximum(measures[RANKED_BY[design.method]], 0.0)
+        whole = float(np.sum(ranked))
+        about = dict(zip(ABOUT, outcome, strict=True))
         for i, factor in enumerate(factors):
-            row: dict[str, Any] = {
-                "outcome": outcome.name,
-                "quantity": outcome.quantity,
-                "sq_m": outcome.sq,
-                "factor": factor,
-            }
-            row |= {name: float(column[i]) for name, column in measures.items()}
-            row["share"] = max(float(ranked[i]), 0.0) / whole if whole > 0.0 else 0.0
-            effects.append(row)
+            each = {name: float(measure[i]) for name, measure in measures.items()}
+            effects.append(
+                {**about, "factor": factor, **each, "share": float(ranked[i]) / whole if whole > 0.0 else 0.0}
+            )
     lost = np.isnan(np.asarray(columns)).any(axis=0).reshape(-1, design.block).any(axis=1)
     return Sensitivity(
         case=case,
@@ -362,11 +342,10 @@ def _outcomes(
     curves: dict[str, Field], sq: Sequence[float], curve: Sequence[float]
 ) -> tuple[list[SensitivityOutcome], list[Field]]:
     outcomes, columns = [], []
-    places = {level: place for place, level in enumerate(curve)}
     for key, values in curves.items():
         for level in sq:
             outcomes.append(SensitivityOutcome(f"{key} at {1e6 * level:g} um", key, level))
-            columns.append(values[:, places[float(f"{level:.6g}")]])
+            columns.append(values[:, curve.index(float(f"{level:.6g}"))])
     if "crf_hz" in curves and len(curve) >= FEWEST_PLACES:
         outcomes.append(SensitivityOutcome("knee", "knee_m", math.nan))
         columns.append(np.array([knee(np.array(curve), crf) for crf in curves["crf_hz"]]))
@@ -393,7 +372,3 @@ def _distinct(curves: dict[str, Field], curve: Sequence[float]) -> float:
         return math.nan
     whole = [crf for crf in curves["crf_hz"] if np.isfinite(crf).all()]
     return float(np.mean([split_stages(curve, crf).found for crf in whole])) if whole else math.nan
-
-
-def _or_none(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

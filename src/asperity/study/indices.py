@@ -10,6 +10,10 @@ from asperity.errors import AsperityError, BadInput
 
 SensitivityMethod = Literal["morris", "sobol"]
 SIZES: dict[SensitivityMethod, int] = {"morris": 12, "sobol": 64}  # trajectories; base samples, a power of two
+MEASURES: dict[SensitivityMethod, dict[str, str]] = {  # and what SALib calls them
+    "morris": {name: name for name in ("mu", "mu_star", "mu_star_conf", "sigma")},
+    "sobol": {"s1": "S1", "s1_conf": "S1_conf", "st": "ST", "st_conf": "ST_conf"},
+}
 LEVELS = 4  # places a factor of Morris' design can take
 CONFIDENCE = 0.95  # of SALib's intervals
 RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
@@ -28,16 +32,14 @@ class SampleDesign(NamedTuple):
 
 
 def sample_design(method: SensitivityMethod, factors: int, size: int, seed: int = 0) -> SampleDesign:
-    """Morris' trajectories or Saltelli's sample over the unit cube, by SALib.
-
-    Raises
-    ------
-    BadInput
-        for a size that the method cannot take, or without SALib.
-    """
-    _require_salib()
+    """Morris' trajectories or Saltelli's sample over the unit cube; `BadInput` for a size that cannot be."""
+    try:
+        import SALib  # noqa: F401
+    except ModuleNotFoundError:
+        raise BadInput("sensitivity needs SALib; pip install 'asperity[study]'") from None
     if size < 2:
-        raise BadInput(f"{_counted(method)} must be 2 or more, got {size}; {SIZES[method]} is the default")
+        counted = "trajectories" if method == "morris" else "samples"
+        raise BadInput(f"{counted} must be 2 or more, got {size}; {SIZES[method]} is the default")
     if method == "morris":
         from SALib.sample import morris
 
@@ -54,25 +56,18 @@ def sample_design(method: SensitivityMethod, factors: int, size: int, seed: int 
 def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
     """Each factor's effect on an outcome of shape (points,), by SALib; blocks that hold a nan are left out.
 
-    Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape (factors,).
-
-    Raises
-    ------
-    AsperityError
-        if fewer than two blocks are left.
+    Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape (factors,);
+    `AsperityError` if fewer than two blocks are left.
     """
     whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
     if np.count_nonzero(whole) < 2:
         raise AsperityError("too many contacts failed to say what moves the curves; narrow the ranges")
     kept = np.repeat(whole, design.block)
     values, shares = outcome[kept], design.shares[kept]
-    factors = shares.shape[1]
-    names = (
-        ("mu", "mu_star", "mu_star_conf", "sigma") if design.method == "morris" else ("s1", "s1_conf", "st", "st_conf")
-    )
+    names = MEASURES[design.method]
     if np.ptp(values) <= ROUNDING * np.abs(values).max():
-        return {name: np.zeros(factors) for name in names}
-    problem = _problem(factors)
+        return {name: np.zeros(shares.shape[1]) for name in names}
+    problem = _problem(shares.shape[1])
     if design.method == "morris":
         from SALib.analyze import morris
 
@@ -81,22 +76,8 @@ def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
         from SALib.analyze import sobol
 
         analysed = sobol.analyze(problem, values, calc_second_order=False, conf_level=CONFIDENCE, seed=RESAMPLING)
-    return {name: np.asarray(analysed[_SALIB.get(name, name)], dtype=float) for name in names}
-
-
-_SALIB = {"s1": "S1", "s1_conf": "S1_conf", "st": "ST", "st_conf": "ST_conf"}
+    return {name: np.asarray(analysed[salib], dtype=float) for name, salib in names.items()}
 
 
 def _problem(factors: int) -> dict[str, Any]:
     return {"num_vars": factors, "names": [f"x{i}" for i in range(factors)], "bounds": [[0.0, 1.0]] * factors}
-
-
-def _counted(method: SensitivityMethod) -> str:
-    return "trajectories" if method == "morris" else "samples"
-
-
-def _require_salib() -> None:
-    try:
-        import SALib  # noqa: F401
-    except ModuleNotFoundError:
-        raise BadInput("sensitivity needs SALib; pip install 'asperity[study]'") from None

@@ -14,7 +14,7 @@ from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import AsperityError
 from asperity.paper import Anchor
-from asperity.study.curve import SQ_KEY, WearCurve
+from asperity.study.curve import WearCurve, sq_points
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyProgress, run_study
 from asperity.study.plan import StudyPlan, plan_points
@@ -51,11 +51,8 @@ class MisfitSolver:
 
     def solve(self, wanted: Sequence[Field | None], seeds: int | None = None) -> list[pandas.DataFrame]:
         """The rows of each set of shares (None: the case as it is), all levels and seeds, as one study."""
-        sets = [
-            {} if shares is None else overrides_at(self.case, self.ranges, [float(share) for share in shares])
-            for shares in wanted
-        ]
-        points = [{**chosen, SQ_KEY: f"{1e6 * level:.9g} um"} for chosen in sets for level in self.sq]
+        sets = [{} if shares is None else overrides_at(self.case, self.ranges, shares) for shares in wanted]
+        points = [{**chosen, **level} for chosen in sets for level in sq_points(self.sq)]
         table = self._run(plan_points(self.case, points, seeds=seeds or self.seeds, seeding="common"), "evaluations")
         place = table["point"] // len(self.sq)
         return [with_silence(table[place == number]) for number in range(len(sets))]
@@ -84,20 +81,21 @@ class MisfitSolver:
         curve = self.curve(shares)
         if not (curve.table["status"] == DONE).any():
             return np.full(len(self.aimed), LOST)
-        return np.array([_miss(anchor, anchor.of(curve)[0]) for anchor in self.aimed])
+        each = ((anchor, anchor.of(curve)[0]) for anchor in self.aimed)
+        return np.array([anchor.miss(ours) / anchor.tolerance if np.isfinite(ours) else LOST for anchor, ours in each])
+
+    def misfit(self, shares: Field | None) -> float:
+        """Sum of the squared misses."""
+        return float(np.sum(self.misses(shares) ** 2))
 
     def checked(self, calibrated: Case) -> WearCurve:
         """The calibrated case on its own cells, on surfaces of its own at every level."""
-        plan = plan_points(calibrated, [{SQ_KEY: f"{1e6 * level:.9g} um"} for level in self.sq], seeds=CHECK_SEEDS)
+        plan = plan_points(calibrated, sq_points(self.sq), seeds=CHECK_SEEDS)
         return WearCurve(np.array(self.sq), with_silence(self._run(plan, "check")))
 
 
 def _name(shares: Field | None) -> tuple[float, ...] | None:
     return None if shares is None else tuple(float(share) for share in shares)
-
-
-def _miss(anchor: Anchor, ours: float) -> float:
-    return anchor.miss(ours) / anchor.tolerance if np.isfinite(ours) else LOST
 
 
 def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) -> Field:
@@ -108,8 +106,7 @@ def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) ->
     if not any((table["status"] == DONE).any() for table in solver.known.values()):
         reasons = next(iter(solver.known.values()))["reason"]
         raise AsperityError(f"no parameter set could be solved: {reasons.iloc[0]}")
-    ranked = sorted(cube, key=lambda shares: float(np.sum(solver.misses(shares) ** 2)))
-    for first in ranked[:starts]:
+    for first in sorted(cube, key=solver.misfit)[:starts]:
         scipy.optimize.least_squares(
             solver.misses,
             np.clip(first, EDGE, 1.0 - EDGE),
@@ -119,8 +116,7 @@ def least_misfit(solver: MisfitSolver, screened: int, starts: int, seed: int) ->
             xtol=NEARER,
             ftol=NEARER,
         )
-    tried = [np.array(shares) for shares in solver.known if shares is not None]
-    return min(tried, key=lambda shares: float(np.sum(solver.misses(shares) ** 2)))
+    return min((np.array(shares) for shares in solver.known if shares is not None), key=solver.misfit)
 
 
 def neighbours(shares: Field) -> list[tuple[Field, Field]]:

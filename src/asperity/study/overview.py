@@ -10,14 +10,7 @@ import pandas
 from threadpoolctl import threadpool_limits
 
 from asperity.errors import AsperityError, BadInput
-from asperity.paper import (
-    PAPER_ANCHORS,
-    SPLIT_ANCHOR,
-    Anchor,
-    compare_with_anchors,
-    is_papers_contact,
-    rig_prediction,
-)
+from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anchors, is_papers_contact, rig_prediction
 from asperity.quantities import quantity
 from asperity.results import Run, solve_case
 from asperity.study.axes import SweptAxis, swept_axis, varying_outputs
@@ -64,8 +57,8 @@ class StudyOverview:
     @cached_property
     def used(self) -> pandas.DataFrame:
         """The rows that may be used."""
-        table = self.result.table
-        return table[table["status"] == DONE]
+        rows: pandas.DataFrame = self.result.table[self.result.table["status"] == DONE]
+        return rows
 
     @cached_property
     def curve(self) -> WearCurve | None:

@@ -153,14 +153,7 @@ def plan_study(case: Case) -> StudyPlan:
     else:
         points = _sampled(case, keys, section.samples, section.sample_seed)
     _require_distinct(case, points)
-    return plan_points(
-        case,
-        points,
-        axes=tuple(keys),
-        seeds=seeds,
-        kind=section.kind,
-        seeding=section.seeding,
-    )
+    return plan_points(case, points, axes=tuple(keys), seeds=seeds, kind=section.kind, seeding=section.seeding)
 
 
 def plan_points(

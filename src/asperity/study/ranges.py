@@ -7,11 +7,9 @@ that the paper leaves open, each with the reason for its ends.
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-
-import numpy as np
 
 from asperity.case import Case, split_amount
 from asperity.errors import BadInput
@@ -93,10 +91,7 @@ OPEN_RANGES = (
 def parse_range(text: str) -> ParameterRange:
     """A range as the command line has it, `KEY=LOW..HIGH`, such as "material.hardness=0.65 GPa..3 GPa".
 
-    Raises
-    ------
-    BadInput
-        for what is no such text, or has ends of different kinds or the wrong way round.
+    `BadInput` for what is no such text, or has ends of different kinds or the wrong way round.
     """
     key, equals, ends = (part.strip() for part in text.partition("="))
     low, dots, high = (part.strip() for part in ends.partition(".."))
@@ -166,14 +161,14 @@ def stated_value(case: Case, key: str) -> Any:
     return value[place] if isinstance(value, list) and place < len(value) else None
 
 
-def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Sequence[float]) -> dict[str, Any]:
+def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Iterable[float]) -> dict[str, Any]:
     """The case's overrides at a share of the way through each range.
 
     Where the domain is moved along x or y, its cells go with it, so that their size stays that of the case's cells on
     the widest domain in the ranges.
     """
     overrides: dict[str, Any] = {}
-    for entry, share in zip(ranges, shares, strict=True):
+    for entry, share in zip(ranges, map(float, shares), strict=True):
         key, place = entry_of(entry.key)
         if place is None:
             overrides[key] = entry.written(share)
@@ -201,13 +196,7 @@ def _widest(case: Case, ranges: Sequence[ParameterRange], key: str) -> float:
 
 
 def require_ranges(case: Case, ranges: Sequence[ParameterRange], reserved: Mapping[str, str]) -> None:
-    """Refuse ranges that are named twice, of a `reserved` key (the value says why), or that the case would refuse.
-
-    Raises
-    ------
-    BadInput
-        for any of these, and for no range at all.
-    """
+    """Refuse ranges named twice, of a `reserved` key (the value says why) or that the case would refuse, and none."""
     if not ranges:
         raise BadInput(f"{case.source}: nothing is varied; name a range such as 'material.hardness=0.65 GPa..3 GPa'")
     keys = [entry.key for entry in ranges]
@@ -220,9 +209,8 @@ def require_ranges(case: Case, ranges: Sequence[ParameterRange], reserved: Mappi
             raise BadInput(f"{case.source}: {key} is no entry of the case; name one such as grid.x[0]")
     for number in range(len(ranges)):
         for end in (0.0, 1.0):
-            shares = np.full(len(ranges), 0.5)
-            shares[number] = end
-            case.with_overrides(overrides_at(case, ranges, [float(share) for share in shares]))
+            shares = [end if place == number else 0.5 for place in range(len(ranges))]
+            case.with_overrides(overrides_at(case, ranges, shares))
 
 
 def at_cells(case: Case, cells: int | None) -> Case:

@@ -105,9 +105,7 @@ class MisfitSlopes:
             sign = 1.0 if vector[np.argmax(np.abs(vector))] > 0.0 else -1.0
             std = 1.0 / math.sqrt(value) if value > 1e-9 * values[-1] else math.inf  # what is left of 0 after rounding
             learnt = value / (value + 1.0 / PRIOR_VARIANCE)
-            directions.append(
-                ParameterDirection(tuple(float(w) for w in sign * vector), std, bool(learnt >= LEARNT_FROM))
-            )
+            directions.append(ParameterDirection(tuple((sign * vector).tolist()), std, bool(learnt >= LEARNT_FROM)))
         return directions
 
     def trade_offs(self, best: Field, aimed: Sequence[Anchor]) -> list[TradeOff]:
@@ -127,16 +125,7 @@ class MisfitSlopes:
             if not others:
                 continue
             before, after = everything[others], moved(others)[others]
-            gains = before**2 - after**2
-            first = int(np.argmax(gains))
-            trade_offs.append(
-                TradeOff(
-                    anchor.name,
-                    float(np.sum(before**2)),
-                    float(np.sum(after**2)),
-                    aimed[others[first]].name,
-                    float(before[first]),
-                    float(after[first]),
-                )
-            )
+            most = int(np.argmax(before**2 - after**2))
+            misfits, misses = (float(np.sum(before**2)), float(np.sum(after**2))), (before[most], after[most])
+            trade_offs.append(TradeOff(anchor.name, *misfits, aimed[others[most]].name, *map(float, misses)))
         return sorted(trade_offs, key=lambda trade: trade.without - trade.misfit)

@@ -22,8 +22,17 @@ import pyarrow.parquet
 from asperity.arrays import Field
 from asperity.case import load_case, relative_path, to_si
 from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.files import MANIFEST, make_folder, read_manifest, require_writable, versions, whole_file
-from asperity.study.evaluate import DONE, Row
+from asperity.files import (
+    MANIFEST,
+    make_folder,
+    read_manifest,
+    require_same_version,
+    require_writable,
+    versions,
+    whole_file,
+    write_text,
+)
+from asperity.study.evaluate import Row
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
 FORMAT = 1  # counts up when a reader of the format before could not read the folder
@@ -43,21 +52,14 @@ class Store:
         """Status and attempt of every case that some part holds."""
         newest: dict[str, tuple[str, int]] = {}
         for path in self._parts():
-            with _naming(path):
-                part = pyarrow.parquet.read_table(path, columns=["case_id", "status", "attempt"]).to_pydict()
+            part = _read_part(path, ["case_id", "status", "attempt"]).to_pydict()
             for case_id, status, attempt in zip(*(part[name] for name in part), strict=True):
                 if attempt >= newest.get(case_id, ("", 0))[1]:
                     newest[case_id] = status, attempt
         return newest
 
     def keep(self, rows: Sequence[Row], maps: Mapping[str, Mapping[str, Field]]) -> None:
-        """Write a finished batch: its fields first, then its rows.
-
-        Raises
-        ------
-        AsperityError
-            if the system refuses to write; nothing half written is left behind.
-        """
+        """Write a finished batch: its fields first, then its rows; `AsperityError` if the system refuses to write."""
         for case_id, fields in maps.items():
             if fields:
                 self._keep_maps(case_id, fields)
@@ -71,7 +73,10 @@ class Store:
             for name, values in fields.items():
                 group.create_array(name, data=values, chunks=values.shape, overwrite=True)
         except OSError as error:
-            raise AsperityError(_refused(self.folder / MAPS, error)) from error
+            reason = error.strerror or error
+            raise AsperityError(
+                f"{self.folder / MAPS} could not be written: {reason}; finished cases are kept"
+            ) from error
 
     def merge(self) -> Path:
         """Write what is finished as one table, in the order of the plan, and return its path."""
@@ -81,31 +86,28 @@ class Store:
         self._write(path, table.replace_schema_metadata({**table.schema.metadata, **about}))
         return path
 
+    @property
+    def merged(self) -> Path | None:
+        """The merged table, where it has been written."""
+        path = self.folder / TABLE
+        return path if path.exists() else None
+
     def table(self) -> pandas.DataFrame:
         """What is finished, a row a case in the order of the plan."""
-        parts = []
-        for path in self._parts():
-            with _naming(path):
-                parts.append(pyarrow.parquet.read_table(path))
-        return in_order(parts, self.plan)
+        return in_order([_read_part(path) for path in self._parts()], self.plan)
 
-    def take_from(self, other: Path) -> int:
-        """Copy the parts of another folder of the same study (a shard computed elsewhere), and return how many."""
-        open_read(other, self.plan)
-        taken = 0
-        for path in sorted((other / PARTS).glob("*.parquet")):
+    def take_from(self, other: Path) -> None:
+        """Copy the parts of another folder of the same study (a shard computed elsewhere)."""
+        for path in open_read(other, self.plan)._parts():
             target = self.folder / PARTS / path.name
             if not target.exists():
                 with whole_file(target) as part:
                     part.write_bytes(path.read_bytes())
-                taken += 1
-        return taken
 
     def _parts(self) -> list[Path]:
         return sorted((self.folder / PARTS).glob("*.parquet"))
 
     def _write(self, path: Path, table: pyarrow.Table) -> None:
-
         try:
             with whole_file(path) as part:
                 pyarrow.parquet.write_table(table, part)
@@ -117,17 +119,13 @@ class Store:
 def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterator[Store]:
     """A study's folder, made or found, with its manifest written, held against a second process that computes there.
 
-    Raises
-    ------
-    BadInput
-        for a folder that cannot be written to, that holds another study, or that another process is working in.
-    AsperityError
-        if the system refuses to write, as on a full disk.
+    `BadInput` for a folder that cannot be written to, that holds another study, or that another process is working in;
+    `AsperityError` if the system refuses to write, as on a full disk.
     """
     make_folder(folder)
     manifest = folder / MANIFEST
     if manifest.exists():
-        _require_same(read_manifest(folder, of="study", layout=FORMAT), plan, folder)
+        _require_same(plan, folder)
     elif any((folder / PARTS).glob("*.parquet")):
         raise BadInput(f"{folder} holds parts of a study without its manifest; choose another folder")
     make_folder(folder / PARTS)
@@ -137,14 +135,13 @@ def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterato
         for left in (folder / PARTS).glob(".*.part"):
             if shard == (1, 1) or time.time() - left.stat().st_mtime > LEFT_BEHIND_S:
                 left.unlink(missing_ok=True)
-        with whole_file(manifest) as part:
-            part.write_text(json.dumps(_manifest(plan, folder), indent=1), "utf-8")
+        write_text(manifest, json.dumps(_manifest(plan, folder), indent=1))
         yield Store(folder, plan)
 
 
 def open_read(folder: Path, plan: StudyPlan) -> Store:
     """A study's folder to read from; BadInput where it holds another study than `plan`."""
-    _require_same(read_manifest(folder, of="study", layout=FORMAT), plan, folder)
+    _require_same(plan, folder)
     return Store(folder, plan)
 
 
@@ -165,14 +162,8 @@ def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
 
 
 def read_plan(folder: Path) -> StudyPlan:
-    """The plan of a study's folder.
-
-    Raises
-    ------
-    UnreadableFile
-        if the folder holds no study, or its manifest is damaged.
-    """
-    manifest = read_manifest(folder, of="study", layout=FORMAT)
+    """The plan of a study's folder; `UnreadableFile` if it holds no study, or its manifest is damaged."""
+    manifest = manifest_of(folder)
     try:
         home = (folder / manifest["case_folder"]).resolve()
         case = load_case(manifest["case"], folder=home, name=manifest["source"])
@@ -192,10 +183,9 @@ def read_plan(folder: Path) -> StudyPlan:
         raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
 
 
-def kept_versions(folder: Path) -> dict[str, str]:
-    """What a study's folder was begun with."""
-    begun_with: dict[str, str] = read_manifest(folder, of="study", layout=FORMAT)["versions"]
-    return begun_with
+def manifest_of(folder: Path) -> dict[str, Any]:
+    """What a study's folder says of itself."""
+    return read_manifest(folder, of="study", layout=FORMAT)
 
 
 def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
@@ -218,11 +208,10 @@ def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
     }
 
 
-def _require_same(manifest: Mapping[str, Any], plan: StudyPlan, folder: Path) -> None:
+def _require_same(plan: StudyPlan, folder: Path) -> None:
     """Levels and seeds may be added to a study; what all its cases share may not change under it."""
-    theirs, ours = manifest.get("versions", {}).get("asperity"), version("asperity")
-    if theirs != ours:
-        raise BadInput(f"{folder} was computed by asperity {theirs}, this is {ours}; choose another folder")
+    manifest = manifest_of(folder)
+    require_same_version(manifest, folder)
     if manifest.get("design") != plan.design:
         raise BadInput(
             f"{folder} holds a study of another case than {plan.case.source}; "
@@ -230,17 +219,11 @@ def _require_same(manifest: Mapping[str, Any], plan: StudyPlan, folder: Path) ->
         )
 
 
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-
+def _read_part(path: Path, columns: list[str] | None = None) -> pyarrow.Table:
     try:
-        yield
+        return pyarrow.parquet.read_table(path, columns=columns)
     except (OSError, pyarrow.ArrowException) as error:
         raise UnreadableFile(f"{path} is damaged ({error}); delete it, and its cases are computed again") from None
-
-
-def _refused(path: Path, error: OSError) -> str:
-    return f"{path} could not be written: {error.strerror or error}; finished cases are kept"
 
 
 def require_zarr() -> Any:
@@ -265,12 +248,7 @@ def table_of(rows: Iterable[Row]) -> pyarrow.Table:
 def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFrame:
     """Finished rows behind the plan's own columns, by case number; of a case computed twice, the last attempt."""
     planned = pandas.DataFrame(
-        {
-            "case_id": [case.id for case in plan.cases],
-            "number": [case.number for case in plan.cases],
-            "point": [case.point for case in plan.cases],
-            "realisation": [case.realisation for case in plan.cases],
-        }
+        [(case.id, case.number, case.point, case.realisation) for case in plan.cases], columns=list(_LEADING[:4])
     )
     for key in (*plan.axes, *(seed for seed in SEED_KEYS if seed not in plan.axes)):
         values = [to_si(case.overrides.get(key)) for case in plan.cases]
@@ -304,8 +282,3 @@ def _of_one_type(values: Sequence[Any]) -> list[Any]:
     if all(value is None or isinstance(value, int | float) for value in values):
         return list(values)
     return [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
-
-
-def failed(table: pandas.DataFrame) -> pandas.DataFrame:
-    """The rows that must not be used."""
-    return table[table["status"] != DONE]
