@@ -12,16 +12,9 @@ from typing import Any
 import numpy as np
 import scipy
 
+from asperity import coupling
 from asperity.arrays import Field
-from asperity.coupling import (
-    LINEAR_UP_TO,
-    Tangent,
-    Vibration,
-    VibrationModel,
-    band_about,
-    contact_vibration,
-    damped_oscillator,
-)
+from asperity.coupling import LINEAR_UP_TO, Tangent, Vibration, VibrationModel, band_about, contact_vibration
 from asperity.ehl import Scales, solve_contact
 from asperity.errors import BadInput, NotConverged
 from asperity.history.history import History
@@ -149,17 +142,14 @@ def history_vibration(
     surfaces = history.surfaces()
     steps, stiffness, unsolved = _tangents(history, surfaces, model, moments)
     with case.naming("vibration"):
-        oscillator = damped_oscillator(float(np.mean(stiffness)), case.conditions.load, model)
+        oscillator = coupling.damped_oscillator(float(np.mean(stiffness)), case.conditions.load, model)
         alone = model
         if model.needs_solution:
             alone = model.with_choices(stiffness_law="hertz-point", excitation="noise")
         coupled = contact_vibration(history.mean_state, case.conditions, alone)
     f0 = oscillator.natural_frequency_hz
     period, objection = _period(surfaces)
-    profile: Signal | None = None
-    not_periodic: float | None = None
-    if period is not None:
-        profile, not_periodic, objection = _passage(history, period)
+    profile, not_periodic, objection = (None, None, objection) if period is None else _passage(history, period)
     vibration = HistoryVibration(
         oscillator=oscillator,
         stiffness=stiffness,
@@ -208,8 +198,7 @@ def repeating(time: Field, heights: Field, period: float) -> tuple[Signal | None
     phase = 2.0 * np.pi * np.outer(time / period, np.arange(1, waves + 1))
     basis = np.hstack([np.ones((time.size, 1)), np.cos(phase), np.sin(phase)])
     coefficients: Field = np.linalg.lstsq(basis, heights - heights.mean(), rcond=None)[0]
-    left = float(np.std(heights - basis @ coefficients))
-    varied = float(np.std(heights))
+    left, varied = float(np.std(heights - basis @ coefficients)), float(np.std(heights))
     samples = math.ceil(length)
     spectrum = np.zeros(samples // 2 + 1, dtype=complex)
     spectrum[1 : waves + 1] = samples / 2.0 * (coefficients[1 : waves + 1] - 1j * coefficients[waves + 1 :])
@@ -220,9 +209,8 @@ def resampled(profile: Signal, rate_hz: float) -> Signal:
     """A profile that repeats, at `rate_hz` or faster: its own waves and no others."""
     samples = profile.values.size
     finer = scipy.fft.next_fast_len(max(samples, math.ceil(samples * rate_hz / profile.rate_hz)), real=True)
-    return replace(
-        profile, values=scipy.signal.resample(profile.values, finer), rate_hz=profile.rate_hz * finer / samples
-    )
+    values = scipy.signal.resample(profile.values, finer)
+    return replace(profile, values=values, rate_hz=profile.rate_hz * finer / samples)
 
 
 def steady_response(oscillator: ContactOscillator, profile: Signal) -> Signal:
@@ -262,9 +250,8 @@ def _tangents(
             failure = unfinished
             unsolved.append(int(number))
     if not stiffness:
-        raise NotConverged(
-            failure.solution, f"the tangent stiffness could be had at none of {len(unsolved)} steps: {failure}"
-        )
+        reason = f"the tangent stiffness could be had at none of {len(unsolved)} steps: {failure}"
+        raise NotConverged(failure.solution, reason)
     return tuple(solved), np.array(stiffness), tuple(unsolved)
 
 
@@ -274,10 +261,7 @@ def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonanc
     apart = spectrum.spacing_hz
     if (band[1] - band[0]) / apart < FEWEST_LINES + 1:
         least = math.ceil((FEWEST_LINES + 1) * apart / (band[1] - band[0]))
-        return no_resonance(
-            f"the track repeats: its lines lie {apart:.0f} Hz apart, too far to show a resonance near {f0:.0f} Hz; "
-            f"make motion.track {least} times as long or more",
-            band,
-            model.method,
-        )
+        reason = f"the track repeats: its lines lie {apart:.0f} Hz apart, too far to show a resonance near {f0:.0f} Hz"
+        remedy = f"make motion.track {least} times as long or more"
+        return no_resonance(f"{reason}; {remedy}", band, model.method)
     return contact_resonance(spectrum, band_hz=band, method=model.method)

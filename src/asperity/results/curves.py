@@ -10,10 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from asperity.case import Case
-from asperity.conditions import ContactConditions
 from asperity.ehl import HOT, ContactSolution, Iteration, contact_state, friction_and_heat, solve_thermal_contact
 from asperity.errors import BadInput, require_positive
-from asperity.surface import Surface
 
 SolverProgress = Callable[[Iteration], None]
 FrictionCurveKind = Literal["stribeck", "traction"]
@@ -81,11 +79,9 @@ class FrictionCurve:
                 f"Friction is at most {highest.friction_coefficient:.4f}, at a slide-to-roll ratio of "
                 f"{100 * highest.slide_to_roll:.3g} %"
             )
-        sentence += f" (Sq {1e6 * self.sq:.3g} um, boundary friction {self.boundary_friction:g})"
+        sentence += f" (Sq {1e6 * self.sq:.3g} um, boundary friction {self.boundary_friction:g})."
         unfinished = sum(not point.converged for point in self.points)
-        return (
-            f"NOT CONVERGED at {unfinished} of {len(self.points)} points: {sentence}." if unfinished else f"{sentence}."
-        )
+        return f"NOT CONVERGED at {unfinished} of {len(self.points)} points: {sentence}" if unfinished else sentence
 
     def hint(self) -> str | None:
         """What a reader has to know about the figures, None if nothing."""
@@ -120,12 +116,9 @@ def stribeck_curve(
         speeds = [float(speed) for speed in np.geomspace(low, high, SPEEDS)]
     for speed in speeds:
         require_positive("entrainment speed", speed, "m/s")
-    ratios = [speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds]
-    wanted = [
-        replace(case.conditions, surface_speeds=(ratios[0] * speed, ratios[1] * speed)) for speed in sorted(speeds)
-    ]
-    points = _solved(case, case.surface(), wanted[::-1], progress)  # from full film down: each starts the next well
-    return _curve(case, "stribeck", points[::-1])
+    first, second = (speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds)
+    pairs = [(first * speed, second * speed) for speed in sorted(speeds, reverse=True)]
+    return _curve(case, "stribeck", pairs, progress)  # from full film down: each starts the next well
 
 
 def traction_curve(
@@ -149,56 +142,41 @@ def traction_curve(
         if not 0.0 <= slip <= MOST_SLIP:
             raise BadInput(f"slide-to-roll ratio must lie between 0 and {MOST_SLIP:g}, got {slip:g}")
     speed = case.conditions.entrainment_speed
-    wanted = [
-        replace(case.conditions, surface_speeds=(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)))
-        for slip in sorted(slips)
-    ]
-    return _curve(case, "traction", _solved(case, case.surface(), wanted, progress))
+    pairs = [(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)) for slip in sorted(slips)]
+    return _curve(case, "traction", pairs, progress)
 
 
-def _curve(case: Case, kind: FrictionCurveKind, points: list[FrictionPoint]) -> FrictionCurve:
-    if not points:
+def _curve(
+    case: Case, kind: FrictionCurveKind, speeds: Sequence[tuple[float, float]], progress: SolverProgress | None
+) -> FrictionCurve:
+    """Contacts at these surface speeds, each started from the one before."""
+    if not speeds:
         raise BadInput("a curve needs at least one point, got none")
-    return FrictionCurve(
-        kind=kind,
-        points=tuple(points),
-        boundary_friction=case.boundary_friction,
-        sq=case.surface().sq,
-        feedback=case.thermal.feedback,
-    )
-
-
-def _solved(
-    case: Case, surface: Surface, wanted: Sequence[ContactConditions], progress: SolverProgress | None
-) -> list[FrictionPoint]:
-    points: list[FrictionPoint] = []
+    surface, points = case.surface(), []
     start: ContactSolution | None = None
-    for conditions in wanted:
-        solution = _solve(case, surface, conditions, start, progress)
-        if start is not None and not solution.convergence.converged:
-            solution = _solve(case, surface, conditions, None, progress)
+    for pair in speeds:
+        for first in (start, None):  # from nothing where the neighbour leads nowhere
+            solution = solve_thermal_contact(
+                replace(case.conditions, surface_speeds=pair),
+                case.lubricant,
+                surface,
+                boundary_friction=case.boundary_friction,
+                thermal=case.thermal,
+                options=case.options,
+                start=first,
+                strict=False,
+                progress=progress,
+            )
+            if solution.convergence.converged or first is None:
+                break
         start = solution if solution.convergence.converged else None
         points.append(_point(case, solution))
-    return points
-
-
-def _solve(
-    case: Case,
-    surface: Surface,
-    conditions: ContactConditions,
-    start: ContactSolution | None,
-    progress: SolverProgress | None,
-) -> ContactSolution:
-    return solve_thermal_contact(
-        conditions,
-        case.lubricant,
-        surface,
+    return FrictionCurve(
+        kind=kind,
+        points=tuple(points if kind == "traction" else points[::-1]),
         boundary_friction=case.boundary_friction,
-        thermal=case.thermal,
-        options=case.options,
-        start=start,
-        strict=False,
-        progress=progress,
+        sq=surface.sq,
+        feedback=case.thermal.feedback,
     )
 
 

@@ -13,28 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity import ehl
 from asperity.arrays import Field
 from asperity.case import Case, load_case
 from asperity.coupling import Vibration, contact_vibration, require_sampling
-from asperity.ehl import (
-    FILMS,
-    HOT,
-    ContactSolution,
-    ContactState,
-    FlashTemperature,
-    Friction,
-    Iteration,
-    LoadSharing,
-    SubsurfaceStress,
-    clr_below,
-    contact_state,
-    friction_and_heat,
-    load_solution,
-    save_dataset,
-    sharing_by_film,
-    solve_thermal_contact,
-    subsurface_stress,
-)
+from asperity.ehl import FILMS, HOT, ContactSolution, ContactState, FlashTemperature, Friction, friction_and_heat
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.quantities import lines, quantity, read
 from asperity.surface import Surface
@@ -69,9 +52,8 @@ class Run:
     def _rubbing(self) -> tuple[Friction, FlashTemperature] | str:
         """Friction and heat, or why there are none."""
         try:
-            return friction_and_heat(
-                self.solution, boundary_friction=self.case.boundary_friction, thermal=self.case.thermal
-            )
+            case = self.case
+            return friction_and_heat(self.solution, boundary_friction=case.boundary_friction, thermal=case.thermal)
         except BadInput:
             raise
         except AsperityError as error:  # the film, the load sharing and the stress are as good without it
@@ -105,9 +87,9 @@ class Run:
         return self._rubbing if isinstance(self._rubbing, str) else None
 
     @cached_property
-    def stress(self) -> SubsurfaceStress:
+    def stress(self) -> ehl.SubsurfaceStress:
         """Stresses in body 1 under the solved pressure and friction's traction."""
-        return subsurface_stress(self.solution, shear=None if self.friction is None else self.friction.shear)
+        return ehl.subsurface_stress(self.solution, shear=None if self.friction is None else self.friction.shear)
 
     @property
     def resonance(self) -> Resonance | None:
@@ -116,14 +98,14 @@ class Run:
         return resonance if resonance is not None and resonance.found else None
 
     @cached_property
-    def sharing(self) -> LoadSharing:
+    def sharing(self) -> ehl.LoadSharing:
         """The load by film."""
-        return sharing_by_film(self.solution)
+        return ehl.sharing_by_film(self.solution)
 
     @property
     def load_below(self) -> dict[str, float]:
         """Share of the load on films no thicker than each of `FILMS`."""
-        return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
+        return {f"{film * 1e9:.0f}nm": ehl.clr_below(self.solution, film) for film in FILMS}
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its key in the catalogue of quantities, SI; None where there is none."""
@@ -182,14 +164,14 @@ class Run:
 
     def save(self, path: str | Path) -> Path:
         """Write the run as one netCDF that restates its case, whole or not at all, and return the path."""
-        return save_dataset(self.to_dataset(), path)
+        return ehl.save_dataset(self.to_dataset(), path)
 
 
 def solve_case(
     case: Case,
     *,
     surface: Surface | None = None,
-    progress: Callable[[Iteration], None] | None = None,
+    progress: Callable[[ehl.Iteration], None] | None = None,
     strict: bool = True,
 ) -> Run:
     """Solve a case, and work out its vibration.
@@ -210,10 +192,8 @@ def solve_case(
     """
     if surface is not None:
         if surface.grid != case.grid:
-            raise BadInput(
-                f"surface must lie on the case's grid, got {surface.grid} where the case has {case.grid}; "
-                "make it on case.grid"
-            )
+            grids = f"got {surface.grid} where the case has {case.grid}"
+            raise BadInput(f"surface must lie on the case's grid, {grids}; make it on case.grid")
         case = replace(case, stored=surface)
     roughness = case.surface()
     if case.vibration is not None:
@@ -222,7 +202,7 @@ def solve_case(
     notes = (*case.surface_notes, *case.notes)
     kept = {"case": case.text, "notes": json.dumps(notes)}
     try:
-        solution = solve_thermal_contact(
+        solution = ehl.solve_thermal_contact(
             case.conditions,
             case.lubricant,
             roughness,
@@ -246,20 +226,19 @@ def load_run(path: str | Path) -> Run:
         if the file is missing, damaged, or holds no case.
     """
     path = Path(path)
-    solution = load_solution(path)
+    solution = ehl.load_solution(path)
     try:
         text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
     except (KeyError, ValueError):
-        raise UnreadableFile(
-            f"{path} holds a solution without its case; save the run (Run.save), not its solution alone"
-        ) from None
+        alone = f"{path} holds a solution without its case"
+        raise UnreadableFile(f"{alone}; save the run (Run.save), not its solution alone") from None
     case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
     case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
     return _run(case, solution, notes)
 
 
 def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
-    state = contact_state(solution)
+    state = ehl.contact_state(solution)
     model = case.vibration
     with case.naming("vibration"):
         vibration = None if model is None else contact_vibration(state, case.conditions, model, solution=solution)
@@ -272,7 +251,7 @@ def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
 
 def _threshold(solution: ContactSolution) -> str:
     """What the conserving model's share of asperities counts, and what another film would make of it."""
-    sharing = sharing_by_film(solution)
+    sharing = ehl.sharing_by_film(solution)
     shares = ", ".join(
         f"{100 * share:.0f} % of at most {film * 1e9:.0f} nm"
         for film, share in zip(sharing.films, sharing.below, strict=True)

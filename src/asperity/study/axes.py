@@ -3,7 +3,6 @@
 Swept quantities are in the unit that they were written in.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,10 +11,11 @@ import numpy as np
 import pandas
 
 from asperity.arrays import Field
-from asperity.case import Case, split_amount
+from asperity.case import split_amount
 from asperity.errors import BadInput
 from asperity.study.curve import student_reach
 from asperity.study.plan import StudyPlan, as_written
+from asperity.study.ranges import stated_value
 
 MOST_VALUES = 12  # of a swept quantity that has a mean each, however few cases share one
 GROUPS = 8  # of one with more
@@ -64,7 +64,8 @@ class SweptAxis:
 
 def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
     """A swept key over the rows of a study's table, in the unit that its first value was written in."""
-    own = _own_value(plan.case, key)
+    own = stated_value(plan.case, key)
+    own = "not set" if own is None else own
     written = [plan.cases[number].overrides.get(key, own) for number in table["number"]]
     try:
         numbers, unit = _numbers(written)
@@ -73,8 +74,7 @@ def swept_axis(plan: StudyPlan, table: pandas.DataFrame, key: str) -> SweptAxis:
         names = {text: _short(value) for text, value in zip(texts, written, strict=True)}
         if len(set(names.values())) < len(names):
             names = {text: text for text in names}
-        order = list(names)
-        values = np.array([order.index(text) for text in texts], dtype=float)
+        values = np.array([list(names).index(text) for text in texts], dtype=float)
         return SweptAxis(key, values, names=tuple(names.values()))
     return SweptAxis(key, numbers, unit, logarithmic=_crowds_low(np.unique(numbers)))
 
@@ -94,13 +94,11 @@ def group_means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field,
     rows = []
     for number in np.unique(group):
         members = values[group == number]
-        mean = float(members.mean())
-        reach = np.nan
-        if members.size > 1:
-            reach = float(student_reach(members.std(ddof=1), members.size))
-        rows.append((float(x[group == number].mean()), mean, mean - reach, mean + reach))
-    columns = np.array(rows).reshape(-1, 4).T
-    return columns[0], columns[1], columns[2], columns[3]
+        mean = members.mean()
+        reach = student_reach(members.std(ddof=1), members.size) if members.size > 1 else np.nan
+        rows.append((x[group == number].mean(), mean, mean - reach, mean + reach))
+    places, means, low, high = np.array(rows, dtype=float).reshape(-1, 4).T
+    return places, means, low, high
 
 
 def pair_means(values: Field, across: SweptAxis, up: SweptAxis) -> Field:
@@ -128,22 +126,12 @@ def _short(value: Any) -> str:
     return as_written(value).rpartition("/")[2]
 
 
-def _own_value(case: Case, key: str) -> Any:
-    """What a case says of a key that a point leaves alone."""
-    value: Any = tomllib.loads(case.text)
-    for part in key.split("."):
-        value = value.get(part) if isinstance(value, dict) else None
-    return "not set" if value is None else value
-
-
 def _numbers(written: Sequence[Any]) -> tuple[Field, str]:
     """Values in the first one's unit; BadInput where one is no number or an uneven pair."""
-    single = []
-    for value in written:
-        entries = list(value) if isinstance(value, list | tuple) else [value]
-        if any(entry != entries[0] for entry in entries):
-            raise BadInput(f"{value} is no single number")
-        single.append(entries[0])
+    pairs = [list(value) if isinstance(value, list | tuple) else [value] for value in written]
+    if any(entry != pair[0] for pair in pairs for entry in pair):
+        raise BadInput("uneven pairs are no single numbers")
+    single = [pair[0] for pair in pairs]
     unit = split_amount(single[0])[1]
     return np.array([float(split_amount(value, unit)[0]) for value in single]), unit
 

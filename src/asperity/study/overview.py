@@ -50,9 +50,8 @@ class StudyOverview:
 
     def __post_init__(self) -> None:
         if not len(self.result.table):
-            raise BadInput(
-                f"the study has no computed case yet, of {len(self.result.plan.cases)}; run it with asperity study"
-            )
+            planned = len(self.result.plan.cases)
+            raise BadInput(f"the study has no computed case yet, of {planned}; run it with asperity study")
 
     @cached_property
     def used(self) -> pandas.DataFrame:
@@ -137,14 +136,13 @@ class StudyOverview:
         """Sentences to read before the numbers."""
         notes = []
         if self.result.missing:
-            notes.append(
-                f"{self.result.missing} of {len(self.result.plan.cases)} cases have not been computed yet: run the "
-                "study again."
-            )
+            share = f"{self.result.missing} of {len(self.result.plan.cases)} cases"
+            notes.append(f"{share} have not been computed yet: run the study again.")
         if self.result.plan.realisations == 1:
             notes.append("One surface a point: other seeds give other numbers, and there is no interval of them.")
         notes += [self.runs] if isinstance(self.runs, str) else self._changed_maps(self.runs)
-        silent = {name: self.used[f"crf_{name}_hz"].isna().sum() for name in BOTH_PRESETS if self._has_preset(name)}
+        columns = {name: f"crf_{name}_hz" for name in BOTH_PRESETS if f"crf_{name}_hz" in self.used}
+        silent = {name: self.used[column].isna().sum() for name, column in columns.items()}
         if self.curve is not None and not silent:
             notes.append("The case has no [vibration]: there is no contact resonance to show.")
         if any(silent.values()):
@@ -154,9 +152,6 @@ class StudyOverview:
                 "CRFA leave them out."
             )
         return notes
-
-    def _has_preset(self, name: str) -> bool:
-        return f"crf_{name}_hz" in self.used
 
     def _changed_maps(self, runs: Sequence[Run]) -> list[str]:
         """Which maps are not of the contacts in the table."""

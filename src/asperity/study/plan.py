@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from difflib import get_close_matches
 from functools import cached_property
-from itertools import product
+from itertools import permutations, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,7 +71,8 @@ class StudyPlan:
 
     @cached_property
     def _fixed(self) -> dict[str, Any]:
-        return {"kind": self.kind, "surface file": self.surface_digest, **_flat(self.case.contents)}
+        values = {key: to_si(value) for key, value in _entries(self.case.contents) if not isinstance(value, Section)}
+        return {"kind": self.kind, "surface file": self.surface_digest, **values}
 
     @cached_property
     def surface_digest(self) -> str | None:
@@ -92,9 +93,8 @@ class StudyPlan:
             seeded = [key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)]
             shared: dict[str, Any] = {}
             if self.ids is None:
-                shared = {**self._fixed, **plain}
-                if shaped is not self.case:
-                    shared["surface file"] = _surface_digest(shaped)
+                file = self.surface_digest if shaped is self.case else _surface_digest(shaped)
+                shared = {**self._fixed, **plain, "surface file": file}
             words = [] if self.seeding == "common" else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
             for realisation in range(self.realisations):
                 if self.seeds is None:
@@ -127,29 +127,20 @@ def plan_study(case: Case) -> StudyPlan:
     keys = {_full_key(case, name): (name, values) for name, values in section.axes.items()}
     if len(keys) < len(section.axes):
         raise BadInput(f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}")
-    for key in keys:
-        for part in keys:
-            if part.startswith(f"{key}."):
-                raise BadInput(
-                    f"{case.source}: study sweeps {key} and {part}, a part of it; write {part} in its tables"
-                )
+    for key, part in permutations(keys, 2):
+        if part.startswith(f"{key}."):
+            raise BadInput(f"{case.source}: study sweeps {key} and {part}, a part of it; write {part} in its tables")
     count = math.prod(
         len(values) if isinstance(values, tuple) else _range_size(case, name, values) for name, values in keys.values()
     )
     seeds = section.seeds
-    realisations = seeds if isinstance(seeds, int) else len(seeds)
-    if (section.samples or count) * realisations > MOST_CASES:
-        raise BadInput(
-            f"{case.source}: study has {(section.samples or count) * realisations} cases, more than {MOST_CASES}; "
-            "widen its steps, or take samples"
-        )
-    points: list[dict[str, Any]]
+    cases = (section.samples or count) * (seeds if isinstance(seeds, int) else len(seeds))
+    if cases > MOST_CASES:
+        remedy = "widen its steps, or take samples"
+        raise BadInput(f"{case.source}: study has {cases} cases, more than {MOST_CASES}; {remedy}")
     if section.samples is None:
-        swept = {
-            key: values if isinstance(values, tuple) else tuple(_range(case, name, values))
-            for key, (name, values) in keys.items()
-        }
-        points = [dict(zip(swept, combined, strict=True)) for combined in product(*swept.values())]
+        swept = (v if isinstance(v, tuple) else tuple(_range(case, name, v)) for name, v in keys.values())
+        points = [dict(zip(keys, combined, strict=True)) for combined in product(*swept)]
     else:
         points = _sampled(case, keys, section.samples, section.sample_seed)
     _require_distinct(case, points)
@@ -186,8 +177,7 @@ def plan_points(
     if axes is None:
         axes = tuple(dict.fromkeys(key for point in points for key in point))
     _require_values(base, axes, points)
-    given = None if isinstance(seeds, int) else tuple(seeds)
-    realisations = seeds if isinstance(seeds, int) else len(seeds)
+    given, realisations = (None, seeds) if isinstance(seeds, int) else (tuple(seeds), len(seeds))
     if realisations < 1:
         raise BadInput(f"seeds must be 1 or more, got {realisations}")
     if given is not None and len(set(given)) < realisations:
@@ -200,10 +190,8 @@ def _require_values(case: Case, axes: Sequence[str], points: Sequence[Mapping[st
     for key in axes:
         values = {json.dumps(to_si(point[key])): point[key] for point in points if key in point}
         chosen = list(values.values())
-        numbers = [to_si(value) for value in chosen]
-        if len(chosen) > 100 and all(isinstance(number, float | int) for number in numbers):
-            order = sorted(range(len(chosen)), key=numbers.__getitem__)
-            chosen = [chosen[order[0]], chosen[order[-1]]]
+        if len(chosen) > 100 and all(isinstance(to_si(value), float | int) for value in chosen):
+            chosen = [min(chosen, key=to_si), max(chosen, key=to_si)]
         for value in chosen:
             case.with_overrides({key: value})
 
@@ -215,20 +203,16 @@ def _require_distinct(case: Case, points: Sequence[Mapping[str, Any]]) -> None:
         plain = json.dumps({key: to_si(value) for key, value in point.items()}, sort_keys=True)
         if plain in seen:
             where = ", ".join(f"{key} = {as_written(value)}" for key, value in point.items())
-            raise BadInput(
-                f"{case.source}: study has the point {where} twice; write each value once, "
-                "and ask for more surfaces by seeds"
-            )
+            remedy = "write each value once, and ask for more surfaces by seeds"
+            raise BadInput(f"{case.source}: study has the point {where} twice; {remedy}")
         seen.add(plain)
 
 
 def _full_key(case: Case, name: str) -> str:
     """The dotted key that a name in [study] means: itself, or the one key of the case that ends so."""
-    tables: list[str] = []
-    keys: list[str] = []
-    for key, value in _entries(case.contents):
-        if key.partition(".")[0] not in ("study", FOR_RUNS):
-            (tables if isinstance(value, Section) else keys).append(key)
+    entries = [(k, v) for k, v in _entries(case.contents) if k.partition(".")[0] not in ("study", FOR_RUNS)]
+    tables = [key for key, value in entries if isinstance(value, Section)]
+    keys = [key for key, value in entries if not isinstance(value, Section)]
     if name.partition(".")[0] == FOR_RUNS:
         raise BadInput(f"{case.source}: study.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run")
     if name in (*keys, *tables):
@@ -375,11 +359,6 @@ def _surface_digest(case: Case) -> str | None:
         except OSError as error:
             raise UnreadableFile(f"{file} cannot be read: {error.strerror}; check surface.file") from None
     return digest.hexdigest() if any(files) else None
-
-
-def _flat(section: Section) -> dict[str, Any]:
-    """Every value of the case in SI by its dotted key."""
-    return {key: to_si(value) for key, value in _entries(section) if not isinstance(value, Section)}
 
 
 def _hash(values: Mapping[str, Any]) -> str:

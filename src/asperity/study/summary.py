@@ -9,13 +9,12 @@ from asperity.study.plan import StudyPlan
 
 def study_verdict(result: StudyResult) -> str:
     """How much of the study there is, and what it says."""
-    planned, there = len(result.plan.cases), len(result.table)
-    share = f"{there} cases" if there == planned else f"{there} of {planned} cases"
-    sentence = f"{share}, {result.failed or 'none'} failed"
+    of_all = f" of {len(result.plan.cases)}" if result.missing else ""
+    sentence = f"{len(result.table)}{of_all} cases, {result.failed or 'none'} failed"
     if result.computed:
         sentence += f"; {result.computed} computed in {duration_text(result.seconds)}"
-    curve = finished_curve(result)
-    if curve is not None and there == planned:
+    curve = None if result.missing else finished_curve(result)
+    if curve is not None:
         sentence += f". {curve.verdict()}"
     return f"{sentence.rstrip('.')}."
 
@@ -33,8 +32,8 @@ def study_scalars(result: StudyResult) -> dict[str, Any]:
         "axes": list(result.plan.axes),
         "seeds": result.plan.realisations,
     }
-    curve = finished_curve(result)
-    if curve is not None and len(result.table) == len(result.plan.cases):
+    curve = None if result.missing else finished_curve(result)
+    if curve is not None:
         scalars["stages"] = {
             name: {
                 "kind": stages.kind,
