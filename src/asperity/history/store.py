@@ -175,10 +175,8 @@ def open_keeper(
         kept = read_manifest(folder, of="history", layout=FORMAT)
         require_same_version(kept, folder)
         if kept["digest"] != digest:
-            raise BadInput(
-                f"{folder} holds the history of another case than {case.source}; choose another folder, or the case "
-                "as it was"
-            )
+            remedy = "choose another folder, or the case as it was"
+            raise BadInput(f"{folder} holds the history of another case than {case.source}; {remedy}")
         usual = kept["every"]
     elif folder.exists() and any(folder.iterdir()):
         raise BadInput(f"{folder} is not empty and holds no history; name a new folder")

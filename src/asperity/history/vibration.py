@@ -92,10 +92,10 @@ class HistoryVibration:
     def verdict(self) -> str:
         """One sentence: the contact's own resonance, the paper's, and what drives the mass."""
         f0, coupled, force = self.oscillator.natural_frequency_hz, self.coupled.oscillator, self.dynamic_load
+        by_paper = "not at all" if coupled is None else f"at {coupled.natural_frequency_hz:.0f} Hz"
         sentence = (
             f"By its own stiffness, taken at {len(self.moments)} moments, the contact resonates at "
-            f"{f0:.0f} ± {self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling "
-            + ("not at all" if coupled is None else f"at {coupled.natural_frequency_hz:.0f} Hz")
+            f"{f0:.0f} ± {self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling {by_paper}"
         )
         if self.approach_std is not None and force is not None:
             sentence += (

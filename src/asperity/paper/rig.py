@@ -163,20 +163,16 @@ def _require_settings(
     require_positive("rig recording's duration", duration_s, "s")
     require_positive("rig sampling rate", rate_hz, "Hz")
     if round(duration_s * rate_hz) < SHORTEST_RECORD:
-        raise BadInput(
-            f"a rig recording needs at least {SHORTEST_RECORD} samples, got {duration_s:g} s at {rate_hz:g} Hz; "
-            "lengthen it"
-        )
+        record = f"{duration_s:g} s at {rate_hz:g} Hz"
+        raise BadInput(f"a rig recording needs at least {SHORTEST_RECORD} samples, got {record}; lengthen it")
 
 
 def _band(conditions: ContactConditions, model: VibrationModel, rate_hz: float) -> tuple[float, float]:
     """The search band [Hz], which the sampling rate must be able to show."""
     band_hz = search_band(conditions, model)
     if rate_hz < RATE_PER_BAND * band_hz[1]:
-        raise BadInput(
-            f"rig sampling rate must be at least {RATE_PER_BAND:g} times the upper end of the "
-            f"search band, {band_hz[1]:.0f} Hz, got {rate_hz:g} Hz; raise it"
-        )
+        least = f"{RATE_PER_BAND:g} times the upper end of the search band, {band_hz[1]:.0f} Hz"
+        raise BadInput(f"rig sampling rate must be at least {least}, got {rate_hz:g} Hz; raise it")
     return band_hz
 
 
@@ -188,10 +184,10 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
     if model is None:
         raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
     if not model.stiffness_law.asperities_alone:
+        usable = " or ".join(name for name, law in STIFFNESS_LAWS.items() if law.asperities_alone)
         raise BadInput(
             f"{case.source}: a rig's resonance follows the asperities' load, got the stiffness law "
-            f"{model.stiffness_law.name!r}; "
-            f"take {' or '.join(name for name, law in STIFFNESS_LAWS.items() if law.asperities_alone)}"
+            f"{model.stiffness_law.name!r}; take {usable}"
         )
     return case.conditions, model
 

@@ -48,10 +48,8 @@ class VibratedCase:
         sentence += f", CRFA {resonance.crfa:.3g} (m/s^2)^2/Hz: {contact}"
         linear = model is not None and model.linear
         if linear and force is not None and force > LINEAR_UP_TO:
-            sentence += (
-                f"; but the dynamic force is {100 * force:.0f} % of the load, too much for a linear spring: "
-                "take vibration.response = nonlinear"
-            )
+            sentence += f"; but the dynamic force is {100 * force:.0f} % of the load, too much for a linear spring: "
+            sentence += "take vibration.response = nonlinear"
         return f"{sentence}."
 
 

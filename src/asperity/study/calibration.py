@@ -25,7 +25,6 @@ from asperity.study.ranges import (
     OPEN_RANGES,
     ParameterRange,
     at_cells,
-    entry_of,
     open_ranges,
     overrides_at,
     parse_range,
@@ -209,13 +208,11 @@ def _parameters(
 def _start(case: Case, entry: ParameterRange) -> float | None:
     """What the case itself has, in the range's unit; of a pair in which both are free as one, the first."""
     value = stated_value(case, entry.key)
-    if isinstance(value, list) and entry_of(entry.key)[1] is None:
-        value = value[0]
+    value = value[0] if isinstance(value, list) else value
     return None if value is None else float(split_amount(value, entry.unit)[0])
 
 
 def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> pandas.DataFrame:
     """The anchors that the curve's levels can tell."""
     reached = [a for a in anchors if a.sq is not None and np.isfinite(a.of(curve)[0])]
-    aimed_without = [a for a in anchors if a.fitted and a not in reached]
-    return compare_with_anchors(curve, [*reached, *aimed_without])
+    return compare_with_anchors(curve, [*reached, *(a for a in anchors if a.fitted and a not in reached)])

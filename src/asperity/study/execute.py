@@ -20,7 +20,7 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice, takewhile
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -249,10 +249,8 @@ class _Work:
             return [self.waiting.popleft()]
         size = 1 if self.case_s is None else math.ceil(BATCH_S / max(self.case_s, BATCH_S / LARGEST_BATCH))
         fair = math.ceil(len(self.waiting) / (2 * workers))  # or one worker ends long after the others
-        taken: list[StudyCase] = []
-        while self.waiting and len(taken) < min(size, fair) and not self.deaths[self.waiting[0].id]:
-            taken.append(self.waiting.popleft())
-        return taken
+        next_ones = takewhile(lambda case: not self.deaths[case.id], islice(self.waiting, min(size, fair)))
+        return [self.waiting.popleft() for _ in list(next_ones)]
 
     def finish(
         self, batch: Sequence[StudyCase], results: Sequence[tuple[Row, dict[str, Field]]], seconds: float

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -218,9 +219,9 @@ def sensitivity(
     seeded = [key for key in SEED_KEYS if stated_value(case, key) is not None]
     factors = (*(entry.key for entry in ranges), *([SEED_FACTOR] if seeded else []))
     design = sample_design(method, len(factors), size or SIZES[method], sample_seed)
-    plan = _plan(case, ranges, seeded, design, curve, seeds, sample_seed)
-    result = run_study(plan, out=out, executor=executor, workers=workers, progress=progress)
-    return _analysed(case, ranges, factors, design, result, sq, curve, seeds)
+    study = _Design(case, ranges, tuple(seeded), design, curve, seeds, sample_seed)
+    result = run_study(study.plan(), out=out, executor=executor, workers=workers, progress=progress)
+    return _analysed(study, factors, result, sq)
 
 
 # The study -----------------------------------------------------------------------------------------------------------
@@ -238,51 +239,41 @@ def _curve_levels(sq: Sequence[float], levels: int) -> tuple[float, ...]:
     return tuple(sorted({float(f"{value:.6g}") for value in (*sq, *between)}))
 
 
-def _plan(
-    case: Case,
-    ranges: Sequence[ParameterRange],
-    seeded: Sequence[str],
-    design: SampleDesign,
-    curve: Sequence[float],
-    seeds: int,
-    seed: int,
-) -> StudyPlan:
-    points = []
-    for number, shares in enumerate(design.shares):
-        chosen = overrides_at(case, ranges, shares[: len(ranges)])
-        for level in curve:
-            for surface in range(seeds):
-                point = {**chosen, "surface.sq": f"{1e6 * level:g} um"}
-                if seeded:
-                    point |= _seeds(seeded, design, number, float(shares[-1]), surface, seed)
-                points.append(point)
-    return plan_points(case, points)
+class _Design(NamedTuple):
+    """What is solved: every level of the curve with every surface, at every point of the sample."""
+
+    case: Case
+    ranges: tuple[ParameterRange, ...]
+    seeded: tuple[str, ...]
+    sample: SampleDesign
+    curve: tuple[float, ...]
+    seeds: int
+    sample_seed: int
+
+    def plan(self) -> StudyPlan:
+        points = []
+        for number, shares in enumerate(self.sample.shares):
+            chosen = overrides_at(self.case, self.ranges, shares[: len(self.ranges)])
+            for level, surface in product(self.curve, range(self.seeds)):
+                drawn = self._drawn(number, float(shares[-1]), surface)
+                points.append({**chosen, "surface.sq": f"{1e6 * level:g} um", **drawn})
+        return plan_points(self.case, points)
+
+    def _drawn(self, number: int, share: float, surface: int) -> dict[str, int]:
+        """The realisation that a share of the seed's range stands for.
+
+        Sobol's shares are all different. Morris' are four, so each trajectory has four realisations of its own: its
+        step along the seed is a change of surface drawn anew.
+        """
+        trajectory = number // self.sample.block if self.sample.method == "morris" else 0
+        words = np.random.SeedSequence([self.sample_seed, trajectory, round(share * 2**31), surface])
+        drawn = zip(SEED_KEYS, words.generate_state(len(SEED_KEYS)), strict=True)
+        return {key: int(word) for key, word in drawn if key in self.seeded}
 
 
-def _seeds(
-    seeded: Sequence[str], design: SampleDesign, number: int, share: float, surface: int, seed: int
-) -> dict[str, int]:
-    """The realisation that a share of the seed's range stands for.
-
-    Sobol's shares are all different. Morris' are four, so each trajectory has four realisations of its own: its step
-    along the seed is a change of surface drawn anew.
-    """
-    trajectory = number // design.block if design.method == "morris" else 0
-    drawn = np.random.SeedSequence([seed, trajectory, round(share * 2**31), surface]).generate_state(len(SEED_KEYS))
-    return {key: int(word) for key, word in zip(SEED_KEYS, drawn, strict=True) if key in seeded}
-
-
-def _analysed(
-    case: Case,
-    ranges: tuple[ParameterRange, ...],
-    factors: tuple[str, ...],
-    design: SampleDesign,
-    result: StudyResult,
-    sq: Sequence[float],
-    curve: Sequence[float],
-    seeds: int,
-) -> Sensitivity:
-    shape = (len(design.shares), len(curve), seeds)
+def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq: Sequence[float]) -> Sensitivity:
+    design, curve = study.sample, study.curve
+    shape = (len(design.shares), len(curve), study.seeds)
     curves, silent_share = _curves(result, shape)
     outcomes, columns = _outcomes(curves, sq, curve)
     names = [*factors, *(outcome.name for outcome in outcomes)]
@@ -300,9 +291,9 @@ def _analysed(
             )
     lost = np.isnan(np.asarray(columns)).any(axis=0).reshape(-1, design.block).any(axis=1)
     return Sensitivity(
-        case=case,
+        case=study.case,
         method=design.method,
-        ranges=ranges,
+        ranges=study.ranges,
         factors=factors,
         outcomes=tuple(outcomes),
         effects=pandas.DataFrame(effects),

@@ -137,10 +137,8 @@ def _carried(case: Case, lengths: ParameterRange, others: Sequence[ParameterRang
     shortest = 1e6 * min(*along, grid.extent[1])
     low, high = max(lengths.low, 2.0 * coarsest), min(lengths.high, 0.49 * shortest)
     if low >= high:
-        raise BadInput(
-            f"{case.source}: the grid carries no correlation length from {lengths.low:g} to {lengths.high:g} um; "
-            "use more cells or a larger domain"
-        )
+        reason = f"the grid carries no correlation length from {lengths.low:g} to {lengths.high:g} um"
+        raise BadInput(f"{case.source}: {reason}; use more cells or a larger domain")
     return replace(lengths, low=float(f"{low:.3g}"), high=float(f"{high:.3g}"))
 
 
@@ -179,8 +177,7 @@ def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Iterable[
     for axis, key in enumerate(("grid.x", "grid.y")):
         if key in overrides and cells[axis] > 1:
             reach = overrides[key][1] - overrides[key][0]
-            even = 2 * round(cells[axis] * reach / _widest(case, ranges, key) / 2)
-            cells[axis] = max(even, FEWEST_CELLS)
+            cells[axis] = max(2 * round(cells[axis] * reach / _widest(case, ranges, key) / 2), FEWEST_CELLS)
     if tuple(cells) != case.grid.cells:
         overrides["grid.cells"] = cells
     return overrides

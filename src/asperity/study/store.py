@@ -67,16 +67,14 @@ class Store:
         self._write(self.folder / PARTS / f"{names[:20]}.parquet", table_of(rows))
 
     def _keep_maps(self, case_id: str, fields: Mapping[str, Field]) -> None:
-        zarr = require_zarr()
+        zarr, group_path = require_zarr(), self.folder / MAPS
         try:
-            group = zarr.open_group(self.folder / MAPS, mode="a").require_group(case_id)
+            group = zarr.open_group(group_path, mode="a").require_group(case_id)
             for name, values in fields.items():
                 group.create_array(name, data=values, chunks=values.shape, overwrite=True)
         except OSError as error:
             reason = error.strerror or error
-            raise AsperityError(
-                f"{self.folder / MAPS} could not be written: {reason}; finished cases are kept"
-            ) from error
+            raise AsperityError(f"{group_path} could not be written: {reason}; finished cases are kept") from error
 
     def merge(self) -> Path:
         """Write what is finished as one table, in the order of the plan, and return its path."""
@@ -189,6 +187,7 @@ def manifest_of(folder: Path) -> dict[str, Any]:
 
 
 def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
+    stated = ("surface_digest", "kind", "seeding", "seeds", "realisations", "axes", "points")
     return {
         "of": "study",
         "format": FORMAT,
@@ -197,13 +196,7 @@ def _manifest(plan: StudyPlan, folder: Path) -> dict[str, Any]:
         "source": plan.case.source,
         "case": plan.case.text,
         "case_folder": relative_path(plan.case.folder.resolve(), folder.resolve()),
-        "surface_digest": plan.surface_digest,
-        "kind": plan.kind,
-        "seeding": plan.seeding,
-        "seeds": plan.seeds,
-        "realisations": plan.realisations,
-        "axes": plan.axes,
-        "points": plan.points,
+        **{name: getattr(plan, name) for name in stated},
         "ids": [case.id for case in plan.cases],
     }
 
@@ -213,10 +206,8 @@ def _require_same(plan: StudyPlan, folder: Path) -> None:
     manifest = manifest_of(folder)
     require_same_version(manifest, folder)
     if manifest.get("design") != plan.design:
-        raise BadInput(
-            f"{folder} holds a study of another case than {plan.case.source}; "
-            "choose another folder, or the case as it was"
-        )
+        remedy = "choose another folder, or the case as it was"
+        raise BadInput(f"{folder} holds a study of another case than {plan.case.source}; {remedy}")
 
 
 def _read_part(path: Path, columns: list[str] | None = None) -> pyarrow.Table:
