@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import x3pio
 
-import asperity.results.run as results
+import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
 from asperity.errors import BadInput
 from asperity.surface import flat_surface
@@ -149,7 +149,7 @@ def test_ctrl_c_leaves_nothing(asp, monkeypatch, tmp_path):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(results, "solve_thermal_contact", interrupted)
+    monkeypatch.setattr(asperity.ehl, "solve_thermal_contact", interrupted)
     code, out, err = asp("solve", "case.toml", "--out", "run.nc")
     assert (code, out) == (1, "")
     assert err.startswith("error: interrupted")

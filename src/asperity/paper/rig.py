@@ -114,8 +114,7 @@ def simulate_rig(
     conditions, model = _contact(case)
     band_hz = _band(conditions, model, rate_hz)
     positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
-    printed = np.arange(len(SAMPLES_SQ_UM))
-    sq, sq_std = (np.interp(positions, printed, of_ring) * 1e-6 for of_ring in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
+    sq, sq_std = (np.interp(positions, range(len(um)), um) * 1e-6 for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
     whole = replace(dry_full_load(conditions, float(sq[0])), clr=1.0)
     full_load_crf_hz = oscillator(whole, conditions, model).natural_frequency_hz
     disturbance = disturbance or Disturbance()
