@@ -176,6 +176,40 @@ def test_local_stencil_is_the_twins_matrix(film, rows, storing):
     np.testing.assert_allclose(dense(stencil), expected, rtol=1e-12, atol=1e-12)
 
 
+def test_mobility_slopes_are_the_complex_step_of_the_twin(rng, film, rows):
+    """Each cell's mobility changed by what its own pressure does to it, all pressures held; ambient at both ends."""
+    compliance, pressure = 0.4, rng.random(CELLS)
+    pressure[[0, -1]] = 0.0
+    stencil = Stencil(*(np.zeros(CELLS) for _ in range(5)))
+    reynolds.add_mobility_slopes(rows, film, faces_of(film), pressure, compliance, (DX, DY), stencil)
+    slope = film.log_mobility_by_pressure + compliance * film.log_mobility_by_gap
+    expected = np.empty((pressure.size, pressure.size))
+    for column in range(pressure.size):
+        unit = np.zeros(pressure.size)
+        unit[column] = 1.0
+        mobility = film.mobility * (1.0 + 1e-30j * slope * unit.reshape(CELLS))
+        nothing = np.zeros(CELLS, complex)
+        out = twin.net_outflow(pressure + nothing, nothing, mobility, film.ambient, nothing[0], DX, DY)
+        expected[:, column] = (out.imag / 1e-30 * rows.fluid_scale * (rows.state == LUBRICATED)).ravel()
+    np.testing.assert_allclose(dense(stencil), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_leaning_outflow_is_its_twins(rng):
+    content, lean, found = rng.random(CELLS), rng.random(CELLS), np.empty(CELLS)
+    reynolds.leaning_outflow(content, lean, DX, found)
+    through = np.zeros((CELLS[0] + 1, CELLS[1]))  # x faces; the outer two and the first inner one stay as they are
+    through[2:-1] = lean[1:-1] * np.diff(content, axis=0)[:-1]
+    np.testing.assert_allclose(found, np.diff(through, axis=0) / DX, rtol=1e-12, atol=1e-12)
+
+
+def test_a_film_that_leans_by_a_half_has_the_second_order_wedge(rng, film):
+    pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
+    added = np.empty(CELLS)
+    reynolds.leaning_outflow(film.content, np.full(CELLS, 0.5), DX, added)
+    first = outflow(pressure, film, inlet, wedge=(0.0, 0.0))
+    np.testing.assert_allclose(first + added, outflow(pressure, film, inlet), rtol=1e-12, atol=1e-12)
+
+
 def test_fluid_diagonal_is_the_stencils_own_but_never_below_the_stiff_film(film):
     found = np.empty(CELLS)
     reynolds.fluid_diagonal(film, faces_of(film), NEAR, DX, DY, found)

@@ -238,7 +238,7 @@ def test_what_does_not_converge_is_loud(flattened):
 def test_what_it_does_not_cover_is_refused():
     with pytest.raises(BadInput, match="dry contact"):
         solve_contact(contact(), None, flat_surface(ON), options=OPTIONS)
-    with pytest.raises(BadInput, match="model must be unified or conserving"):
+    with pytest.raises(BadInput, match="model must be one of unified, paper, mixed, conserving"):
         Options(model="lossy")
     with pytest.raises(BadInput, match="solve without start"):
         solved(flat_surface(grid((96, 64))), start=solved(flat_surface(ON)))

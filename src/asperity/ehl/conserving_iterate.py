@@ -10,14 +10,12 @@ from itertools import count
 
 import numpy as np
 
-from asperity.arrays import Field
 from asperity.ehl.conserving import FREE, Earlier, OilBalance, Unknowns, evaluate
 from asperity.ehl.conserving_linear import newton_step
+from asperity.ehl.limit import StepLimit
 from asperity.ehl.problem import Problem
 from asperity.kernels.conserving import FULL, PLATEAU, RUPTURED
 
-LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step ...
-LONGEST_SHARE = 0.5  # ... or this share of the cell's own pressure
 LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
 FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
 BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
@@ -40,7 +38,7 @@ class OilStep:
 def newton(problem: Problem, unknowns: Unknowns, earlier: Earlier | None = None) -> Iterator[OilStep]:
     """Yield the start and then where each Newton step leads."""
     wanted_mean = problem.load / (unknowns.pressure.size * problem.spacing[0] * problem.spacing[1])
-    fluid, pressure = (_Limit(np.zeros_like(unknowns.fluid)) for _ in range(2))
+    fluid, pressure = (StepLimit(np.zeros_like(unknowns.fluid)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change = 0.0, np.inf
     for number in count():
@@ -61,21 +59,6 @@ def newton(problem: Problem, unknowns: Unknowns, earlier: Earlier | None = None)
         approach_before = step.approach
         d_approach = float(np.clip(step.approach, -furthest, furthest))
         unknowns = _moved(balance, Unknowns(d_fluid, d_pressure, d_approach))
-
-
-class _Limit:
-    """The longest step of every cell, which shrinks where it turns back."""
-
-    def __init__(self, before: Field) -> None:
-        self.before, self.longest = before, np.full_like(before, np.inf)
-
-    def limited(self, step: Field, size: Field, upward: Field | float) -> Field:
-        """The step, no longer than what its cell's `size` and its past allow, but for `upward` if that is more."""
-        most = np.maximum(LONGEST_STEP, LONGEST_SHARE * size)
-        turned_back = (step * self.before < 0.0) & (np.abs(step) > self.longest)
-        self.longest = np.where(turned_back, 0.5 * np.minimum(self.longest, most), np.minimum(1.5 * self.longest, most))
-        self.before = step
-        return np.clip(step, -self.longest, np.maximum(self.longest, upward))
 
 
 def _moved(balance: OilBalance, step: Unknowns) -> Unknowns:

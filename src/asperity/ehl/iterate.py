@@ -15,6 +15,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.ehl.krylov import Operator, gmres
 from asperity.ehl.linear import Linear
+from asperity.ehl.mixed import MixedBalance
 from asperity.ehl.problem import Balance, Problem
 
 LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step ...
@@ -52,7 +53,7 @@ class Step:
     """Where a Newton step led: its balance, and the mean relative change of pressure it had asked for."""
 
     number: int
-    balance: Balance
+    balance: Balance | MixedBalance
     approach: float
     change: float
 

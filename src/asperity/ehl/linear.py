@@ -42,18 +42,14 @@ class Linear:
         scale = balance.rows.fluid_scale.astype(dtype)
         self.rows = balance.rows._replace(fluid_scale=scale)
         self.film = None if balance.film is None else Film(*(part.astype(dtype) for part in balance.film))
-        self.faces = None if balance.faces is None else _faces(balance.faces, dtype)
+        self.faces = None if balance.faces is None else single_faces(balance.faces, dtype)
         self.storing, self.kept = storing, self._kept(balance.problem.past, storing)
         if self.film is not None and balance.problem.past is not None and balance.problem.past.followed:
             self.film = self.film.followed
         self.stencil = self._stencil()
-        self.even, self.odd = (self._lines(parity) for parity in (0, 1))
+        self.lines = LineRelaxation(self.stencil)
         if self.film is not None:
-            self.weight = np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0))
-            self.block = (_block(self.cells[0]), _block(self.cells[1]))
-            nx, ny = (-(-n // size) for n, size in zip(self.cells, self.block, strict=True))
-            self.pattern = five_point_pattern((nx, ny))
-            self.factors = self._factor()
+            self.blocks = Blocks(self.stencil, np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0)))
 
     def product(self, d_pressure: Field, d_approach: float) -> Field:
         """The linearised equations applied to a change of pressure and approach."""
@@ -74,19 +70,8 @@ class Linear:
 
     def __call__(self, residual: Field) -> Field:
         """Approximate change of pressure that answers a residual, both (nx, ny); none in cells that know theirs."""
-        change = np.zeros(self.cells, self.dtype)
-        if self.film is not None:
-            coarse = np.empty(self.pattern.cells)
-            relax.restrict(residual, self.weight, self.block, coarse)
-            relax.prolong(self.pattern.solve(self.factors, coarse), self.weight, self.block, change)
-        lines = [np.zeros((self.cells[0], part.lower.shape[1]), self.dtype) for part in (self.even, self.odd) * 2]
-        rest_even, rest_odd, even, odd = lines
-        relax.split_residual(self.stencil, residual, change, rest_even, rest_odd)
-        relax.relax_lines(self.even, 0, rest_even, odd[:, :0], even)
-        relax.relax_lines(self.odd, 1, rest_odd, even, odd)
-        relax.relax_lines(self.even, 0, rest_even, odd, even)
-        relax.add_lines(even, odd, change)
-        return change
+        change = np.zeros(self.cells, self.dtype) if self.film is None else self.blocks(residual)
+        return self.lines(residual, change)
 
     def _kept(self, past: Past | None, storing: float) -> Kept | None:
         """What the kernels leave to be added; they store for followed oil nothing.
@@ -115,16 +100,48 @@ class Linear:
             stencil.east[:] += self.kept.by_gap * neighbour
         return stencil
 
-    def _lines(self, parity: int) -> relax.Lines:
-        nx, ny = self.cells
-        lines = relax.Lines(*np.empty((5, nx, (ny + 1 - parity) // 2), self.dtype))
-        relax.factor_lines(self.stencil, parity, lines)
-        return lines
 
-    def _factor(self) -> Any:  # SuperLU has no public type
-        coarse = Stencil(*np.empty((5, *self.pattern.cells)))
-        relax.aggregate_stencil(self.stencil, self.weight, self.block, coarse)
-        return self.pattern.factored(coarse)
+class LineRelaxation:
+    """Zebra relaxation of a five-point stencil: its x lines solved exactly, even, odd and even ones in turn."""
+
+    def __init__(self, stencil: Stencil) -> None:
+        self.stencil = stencil
+        nx, ny = stencil.centre.shape
+        self.even, self.odd = (
+            relax.Lines(*np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)) for parity in (0, 1)
+        )
+        for parity, lines in enumerate((self.even, self.odd)):
+            relax.factor_lines(stencil, parity, lines)
+
+    def __call__(self, residual: Field, change: Field) -> Field:
+        """`change`, improved in place so that it better answers the residual, both (nx, ny)."""
+        rest_even, rest_odd, even, odd = (np.zeros_like(part.lower) for part in (self.even, self.odd) * 2)
+        relax.split_residual(self.stencil, residual, change, rest_even, rest_odd)
+        relax.relax_lines(self.even, 0, rest_even, odd[:, :0], even)
+        relax.relax_lines(self.odd, 1, rest_odd, even, odd)
+        relax.relax_lines(self.even, 0, rest_even, odd, even)
+        relax.add_lines(even, odd, change)
+        return change
+
+
+class Blocks:
+    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
+
+    def __init__(self, stencil: Stencil, weight: Field) -> None:
+        self.weight, cells = weight, weight.shape
+        self.block = (_block(cells[0]), _block(cells[1]))
+        nx, ny = (-(-n // size) for n, size in zip(cells, self.block, strict=True))
+        self.pattern = five_point_pattern((nx, ny))
+        coarse = Stencil(*np.empty((5, nx, ny)))
+        relax.aggregate_stencil(stencil, weight, self.block, coarse)
+        self.factors = self.pattern.factored(coarse)
+
+    def __call__(self, residual: Field) -> Field:
+        """The change, one number a block, that answers a residual; none in cells without weight."""
+        coarse, change = np.empty(self.pattern.cells), np.zeros_like(self.weight)
+        relax.restrict(residual, self.weight, self.block, coarse)
+        relax.prolong(self.pattern.solve(self.factors, coarse), self.weight, self.block, change)
+        return change
 
 
 def _block(cells: int) -> int:
@@ -133,7 +150,7 @@ def _block(cells: int) -> int:
     return max(smallest, -(-cells // MOST_COARSE_CELLS))
 
 
-def _faces(faces: Faces, dtype: Any) -> Faces:
+def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
     """In another precision; what would become denormal in it is none."""
     least = LEAST * float(max(faces.east.max(), faces.north.max()))
     return Faces(*(np.where(part > least, part, 0.0).astype(dtype) for part in faces))

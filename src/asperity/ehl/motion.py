@@ -182,6 +182,7 @@ class _Contact:
             attempt=HELD if held else ATTEMPTS[0],
         )
         balance = step.balance
+        assert isinstance(balance, Balance)
         if self.one_line:
             balance = whole.evaluate(np.repeat(balance.pressure, whole.cells[1], axis=1), step.approach)
         kept = {"content_before": memory["content"]}

@@ -7,8 +7,8 @@ from typing import Literal, get_args
 
 from asperity.errors import BadInput, require_positive
 
-ContactModel = Literal["unified", "conserving"]
-UNIFIED, CONSERVING = MODELS = get_args(ContactModel)
+ContactModel = Literal["unified", "paper", "mixed", "conserving"]
+UNIFIED, PAPER, MIXED, CONSERVING = MODELS = get_args(ContactModel)  # the first two are one
 Start = Literal["steady", "stationary"]
 LONGEST_STEP = 8.0  # cells that the oil may travel in one step of time
 
@@ -23,7 +23,8 @@ class Options:
     max_iterations : Newton steps allowed on each grid level and in each attempt
     contact_film : gap at which asperities count as touching [m]; a few molecules of oil. It moves the load share by
         some per cent per factor of ten, so it belongs beside every CLR.
-    model : "unified", which lets oil vanish where bodies touch and appear where it ruptures, or "conserving"
+    model : "unified" (or "paper"), one pressure for oil and asperities; "mixed", a pressure each, which without speed
+        is the dry contact; "conserving", in which no oil is lost
     """
 
     tolerance: float = 1e-4
@@ -38,7 +39,7 @@ class Options:
             raise BadInput(f"max_iterations must be at least 1, got {self.max_iterations}")
         require_positive("contact film", self.contact_film, "m")
         if self.model not in MODELS:
-            raise BadInput(f"model must be {' or '.join(MODELS)}, got {self.model!r}")
+            raise BadInput(f"model must be one of {', '.join(MODELS)}, got {self.model!r}")
 
 
 # what is tried, one after the other, until one converges

@@ -20,7 +20,7 @@ from asperity.lubricant import Lubricant
 
 CLOSED_WITHIN = 0.01  # of the contact film
 # weights of the next and the upstream cell in the wedge; the more accurate ones do not converge on all rough surfaces
-THIRD_ORDER, SECOND_ORDER = (0.375, 0.125), (0.0, 0.5)
+THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,9 @@ class Problem:
             film, faces, outflow, fluid_scale = None, None, np.zeros_like(pressure), np.ones_like(pressure)
             residual, state = touching.copy(), np.full(pressure.shape, TOUCHING, dtype=np.int8)
         else:
-            film, faces, outflow, fluid_scale = self._flow(pressure, gap, self.lubricant)
+            film, faces, outflow, fluid_scale = self.flow(
+                pressure, gap, self.lubricant, THIRD_ORDER if self.accurate else SECOND_ORDER
+            )
             fluid = outflow * fluid_scale
             wet = fluid < touching
             residual = np.minimum(fluid, touching)
@@ -157,7 +159,10 @@ class Problem:
             film = film.held_where((touching <= 0.0) & (state != LUBRICATED))
         return Balance(self, pressure, gap, residual, Rows(state, fluid_scale, contact_scale), film, faces, outflow)
 
-    def _flow(self, pressure: Field, gap: Field, oil: Lubricant) -> tuple[Film, Faces, Field, Field]:
+    def flow(
+        self, pressure: Field, gap: Field, oil: Lubricant, wedge: tuple[float, float], least_mobility: float = 0.0
+    ) -> tuple[Film, Faces, Field, Field]:
+        """Film, faces, net outflow of each cell and the inverse of its derivative, of an oil pressure and a gap."""
         pascals = pressure * self.p_scale
         height = np.maximum(gap, self.contact_gap)
         density = oil.density(pascals) / oil.density.rho0
@@ -182,7 +187,8 @@ class Problem:
             ambient,
             3.0 * ambient / height[[0, -1]],
         )
-        wedge = THIRD_ORDER if self.accurate else SECOND_ORDER
+        if least_mobility > 0.0:
+            film = film.no_stiffer_than(least_mobility)
         east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty((6, *self.cells))
         faces = Faces(
             east,
@@ -194,6 +200,7 @@ class Problem:
             inlet=np.empty(self.cells[1]),
             wedge=np.array(wedge),
         )
+        mobility = film.mobility
         log_mobility = np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
         reynolds.face_mobilities(film, log_mobility, self.accurate, faces)
         dx, dy = self.spacing

@@ -10,7 +10,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
-from asperity.ehl.outcome import Convergence, Options
+from asperity.ehl.outcome import CONSERVING, Convergence, Options
 from asperity.errors import BadInput
 from asperity.files import versions, whole_file
 from asperity.grid import Grid
@@ -83,7 +83,7 @@ class ContactSolution:
         """Cells in which the oil has ruptured: no pressure, no contact; in the conserving model any not full of oil."""
         if self.lubricant is None:
             return np.zeros(self.pressure.shape, dtype=bool)
-        if self.oil is not None:
+        if self.options.model == CONSERVING and self.oil is not None:
             return np.asarray(self.oil.content < 1.0)
         return (self.pressure <= 0.0) & ~self.in_contact
 

@@ -8,7 +8,8 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving_solve import solve_conserving
-from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
+from asperity.ehl.mixed_solve import solve_mixed
+from asperity.ehl.outcome import ATTEMPTS, Options
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels, on_one_line
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import Progress, Search
@@ -52,8 +53,7 @@ def solve_contact(
     _check_grid(conditions, surface)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
-    solve = solve_conserving if options.model == CONSERVING else solve_unified
-    solution = solve(
+    solution = SOLVERS[options.model](
         conditions,
         lubricant,
         surface,
@@ -107,6 +107,9 @@ def solve_unified(
         discretisation=search.discretisation_error if start is None else start.convergence.discretisation_error,
         viscosity_factor=viscosity_factor,
     )
+
+
+SOLVERS = {"unified": solve_unified, "paper": solve_unified, "mixed": solve_mixed, "conserving": solve_conserving}
 
 
 def _warm_start(start: ContactSolution, cells: tuple[int, int], scales: Scales) -> tuple[Field, float]:

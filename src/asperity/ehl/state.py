@@ -5,7 +5,10 @@ import numpy as np
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import OilBalance, evaluate
 from asperity.ehl.conserving_solve import unknowns_of
-from asperity.ehl.outcome import ContactState
+from asperity.ehl.mixed import MixedBalance
+from asperity.ehl.mixed import evaluate as evaluate_mixed
+from asperity.ehl.mixed_solve import pressures_of
+from asperity.ehl.outcome import MIXED, ContactState
 from asperity.ehl.posing import contact_problem, smooth_film
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
@@ -26,6 +29,9 @@ def contact_state(solution: ContactSolution) -> ContactState:
         solution.viscosity_factor,
         attempt=solution.convergence.attempt,
     )
+    if solution.options.model == MIXED:
+        pressures = pressures_of(solution, problem, scales)
+        return state_of(solution, evaluate_mixed(problem, pressures, second_order=True))
     if solution.oil is not None:
         return state_of(solution, evaluate(problem, unknowns_of(solution, problem, scales)))
     return state_of(
@@ -33,7 +39,7 @@ def contact_state(solution: ContactSolution) -> ContactState:
     )
 
 
-def state_of(solution: ContactSolution, balance: Balance | OilBalance) -> ContactState:
+def state_of(solution: ContactSolution, balance: Balance | MixedBalance | OilBalance) -> ContactState:
     """The scalars of a solution whose equations, those of a moving contact perhaps, are left with `balance`."""
     grid, touching, problem = solution.grid, solution.in_contact, balance.problem
     sq, oil = solution.surface.sq, solution.lubricant

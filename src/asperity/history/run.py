@@ -16,7 +16,11 @@ from asperity.history.rows import Row, step_row
 from asperity.history.store import open_keeper
 from asperity.surface import MovingSurfaces
 
-MODELS: dict[str, Steps] = {"unified": moving_contact, "conserving": moving_conserving_contact}  # by the case's `model`
+MODELS: dict[str, Steps] = {  # by the case's `model`
+    "unified": moving_contact,
+    "paper": moving_contact,
+    "conserving": moving_conserving_contact,
+}
 
 
 class HistoryProgress(NamedTuple):

@@ -40,6 +40,15 @@ class Film(NamedTuple):
             ambient_by_gap=np.where(held[[0, -1]], 0.0, self.ambient_by_gap),
         )
 
+    def no_stiffer_than(self, mobility: float) -> "Film":
+        """The same film, no cell of which moves its oil less easily than with this mobility."""
+        stiff = self.mobility < mobility
+        return self._replace(
+            mobility=np.where(stiff, mobility, self.mobility),
+            log_mobility_by_gap=np.where(stiff, 0.0, self.log_mobility_by_gap),
+            log_mobility_by_pressure=np.where(stiff, 0.0, self.log_mobility_by_pressure),
+        )
+
     @property
     def followed(self) -> "Film":
         """The same film without a wedge, for oil that is balanced along its way."""
@@ -142,6 +151,24 @@ def net_outflow(
             north = faces.north[i, j] * (pressure[i, j] - pressure[i, jn])
             south = faces.north[i, js] * (pressure[i, js] - pressure[i, j])
             out[i, j] += (north - south) / (dy * dy)
+
+
+@njit(cache=True)
+def leaning_outflow(content: Field, lean: Field, dx: float, out: Field) -> None:
+    """What a wedge of face values m + `lean` (m - m_upstream) adds to the outflow of each cell, per cell area.
+
+    The first and the last face along x stay as they are.
+    """
+    nx, ny = content.shape
+    over_dx = content.dtype.type(1.0 / dx)
+    for i in range(nx):
+        for j in range(ny):
+            east, west = content.dtype.type(0.0), content.dtype.type(0.0)
+            if 0 < i < nx - 1:
+                east = lean[i, j] * (content[i, j] - content[i - 1, j])
+            if i > 1:
+                west = lean[i - 1, j] * (content[i - 1, j] - content[i - 2, j])
+            out[i, j] = (east - west) * over_dx
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
@@ -286,3 +313,47 @@ def local_stencil(
             out.east[i, j] = downstream if wet else (touching_next if touching else none)
             out.north[i, j] = -across[j + 1] * scale if wet else none
             out.south[i, j] = -across[j] * scale if wet else none
+
+
+@njit(cache=True)
+def add_mobility_slopes(
+    rows: Rows,
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    compliance: float,
+    spacing: tuple[float, float],
+    out: Stencil,
+) -> None:
+    """Add to a local stencil what changed pressures do to the mobilities of the inner faces, in the precision of `out`.
+
+    `compliance` is that of a cell's gap to its own pressure.
+    """
+    nx, ny = pressure.shape
+    real = out.centre.dtype.type
+    dx, dy = spacing
+    over_dx2, over_dy2, own = real(1.0 / (dx * dx)), real(1.0 / (dy * dy)), real(compliance)
+    slope = film.log_mobility_by_pressure + own * film.log_mobility_by_gap
+    for i in range(nx):
+        for j in range(ny):
+            here, scale = rows.state[i, j] == LUBRICATED, rows.fluid_scale[i, j]
+            if i < nx - 1:
+                falling = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
+                by_own = falling * faces.east_by_own[i, j] * slope[i, j]
+                by_next = falling * faces.east_by_next[i, j] * slope[i + 1, j]
+                if here:
+                    out.centre[i, j] += scale * by_own
+                    out.east[i, j] += scale * by_next
+                if rows.state[i + 1, j] == LUBRICATED:
+                    out.centre[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_next
+                    out.west[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_own
+            jn = j + 1 if j < ny - 1 else 0
+            falling = over_dy2 * (pressure[i, j] - pressure[i, jn])
+            by_own = falling * faces.north_by_own[i, j] * slope[i, j]
+            by_next = falling * faces.north_by_next[i, j] * slope[i, jn]
+            if here:
+                out.centre[i, j] += scale * by_own
+                out.north[i, j] += scale * by_next
+            if rows.state[i, jn] == LUBRICATED:
+                out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
+                out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own

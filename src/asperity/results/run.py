@@ -242,7 +242,7 @@ def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
     model = case.vibration
     with case.naming("vibration"):
         vibration = None if model is None else contact_vibration(state, case.conditions, model, solution=solution)
-    if solution.oil is not None:
+    if solution.options.model == "conserving":
         notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)

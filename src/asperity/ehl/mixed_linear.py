@@ -1,0 +1,131 @@
+"""The mixed contact linearised, and Newton's step of it by GMRES, in single precision.
+
+Unknown are the changes of the oil's pressure where it is lubricated and of the total one where bodies touch; free cells
+have one pressure, ruptured and capped ones know theirs. The approximate inverse answers the oil's rows by blocks and
+lines, as `asperity.ehl.linear` does, and a touching cell's row by its own compliance.
+
+Two things differ from there, and GMRES needs a fifth of the steps for them where oil is stiff. A cell's pressure moves
+its own gap only: oil carries its film downstream unchanged, which the differences of a stencil cut off after three
+cells let decay. And mobilities answer: beside asperities the oil's pressure changes so much from cell to cell that
+this outweighs the mobilities themselves.
+"""
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.ehl.krylov import gmres
+from asperity.ehl.linear import Blocks, LineRelaxation, single_faces
+from asperity.ehl.mixed import FREE, MixedBalance, Pressures
+from asperity.kernels import reynolds
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Stencil
+
+LEFT = 0.1  # share to which the linearised equations are left
+MOST_KRYLOV_STEPS = 60
+LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
+
+
+class MixedLinear:
+    """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny)."""
+
+    def __init__(self, balance: MixedBalance) -> None:
+        self.balance, problem = balance, balance.problem
+        self.cells, self.real = problem.cells, np.float32
+        self.lubricated = balance.rows.state == LUBRICATED
+        self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
+        self.oil = balance.unknowns.oil.astype(self.real)
+        self.lean = balance.lean.astype(self.real)
+        self.rows = balance.rows._replace(fluid_scale=balance.rows.fluid_scale.astype(self.real))
+        self.film = Film(*(part.astype(self.real) for part in balance.film))
+        self.faces = single_faces(balance.faces)
+        stencil = self._stencil()
+        self.blocks = Blocks(stencil, np.where(self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0)))
+        self.lines = LineRelaxation(stencil)
+
+    def _stencil(self) -> Stencil:
+        problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
+        state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
+        rows, film = self.rows._replace(state=state), self.film.held_where(~self.free)
+        own = 1.0 / self.rows.contact_scale
+        near = np.array([own, 0.0, 0.0, 0.0])
+        reynolds.local_stencil(rows, film, self.faces, near, problem.spacing, 0.0, stencil)
+        reynolds.add_mobility_slopes(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
+        return stencil
+
+    def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
+        """Changes of the oil's equations and, in touching cells, of the asperities'; zero elsewhere."""
+        problem = self.balance.problem
+        d_gap = problem.deflection(d_total)
+        if d_approach:
+            d_gap += self.real(d_approach)
+        wet, leaning = np.empty(self.cells, self.real), np.empty(self.cells, self.real)
+        spacing = problem.spacing
+        reynolds.jacobian_product(self.rows, self.film, self.faces, self.oil, d_oil, d_gap, spacing, 0.0, wet)
+        d_content = self.film.content_by_gap * d_gap + self.film.content_by_pressure * d_oil
+        reynolds.leaning_outflow(d_content, self.lean, spacing[0], leaning)
+        wet += leaning * self.rows.fluid_scale
+        zero = self.real(0.0)
+        return (
+            np.where(self.lubricated, wet, zero),
+            np.where(self.touching, d_gap * self.real(self.rows.contact_scale), zero),
+        )
+
+    def answer(self, wet: Field, closed: Field) -> tuple[Field, Field]:
+        """Approximate changes of the oil's pressure and of touching cells' total pressure that answer both rows."""
+        return self.lines(wet, self.blocks(wet)), closed
+
+    def total(self, d_oil: Field, d_closed: Field) -> Field:
+        """Change of the total pressure: the oil's in free cells, their own in touching ones."""
+        return np.where(self.free, d_oil, d_closed)
+
+
+def newton_step(balance: MixedBalance) -> Pressures:
+    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth."""
+    linear, problem = MixedLinear(balance), balance.problem
+    cells, real, count = linear.cells, linear.real, balance.gap.size
+    zero = real(0.0)
+    known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
+    known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
+    known = np.where(linear.free, known_oil - balance.solid_residual, known)
+    wet, closed = linear.product(known_oil.astype(real), known.astype(real), 0.0)
+    wet = np.where(linear.lubricated, -balance.oil_residual - wet, zero).astype(real)
+    closed = np.where(linear.touching, -balance.solid_residual - closed, zero).astype(real)
+    dx, dy = problem.spacing
+    missing = -balance.load_error * problem.load / (dx * dy) - known.sum()
+
+    # unknowns: of the oil, of touching cells and, last, the approach; last equation: the missing load
+    weight = real(1.0 / np.sqrt(count))
+    by_approach = linear.product(np.zeros(cells, real), np.zeros(cells, real), 1.0)
+    response = linear.answer(*by_approach)
+    whole = float(linear.total(*response).sum())
+    if whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
+        return Pressures(known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale)
+
+    touching = np.flatnonzero(linear.touching)
+
+    def split(vector: Field) -> tuple[Field, Field]:
+        solid = np.zeros(count, real)
+        solid[touching] = vector[count:-1]
+        return vector[:count].reshape(cells), solid.reshape(cells)
+
+    def joined(oil: Field, solid: Field, last: float) -> Field:
+        vector = np.empty(count + touching.size + 1, real)
+        vector[:count], vector[count:-1], vector[-1] = oil.ravel(), solid.ravel()[touching], last
+        return vector
+
+    def product(vector: Field) -> Field:
+        d_oil, d_closed = split(vector)
+        d_total = linear.total(d_oil, d_closed)
+        wet, closed = linear.product(d_oil, d_total, float(vector[-1]))
+        return joined(np.where(linear.lubricated, wet, d_oil), closed, float(weight * d_total.sum()))
+
+    def precondition(vector: Field) -> Field:
+        d_oil, d_closed = linear.answer(*split(vector))
+        d_approach = float((linear.total(d_oil, d_closed).sum() - vector[-1] / weight) / whole)
+        return joined(d_oil - d_approach * response[0], d_closed - d_approach * response[1], d_approach)
+
+    wanted = joined(wet, closed, float(weight * missing))
+    solved = gmres(product, precondition, wanted, tolerance=LEFT, most_steps=MOST_KRYLOV_STEPS)
+    d_oil, d_closed = split(solved)
+    d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)
+    d_total = np.where(linear.free, d_oil - balance.solid_residual, np.where(linear.touching, d_closed, known))
+    return Pressures(d_oil, d_total, float(solved[-1]))

@@ -1,0 +1,89 @@
+"""The mixed contact with a pressure each for oil and asperities: its limits, and one answer whatever the start."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.case import load_case
+from asperity.ehl import Options, contact_state, solve_contact
+from asperity.ehl.mixed_solve import MixedSearch
+from asperity.ehl.posing import contact_problem, first_guess
+from asperity.ehl.scales import Scales
+from asperity.errors import BadInput
+from asperity.grid import Grid
+from asperity.surface import flat_surface, gaussian_surface
+from support.paper import barus, contact, grid, rough
+
+PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
+COARSE = grid((64, 64))
+MIXED = Options(model="mixed")
+
+
+def clr(solution):
+    return contact_state(solution).clr
+
+
+def ball(*, speed, hardness):
+    return contact(geometry="point", radius=10e-3, load=15.0, length=None, speed=speed, hardness=hardness)
+
+
+@pytest.mark.parametrize("hardness", [0.7e9, 2e9, 7e9])
+@pytest.mark.parametrize("sq", [0.5e-6, 2.5e-6])
+def test_a_line_contact_without_speed_is_dry(sq, hardness):
+    slow = contact(speed=1e-4, hardness=hardness)
+    assert clr(solve_contact(slow, barus(), rough(COARSE, sq), options=MIXED)) > 0.999
+
+
+@pytest.mark.parametrize("hardness", [2e9, 7e9])
+def test_a_ball_without_speed_is_dry(hardness):
+    slow = ball(speed=1e-4, hardness=hardness)
+    a = slow.hertz.half_widths[0]
+    on = Grid((64, 64), (-2.5 * a, -2.0 * a), (1.5 * a, 2.0 * a), periodic=(False, False))
+    surface = gaussian_surface(on, sq=0.3e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
+    assert clr(solve_contact(slow, barus(), surface, options=MIXED)) > 0.999
+
+
+def test_the_papers_contact_has_the_trials_load_share():
+    """An independent program of the same equations found 0.750 on this grid."""
+    case = load_case(PAPER).with_overrides({"grid.cells": "[64, 64]", "model": "mixed"})
+    solution = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
+    assert clr(solution) == pytest.approx(0.7499, abs=0.005)
+
+
+def test_one_answer_from_two_starts():
+    """All load on the asperities, and all of it in the oil."""
+    conditions, oil, surface = contact(hardness=2e9), barus(), rough(COARSE, 1e-6, seed=7)
+    problem, scales = contact_problem(conditions, oil, surface, MIXED), Scales.of(conditions, oil)
+
+    dry, hertz = MixedSearch(MIXED, scales.gap, None), MixedSearch(MIXED, scales.gap, None)
+    dry.from_dry(problem)
+    hertz.climb_from(problem, *first_guess(problem, conditions, oil, scales))
+    assert dry.settled(MIXED.tolerance)
+    assert hertz.settled(MIXED.tolerance)
+    assert dry.figures[-1].clr == pytest.approx(hertz.figures[-1].clr, abs=0.002)
+
+
+def test_the_asperities_bear_what_the_oil_does_not():
+    """Oil bears no tension and never more than all; asperities bear only where they touch."""
+    solution = solve_contact(contact(hardness=2e9), barus(), rough(COARSE, 1e-6, seed=7), options=MIXED)
+    borne = solution.pressure - solution.oil.pressure
+    assert solution.oil.pressure.min() >= 0.0
+    assert borne.min() > -1e-3 * solution.pressure.max()
+    np.testing.assert_allclose(borne[~solution.in_contact], 0.0, atol=1e-3 * solution.pressure.max())
+
+
+def test_a_full_film_is_the_unified_models():
+    """Smooth bodies: no cell touches, and both models solve the same equation but for the wedge at steep fronts."""
+    flooded, surface = contact(speed=10.0), flat_surface(grid((128, 8)))
+    mixed, unified = (
+        contact_state(solve_contact(flooded, barus(), surface, options=Options(model=model)))
+        for model in ("mixed", "unified")
+    )
+    assert mixed.clr == unified.clr == 0.0
+    assert mixed.h_central == pytest.approx(unified.h_central, rel=0.01)
+
+
+def test_a_dry_contact_has_no_oil_to_balance():
+    with pytest.raises(BadInput, match='"mixed" is about oil'):
+        solve_contact(contact(), None, rough(COARSE, 1e-6), options=MIXED)
