@@ -4,7 +4,7 @@ import pytest
 from asperity.coupling import VibrationModel, contact_vibration, dry_full_load
 from asperity.errors import BadInput
 from asperity.paper import TABLE1_PRINTED, Table1Row, papers_contact
-from asperity.report import excitation_figure, load_trend_figure, response_figure, table1_figure, write_figure
+from asperity.report import excitation_figure, response_figure, table1_figure, trend_over_load_figure, write_figure
 
 PAPER = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
 CONTACT = papers_contact(200.0)
@@ -32,7 +32,7 @@ def test_fig_4_marks_the_resonance_that_was_found(heard):
 
 
 def test_the_load_trend_vanishes_with_fine_sampling():
-    figure = load_trend_figure(PAPER)
+    figure = trend_over_load_figure(PAPER)
     drawn = {line.get_label(): line.get_ydata() for line in figure.get_axes()[0].get_lines()}
     assert [label.split(":")[0] for label in drawn] == ["10 kHz", "20 kHz", "50 kHz", "200 kHz", "not sampled"]
     falls = [values[0] / values[-1] for values in drawn.values()]

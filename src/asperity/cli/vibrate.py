@@ -86,7 +86,7 @@ def _table1(preset: str, records: int | None, figures: Path | None, *, as_json: 
         model = coupling.VibrationModel.preset(preset, mass=paper.MASS, damping_ratio=paper.DAMPING_RATIO)
         drawn = [
             report.write_figure(report.table1_figure(rows), figures / "table1.png"),
-            report.write_figure(report.load_trend_figure(model), figures / "load-trend.png"),
+            report.write_figure(report.trend_over_load_figure(model), figures / "load-trend.png"),
         ]
     verdict = paper.table1_verdict(rows, preset)
     show(

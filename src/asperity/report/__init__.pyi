@@ -3,9 +3,9 @@ from .run.curves import friction_figure as friction_figure
 from .run.page import write_report as write_report
 from .run.surface import surface_map as surface_map
 from .run.vibration import excitation_figure as excitation_figure
-from .run.vibration import load_trend_figure as load_trend_figure
 from .run.vibration import response_figure as response_figure
 from .run.vibration import table1_figure as table1_figure
+from .run.vibration import trend_over_load_figure as trend_over_load_figure
 from .study.exploration import calibration_figure as calibration_figure
 from .study.exploration import sensitivity_figure as sensitivity_figure
 from .study.page import write_study_report as write_study_report

@@ -199,7 +199,7 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
 
 
 @ON_PAGE.drawing()
-def load_trend_figure(model: VibrationModel) -> Figure:
+def trend_over_load_figure(model: VibrationModel) -> Figure:
     """CRFA over load at several sampling rates, in closed form: what of the paper's trend is sampling, what physics."""
     strokes = (("-o", VERMILION), ("--s", BLUE), ("-.^", GREEN), (":D", GREY))
     figure = Figure(figsize=(5.6, 4.4), layout="constrained")
