@@ -59,7 +59,7 @@ Rate = Annotated[
     float | None, typer.Option(metavar="HZ", parser=_hertz, help="Sampling rate, for files that do not state it.")
 ]
 Unit = Annotated[
-    str | None, typer.Option(help="Unit of the values, such as g (of heights: um), for files that do not state it.")
+    str | None, typer.Option(help="Unit of the values, such as g or, of heights, um, for files that do not state it.")
 ]
 Channel = Annotated[str | None, typer.Option(help="Name or number of the channel, where files have several.")]
 Scale = Annotated[

@@ -110,8 +110,8 @@ class ContactSolution:
         if taken:
             raise BadInput(f"attribute {taken[0]!r} of the solution is a name that the run file uses itself; rename it")
         coordinates: dict[str, Any] = {
-            "x": ("x", self.grid.x, {"long_name": "position along rolling", "units": "m", "axis": "X"}),
-            "y": ("y", self.grid.y, {"long_name": "position along the contact line", "units": "m", "axis": "Y"}),
+            "x": ("x", self.grid.x, {**quantity("x_m").attributes, "axis": "X"}),
+            "y": ("y", self.grid.y, {**quantity("y_m").attributes, "axis": "Y"}),
         }
         described = self._described()
         attributes = {

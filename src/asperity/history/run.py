@@ -99,7 +99,7 @@ def _moving_parts(case: Case) -> tuple[MovingSurfaces, Steps]:
         raise BadInput(f"{case.source}: motion knows no warm film; set thermal.feedback=false")
     name: str = case.contents.model
     if name not in MODELS:
-        raise BadInput(f"{case.source}: model {name} has no steps in time; {' or '.join(MODELS)} has")
+        raise BadInput(f"{case.source}: model {name} has no steps in time; take one of {', '.join(MODELS)}")
     return case.moving_surfaces(), MODELS[name]
 
 

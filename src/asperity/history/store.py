@@ -115,12 +115,8 @@ class Keeper:
         dataset = xarray.Dataset(
             {name: (("x", "y"), values, quantity(name).attributes) for name, values in maps.items()},
             {
-                "x": ("x", grid.x, {"long_name": "position along rolling", "units": "m", "axis": "X"}),
-                "y": (
-                    "y",
-                    solution.grid.y,
-                    {"long_name": "position along the contact line", "units": "m", "axis": "Y"},
-                ),
+                "x": ("x", grid.x, {**quantity("x_m").attributes, "axis": "X"}),
+                "y": ("y", solution.grid.y, {**quantity("y_m").attributes, "axis": "Y"}),
             },
             {"Conventions": "CF-1.11", **about},
         )

@@ -193,7 +193,7 @@ class Track:
             "density": (("recording", "frequency"), density, spectral),
             "kept": (("recording", "frequency"), kept, {"long_name": "line of the spectrum counts", **flags}),
         }
-        return variables, {"frequency": ("frequency", first.frequency_hz, {"long_name": "frequency", "units": "Hz"})}
+        return variables, {"frequency": ("frequency", first.frequency_hz, quantity("frequency_hz").attributes)}
 
     def save(self, path: str | Path) -> Path:
         """Write the series whole or not at all: .csv or .parquet the table, .nc the spectra too.
