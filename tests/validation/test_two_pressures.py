@@ -1,5 +1,6 @@
 """The mixed contact with a pressure each for oil and asperities: its limits, and one answer whatever the start."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +8,14 @@ import pytest
 
 from asperity.case import load_case
 from asperity.ehl import Options, contact_state, solve_contact
+from asperity.ehl.dry import dry_contact
+from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.mixed_solve import MixedSearch
 from asperity.ehl.posing import contact_problem, first_guess
 from asperity.ehl.scales import Scales
 from asperity.errors import BadInput
 from asperity.grid import Grid
+from asperity.kernels.reynolds import LUBRICATED, TOUCHING
 from asperity.surface import flat_surface, gaussian_surface
 from support.paper import barus, contact, grid, rough
 
@@ -71,6 +75,22 @@ def test_the_asperities_bear_what_the_oil_does_not():
     assert solution.oil.pressure.min() >= 0.0
     assert borne.min() > -1e-3 * solution.pressure.max()
     np.testing.assert_allclose(borne[~solution.in_contact], 0.0, atol=1e-3 * solution.pressure.max())
+
+
+def test_a_closed_cells_equation_grows_with_its_own_pressure():
+    """Scaled by an open cell's derivative it would hardly move, and shut-in oil would count as balanced."""
+    fast = contact(speed=10.0, hardness=7e9)
+    problem = contact_problem(fast, barus(), rough(COARSE, 1e-6, seed=7), MIXED)
+    hertz = np.sqrt(np.maximum(1.0 - problem.x**2, 0.0))[:, None] * np.ones(problem.cells)
+    total, approach, _ = dry_contact(replace(problem, lubricant=None, contact_gap=0.0), hertz)
+    before = evaluate(problem, Pressures(0.3 * total, total, approach), second_order=False)
+    closed = (before.solid == TOUCHING) & (before.rows.state == LUBRICATED) & (before.gap < problem.contact_gap)
+    assert closed.sum() > 5
+    for cell in list(zip(*np.nonzero(closed), strict=True))[:5]:
+        oil = before.unknowns.oil.copy()
+        oil[cell] += 1e-6
+        after = evaluate(problem, before.unknowns._replace(oil=oil), second_order=False)
+        assert after.oil_residual[cell] - before.oil_residual[cell] > 0.9e-6
 
 
 def test_a_full_film_is_the_unified_models():

@@ -92,7 +92,7 @@ def require_conserving(conditions: ContactConditions, lubricant: Lubricant | Non
 
 
 def unknowns_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Unknowns:
-    """The unknowns of a solution of either model, on the grid of `problem`."""
+    """The unknowns of a solution of the unified or the conserving model, on the grid of `problem`."""
     pressure = solution.pressure / scales.pressure
     if pressure.shape != problem.cells:
         raise BadInput(f"start has {solution.grid.cells} cells, the surface {problem.cells}; solve without start")

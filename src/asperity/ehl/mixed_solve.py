@@ -131,7 +131,7 @@ class MixedSearch(Search):
 
 
 def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:
-    """The unknowns of a solution of either model, on the grid of `problem`."""
+    """The unknowns of a solution of any model, on the grid of `problem`."""
     total = solution.pressure / scales.pressure
     oil = total if solution.oil is None else solution.oil.pressure / scales.pressure
     if problem.cells[1] == 1:

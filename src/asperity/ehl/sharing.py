@@ -1,4 +1,4 @@
-"""Who carries the load at which film: shares that name their threshold, of either model.
+"""Who carries the load at which film: shares that name their threshold, of any model.
 
 A share of load on "contact" means little without the film below which a cell counts: where the oil stands at the cap
 it may lie tens of nanometres thick between bodies that touch.
@@ -53,7 +53,7 @@ def clr_below(solution: ContactSolution, film: float) -> float:
 
 
 def sharing_by_film(solution: ContactSolution) -> LoadSharing:
-    """Read the shares off a solution of either model."""
+    """Read the shares off a solution of any model."""
     zone = hertz_zone(solution.conditions, solution.grid)
     films = (solution.options.contact_film, *(film for film in FILMS if film > solution.options.contact_film))
     content = np.ones_like(solution.gap) if solution.oil is None else solution.oil.content
