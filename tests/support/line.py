@@ -24,6 +24,7 @@ class Film(NamedTuple):
     x: np.ndarray
     pressure: np.ndarray
     gap: np.ndarray
+    rupture: int
 
     @property
     def smallest(self):
@@ -72,36 +73,22 @@ def line_contact(lower, upper, nodes, speed, oil):
                 rupture += 1
     assert pressure.min() >= 0.0
     assert outflow[rupture - 1 :].min() >= 0.0
-    return Film(x, pressure, x**2 / 2.0 + matrix @ pressure + approach)
+    return Film(x, pressure, x**2 / 2.0 + matrix @ pressure + approach, rupture)
 
 
 def _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture):
     """Newton for R = 0 at the inner nodes before `rupture`, and the load; R of all inner nodes comes back too."""
     spacing = x[1] - x[0]
-    face = np.arange(x.size - 1)
     wet = slice(0, rupture - 1)  # of the inner nodes
     pressure = pressure.copy()
     pressure[rupture:] = 0.0
     for _ in range(100):
         gap = x**2 / 2.0 + matrix @ pressure + approach
-        density, slope = oil.density(pressure), oil.density_slope(pressure)
-        mobility = density * gap**3 / speed * np.exp(-stiffening * oil.log_viscosity(pressure))
-        mobility_by_gap = 3.0 * mobility / gap
-        content_by_p = density[:, None] * matrix + np.diag(slope * gap)
-        mobility_by_p = mobility_by_gap[:, None] * matrix + np.diag(
-            mobility * (slope / density - stiffening * oil.log_viscosity_slope(pressure))
-        )
-        between = (mobility[1:] + mobility[:-1]) / 2.0
-        gradient = np.diff(pressure) / spacing
-        flux = upwind(density * gap) - between * gradient
-        flux_by_p = upwind(content_by_p) - (mobility_by_p[1:] + mobility_by_p[:-1]) / 2.0 * gradient[:, None]
-        flux_by_p[face, face] += between / spacing
-        flux_by_p[face, face + 1] -= between / spacing
-        flux_by_approach = upwind(density) - (mobility_by_gap[1:] + mobility_by_gap[:-1]) / 2.0 * gradient
+        flux, by_p, by_approach = _fluxes(x, matrix, pressure, gap, speed, oil, stiffening)
         outflow = np.diff(flux)
         jacobian = np.zeros((rupture, rupture))
-        jacobian[:-1, :-1] = np.diff(flux_by_p, axis=0)[wet, 1:rupture]
-        jacobian[:-1, -1] = np.diff(flux_by_approach)[wet]
+        jacobian[:-1, :-1] = np.diff(by_p, axis=0)[wet, 1:rupture]
+        jacobian[:-1, -1] = np.diff(by_approach)[wet]
         jacobian[-1, :-1] = spacing
         step = -np.linalg.solve(jacobian, np.append(outflow[wet], spacing * pressure.sum() - np.pi / 2.0))
         if np.abs(step).max() < 1e-9:
@@ -109,3 +96,39 @@ def _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture):
         pressure[1:rupture] += np.clip(step[:-1], -0.3, 0.3)
         approach += np.clip(step[-1], -0.3, 0.3)
     raise AssertionError(f"the reference did not converge: last step {np.abs(step).max():.1e}")
+
+
+def _fluxes(x, matrix, pressure, gap, speed, oil, stiffening):
+    """Flux at the midpoints, and its slopes in all pressures and the approach."""
+    spacing, face = x[1] - x[0], np.arange(x.size - 1)
+    density, slope = oil.density(pressure), oil.density_slope(pressure)
+    mobility = density * gap**3 / speed * np.exp(-stiffening * oil.log_viscosity(pressure))
+    mobility_by_gap = 3.0 * mobility / gap
+    content_by_p = density[:, None] * matrix + np.diag(slope * gap)
+    mobility_by_p = mobility_by_gap[:, None] * matrix + np.diag(
+        mobility * (slope / density - stiffening * oil.log_viscosity_slope(pressure))
+    )
+    between = (mobility[1:] + mobility[:-1]) / 2.0
+    gradient = np.diff(pressure) / spacing
+    flux = upwind(density * gap) - between * gradient
+    by_p = upwind(content_by_p) - (mobility_by_p[1:] + mobility_by_p[:-1]) / 2.0 * gradient[:, None]
+    by_p[face, face] += between / spacing
+    by_p[face, face + 1] -= between / spacing
+    by_approach = upwind(density) - (mobility_by_gap[1:] + mobility_by_gap[:-1]) / 2.0 * gradient
+    return flux, by_p, by_approach
+
+
+def shaken(film, speed, oil, frequency):
+    """Complex change of the load (sum of P dX) as the bodies come closer by 1, at the angular frequency ω a/u.
+
+    Dense: every node stores what its film gains, and the rupture point stays.
+    """
+    x, pressure, gap, rupture = film
+    matrix, inner = compliance(x), slice(1, rupture)
+    _, by_p, by_approach = _fluxes(x, matrix, pressure, gap, speed, oil, 1.0)
+    spacing, density = x[1] - x[0], oil.density(pressure)
+    stored = 1j * frequency * spacing
+    content_by_p = density[:, None] * matrix + np.diag(oil.density_slope(pressure) * gap)
+    rows = np.diff(by_p, axis=0)[: rupture - 1, inner] + stored * content_by_p[inner, inner]
+    wanted = np.diff(by_approach)[: rupture - 1] + stored * density[inner]
+    return np.linalg.solve(rows, wanted).sum() * spacing

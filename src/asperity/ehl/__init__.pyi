@@ -1,6 +1,9 @@
 from .cavitation import FilmSolution as FilmSolution
 from .cavitation import solve_film as solve_film
 from .conserving_motion import moving_conserving_contact as moving_conserving_contact
+from .dynamic import DynamicStiffness as DynamicStiffness
+from .dynamic import ShakenContact as ShakenContact
+from .dynamic import dynamic_stiffness as dynamic_stiffness
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
 from .influence import Tractions as Tractions
@@ -30,6 +33,7 @@ from .solution import save_dataset as save_dataset
 from .solve import solve_contact as solve_contact
 from .state import contact_state as contact_state
 from .stiffness import TangentStiffness as TangentStiffness
+from .stiffness import Yielded as Yielded
 from .stiffness import roller_depth as roller_depth
 from .stiffness import tangent_stiffness as tangent_stiffness
 from .storage import load_solution as load_solution

@@ -10,6 +10,8 @@ cells let decay. And mobilities answer: beside asperities the oil's pressure cha
 this outweighs the mobilities themselves.
 """
 
+from typing import Any
+
 import numpy as np
 
 from asperity.arrays import Field
@@ -27,16 +29,16 @@ LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of
 class MixedLinear:
     """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny)."""
 
-    def __init__(self, balance: MixedBalance) -> None:
+    def __init__(self, balance: MixedBalance, dtype: Any = np.float32) -> None:
         self.balance, problem = balance, balance.problem
-        self.cells, self.real = problem.cells, np.float32
+        self.cells, self.real = problem.cells, dtype
         self.lubricated = balance.rows.state == LUBRICATED
         self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
         self.oil = balance.unknowns.oil.astype(self.real)
         self.lean = balance.lean.astype(self.real)
         self.rows = balance.rows._replace(fluid_scale=balance.rows.fluid_scale.astype(self.real))
         self.film = Film(*(part.astype(self.real) for part in balance.film))
-        self.faces = single_faces(balance.faces)
+        self.faces = single_faces(balance.faces, dtype)
         stencil = self._stencil()
         self.blocks = Blocks(stencil, np.where(self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0)))
         self.lines = LineRelaxation(stencil)

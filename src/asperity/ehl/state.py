@@ -1,5 +1,7 @@
 """What a tribologist reads off a solved contact: load and area shares, film, and how well the equations are met."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from asperity.conditions import ContactConditions
@@ -8,8 +10,8 @@ from asperity.ehl.conserving_solve import unknowns_of
 from asperity.ehl.mixed import MixedBalance
 from asperity.ehl.mixed import evaluate as evaluate_mixed
 from asperity.ehl.mixed_solve import pressures_of
-from asperity.ehl.outcome import MIXED, ContactState
-from asperity.ehl.posing import contact_problem, smooth_film
+from asperity.ehl.outcome import CONSERVING, MIXED, ContactState
+from asperity.ehl.posing import contact_problem, on_one_line, smooth_film
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import CENTRE, area_share, carried_share
@@ -20,6 +22,14 @@ from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
 def contact_state(solution: ContactSolution) -> ContactState:
     """Read the scalars off a solution; the residuals are evaluated anew from its fields."""
+    return state_of(solution, balance_of(solution))
+
+
+def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | MixedBalance | OilBalance:
+    """What is left of a solution's equations, evaluated anew from its fields on its own grid.
+
+    Unless `whole`, a contact in which nothing varies along y is taken on one line of cells.
+    """
     scales = Scales.of(solution.conditions, solution.lubricant)
     problem = contact_problem(
         solution.conditions,
@@ -29,14 +39,15 @@ def contact_state(solution: ContactSolution) -> ContactState:
         solution.viscosity_factor,
         attempt=solution.convergence.attempt,
     )
+    if not whole and problem.uniform and solution.options.model != CONSERVING:
+        problem = on_one_line(problem)
     if solution.options.model == MIXED:
-        pressures = pressures_of(solution, problem, scales)
-        return state_of(solution, evaluate_mixed(problem, pressures, second_order=True))
+        problem = replace(problem, accurate=False)
+        return evaluate_mixed(problem, pressures_of(solution, problem, scales), second_order=True)
     if solution.oil is not None:
-        return state_of(solution, evaluate(problem, unknowns_of(solution, problem, scales)))
-    return state_of(
-        solution, problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
-    )
+        return evaluate(problem, unknowns_of(solution, problem, scales))
+    pressure = solution.pressure[:, : problem.cells[1]] / scales.pressure
+    return problem.evaluate(pressure, solution.rigid_approach / scales.gap)
 
 
 def state_of(solution: ContactSolution, balance: Balance | MixedBalance | OilBalance) -> ContactState:

@@ -1,21 +1,29 @@
 """The tangent stiffness of a solved contact, asperities and film apart: the load a little up and down, solved again.
 
 Quasi-static: the film is given the time to settle that a 3 kHz vibration does not quite leave it (oil crosses the
-paper's Hertz zone in 0.06 ms, a fifth of a period). No squeeze, no film damping.
+paper's Hertz zone in 0.06 ms, a fifth of a period). No squeeze, no film damping: `asperity.ehl.dynamic` has both.
 """
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 
 from asperity.conditions import ContactConditions
+from asperity.ehl.conserving import OilBalance
+from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.solve import solve_contact
+from asperity.ehl.state import balance_of
 from asperity.errors import BadInput, require_positive
 
 LOAD_STEP = 0.02  # up and down, as a share of the load
 TIGHT = 1e-6  # solver tolerance: the approach differs by some per cent of a^2/R only
+HARDENED = 1.15  # times the cap: no cell of a shaken-down contact reaches it again in steps of some per cent
+
+Yielded = Literal["flowing", "elastic"]
+FLOWING, ELASTIC = YIELDED = get_args(Yielded)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +34,9 @@ class TangentStiffness:
     depends (None for the others, measured from far away). `step` is the load step behind the figures, as a share of
     the load; `step_change` and `split_change` are how far the total, relatively, and the asperities' share of it move
     from a step twice as large to this one. The total is sharp to a few per cent; the split is not, because few cells
-    change hands in a small step.
+    change hands in a small step. `yielded` tells what cells at the pressure cap did: "flowing" at a constant pressure,
+    on unloading too, as virgin roughness does on average while ever new asperities come; or "elastic", as in a joint
+    that has borne this load before.
     """
 
     asperity: float
@@ -35,6 +45,7 @@ class TangentStiffness:
     step: float
     step_change: float
     split_change: float
+    yielded: Yielded = FLOWING
 
     @property
     def total(self) -> float:
@@ -43,7 +54,11 @@ class TangentStiffness:
 
 
 def tangent_stiffness(
-    solution: ContactSolution, *, reference_depth: float | None = None, step: float = LOAD_STEP
+    solution: ContactSolution,
+    *,
+    reference_depth: float | None = None,
+    step: float = LOAD_STEP,
+    yielded: Yielded = FLOWING,
 ) -> TangentStiffness:
     """Tangent stiffness of a solved contact, by central differences over load steps of `step` and half of it.
 
@@ -51,17 +66,23 @@ def tangent_stiffness(
     ----------
     reference_depth : of a line contact [m]; None takes `roller_depth` of the conditions
     step : share of the load
+    yielded : what cells at the pressure cap do; "elastic" takes the overlap that the cap allowed off the heights, puts
+        the cap up by 15 % and solves that contact, which then has nowhere left to yield
 
     Raises
     ------
     BadInput
-        for a step outside 0.1 % to 20 %, or a reference no deeper than the contact is wide.
+        for a yielding that is none, a step outside 0.1 % to 20 %, or a reference no deeper than the contact is wide.
     NotConverged
         if a neighbouring load cannot be solved.
     """
     if not 1e-3 <= step <= 0.2:
         raise BadInput(f"load step must lie between 0.001 and 0.2 of the load, got {step:g}; {LOAD_STEP:g} is usual")
-    depth = _checked_depth(solution.conditions, reference_depth) if solution.conditions.geometry == "line" else None
+    if yielded not in YIELDED:
+        raise BadInput(f"yielded must be one of {', '.join(YIELDED)}, got {yielded!r}")
+    depth = checked_depth(solution.conditions, reference_depth) if solution.conditions.geometry == "line" else None
+    if yielded == ELASTIC and solution.p_cap is not None:
+        solution = _shaken_down(solution)
     coarse, fine = (_central_difference(solution, depth, share) for share in (step, step / 2.0))
     return TangentStiffness(
         asperity=fine[0],
@@ -70,10 +91,25 @@ def tangent_stiffness(
         step=step / 2.0,
         step_change=sum(fine) / sum(coarse) - 1.0,
         split_change=fine[0] / sum(fine) - coarse[0] / sum(coarse),
+        yielded=yielded,
     )
 
 
-def _checked_depth(conditions: ContactConditions, reference_depth: float | None) -> float:
+def _shaken_down(solution: ContactSolution) -> ContactSolution:
+    """The same contact, its asperities as flat as the load has made them and hard enough to stay so."""
+    balance, surface, conditions = balance_of(solution), solution.surface, solution.conditions
+    if isinstance(balance, OilBalance) or conditions.hardness is None:
+        raise BadInput("a contact is shaken down in the models unified and mixed only; solve by one of them")
+    overlap = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)  # the solution's own gap ends at the film
+    overlap *= balance.pressure >= balance.problem.p_cap
+    lower = surface.heights - overlap * Scales.of(conditions, solution.lubricant).gap
+    flattened = replace(solution, surface=replace(surface, heights=lower))
+    hardened = replace(conditions, hardness=HARDENED * conditions.hardness)
+    return _solved_again(replace(flattened, conditions=hardened), 1.0)
+
+
+def checked_depth(conditions: ContactConditions, reference_depth: float | None) -> float:
+    """Where a line contact's approach is measured from [m]: `roller_depth` unless given."""
     depth = roller_depth(conditions) if reference_depth is None else reference_depth
     require_positive("reference depth", depth, "m")
     half_width = conditions.hertz.half_widths[0]
@@ -102,9 +138,17 @@ def _central_difference(solution: ContactSolution, depth: float | None, share: f
 
 def _state_at(solution: ContactSolution, depth: float | None, factor: float) -> tuple[float, float, float]:
     """Load on asperities, load on film, approach of points `depth` away; at `factor` times the load."""
+    solved = _solved_again(solution, factor)
+    load = solved.conditions.load
+    borne = float(solved.pressure[solved.in_contact].sum() / solved.pressure.sum())
+    return borne * load, (1.0 - borne) * load, approach_of(solved, depth)
+
+
+def _solved_again(solution: ContactSolution, factor: float) -> ContactSolution:
+    """Solved tightly, from the solution itself."""
     conditions = replace(solution.conditions, load=factor * solution.conditions.load)
     options = replace(solution.options, tolerance=min(TIGHT, solution.options.tolerance))
-    solved = solve_contact(
+    return solve_contact(
         conditions,
         solution.lubricant,
         solution.surface,
@@ -112,8 +156,6 @@ def _state_at(solution: ContactSolution, depth: float | None, factor: float) -> 
         start=solution,
         viscosity_factor=solution.viscosity_factor,
     )
-    borne = float(solved.pressure[solved.in_contact].sum() / solved.pressure.sum())
-    return borne * conditions.load, (1.0 - borne) * conditions.load, approach_of(solved, depth)
 
 
 def approach_of(solution: ContactSolution, depth: float | None) -> float:

@@ -1,0 +1,149 @@
+"""The dynamic stiffness k(ω) + iω c(ω) of a solved contact: what a small oscillation of the bodies' distance meets.
+
+Reynolds' equation with its squeeze term, the deflection and the touching cells, linearised where they were solved. The
+oil needs time to follow, so the force runs before or behind the distance: that is the contact's own damping, which may
+be negative where the film is carried through just late enough (the entraining motion pays for it).
+"""
+
+import math
+from dataclasses import dataclass
+
+from asperity.ehl.conserving import OilBalance
+from asperity.ehl.oscillating import Oscillating, elastic
+from asperity.ehl.scales import Scales
+from asperity.ehl.solution import ContactSolution
+from asperity.ehl.state import balance_of
+from asperity.ehl.stiffness import ELASTIC, YIELDED, Yielded, checked_depth
+from asperity.errors import AsperityError, BadInput, require_positive
+
+TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
+SAME_FREQUENCY = 0.01  # a resonance is found when its own stiffness moves it by less
+MOST_TRIALS = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DynamicStiffness:
+    """Force over approach of a contact that is shaken at `frequency_hz`: `stiffness` k [N/m] + iω `damping` c [N s/m].
+
+    The approach of a line contact is that of points `reference_depth` [m] away (None for others: from far away).
+    `yielded` tells what cells at the pressure cap do: "flowing" at a constant pressure, as virgin roughness does, or
+    "elastic", as where this load has been borne before. At 0 Hz `damping` is nan. `left` is the share of the linear
+    equations that was not met.
+    """
+
+    frequency_hz: float
+    stiffness: float
+    damping: float
+    yielded: Yielded
+    reference_depth: float | None
+    left: float
+
+    @property
+    def damping_ratio(self) -> float:
+        """ζ = ω c/2k of a mass that resonates on this contact at this frequency, and of nothing else."""
+        return math.pi * self.frequency_hz * self.damping / self.stiffness
+
+
+class ShakenContact:
+    """A solved contact made ready to be shaken at any number of frequencies.
+
+    Parameters
+    ----------
+    solution : of the model unified (or paper) or mixed, dry ones too
+    yielded : what cells at the pressure cap do, see `DynamicStiffness`
+    reference_depth : of a line contact [m]; None takes `roller_depth` of the conditions
+
+    Raises
+    ------
+    BadInput
+        for a solution of the conserving model, or a reference no deeper than the contact is wide.
+    """
+
+    def __init__(
+        self, solution: ContactSolution, *, yielded: Yielded = ELASTIC, reference_depth: float | None = None
+    ) -> None:
+        if yielded not in YIELDED:
+            raise BadInput(f"yielded must be one of {', '.join(YIELDED)}, got {yielded!r}")
+        conditions = solution.conditions
+        line = conditions.geometry == "line"
+        self.yielded, self.conditions = yielded, conditions
+        self.depth = checked_depth(conditions, reference_depth) if line else None
+        balance = balance_of(solution, whole=False)
+        if isinstance(balance, OilBalance):
+            raise BadInput("a dynamic stiffness needs the model unified or mixed, got conserving; solve by one of them")
+        self.balance = elastic(balance) if yielded == ELASTIC else balance
+        self.scales = Scales.of(conditions, solution.lubricant)
+        self.oscillating = Oscillating(self.balance)
+
+    def at(self, frequency_hz: float) -> DynamicStiffness:
+        """Stiffness and damping at a frequency [Hz]; 0 for a change so slow that the film follows.
+
+        Raises
+        ------
+        AsperityError
+            where the linear equations cannot be solved.
+        """
+        if not 0.0 <= frequency_hz < math.inf:
+            raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
+        omega = 2.0 * math.pi * frequency_hz
+        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=TOLERANCE)
+        if not answer.left < 10.0 * TOLERANCE:
+            raise AsperityError(
+                f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
+                f"{answer.left:.1e} of the linear equations, wanted {TOLERANCE:.0e}"
+            )
+        response = self._from_reference(complex(answer.total.sum()) * self._newtons_per_metre())
+        return DynamicStiffness(
+            frequency_hz=frequency_hz,
+            stiffness=response.real,
+            damping=response.imag / omega if omega > 0.0 else math.nan,
+            yielded=self.yielded,
+            reference_depth=self.depth,
+            left=answer.left,
+        )
+
+    def per_crossing(self, frequency_hz: float) -> float:
+        """Angular frequency times the time that oil takes across a half-width."""
+        speed = self.conditions.entrainment_speed
+        return 2.0 * math.pi * frequency_hz * self.scales.length / speed if speed > 0.0 else 0.0
+
+    def resonance(self, mass: float) -> DynamicStiffness:
+        """Where a mass [kg] on this contact resonates, k = m ω², to 1 % of its frequency; AsperityError if nowhere."""
+        require_positive("mass", mass, "kg")
+        found = self.at(0.0)
+        for _ in range(MOST_TRIALS):
+            if found.stiffness <= 0.0:
+                break
+            frequency = math.sqrt(found.stiffness / mass) / (2.0 * math.pi)
+            if abs(frequency - found.frequency_hz) <= SAME_FREQUENCY * frequency:
+                return found
+            found = self.at(frequency)
+        raise AsperityError(f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere")
+
+    def _newtons_per_metre(self) -> float:
+        """What one dimensionless cell's pressure per gap is worth, over the whole length of a line contact."""
+        problem, scales, conditions = self.balance.problem, self.scales, self.conditions
+        dx, dy = problem.spacing
+        cell = scales.pressure * scales.length**2 / scales.gap * dx * dy
+        if conditions.length is None:
+            return cell
+        return cell * conditions.length / (problem.cells[1] * dy * scales.length)
+
+    def _from_reference(self, response: complex) -> complex:
+        """The solver measures a line's approach from points one half-width away; deeper ones give way besides."""
+        conditions = self.conditions
+        if self.depth is None or conditions.length is None:
+            return response
+        modulus, a = conditions.pair.reduced_modulus, conditions.hertz.half_widths[0]
+        return 1.0 / (1.0 / response + 2.0 / (math.pi * modulus * conditions.length) * math.log(self.depth / a))
+
+
+def dynamic_stiffness(
+    solution: ContactSolution,
+    frequency_hz: float,
+    *,
+    yielded: Yielded = ELASTIC,
+    reference_depth: float | None = None,
+) -> DynamicStiffness:
+    """k(ω) and c(ω) of a solved contact at one frequency [Hz]; `ShakenContact` for many, and for what it raises."""
+    return ShakenContact(solution, yielded=yielded, reference_depth=reference_depth).at(frequency_hz)

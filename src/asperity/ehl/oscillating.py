@@ -1,0 +1,175 @@
+"""A solved contact whose bodies oscillate a little: its linearised equations with the oil's squeeze term, answered.
+
+With every cell held by what decides it, bodies that come closer by e^(iωt) ask for pressures x with
+(J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and distance, S and s the oil that
+lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned by Newton's own approximate inverse of J.
+Dimensionless; the roughness stands.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import scipy
+
+from asperity.arrays import Field, Mask
+from asperity.ehl.linear import Linear
+from asperity.ehl.mixed import FREE, MixedBalance
+from asperity.ehl.mixed_linear import MixedLinear
+from asperity.ehl.problem import Balance
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
+
+MOST_STEPS = 300
+
+Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
+
+
+class Answer(NamedTuple):
+    """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
+
+    `left` is the share of the equations that was left, `steps` how many GMRES took.
+    """
+
+    oil: Waves
+    total: Waves
+    left: float
+    steps: int
+
+
+class _Equations(Protocol):
+    """A model's linearised equations over one vector of unknowns."""
+
+    size: int
+
+    def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
+        """Rows of J and of S for a change of the unknowns and of the approach."""
+
+    def answer(self, rows: Field) -> Field:
+        """Unknowns that about answer rows of J."""
+
+    def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
+        """Oil's and total pressure, (nx, ny)."""
+
+
+class _OnePressure:
+    """One pressure for oil and asperities."""
+
+    def __init__(self, balance: Balance) -> None:
+        self.linear = Linear(balance, dtype=np.float64)
+        self.unknown, self.cells, self.size = balance.unknown, balance.problem.cells, balance.gap.size
+        self.deflection = balance.problem.deflection
+        film, wet = balance.film, balance.rows.state == LUBRICATED
+        scale = np.where(wet, balance.rows.fluid_scale, 0.0)
+        nothing = np.zeros_like(scale)
+        self.by_gap = nothing if film is None else scale * film.content_by_gap
+        self.by_pressure = nothing if film is None else scale * film.content_by_pressure
+
+    def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
+        d_pressure = vector.reshape(self.cells)
+        rows = self.linear.product(d_pressure, d_approach)
+        d_gap = self.deflection(d_pressure) + d_approach
+        stored = self.by_gap * d_gap + self.by_pressure * d_pressure
+        return np.where(self.unknown, rows, d_pressure).ravel(), stored.ravel()
+
+    def answer(self, rows: Field) -> Field:
+        return self.linear(rows.reshape(self.cells)).ravel()
+
+    def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
+        pressure = vector.reshape(self.cells)
+        return pressure, pressure
+
+
+class _TwoPressures:
+    """The oil's pressure in every cell and, after these, the total one of touching cells."""
+
+    def __init__(self, balance: MixedBalance) -> None:
+        self.linear = linear = MixedLinear(balance, np.float64)
+        self.cells, self.count = linear.cells, balance.gap.size
+        self.touching = np.flatnonzero(linear.touching)
+        self.size = self.count + self.touching.size
+        self.deflection = balance.problem.deflection
+        scale = np.where(linear.lubricated, balance.rows.fluid_scale, 0.0)
+        self.by_gap, self.by_pressure = scale * balance.film.content_by_gap, scale * balance.film.content_by_pressure
+
+    def _split(self, vector: Any) -> tuple[Any, Any]:
+        closed = np.zeros(self.count, vector.dtype)
+        closed[self.touching] = vector[self.count :]
+        return vector[: self.count].reshape(self.cells), closed.reshape(self.cells)
+
+    def _joined(self, oil: Field, closed: Field) -> Field:
+        return np.concatenate([oil.ravel(), closed.ravel()[self.touching]])
+
+    def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
+        d_oil, closed = self._split(vector)
+        d_total = self.linear.total(d_oil, closed)
+        wet, gap_rows = self.linear.product(d_oil, d_total, d_approach)
+        d_gap = self.deflection(d_total) + d_approach
+        stored = self.by_gap * d_gap + self.by_pressure * d_oil
+        rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
+        return rows, self._joined(stored, np.zeros_like(closed))
+
+    def answer(self, rows: Field) -> Field:
+        return self._joined(*self.linear.answer(*self._split(rows)))
+
+    def pressures(self, vector: Waves) -> tuple[Any, Any]:
+        oil, closed = self._split(vector)
+        return oil, np.where(self.linear.free, oil, closed)
+
+
+class Oscillating:
+    """A balance ready to be shaken at any number of frequencies."""
+
+    def __init__(self, balance: Balance | MixedBalance) -> None:
+        self.equations: _Equations = (
+            _TwoPressures(balance) if isinstance(balance, MixedBalance) else _OnePressure(balance)
+        )
+        rows, stored = self.equations.product(np.zeros(self.equations.size), 1.0)
+        self.by_approach = rows, stored
+
+    def answer(self, frequency: float, *, tolerance: float) -> Answer:
+        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`."""
+        equations, steps = self.equations, 0
+
+        def product(vector: Waves) -> Waves:
+            rows, stored = _each_part(lambda part: np.stack(equations.product(part, 0.0)), vector)
+            return np.asarray(rows + 1j * frequency * stored)
+
+        def precondition(vector: Waves) -> Waves:
+            return np.asarray(_each_part(equations.answer, vector))
+
+        def preconditioned(vector: Waves) -> Waves:
+            nonlocal steps
+            steps += 1
+            return product(precondition(vector))
+
+        rows, stored = self.by_approach
+        wanted = rows + 1j * frequency * stored
+        shape = (equations.size, equations.size)
+        operator = scipy.sparse.linalg.LinearOperator(shape, preconditioned, dtype=complex)
+        solved, _ = scipy.sparse.linalg.gmres(operator, wanted, rtol=tolerance, restart=MOST_STEPS, maxiter=1)
+        vector = precondition(solved)
+        size = float(np.linalg.norm(wanted))
+        left = float(np.linalg.norm(product(vector) - wanted)) / size if size > 0.0 else 0.0
+        return Answer(*equations.pressures(vector), left, steps)
+
+
+def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
+    """A real linear operator on a complex vector."""
+    return operator(np.ascontiguousarray(vector.real)) + 1j * operator(np.ascontiguousarray(vector.imag))
+
+
+def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
+    """The balance with its capped cells elastic, as they are once they have yielded and are shaken below that load.
+
+    Where the bodies overlap they stay together; where oil at the cap parts them it is oil like any other.
+    """
+    state = balance.rows.state
+    closed: Mask = balance.in_contact
+    if isinstance(balance, MixedBalance):
+        solid = np.where(closed, np.int8(TOUCHING), np.int8(FREE))
+        solid = np.where(balance.solid == CAPPED, solid, balance.solid)
+        oil = np.where(state == CAPPED, np.int8(LUBRICATED), state)
+        return replace(balance, solid=solid, rows=balance.rows._replace(state=oil))
+    shaken = np.where(closed | (balance.film is None), np.int8(TOUCHING), np.int8(LUBRICATED))
+    return replace(balance, rows=balance.rows._replace(state=np.where(state == CAPPED, shaken, state)))

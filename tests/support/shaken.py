@@ -1,0 +1,95 @@
+"""A solved contact, shaken: its equations written out face by face in NumPy and solved as one dense complex system.
+
+Takes from the package what decides each cell and nothing else of its linearisation: slopes come by complex steps.
+"""
+
+import numpy as np
+
+from asperity.ehl.mixed import MixedBalance
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
+from support.reynolds import net_outflow
+
+TINY = 1e-30
+
+
+def compliance(problem):
+    """Deflection of every cell by a unit of pressure in every other, (cells, cells)."""
+    count = problem.roughness.size
+    units = np.eye(count).reshape(count, *problem.cells)
+    return np.stack([problem.deflection(unit).ravel() for unit in units], axis=1)
+
+
+def faces_of(balance):
+    """How the model takes content and mobility from cells to faces."""
+    if isinstance(balance, MixedBalance):
+        return {"wedge": (0.0, 0.0), "logarithmic": False}
+    accurate = balance.problem.accurate
+    return {"wedge": (0.375, 0.125) if accurate else (0.0, 0.5), "logarithmic": accurate}
+
+
+def shaken_cells(balance, frequencies):
+    """Complex changes of the sum of P as the bodies come closer by 1, at angular frequencies ω a/u."""
+    problem, count = balance.problem, balance.gap.size
+    two = isinstance(balance, MixedBalance)
+    oil_pressure = balance.unknowns.oil if two else balance.pressure
+    wet = (balance.rows.state == LUBRICATED).ravel()
+    solid = balance.solid if two else balance.rows.state
+    closed = (solid == TOUCHING).ravel()
+    free = ~closed & (solid != CAPPED).ravel()
+    held = (balance.gap <= problem.contact_gap) & (solid != LUBRICATED)
+    bend = compliance(problem)
+
+    def oil_rows(d_pressure, d_gap):
+        """Slope of outflow and of content along a change of the oil's pressure and of the gap."""
+        pressure = oil_pressure + 1j * TINY * d_pressure
+        gap = np.maximum(balance.gap, problem.contact_gap) + 1j * TINY * np.where(held, 0.0, d_gap)
+        outflow, content = _outflow(balance, pressure, gap)
+        return outflow.imag.ravel() / TINY, content.imag.ravel() / TINY
+
+    oil_cells, solid_cells = np.flatnonzero(wet), np.flatnonzero(closed)
+    columns, stored, totals = [], [], []
+    for number, cell in enumerate([*oil_cells, *solid_cells]):
+        unit = np.zeros(count)
+        unit[cell] = 1.0
+        of_oil = number < oil_cells.size
+        total = unit if not (two and of_oil) or free[cell] else np.zeros(count)
+        own = unit if of_oil or not two else np.zeros(count)
+        d_gap = bend @ total
+        rows, kept = oil_rows(own.reshape(problem.cells), d_gap.reshape(problem.cells))
+        totals.append(total)
+        columns.append(np.concatenate([rows[oil_cells], d_gap[solid_cells]]))
+        stored.append(np.concatenate([kept[oil_cells], np.zeros(solid_cells.size)]))
+    by_approach = np.ones(problem.cells)
+    rows, kept = oil_rows(np.zeros(problem.cells), by_approach)
+    wanted = np.concatenate([rows[oil_cells], np.ones(solid_cells.size)])
+    kept = np.concatenate([kept[oil_cells], np.zeros(solid_cells.size)])
+    matrix, stores, total = np.stack(columns, axis=1), np.stack(stored, axis=1), np.array(totals).sum(axis=1)
+    return [
+        complex(total @ np.linalg.solve(matrix + 1j * frequency * stores, wanted + 1j * frequency * kept))
+        for frequency in frequencies
+    ]
+
+
+def _outflow(balance, pressure, gap):
+    """Net outflow and oil content of every cell, complex welcome."""
+    problem = balance.problem
+    oil, pascals = problem.lubricant, pressure * problem.p_scale
+    density = oil.density(pascals) / oil.density.rho0
+    eta0 = oil.viscosity.eta0
+    mobility = density * gap**3 * eta0 / (problem.speed * oil.viscosity(pascals))
+    if isinstance(balance, MixedBalance):
+        least = problem.contact_gap**3 / problem.speed
+        mobility = np.where(mobility.real < least, least, mobility)
+    ambient = gap[[0, -1]] ** 3 / problem.speed
+    content = density * gap
+    dx, dy = problem.spacing
+    ahead = gap[0] + ((problem.x[0] - dx) ** 2 - problem.x[0] ** 2) / 2.0
+    outflow = net_outflow(pressure, content, mobility, ambient, (ahead + gap[0]) / 2.0, dx, dy, **faces_of(balance))
+    if isinstance(balance, MixedBalance):  # second order, less where the film's content jumps; the weights stay
+        lean = balance.lean
+        added = np.zeros_like(content)
+        added[1:-1] = lean[1:-1] * (content[1:-1] - content[:-2])
+        leaning = added.copy()
+        leaning[1:] -= added[:-1]
+        outflow = outflow + leaning / dx
+    return outflow, content
