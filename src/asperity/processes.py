@@ -1,7 +1,10 @@
-"""What all that starts processes needs: how many, and that Ctrl-C is the parent's business."""
+"""What all that starts processes needs: how many, that Ctrl-C is the parent's business, and that they end with it."""
 
+import multiprocessing
 import os
 import signal
+import threading
+from multiprocessing.connection import wait
 
 
 def cores() -> int:
@@ -12,3 +15,16 @@ def cores() -> int:
 def leave_interrupts_to_the_parent() -> None:
     """Ignore Ctrl-C in a worker process: the parent stops it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def set_up_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it: a parent that is killed cannot tell its workers to stop."""
+    leave_interrupts_to_the_parent()
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)

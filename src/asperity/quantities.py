@@ -98,17 +98,44 @@ class Quantity:
         number = self.number(value, deviation)
         return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
 
+    def interval(self, low: float, high: float) -> str:
+        """From where to where, with its unit and no more digits than its width bears: "55.1 to 69.9 %"."""
+        return f"{self._span(low, high)} {self.display}".rstrip()
+
+    def _span(self, low: float, high: float) -> str:
+        half = 0.5 * (high - low) * self.factor
+        decimals = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 6
+        form = self.form
+        if form.endswith("f"):
+            form = f".{min(decimals, int(form.strip('.f')))}f"
+        return " to ".join(with_deviation(end * self.factor, None, form) for end in (low, high))
+
     def named(self, value: Any, deviation: float | None = None) -> str:
         """A stored value behind its symbol: "CLR 84.0 ± 2.4 %"."""
         return f"{self.short} {self.text(value, deviation)}"
 
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Keys of the ends of its 90 % interval, where a row has one: `crf_low_hz` and `crf_high_hz` of `crf_hz`."""
+        stem, unit = (self.key.removesuffix("_hz"), "_hz") if self.key.endswith("_hz") else (self.key, "")
+        return f"{stem}_low{unit}", f"{stem}_high{unit}"
+
     def number_in(self, values: Mapping[str, Any]) -> str:
-        """Its number in a row, a run's or a table's, with its deviation where the row has one."""
-        return self.number(values.get(self.key), values.get(self.deviation))
+        """Its number in a row, a run's or a table's: "61.3 (44 to 78)", or "61.3 ± 2.4".
+
+        One that has a whole interval, known or not, bears no deviation: that would be a part of the doubt alone.
+        """
+        value, (low, high) = values.get(self.key), (values.get(end) for end in self.ends)
+        if self.ends[0] not in values:
+            return self.number(value, values.get(self.deviation))
+        if value is None or low is None or high is None:
+            return self.number(value)
+        return f"{self.number(value)} ({self._span(low, high)})"
 
     def text_in(self, values: Mapping[str, Any]) -> str:
-        """Its number in a row with its deviation and unit."""
-        return self.text(values.get(self.key), values.get(self.deviation))
+        """The same with its unit: "61.3 (44 to 78) %"."""
+        number = self.number_in(values)
+        return number if number == NO_VALUE or not self.display else f"{number} {self.display}"
 
 
 def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> str:

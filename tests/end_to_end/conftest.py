@@ -13,7 +13,8 @@ PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8
 def asp(tmp_path, monkeypatch, capsys):
     """Run a command in a folder that holds a small case; return exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    Path("case.toml").write_text(PAPER.replace("[256, 256]", "[64, 64]"), "utf-8")
+    alone = PAPER.replace("[256, 256]", "[64, 64]").replace("[solver]", "[solver]\nsurfaces = 1")
+    Path("case.toml").write_text(alone, "utf-8")
 
     def run(*arguments: str) -> tuple[int, str, str]:
         with pytest.raises(SystemExit) as end:

@@ -26,6 +26,8 @@ KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of frict
     *("shear_stress_max_pa", "shear_stress_depth_m"),
     *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
+    *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
+    *("clr_surfaces_error", "crf_error_hz", "crf_surfaces_error_hz", "crf_record_error_hz"),
 ]
 
 
@@ -48,9 +50,23 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
     assert out.splitlines()[0].startswith("Mixed lubrication: asperities carry ")
-    assert f"{100 * scalars['clr']:.1f} % of the load on {100 * scalars['car']:.1f} %" in out.splitlines()[0]
-    assert f"{scalars['crf_hz']:.1f} ± {scalars['crf_std_hz']:.1f} Hz" in out
+    assert f"{100 * scalars['clr']:.1f} % of the load (± not determined" in out.splitlines()[0]
+    assert f"on {100 * scalars['car']:.1f} % of the Hertz zone" in out.splitlines()[0]
+    assert f"resonance at {scalars['crf_hz']:.0f} Hz (± not determined" in out.splitlines()[0]
     assert asp("solve", "case.toml", "--quiet")[1:] == (out.splitlines()[0] + "\n", "")
+
+
+def test_several_surfaces_are_solved_and_kept(asp):
+    quick = ("--set", "grid.cells=[48, 48]", "--set", "vibration.duration=0.2 s")
+    code, out, _ = asp("solve", "case.toml", "--surfaces", "2", "--out", "run.nc", "--json", *quick)
+    assert code == 0
+    assert json.loads(out)["surfaces"] == 2
+    assert load_run("run.nc").scalars() == json.loads(out)
+    assert numbers(asp("solve", "run.nc", "--json")[1]) == numbers(out)  # it states how many, too
+    code, out, _ = asp("solve", "case.toml", "--set", "solver={}", "--json", *quick)
+    assert json.loads(out)["surfaces"] == 5
+    code, out, err = asp("solve", "case.toml", "--surfaces", "0")
+    assert (code, out) == (2, "")
 
 
 @pytest.mark.parametrize(

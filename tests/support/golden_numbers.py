@@ -48,7 +48,7 @@ def say(*arguments: str) -> dict[str, Any]:
 
 
 def solved(*overrides: str, case: str = "paper.toml") -> dict[str, Any]:
-    return say("solve", str(EXAMPLES / case), *_set(overrides))
+    return say("solve", str(EXAMPLES / case), "--surfaces", "1", *_set(overrides))
 
 
 def elliptic() -> dict[str, Any]:
@@ -56,7 +56,7 @@ def elliptic() -> dict[str, Any]:
     text = text.replace('geometry = "point"', 'geometry = "elliptic"').replace('"12.5 mm"', '["8 mm", "20 mm"]')
     start, rest = text.split("[surface]")
     Path("case.toml").write_text(f"{start}[surface]{GROUND}\n[grid]{rest.split('[grid]')[1]}", "utf-8")
-    return say("solve", "case.toml", *_set(("grid.cells=[48, 48]", "thermal.feedback=true")))
+    return say("solve", "case.toml", "--surfaces", "1", *_set(("grid.cells=[48, 48]", "thermal.feedback=true")))
 
 
 def study() -> dict[str, Any]:

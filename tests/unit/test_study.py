@@ -80,7 +80,7 @@ def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
     row = unbroken.iloc[4]
     assert row["case_id"] == chosen.id
     assert row["surface.sq"] == 2e-6
-    scalars = {name: value for name, value in alone.scalars().items() if name != "seconds" and value is not None}
+    scalars = {name: value for name, value in alone.own_scalars.items() if name != "seconds" and value is not None}
     assert {name: row[name] for name in scalars} == scalars
     assert row["crf_sound_hz"] == pytest.approx(3000, rel=0.5)
     assert row["crf_paper_hz"] == pytest.approx(row["crf_sound_hz"], rel=0.05)

@@ -5,7 +5,7 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.grid import Grid
-from asperity.surface import CompositeSurface, MeasuredSurface, gaussian_surface, level, prepare_surface
+from asperity.surface import CompositeSurface, MeasuredSurface, gaussian_surface, level, places, prepare_surface
 
 
 def measured(heights, pixel=1e-6):
@@ -225,3 +225,32 @@ def test_blending_says_what_it_changes():
     steps = prepare_surface(measured(rough(seed=4)), contact()).steps
     blending = next(step for step in steps if step.startswith("blended"))
     assert all(name in blending for name in ("Sq", "Sdq", "Ssk", "Sku"))
+
+
+def test_another_place_is_what_lies_beside_the_centre():
+    """What is cut there is what a map has in its middle that was measured a place further on."""
+    heights = rough((600, 500), seed=4)
+    grid = contact((120, 80), periodic=(False, False))
+    everywhere = [
+        prepare_surface(measured(heights), grid, form="none", place=place).surface.heights
+        for place in range(places(measured(heights), grid))
+    ]
+    assert len(everywhere) == 5 * 5  # 600/120 along, 500/80 across, an odd number of each about the centre
+    blocks = [
+        block - block.mean()
+        for i in range(5)
+        for j in range(5)
+        for block in [heights[120 * i : 120 * (i + 1), 50 + 80 * j : 50 + 80 * (j + 1)]]
+    ]
+    for place in everywhere:
+        assert min(np.abs(place - block).max() for block in blocks) < 1e-12
+    assert len({place.tobytes() for place in everywhere}) == 25
+    np.testing.assert_array_equal(everywhere[0], prepare_surface(measured(heights), grid, form="none").surface.heights)
+    with pytest.raises(BadInput, match="room for 25 of the contact's"):
+        prepare_surface(measured(heights), grid, place=25)
+
+
+def test_a_small_map_has_one_place_and_a_profile_those_along_it():
+    grid = contact((120, 80), periodic=(False, False))
+    assert places(measured(rough((130, 90))), grid) == 1
+    assert places(replace(measured(rough((400, 500))), uniform=1), grid) == 3

@@ -13,18 +13,21 @@ from typing import Any
 from asperity.case.amounts import plain
 from asperity.case.refusals import parse_section
 from asperity.case.sections import CaseFile, MotionSection
-from asperity.case.surfaces import composite_roughness, moving_roughness, two_bodies
+from asperity.case.surfaces import GeneratedSection, composite_roughness, moving_roughness, two_bodies
 from asperity.case.text import parse_toml, read_text, replaced, restated
 from asperity.case.vibration import vibration_model
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel
 from asperity.ehl import Options
-from asperity.errors import BadInput
+from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import Lubricant, Thermal
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 
 SHORTEST_INLET = 4.0  # half-widths; a shorter inlet starves the film (0.448 um at 1.9, 0.722 um at 4.5; docs/paper.md)
+# surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
+MANY_SURFACES, FEW_SURFACES = 5, 3
+FINE_GRID = 256 * 256  # cells above which there are few
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ class Case:
     @cached_property
     def options(self) -> Options:
         """How hard to solve."""
-        solver = {name: plain(value) for name, value in self.contents.solver}
+        solver = {name: plain(value) for name, value in self.contents.solver if name != "surfaces"}
         return Options(model=self.contents.model, **solver)
 
     @cached_property
@@ -157,6 +160,38 @@ class Case:
         """
         with self.naming("surface"):
             return self._roughness[0]
+
+    def surface_count(self, asked: int | None = None) -> int:
+        """How many surfaces to solve, where so many are `asked` for, or else as many as [solver] or the wait allows.
+
+        One where all surfaces of the case are the same. A measured map holds few that do not overlap, a run only its
+        own: BadInput where more are asked for.
+        """
+        with self.naming("surface"):
+            stated = self.contents.solver.surfaces if asked is None else asked
+            wanted = stated or (MANY_SURFACES if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID else FEW_SURFACES)
+            if wanted < 1:
+                raise BadInput(f"surfaces must be at least 1, got {wanted}")
+            if wanted == 1 or self.surface().sq == 0.0:
+                return 1
+            try:
+                available = self.contents.surface.available(self.grid, self.folder)
+            except UnreadableFile:
+                if self.stored is None or stated:
+                    raise
+                available = 1  # a run holds the surface that was solved, its measurement need not be at hand
+            if available == 1 and isinstance(self.contents.surface, GeneratedSection):
+                return 1
+            if available is not None and stated and stated > available:
+                raise BadInput(
+                    f"the measured map has room for {available} such contacts that do not overlap, got {stated} "
+                    "surfaces to solve; ask for fewer, or measure more"
+                )
+            return wanted if available is None else min(wanted, available)
+
+    def on_surface(self, number: int) -> "Case":
+        """The case on another surface of its kind, with a later seed or at another place of the map; 0 is its own."""
+        return self.with_overrides(self.contents.surface.another(number)) if number else self
 
     @property
     def surface_notes(self) -> tuple[str, ...]:

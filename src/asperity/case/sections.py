@@ -70,6 +70,7 @@ class SolverSection(Section):
     tolerance: Number = Options().tolerance
     max_iterations: Annotated[int, Strict()] = Options().max_iterations
     contact_film: Length = default_amount(Options().contact_film, "m")
+    surfaces: Count | None = None  # surfaces of one kind that a solution is the mean of; left out: as the wait allows
 
 
 class MotionSection(Section):

@@ -4,13 +4,14 @@
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Strict, create_model
+from pydantic import Field, Strict, create_model
 
 from asperity.case.amounts import OPTIONAL, PAIRED, Length, Number, Seed, plain
 from asperity.case.refusals import Section, choose, validated
@@ -20,6 +21,7 @@ from asperity.surface import (
     CompositeSurface,
     Fit,
     Form,
+    MeasuredSurface,
     MovingSurfaces,
     Outliers,
     PreparedSurface,
@@ -31,6 +33,7 @@ from asperity.surface import (
     ground_surface,
     length_text,
     non_gaussian_surface,
+    places,
     prepare_surface,
     read_surface,
     run_in_surface,
@@ -43,8 +46,16 @@ SAMPLE_DEVIATION = 0.05  # of a generated surface's correlation lengths, beyond 
 RoughBody = Literal["first", "second", "both"]
 
 
-class SurfaceSection(Section):
+class SurfaceSection(Section, ABC):
     """[surface]."""
+
+    @abstractmethod
+    def available(self, grid: Grid, folder: Path) -> int | None:
+        """How many surfaces of its kind there are; None for as many as one likes."""
+
+    @abstractmethod
+    def another(self, number: int) -> dict[str, object]:
+        """The keys and values that make it the surface of that number; it is number 0 itself."""
 
 
 _LENGTH: Any = (Length, ...)
@@ -107,6 +118,14 @@ class GeneratedSection(SurfaceSection):
         rng = np.random.default_rng([seed, *stream] if stream else seed)
         return KINDS[self.kind].generator(grid, **self.arguments(), rng=rng)
 
+    def available(self, grid: Grid, folder: Path) -> int | None:  # noqa: ARG002 - it needs no room
+        """One where no seed draws it."""
+        return None if "seed" in KINDS[self.kind].fields else 1
+
+    def another(self, number: int) -> dict[str, object]:
+        """With a later seed."""
+        return {"surface.seed": getattr(self, "seed", 0) + number}
+
     def notes(self, surface: Surface) -> tuple[str, ...]:
         """How far the correlation lengths of a sample stray from those of a (non-)Gaussian section."""
         if self.kind not in ("gaussian", "non-gaussian"):
@@ -141,12 +160,23 @@ class FileSection(SurfaceSection):
     unit: str | None = None  # of the heights, where the file does not say
     lateral_unit: str | None = None
     pixel: Annotated[tuple[Length, Length], PAIRED] | None = None  # of a matrix of bare heights
+    place: Annotated[int, Strict(), Field(ge=0)] | None = None  # which part of the map; left out: its centre
+
+    def measured(self, folder: Path) -> MeasuredSurface:
+        """The file's map; `folder` is where the file is looked for."""
+        return read_surface(folder / self.file, unit=self.unit, lateral_unit=self.lateral_unit, pixel=plain(self.pixel))
+
+    def available(self, grid: Grid, folder: Path) -> int | None:
+        """As many as the map holds side by side, from its own place on."""
+        return max(1, places(self.measured(folder), grid, turn=self.turn) - (self.place or 0))
+
+    def another(self, number: int) -> dict[str, object]:
+        """At the place so many places on."""
+        return {"surface.place": (self.place or 0) + number}
 
     def prepare(self, grid: Grid, folder: Path) -> PreparedSurface:
         """The file's map on a grid; `folder` is where the file is looked for."""
-        measured = read_surface(
-            folder / self.file, unit=self.unit, lateral_unit=self.lateral_unit, pixel=plain(self.pixel)
-        )
+        measured = self.measured(folder)
         prepared = prepare_surface(
             measured,
             grid,
@@ -157,6 +187,7 @@ class FileSection(SurfaceSection):
             outliers=self.outliers,
             s_filter=plain(self.s_filter),
             l_filter=plain(self.l_filter),
+            place=self.place or 0,
         )
         return replace(prepared, steps=(*measured.notes, *prepared.steps))
 
@@ -165,6 +196,17 @@ class MeasuredSection(FileSection):
     """[surface] file = "..."."""
 
     second: FileSection | None = None  # on the other body; the composite of both is solved
+
+    def available(self, grid: Grid, folder: Path) -> int | None:
+        """As many as both maps hold."""
+        both = [FileSection.available(part, grid, folder) for part in (self, self.second) if part is not None]
+        return min(count for count in both if count is not None)
+
+    def another(self, number: int) -> dict[str, object]:
+        """At another place of both."""
+        if self.second is None:
+            return super().another(number)
+        return {**super().another(number), "surface.second.place": (self.second.place or 0) + number}
 
 
 def parse_surface(value: object) -> SurfaceSection:

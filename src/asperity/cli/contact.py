@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import case, files, report, results
+from asperity import case, files, processes, report, results
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, CaseOrRun, Overrides, Quiet, SurfaceFile, chosen_case, require_output
-from asperity.cli.show import Block, known, show, solver_progress, table, text
+from asperity.cli.show import Block, SolverSteps, known, progress, show, table, text
 from asperity.errors import AsperityError
 from asperity.quantities import quantity
 
@@ -55,13 +55,22 @@ def solve(
     path: CaseOrRun,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
+    surfaces: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Surfaces of its kind to solve: the numbers are means; default 5, fine grids 3."
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve one contact: film, load sharing, contact resonance."""
+    """Solve one contact on several surfaces of its kind: film, load sharing, contact resonance, and their scatter."""
     require_output(out, ".nc")
-    run = _solve(chosen_case(path, overrides, surface), label=path.name, quiet=quiet)
+    chosen = chosen_case(path, overrides, surface)
+    if surfaces is not None:
+        chosen = chosen.with_overrides({"solver.surfaces": surfaces})
+    run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None)
     if out is not None:
         run.save(out)
     kept = [] if out is None else [f"Kept in {out}; asperity report {out} makes a page of it"]
@@ -71,11 +80,19 @@ def solve(
         raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
 
 
-def _solve(chosen: "Case", *, label: str, quiet: bool) -> "Run":
+def _solve(chosen: "Case", *, label: str, quiet: bool, surfaces: int | None = 1) -> "Run":
     """A run, marked where it did not converge."""
     chosen.surface()  # made or read here: it may take seconds, which are not the solver's
-    with solver_progress(label, quiet=quiet) as step:
-        return results.solve_case(chosen, progress=step, strict=False)
+    with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
+        steps = SolverSteps(display)
+        return results.solve_case(
+            chosen,
+            surfaces=surfaces,
+            workers=processes.cores(),
+            progress=steps.step,
+            surface_progress=steps.surface,
+            strict=False,
+        )
 
 
 def run_table(run: "Run") -> Block:
@@ -83,6 +100,7 @@ def run_table(run: "Run") -> Block:
     touching = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     rows = [
         *known(run.scalars()),
+        *results.doubt_rows(run.error),
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
         ("solver", run.solution.convergence.explain()),
     ]

@@ -149,14 +149,29 @@ def _unseen(doing: str, done: int | None = None, total: int | None = None) -> No
     """What a display does that nobody sees."""
 
 
+class SolverSteps:
+    """Shows the solver's steps, and the surfaces that are done where there are several."""
+
+    def __init__(self, display: Display) -> None:
+        self.display = display
+        self.done: int | None = None
+        self.total: int | None = None
+
+    def step(self, iteration: "Iteration") -> None:
+        """After a Newton step; the start is known before all is compiled."""
+        if iteration.number > 0:
+            nx, ny = iteration.cells
+            words = f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}"
+            self.display(words, self.done, self.total)
+
+    def surface(self, done: int, total: int) -> None:
+        """After a surface."""
+        self.done, self.total = done, total
+        self.display(f"{done} of {total} surfaces", done, total)
+
+
 @contextmanager
 def solver_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], None]]":
     """Show the solver's steps."""
     with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
-
-        def step(iteration: "Iteration") -> None:
-            if iteration.number > 0:  # the start is known before all is compiled
-                nx, ny = iteration.cells
-                display(f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}")
-
-        yield step
+        yield SolverSteps(display).step

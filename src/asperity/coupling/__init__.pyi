@@ -38,3 +38,4 @@ from .record import contact_vibration as contact_vibration
 from .record import excitation as excitation
 from .spring import damped_oscillator as damped_oscillator
 from .spring import oscillator as oscillator
+from .spring import resonance_at as resonance_at

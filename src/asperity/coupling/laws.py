@@ -39,11 +39,14 @@ class StiffnessLaw(ABC):
     """Stiffness of the contact [N/m].
 
     `asperities_alone`: no spring without touching asperities, and it carries and grows with their load; other laws
-    need the solved contact. `point_spring`: a sphere's, force ~ compression^1.5, which a nonlinear response supposes.
+    need the solved contact. `by_load_share`: what it takes of the contact is its load share and means over it, so that
+    it can be asked at another share. `point_spring`: a sphere's, force ~ compression^1.5, which a nonlinear response
+    supposes.
     """
 
     name: ClassVar[str]
     asperities_alone: ClassVar[bool] = False
+    by_load_share: ClassVar[bool] = False
     point_spring: ClassVar[bool] = False
 
     @abstractmethod
@@ -60,7 +63,7 @@ class HertzPoint(StiffnessLaw):
     """Stiffness of a sphere on a plane under the asperities' load, Rx and E* of the contact: the paper's Eqs 2-3."""
 
     name = "hertz-point"
-    asperities_alone = True
+    asperities_alone = by_load_share = True
     point_spring = True
 
     def __call__(self, contact: LoadedContact) -> float:
@@ -82,7 +85,7 @@ class HertzLine(_LineApproach, StiffnessLaw):
     """Stiffness of a smooth line contact under the asperities' load: π E* L / (2 ln(2d/a))."""
 
     name = "hertz-line"
-    asperities_alone = True
+    asperities_alone = by_load_share = True
 
     def __call__(self, contact: LoadedContact) -> float:
         """S [N/m]; raises BadInput for a contact that is no line."""
@@ -107,6 +110,7 @@ class ParallelFilm(StiffnessLaw):
     """
 
     name = "parallel-film"
+    by_load_share = True
 
     def __call__(self, contact: LoadedContact) -> float:
         """S [N/m]."""

@@ -25,6 +25,19 @@ def oscillator(
     return loaded_oscillator(model.stiffness_law, LoadedContact(state.clr, state, conditions, solution), model)
 
 
+def resonance_at(clr: float, state: ContactState, conditions: ContactConditions, model: VibrationModel) -> float | None:
+    """Natural frequency [Hz] at another load share of the same contact; None by a law that would need it solved.
+
+    Without any load on asperities, a spring that is theirs alone leaves nothing to resonate: 0.
+    """
+    law = model.stiffness_law
+    if not law.by_load_share:
+        return None
+    if clr <= 0.0 and law.asperities_alone:
+        return 0.0
+    return loaded_oscillator(law, LoadedContact(clr, state, conditions), model).natural_frequency_hz
+
+
 def loaded_oscillator(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> ContactOscillator:
     """The model's mass and damping on the spring that `law` makes of a contact."""
     load = contact.asperity_load if law.asperities_alone else contact.conditions.load

@@ -48,3 +48,7 @@ from .thermal import solve_thermal_contact as solve_thermal_contact
 from .traction import BOUNDARY_FRICTION as BOUNDARY_FRICTION
 from .traction import Friction as Friction
 from .traction import friction as friction
+from .uncertainty import NONE as NONE
+from .uncertainty import ContactError as ContactError
+from .uncertainty import Sides as Sides
+from .uncertainty import Uncertainty as Uncertainty

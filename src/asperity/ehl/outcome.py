@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, get_args
 
+from asperity.ehl.uncertainty import ContactError
 from asperity.errors import BadInput, require_positive
 
 ContactModel = Literal["unified", "paper", "mixed", "conserving"]
@@ -162,7 +163,8 @@ class ContactState:
     relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
     equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when
     dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream;
-    `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch).
+    `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch);
+    `error` how far load share and resonance may be off, and why (None for a mean over the steps of a history).
     """
 
     car: float
@@ -179,3 +181,4 @@ class ContactState:
     load_error: float
     mass_flux_imbalance: float
     contact_slope: float | None = None
+    error: ContactError | None = None

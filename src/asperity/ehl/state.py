@@ -16,6 +16,7 @@ from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import CENTRE, area_share, carried_share
 from asperity.ehl.solution import ContactSolution
+from asperity.ehl.uncertainty import ContactError, Uncertainty
 from asperity.grid import Grid
 from asperity.kernels.reynolds import CAPPED, LUBRICATED
 
@@ -79,6 +80,27 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance | OilBal
         load_error=balance.load_error,
         mass_flux_imbalance=float(unbalanced * dx * dy / (carried * width)),
         contact_slope=_contact_slope(solution),
+        error=_error(solution),
+    )
+
+
+def _error(solution: ContactSolution) -> ContactError:
+    """What the solution alone can tell: iteration and grid, and what was chosen."""
+    convergence, options = solution.convergence, solution.options
+    iteration, grid = (
+        None if figures is None else (figures.clr, figures.clr)
+        for figures in (convergence.iteration_error, convergence.discretisation_error)
+    )
+    clr = carried_share(solution.pressure, solution.in_contact)
+    cap, inlet = solution.p_cap, -solution.grid.lower[0] / solution.conditions.hertz.half_widths[0]
+    return ContactError(
+        clr=Uncertainty(value=clr, iteration=iteration, grid=grid, range=(0.0, 1.0)),
+        choices=(
+            f"model {options.model}",
+            "no pressure cap" if cap is None else f"pressure cap {cap / 1e9:.3g} GPa",
+            *([] if solution.lubricant is None else [f"contact threshold {options.contact_film * 1e9:.3g} nm"]),
+            f"inlet {inlet:.3g} half-widths long",
+        ),
     )
 
 

@@ -79,6 +79,9 @@ class Tile(NamedTuple):
 
 def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
     """A quantity of a row, its deviation and unit apart."""
+    low, high = (row.get(end) for end in quantity.ends)
+    if low is not None and high is not None:
+        return Tile(heading(quantity), quantity.number(row[quantity.key]), f"({quantity.interval(low, high)})")
     value, _, deviation = quantity.number_in(row).partition(" ± ")
     if value.startswith("("):  # the power of ten of both
         deviation, _, power = deviation.partition(")")

@@ -1,11 +1,9 @@
-"""The main job: a case solved, its load sharing read off, its contact resonance found; kept in one file.
+"""What the main job gives: a case solved, its load sharing read off, its contact resonance found; kept in one file.
 
-Does no physics of its own; prints nothing.
+Does no physics of its own, solves and prints nothing.
 """
 
-import json
-import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,12 +13,13 @@ import numpy as np
 
 from asperity import ehl
 from asperity.arrays import Field
-from asperity.case import Case, load_case
-from asperity.coupling import Vibration, contact_vibration, require_sampling
+from asperity.case import Case
+from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import FILMS, HOT, ContactSolution, ContactState, FlashTemperature, Friction, friction_and_heat
-from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.errors import AsperityError, BadInput
 from asperity.quantities import lines, quantity, read
-from asperity.surface import Surface
+from asperity.results.doubt import basis, in_words
+from asperity.results.spread import Row, Scalar, mean_row, whole_error
 from asperity.wear import Resonance
 
 if TYPE_CHECKING:
@@ -29,8 +28,9 @@ if TYPE_CHECKING:
 FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
-Scalar = float | int | bool | None
 RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "solver")
+DOUBT = "uncertainty"  # group of the catalogue: of all surfaces together
+CRUCIAL = ("clr", "clr_error", "car", "crf_hz", "crf_std_hz")
 MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2", "film_temperature")
 
 
@@ -39,7 +39,9 @@ class Run:
     """A solved case: the contact, what a tribologist reads off it, and how a mass on it vibrates.
 
     `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the numbers has to know.
-    Friction, heat and stress are worked out when they are first asked for.
+    Friction, heat and stress are worked out when they are first asked for. `others` are the numbers of further surfaces
+    of the same kind that were solved: fields, state, vibration and friction are those of the first surface, `scalars`
+    the means over all, and `error` says how far a single surface may be off them.
     """
 
     case: Case
@@ -47,6 +49,7 @@ class Run:
     state: ContactState
     vibration: Vibration | None
     notes: tuple[str, ...] = ()
+    others: tuple[Row, ...] = ()
 
     @cached_property
     def _rubbing(self) -> tuple[Friction, FlashTemperature] | str:
@@ -107,40 +110,58 @@ class Run:
         """Share of the load on films no thicker than each of `FILMS`."""
         return {f"{film * 1e9:.0f}nm": ehl.clr_below(self.solution, film) for film in FILMS}
 
-    def scalars(self) -> dict[str, Scalar]:
-        """Every number of the run by its key in the catalogue of quantities, SI; None where there is none."""
+    @property
+    def error(self) -> ehl.ContactError:
+        """How far load share and resonance may be off, and why."""
+        assert self.state.error is not None  # it was read off a solution
+        return self.state.error
+
+    @cached_property
+    def own_scalars(self) -> dict[str, Scalar]:
+        """Every number of the first surface by its key in the catalogue of quantities, SI; None where there is none."""
         return read(self, lines(*RUN_GROUPS))
 
+    def scalars(self) -> dict[str, Scalar]:
+        """Every number of the run by its key, SI: means over its surfaces, and intervals; of the first how it went."""
+        return mean_row((self.own_scalars, *self.others)) | read(self, lines(DOUBT))
+
     def verdict(self) -> str:
-        """One sentence on the state of the contact.
+        """One sentence on the state of the contact, of its surfaces' means and with 90 % intervals.
 
         Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more; mixed between.
         """
-        clr = self.state.clr
+        numbers, error = mean_row((self.crucial, *self.others)), self.error
+        clr, car = (float(numbers[key]) for key in ("clr", "car"))
         if self.solution.lubricant is None:
             regime = "Dry contact"
         elif clr < FULL_FILM_BELOW:
             regime = "Full film"
         else:
             regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
-        load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", self.state.car)))
-        sentence = f"{regime}: asperities carry {load} of the load on {area} of the Hertz zone"
+        load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", car)))
+        sentence = (
+            f"{regime}: asperities carry {load} of the load {in_words('clr', error.clr)} on {area} of the Hertz zone"
+        )
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
-        return f"{sentence}; {self.resonance_in_words()}."
+        return f"{sentence}; {self.resonance_in_words()}; {basis(error)}."
+
+    @property
+    def crucial(self) -> Row:
+        """What the verdict and the intervals need of the first surface: numbers that take no time."""
+        return read(self, map(quantity, CRUCIAL))
 
     def resonance_in_words(self) -> str:
-        """The contact resonance with its standard deviation, or why there is none."""
+        """The contact resonance with its interval, or why there is none."""
         if self.vibration is None:
             return "vibration not asked for"
-        resonance = self.vibration.resonance
-        if not resonance.found:
-            return f"no contact resonance ({resonance.reason.rstrip('.')})"
-        deviation = resonance.crf_std_hz
-        if not math.isfinite(deviation):
-            return f"contact resonance at {resonance.crf_hz:.0f} Hz"
-        decimals = 1 if deviation < 2.0 else 0
-        return f"contact resonance at {resonance.crf_hz:.{decimals}f} ± {deviation:.{decimals}f} Hz"
+        rows = (self.crucial, *self.others)
+        found = sum(row["crf_hz"] is not None for row in rows)
+        error = self.error.crf_hz
+        if not found or error is None:
+            return f"no contact resonance ({self.vibration.resonance.reason.rstrip('.')})"
+        most = "" if found == len(rows) else f", on {found} of {len(rows)} surfaces"
+        return f"contact resonance at {error.value:.0f} Hz {in_words('crf_hz', error)}{most}"
 
     def to_dataset(self) -> "xarray.Dataset":
         """The solution's dataset, with every number of the run and maps of traction, temperature and von Mises stress.
@@ -167,77 +188,8 @@ class Run:
         return ehl.save_dataset(self.to_dataset(), path)
 
 
-def solve_case(
-    case: Case,
-    *,
-    surface: Surface | None = None,
-    progress: Callable[[ehl.Iteration], None] | None = None,
-    strict: bool = True,
-) -> Run:
-    """Solve a case, and work out its vibration.
-
-    Parameters
-    ----------
-    case : what to solve
-    surface : composite roughness on the case's grid, in place of the case's own
-    progress : called after every step of the solver
-    strict : raise when the solver stops before its tolerance; else the run says so
-
-    Raises
-    ------
-    BadInput
-        for a surface that does not fit the case's grid, or cannot be made or read.
-    NotConverged
-        if `strict`; its `solution` is the unfinished contact.
-    """
-    if surface is not None:
-        if surface.grid != case.grid:
-            grids = f"got {surface.grid} where the case has {case.grid}"
-            raise BadInput(f"surface must lie on the case's grid, {grids}; make it on case.grid")
-        case = replace(case, stored=surface)
-    roughness = case.surface()
-    if case.vibration is not None:
-        with case.naming("vibration"):
-            require_sampling(case.conditions, case.vibration, roughness.sq)  # before the time a solution takes
-    notes = (*case.surface_notes, *case.notes)
-    kept = {"case": case.text, "notes": json.dumps(notes)}
-    try:
-        solution = ehl.solve_thermal_contact(
-            case.conditions,
-            case.lubricant,
-            roughness,
-            boundary_friction=case.boundary_friction,
-            thermal=case.thermal,
-            options=case.options,
-            progress=progress,
-            strict=strict,
-        )
-    except NotConverged as unfinished:
-        raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None
-    return _run(case, replace(solution, attributes=kept), notes)
-
-
-def load_run(path: str | Path) -> Run:
-    """Read a run back: its fields as they were solved, everything else worked out from them anew.
-
-    Raises
-    ------
-    UnreadableFile
-        if the file is missing, damaged, or holds no case.
-    """
-    path = Path(path)
-    solution = ehl.load_solution(path)
-    try:
-        text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
-    except (KeyError, ValueError):
-        alone = f"{path} holds a solution without its case"
-        raise UnreadableFile(f"{alone}; save the run (Run.save), not its solution alone") from None
-    case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
-    case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
-    return _run(case, solution, notes)
-
-
-def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
+def run_of(case: Case, solution: ContactSolution, notes: Sequence[str], others: Sequence[Row] = ()) -> Run:
+    """The run of a case that is solved, its vibration worked out; `others` are the numbers of further surfaces."""
     state = ehl.contact_state(solution)
     model = case.vibration
     with case.naming("vibration"):
@@ -246,7 +198,9 @@ def _run(case: Case, solution: ContactSolution, notes: tuple[str, ...]) -> Run:
         notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
-    return Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes)
+    run = Run(case=case, solution=solution, state=state, vibration=vibration, notes=tuple(notes), others=tuple(others))
+    error = whole_error(state, (run.crucial, *others), case.conditions, model, vibration)
+    return replace(run, state=replace(state, error=error))
 
 
 def _threshold(solution: ContactSolution) -> str:

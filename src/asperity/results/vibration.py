@@ -10,7 +10,7 @@ from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_fu
 from asperity.ehl import ContactState, Iteration
 from asperity.errors import BadInput
 from asperity.quantities import lines, quantity, read
-from asperity.results.run import solve_case
+from asperity.results.solve import solve_case
 from asperity.wear import Resonance
 
 KEYS = ("crf_hz", "crfa", "crf_std_hz", "crfa_std", "clr", "car", "sq_m")

@@ -4,12 +4,9 @@ Runs in worker processes: takes and gives only what can be sent, raises nothing 
 """
 
 import logging
-import multiprocessing
-import os
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from multiprocessing.connection import wait
 from typing import Any, Literal, get_args
 
 from threadpoolctl import threadpool_limits
@@ -18,7 +15,6 @@ from asperity.arrays import Field, finite_or_none
 from asperity.case import Case
 from asperity.coupling import Vibration, contact_vibration
 from asperity.errors import AsperityError
-from asperity.processes import leave_interrupts_to_the_parent
 from asperity.results import Run, solve_case, vibrate_case
 
 CaseStatus = Literal["done", "not converged", "failed"]
@@ -65,7 +61,7 @@ def _solved(case: Case, wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]
     run = solve_case(case, strict=False)
     convergence = run.solution.convergence
     status, reason = (DONE, "") if convergence.converged else (NOT_CONVERGED, convergence.explain())
-    row: Row = {"status": status, "reason": reason, **run.scalars()}
+    row: Row = {"status": status, "reason": reason, **run.own_scalars}
     if run.vibration is not None:
         row["full_load_crf_hz"] = run.vibration.full_load_crf_hz
         row |= _both_presets(case, run)
@@ -105,19 +101,3 @@ def _both_presets(case: Case, run: Run) -> Row:
         for name, unit in (("crf", "_hz"), ("crfa", ""), ("crf_std", "_hz"), ("crfa_std", "")):
             row[f"{name}_{preset}{unit}"] = finite_or_none(getattr(resonance, f"{name}{unit}", None))
     return row
-
-
-# In worker processes -------------------------------------------------------------------------------------------------
-
-
-def set_up_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it: a parent that is killed cannot tell its workers to stop."""
-    leave_interrupts_to_the_parent()
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)

@@ -30,8 +30,8 @@ import pandas
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.files import MANIFEST, versions
-from asperity.processes import cores
-from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, set_up_worker, timed_batch
+from asperity.processes import cores, set_up_worker
+from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, timed_batch
 from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.store import Store, in_order, manifest_of, open_read, open_store, read_plan, require_zarr, table_of
 

@@ -25,6 +25,7 @@ from .parameters import surface_parameters as surface_parameters
 from .prepare import CompositeSurface as CompositeSurface
 from .prepare import Fit as Fit
 from .prepare import PreparedSurface as PreparedSurface
+from .prepare import places as places
 from .prepare import prepare_surface as prepare_surface
 from .profile import ProfileParameters as ProfileParameters
 from .profile import profile_parameters as profile_parameters

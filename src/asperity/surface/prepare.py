@@ -70,12 +70,13 @@ def prepare_surface(
     s_filter: float | None = None,
     l_filter: float | None = None,
     most_missing: float = 0.25,
+    place: int = 0,
 ) -> PreparedSurface:
     """Put a measured map onto a contact grid as roughness about a zero mean.
 
-    The map is conditioned as a whole, the centre cut out, its missing cells filled, resampled by a windowed sinc that
-    keeps every wave that the coarser of pixel and cell can show, and, along an axis that repeats, its ends blended
-    into one another. A profile goes on unchanged across its direction.
+    The map is conditioned as a whole, a place of it cut out, its missing cells filled, resampled by a windowed sinc
+    that keeps every wave that the coarser of pixel and cell can show, and, along an axis that repeats, its ends
+    blended into one another. A profile goes on unchanged across its direction.
 
     Parameters
     ----------
@@ -85,11 +86,13 @@ def prepare_surface(
     form, turn, outliers, s_filter, l_filter : how to condition the map first, see `condition`
     fit : "crop" needs a map as large as the grid; "tile" repeats a smaller one, mirrored so that no seam shows
     most_missing : the largest share of missing cells that is filled
+    place : which part of the map, of as many as `places` counts that do not overlap; 0 is its centre
 
     Raises
     ------
     BadInput
-        for a map smaller than the grid, too many missing cells, or a flat map that is to be scaled.
+        for a map smaller than the grid, a place that it has not, too many missing cells, or a flat map that is to be
+        scaled.
     """
     if fit not in get_args(Fit):
         raise BadInput(f"fit must be one of {', '.join(get_args(Fit))}, got {fit!r}")
@@ -98,12 +101,11 @@ def prepare_surface(
     levelled, conditioning = condition_surface(
         measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
     )
-    overlap = tuple(
-        max(4, round(n * _OVERLAP)) if ends and axis != levelled.uniform else 0
-        for axis, (n, ends) in enumerate(zip(grid.cells, grid.periodic, strict=True))
-    )
-    fitting = _fitting(levelled, grid, fit)
-    heights, positions = _cut(levelled, grid, overlap)
+    overlap = _overlap(levelled, grid)
+    fitting, centre = _fitting(levelled, grid, fit), _centre(levelled, grid, place)
+    if place:
+        fitting += f", then moved by {' and '.join(map(length_text, centre))} to place {place}"
+    heights, positions = _cut(levelled, grid, overlap, centre)
     heights, filling = _fill(heights, levelled, most_missing)
     heights, resampling = _resample(heights, positions, levelled.grid, grid, overlap)
     steps = [*conditioning, fitting, filling, resampling]
@@ -124,6 +126,42 @@ def prepare_surface(
         f"from Sq {length_text(natural_sq)} to {length_text(sq)}"
     )
     return PreparedSurface(Surface(heights * (sq / natural_sq), grid), tuple(steps))
+
+
+def places(measured: MeasuredSurface, grid: Grid, *, turn: bool = False) -> int:
+    """How many parts of a map as large as the grid do not overlap, its centre one of them; at least 1."""
+    return len(_places(measured.turned() if turn else measured, grid))
+
+
+def _overlap(measured: MeasuredSurface, grid: Grid) -> tuple[int, ...]:
+    """Cells over which the ends of each axis are blended."""
+    return tuple(
+        max(4, round(n * _OVERLAP)) if ends and axis != measured.uniform else 0
+        for axis, (n, ends) in enumerate(zip(grid.cells, grid.periodic, strict=True))
+    )
+
+
+def _places(measured: MeasuredSurface, grid: Grid) -> list[tuple[float, float]]:
+    """Centres of parts that lie side by side within the map, from the map's own centre [m], the nearest first."""
+    steps, each_way = [], []
+    for axis, (side, cell, shared) in enumerate(zip(grid.extent, grid.spacing, _overlap(measured, grid), strict=True)):
+        step, have = side + shared * cell, measured.grid.extent[axis]
+        steps.append(step)
+        each_way.append(0 if axis == measured.uniform else max(0, int((have / step * (1.0 + 1e-9) - 1.0) / 2.0)))
+    lattice = [(i, j) for i in range(-each_way[0], each_way[0] + 1) for j in range(-each_way[1], each_way[1] + 1)]
+    lattice.sort(key=lambda at: (abs(at[0]) + abs(at[1]), at))
+    return [(i * steps[0], j * steps[1]) for i, j in lattice]
+
+
+def _centre(measured: MeasuredSurface, grid: Grid, place: int) -> tuple[float, float]:
+    """Of a place, from the map's own centre [m]."""
+    centres = _places(measured, grid)
+    if not 0 <= place < len(centres):
+        raise BadInput(
+            f"{measured.name} has room for {len(centres)} of the contact's {area_text(grid.extent)} apart from one "
+            f"another, got place {place}; count them from 0"
+        )
+    return centres[place]
 
 
 def _fitting(measured: MeasuredSurface, grid: Grid, fit: Fit) -> str:
@@ -152,20 +190,23 @@ def _fitting(measured: MeasuredSurface, grid: Grid, fit: Fit) -> str:
     return f"repeated the {have} measured, mirrored at its edges, to cover {need}"
 
 
-def _cut(measured: MeasuredSurface, grid: Grid, overlap: tuple[int, ...]) -> tuple[Field, list[Field]]:
-    """The part around the centre that resampling needs, mirrored beyond the edges, and where its cells sit [m]."""
+def _cut(
+    measured: MeasuredSurface, grid: Grid, overlap: tuple[int, ...], centre: tuple[float, float]
+) -> tuple[Field, list[Field]]:
+    """The part around a centre that resampling needs, mirrored beyond the edges, and where its cells sit [m]."""
     indices: list[npt.NDArray[np.intp]] = []
     positions: list[Field] = []
-    for n, pixel, extent, cell, shared in zip(
-        measured.grid.cells, measured.grid.spacing, grid.extent, grid.spacing, overlap, strict=True
+    for n, pixel, extent, cell, shared, offset in zip(
+        measured.grid.cells, measured.grid.spacing, grid.extent, grid.spacing, overlap, centre, strict=True
     ):
         half = (extent + shared * cell) / 2.0
         margin = 1 + int(np.ceil(_LOBES * max(pixel, cell) / pixel))  # the sinc's reach
         reach = int(np.ceil(half / pixel)) + margin
-        wanted = np.arange(n // 2 - reach, n // 2 + reach + 1)
+        moved = round(offset / pixel)
+        wanted = np.arange(n // 2 - reach, n // 2 + reach + 1) + moved
         folded = np.mod(wanted, 2 * n)
         indices.append(np.minimum(folded, 2 * n - 1 - folded))
-        positions.append(np.asarray((wanted + 0.5 - n / 2.0) * pixel, dtype=np.float64))
+        positions.append(np.asarray((wanted - moved + 0.5 - n / 2.0) * pixel, dtype=np.float64))
     return measured.heights[np.ix_(*indices)], positions
 
 

@@ -12,7 +12,7 @@ from asperity.report.base import Exhibit, Picture, Tile, render, span, tile, wri
 from asperity.report.run import contact, rubbing, several
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.vibration import spectrum
-from asperity.results import RUN_GROUPS, Run
+from asperity.results import RUN_GROUPS, Run, doubt_rows
 
 TILES = ("clr", "car", "h_mean_m", "lambda_ratio", "friction_coefficient", "flash_temperature_max_k", "crf_hz", "crfa")
 
@@ -53,6 +53,7 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         conditions=conditions_table(runs),
         lubricated=any(oil is not None for oil in oils),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
+        alone=any(run.error.surfaces == 1 and run.state.sq > 0.0 for run in runs),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
         sphere=any(run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs),
         line=any(run.solution.conditions.geometry == "line" for run in runs),
@@ -75,6 +76,7 @@ class _RunView(NamedTuple):
     convergence: Convergence
     tiles: list[Tile]
     pictures: list[Picture]
+    doubts: list[tuple[str, str]]
     notes: list[str]
 
 
@@ -88,6 +90,7 @@ def _view(run: Run, number: int, several_runs: bool) -> _RunView:
         convergence=run.solution.convergence,
         tiles=[tile(quantity(key), scalars) for key in TILES],
         pictures=[exhibit.picture() for exhibit in _exhibits(run)],
+        doubts=doubt_rows(run.error),
         notes=[*run.remarks, *_missing_exhibits(run)],
     )
 
