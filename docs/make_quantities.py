@@ -17,6 +17,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "sharing": "Load by film",
     "heat": "Temperature",
     "resonance": "Contact resonance",
+    "own": "Stiffness and damping of the contact itself",
     "map": "Maps in a run's file",
     "vibration": "Vibration model",
     "curve": "Friction curves",

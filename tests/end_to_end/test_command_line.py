@@ -26,6 +26,8 @@ KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of frict
     *("shear_stress_max_pa", "shear_stress_depth_m"),
     *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
+    *("contact_resonance_hz", "contact_stiffness_n_m", "contact_damping_ratio", "contact_damping_error"),
+    *("contact_stiffness_virgin_n_m", "contact_damping_ratio_virgin"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
     *("clr_surfaces_error", "crf_error_hz", "crf_surfaces_error_hz", "crf_record_error_hz"),
 ]

@@ -51,5 +51,19 @@ def test_out_of_steps_it_returns_the_least_residual_of_the_space_it_has(system):
     np.testing.assert_allclose(found, space @ best, rtol=1e-8)
 
 
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
+def test_complex_systems_too(system, dtype):
+    rng = np.random.default_rng(5)
+    matrix = (system[0] + 1j * rng.standard_normal((60, 60)) / 2.0).astype(dtype)
+    wanted = (system[1] * np.exp(2j * np.pi * rng.random(60))).astype(dtype)
+    for tolerance in (0.1, 1e-4):
+        found = gmres(matrix.__matmul__, same, wanted, tolerance=tolerance, most_steps=60)
+        assert found.dtype == dtype
+        left = np.linalg.norm(matrix @ found - wanted) / np.linalg.norm(wanted)
+        assert 0.05 * tolerance < left < 1.001 * tolerance
+    exact = np.linalg.solve(matrix.astype(complex), wanted)
+    np.testing.assert_allclose(gmres(matrix.__matmul__, same, wanted, tolerance=1e-6, most_steps=60), exact, atol=1e-5)
+
+
 def test_nothing_wanted_is_nothing_done(system):
     assert not gmres(system[0].__matmul__, same, np.zeros(60), tolerance=0.1, most_steps=9).any()

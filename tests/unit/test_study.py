@@ -15,7 +15,7 @@ import pytest
 import asperity.study.execute as execution
 from asperity.case import load_case
 from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.results import solve_case
+from asperity.results import RUN_GROUPS, solve_case
 from asperity.study import estimate_study, load_study, plan_points, plan_study, run_study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -80,10 +80,23 @@ def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
     row = unbroken.iloc[4]
     assert row["case_id"] == chosen.id
     assert row["surface.sq"] == 2e-6
-    scalars = {name: value for name, value in alone.own_scalars.items() if name != "seconds" and value is not None}
+    quick = alone.numbers([group for group in RUN_GROUPS if group != "own"])
+    scalars = {name: value for name, value in quick.items() if name != "seconds" and value is not None}
     assert {name: row[name] for name in scalars} == scalars
     assert row["crf_sound_hz"] == pytest.approx(3000, rel=0.5)
     assert row["crf_paper_hz"] == pytest.approx(row["crf_sound_hz"], rel=0.05)
+
+
+def test_a_study_that_shakes_has_the_contacts_own_stiffness_and_damping(case):
+    """A dry contact of rough bodies: elastic where it yielded, it is stiffer than flowing, and nothing damps it."""
+    shaken = case.with_overrides({"study": {"sq": ["2 um"], "kind": "shake"}})
+    row = run_study(plan_study(shaken)).table.iloc[0]
+    chosen = {"surface.sq": "2 um", "surface.seed": int(row["surface.seed"])}
+    alone = solve_case(shaken.with_overrides(chosen)).own_scalars
+    assert row["contact_stiffness_n_m"] == alone["contact_stiffness_n_m"]
+    assert row["contact_stiffness_n_m"] > 1.1 * row["contact_stiffness_virgin_n_m"]
+    assert row["contact_damping_ratio"] == 0.0
+    assert row["crf_sound_hz"] > 0.0
 
 
 def test_a_study_on_disk_is_the_study_in_memory_and_goes_on_where_it_was(plan, unbroken, executor, tmp_path):

@@ -19,7 +19,7 @@ def _parse_seeds(value: object) -> int | tuple[int, ...]:
     raise BadInput(f"must be 1 or more, or a list of seeds such as [1, 2, 3], got {quoted(value)}")
 
 
-StudyKind = Literal["solve", "vibrate"]
+StudyKind = Literal["solve", "vibrate", "shake"]
 Seeding = Literal["independent", "common"]
 
 

@@ -2,8 +2,10 @@ from .cavitation import FilmSolution as FilmSolution
 from .cavitation import solve_film as solve_film
 from .conserving_motion import moving_conserving_contact as moving_conserving_contact
 from .dynamic import DynamicStiffness as DynamicStiffness
+from .dynamic import OwnResonance as OwnResonance
 from .dynamic import ShakenContact as ShakenContact
 from .dynamic import dynamic_stiffness as dynamic_stiffness
+from .dynamic import own_resonance as own_resonance
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
 from .influence import Tractions as Tractions

@@ -9,11 +9,11 @@ import math
 from dataclasses import dataclass
 
 from asperity.ehl.conserving import OilBalance
-from asperity.ehl.oscillating import Oscillating, elastic
+from asperity.ehl.oscillating import Answer, Oscillating, elastic
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.state import balance_of
-from asperity.ehl.stiffness import ELASTIC, YIELDED, Yielded, checked_depth
+from asperity.ehl.stiffness import ELASTIC, FLOWING, YIELDED, Yielded, checked_depth
 from asperity.errors import AsperityError, BadInput, require_positive
 
 TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
@@ -74,9 +74,12 @@ class ShakenContact:
         self.balance = elastic(balance) if yielded == ELASTIC else balance
         self.scales = Scales.of(conditions, solution.lubricant)
         self.oscillating = Oscillating(self.balance)
+        self.before: Answer | None = None
 
     def at(self, frequency_hz: float) -> DynamicStiffness:
         """Stiffness and damping at a frequency [Hz]; 0 for a change so slow that the film follows.
+
+        Near the frequency asked for before it takes a few steps only.
 
         Raises
         ------
@@ -86,7 +89,8 @@ class ShakenContact:
         if not 0.0 <= frequency_hz < math.inf:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
         omega = 2.0 * math.pi * frequency_hz
-        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=TOLERANCE)
+        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=TOLERANCE, start=self.before)
+        self.before = answer
         if not answer.left < 10.0 * TOLERANCE:
             raise AsperityError(
                 f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
@@ -136,6 +140,24 @@ class ShakenContact:
             return response
         modulus, a = conditions.pair.reduced_modulus, conditions.hertz.half_widths[0]
         return 1.0 / (1.0 / response + 2.0 / (math.pi * modulus * conditions.length) * math.log(self.depth / a))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnResonance:
+    """Where a mass resonates on a solved contact: the contact once it has borne its load, and while it still yields.
+
+    `virgin` is at the frequency of `elastic`: one frequency, the two limits of what cells at the pressure cap do.
+    """
+
+    elastic: DynamicStiffness
+    virgin: DynamicStiffness
+
+
+def own_resonance(solution: ContactSolution, mass: float, *, reference_depth: float | None = None) -> OwnResonance:
+    """Stiffness and damping that a mass [kg] meets on a solved contact; raises what `ShakenContact` does."""
+    shaken = ShakenContact(solution, reference_depth=reference_depth).resonance(mass)
+    virgin = dynamic_stiffness(solution, shaken.frequency_hz, yielded=FLOWING, reference_depth=reference_depth)
+    return OwnResonance(elastic=shaken, virgin=virgin)
 
 
 def dynamic_stiffness(

@@ -11,16 +11,19 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import scipy
 
 from asperity.arrays import Field, Mask
+from asperity.ehl.krylov import gmres
 from asperity.ehl.linear import Linear
 from asperity.ehl.mixed import FREE, MixedBalance
 from asperity.ehl.mixed_linear import MixedLinear
 from asperity.ehl.problem import Balance
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
 
-MOST_STEPS = 300
+MOST_STEPS = 200  # of GMRES at a time ...
+AT_A_TIME = 1e-4  # ... which leave no less of what was left before: about what single precision can tell
+MOST_ROUNDS = 12
+STUCK = 0.3  # share left by a round in single precision, above which the next is taken in double
 
 Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
@@ -28,11 +31,12 @@ Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 class Answer(NamedTuple):
     """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
 
-    `left` is the share of the equations that was left, `steps` how many GMRES took.
+    `vector` is the model's own form of it, `left` the share of the equations that was left, `steps` those of GMRES.
     """
 
     oil: Waves
     total: Waves
+    vector: Waves
     left: float
     steps: int
 
@@ -41,6 +45,7 @@ class _Equations(Protocol):
     """A model's linearised equations over one vector of unknowns."""
 
     size: int
+    real: Any  # the precision of all
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         """Rows of J and of S for a change of the unknowns and of the approach."""
@@ -55,20 +60,20 @@ class _Equations(Protocol):
 class _OnePressure:
     """One pressure for oil and asperities."""
 
-    def __init__(self, balance: Balance) -> None:
-        self.linear = Linear(balance, dtype=np.float64)
+    def __init__(self, balance: Balance, real: Any) -> None:
+        self.real, self.linear = real, Linear(balance, dtype=real)
         self.unknown, self.cells, self.size = balance.unknown, balance.problem.cells, balance.gap.size
         self.deflection = balance.problem.deflection
         film, wet = balance.film, balance.rows.state == LUBRICATED
         scale = np.where(wet, balance.rows.fluid_scale, 0.0)
         nothing = np.zeros_like(scale)
-        self.by_gap = nothing if film is None else scale * film.content_by_gap
-        self.by_pressure = nothing if film is None else scale * film.content_by_pressure
+        self.by_gap = (nothing if film is None else scale * film.content_by_gap).astype(real)
+        self.by_pressure = (nothing if film is None else scale * film.content_by_pressure).astype(real)
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         d_pressure = vector.reshape(self.cells)
         rows = self.linear.product(d_pressure, d_approach)
-        d_gap = self.deflection(d_pressure) + d_approach
+        d_gap = self.deflection(d_pressure) + self.real(d_approach)
         stored = self.by_gap * d_gap + self.by_pressure * d_pressure
         return np.where(self.unknown, rows, d_pressure).ravel(), stored.ravel()
 
@@ -83,14 +88,15 @@ class _OnePressure:
 class _TwoPressures:
     """The oil's pressure in every cell and, after these, the total one of touching cells."""
 
-    def __init__(self, balance: MixedBalance) -> None:
-        self.linear = linear = MixedLinear(balance, np.float64)
+    def __init__(self, balance: MixedBalance, real: Any) -> None:
+        self.real, self.linear = real, (linear := MixedLinear(balance, real))
         self.cells, self.count = linear.cells, balance.gap.size
         self.touching = np.flatnonzero(linear.touching)
         self.size = self.count + self.touching.size
         self.deflection = balance.problem.deflection
         scale = np.where(linear.lubricated, balance.rows.fluid_scale, 0.0)
-        self.by_gap, self.by_pressure = scale * balance.film.content_by_gap, scale * balance.film.content_by_pressure
+        self.by_gap = (scale * balance.film.content_by_gap).astype(real)
+        self.by_pressure = (scale * balance.film.content_by_pressure).astype(real)
 
     def _split(self, vector: Any) -> tuple[Any, Any]:
         closed = np.zeros(self.count, vector.dtype)
@@ -104,7 +110,7 @@ class _TwoPressures:
         d_oil, closed = self._split(vector)
         d_total = self.linear.total(d_oil, closed)
         wet, gap_rows = self.linear.product(d_oil, d_total, d_approach)
-        d_gap = self.deflection(d_total) + d_approach
+        d_gap = self.deflection(d_total) + self.real(d_approach)
         stored = self.by_gap * d_gap + self.by_pressure * d_oil
         rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
         return rows, self._joined(stored, np.zeros_like(closed))
@@ -118,40 +124,76 @@ class _TwoPressures:
 
 
 class Oscillating:
-    """A balance ready to be shaken at any number of frequencies."""
+    """A balance ready to be shaken at any number of frequencies.
+
+    GMRES goes in single precision, in rounds; what a round leaves is measured in double. A contact on one line of
+    cells is cheap, and stiffer than single precision bears: double throughout.
+    """
 
     def __init__(self, balance: Balance | MixedBalance) -> None:
-        self.equations: _Equations = (
-            _TwoPressures(balance) if isinstance(balance, MixedBalance) else _OnePressure(balance)
-        )
-        rows, stored = self.equations.product(np.zeros(self.equations.size), 1.0)
-        self.by_approach = rows, stored
+        one_line = balance.problem.cells[1] == 1
+        self.exact = _equations(balance, np.float64)
+        self.rough = self.exact if one_line else _equations(balance, np.float32)
+        self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(self, frequency: float, *, tolerance: float) -> Answer:
-        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`."""
-        equations, steps = self.equations, 0
+    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
+        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
 
-        def product(vector: Waves) -> Waves:
-            rows, stored = _each_part(lambda part: np.stack(equations.product(part, 0.0)), vector)
-            return np.asarray(rows + 1j * frequency * stored)
-
-        def precondition(vector: Waves) -> Waves:
-            return np.asarray(_each_part(equations.answer, vector))
-
-        def preconditioned(vector: Waves) -> Waves:
-            nonlocal steps
-            steps += 1
-            return product(precondition(vector))
-
+        `start` is the answer at a frequency near by.
+        """
+        steps, solver = 0, self.rough
         rows, stored = self.by_approach
         wanted = rows + 1j * frequency * stored
-        shape = (equations.size, equations.size)
-        operator = scipy.sparse.linalg.LinearOperator(shape, preconditioned, dtype=complex)
-        solved, _ = scipy.sparse.linalg.gmres(operator, wanted, rtol=tolerance, restart=MOST_STEPS, maxiter=1)
-        vector = precondition(solved)
         size = float(np.linalg.norm(wanted))
-        left = float(np.linalg.norm(product(vector) - wanted)) / size if size > 0.0 else 0.0
-        return Answer(*equations.pressures(vector), left, steps)
+        vector = np.zeros(self.exact.size, complex) if start is None else start.vector
+        left, share = self._left(wanted, vector, frequency, size)
+        for _ in range(MOST_ROUNDS):
+            if share <= tolerance:
+                break
+            change, taken = _solved(solver, left, frequency, max(tolerance / share, AT_A_TIME))
+            left, now = self._left(wanted, vector + change, frequency, size)
+            steps += taken
+            if now > STUCK * share:
+                if solver is self.exact:
+                    break
+                solver = self.exact
+            if now < share:
+                vector, share = vector + change, now
+            else:
+                left, share = self._left(wanted, vector, frequency, size)
+        return Answer(*self.exact.pressures(vector), vector, share, steps)
+
+    def _left(self, wanted: Waves, vector: Waves, frequency: float, size: float) -> tuple[Waves, float]:
+        """What of the equations is left, and its share of all."""
+        left = wanted - _product(self.exact, vector, frequency)
+        return left, float(np.linalg.norm(left)) / size
+
+
+def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
+    return _TwoPressures(balance, real) if isinstance(balance, MixedBalance) else _OnePressure(balance, real)
+
+
+def _solved(equations: _Equations, wanted: Waves, frequency: float, tolerance: float) -> tuple[Waves, int]:
+    """The unknowns that answer, but for a share `tolerance`, in the equations' own precision; and the steps it took."""
+    steps = 0
+
+    def product(vector: Waves) -> Waves:
+        nonlocal steps
+        steps += 1
+        return _product(equations, vector, frequency)
+
+    def precondition(vector: Waves) -> Waves:
+        return np.asarray(_each_part(equations.answer, vector))
+
+    kind = np.result_type(equations.real, np.complex64)
+    scale = float(np.linalg.norm(wanted))
+    found = gmres(product, precondition, (wanted / scale).astype(kind), tolerance=tolerance, most_steps=MOST_STEPS)
+    return np.asarray(scale * found, dtype=complex), steps
+
+
+def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
+    rows, stored = _each_part(lambda part: np.stack(equations.product(part, 0.0)), vector)
+    return np.asarray(rows + vector.dtype.type(1j * frequency) * stored)
 
 
 def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:

@@ -19,7 +19,7 @@ from asperity.ehl import FILMS, HOT, ContactSolution, ContactState, FlashTempera
 from asperity.errors import AsperityError, BadInput
 from asperity.quantities import lines, quantity, read
 from asperity.results.doubt import basis, in_words
-from asperity.results.spread import Row, Scalar, mean_row, whole_error
+from asperity.results.spread import Row, Scalar, half_interval, mean_row, whole_error
 from asperity.wear import Resonance
 
 if TYPE_CHECKING:
@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
-RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "solver")
+RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "own", "solver")
 DOUBT = "uncertainty"  # group of the catalogue: of all surfaces together
+DAMPING = "contact_damping_ratio"
 CRUCIAL = ("clr", "clr_error", "car", "crf_hz", "crf_std_hz")
 MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2", "film_temperature")
 
@@ -101,6 +102,35 @@ class Run:
         return resonance if resonance is not None and resonance.found else None
 
     @cached_property
+    def _shaken(self) -> ehl.OwnResonance | str:
+        """The mass on the solved contact's own stiffness, or why that is not known."""
+        if self.case.vibration is None:
+            return "no mass is stated; add [vibration]"
+        if not self.solution.convergence.converged:
+            return "the contact is not solved"
+        try:
+            return ehl.own_resonance(self.solution, self.case.vibration.mass)
+        except AsperityError as error:  # every other number is as good without it
+            return str(error)
+
+    @property
+    def own_resonance(self) -> ehl.OwnResonance | None:
+        """The contact's own stiffness and damping where the mass resonates; None where `own_resonance_failure` is."""
+        return None if isinstance(self._shaken, str) else self._shaken
+
+    @property
+    def own_resonance_failure(self) -> str | None:
+        """Why there is no `own_resonance`; None where there is one."""
+        return self._shaken if isinstance(self._shaken, str) else None
+
+    @property
+    def damping_error(self) -> float | None:
+        """How far the contact's damping ratio lies off on one further surface, with 90 %; None of one surface alone."""
+        rows = (read(self, map(quantity, [DAMPING])), *self.others)
+        found = [float(value) for row in rows if (value := row.get(DAMPING)) is not None]
+        return half_interval(found) if len(found) > 1 else None
+
+    @cached_property
     def sharing(self) -> ehl.LoadSharing:
         """The load by film."""
         return ehl.sharing_by_film(self.solution)
@@ -119,7 +149,11 @@ class Run:
     @cached_property
     def own_scalars(self) -> dict[str, Scalar]:
         """Every number of the first surface by its key in the catalogue of quantities, SI; None where there is none."""
-        return read(self, lines(*RUN_GROUPS))
+        return self.numbers(RUN_GROUPS)
+
+    def numbers(self, groups: Sequence[str]) -> dict[str, Scalar]:
+        """`own_scalars` of some groups of the catalogue."""
+        return read(self, lines(*groups))
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its key, SI: means over its surfaces, and intervals; of the first how it went."""

@@ -23,7 +23,17 @@ Row = Mapping[str, Scalar]
 LEVEL = 0.95  # of the t distribution on either side: 90 % between them
 NORMAL = 1.6448536269514722  # standard deviations on either side of 90 % of a normal distribution
 FLOOR = 0.01  # load share below which the film is full: the logarithm of the odds tells no smaller ones apart
-AVERAGED = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance")  # groups of the catalogue
+AVERAGED = (
+    "load",
+    "sharing",
+    "film",
+    "pressure",
+    "friction",
+    "heat",
+    "stress",
+    "resonance",
+    "own",
+)  # groups of the catalogue
 
 
 def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
@@ -50,6 +60,12 @@ def one_surface(values: Sequence[float], *, share: bool) -> tuple[float, Sides]:
     ends = float(np.mean(scale)) - reach, float(np.mean(scale)) + reach
     low, high = (_share(end) for end in ends) if share else ends
     return mean, (max(0.0, mean - low), max(0.0, high - mean))
+
+
+def half_interval(values: Sequence[float]) -> float:
+    """Half of the 90 % interval of one further surface's number, which may be any."""
+    below, above = one_surface(values, share=False)[1]
+    return 0.5 * (below + above)
 
 
 def _odds(share: float) -> float:

@@ -191,4 +191,4 @@ def curve_of(result: StudyResult) -> WearCurve:
 def is_wear_study(result: StudyResult) -> bool:
     """Whether a study's cases differ in Sq (and seeds) alone."""
     swept = [key for key in result.plan.axes if key not in ("surface.seed", "vibration.seed")]
-    return swept == [SQ_KEY] and result.plan.kind == "solve"
+    return swept == [SQ_KEY] and result.plan.kind != "vibrate"

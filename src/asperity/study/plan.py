@@ -48,7 +48,7 @@ class StudyPlan:
     axes : the swept keys, such as "surface.sq"
     points : replaced values by key, as a case file writes them
     realisations : surfaces (and vibration records) a point
-    kind : "solve", a contact each; "vibrate", the vibration model alone
+    kind : "solve", a contact each; "shake", its own stiffness and damping too; "vibrate", the vibration model alone
     seeding : "independent", every case has seeds of its own; "common", the k-th realisation has the same at every
         point, which lets differences between points show with fewer of them
     seeds : the surfaces' seeds in place of ones drawn for the study

@@ -14,7 +14,17 @@ from asperity.report.run.conditions import conditions_table
 from asperity.report.run.vibration import spectrum
 from asperity.results import RUN_GROUPS, Run, doubt_rows
 
-TILES = ("clr", "car", "h_mean_m", "lambda_ratio", "friction_coefficient", "flash_temperature_max_k", "crf_hz", "crfa")
+TILES = (
+    "clr",
+    "car",
+    "h_mean_m",
+    "lambda_ratio",
+    "friction_coefficient",
+    "flash_temperature_max_k",
+    "crf_hz",
+    "crfa",
+    "contact_damping_ratio",
+)
 
 
 def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = None) -> Path:
@@ -122,6 +132,8 @@ def _missing_exhibits(run: Run) -> Iterator[str]:
         yield f"There is no friction and no temperature to show: {run.friction_failure}."
     elif run.solution.conditions.sliding_speed == 0.0:
         yield "There is no friction to show: both surfaces move at the same speed."
+    if run.vibration is not None and run.own_resonance_failure is not None:
+        yield f"There is no stiffness and damping of the contact's own: {run.own_resonance_failure}."
     if run.vibration is not None and run.vibration.spectrum is None:
         yield f"There is no spectrum to show: {run.vibration.resonance.reason}."
 

@@ -14,6 +14,11 @@ from asperity.study import StudyOverview, as_written
 
 MOST_POINTS = 60  # in a table of the page; the csv has all
 MOST_OUTPUTS = 8  # beside each other in it
+COMPUTED = {
+    "solve": "contact and vibration",
+    "shake": "contact and vibration, with the contact's own stiffness and damping",
+    "vibrate": "the vibration model alone",
+}
 LEVELS = ("clr", "car", "car_domain", "crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper")
 
 
@@ -113,7 +118,7 @@ def facts(study: StudyOverview) -> list[tuple[str, str]]:
     plan = study.result.plan
     points = f"{len(plan.points)} points" if len(plan.points) > 1 else "1 point"
     rows = [
-        ("Computed", {"solve": "contact and vibration", "vibrate": "the vibration model alone"}[plan.kind]),
+        ("Computed", COMPUTED[plan.kind]),
         ("Cases", f"{len(plan.cases)}: {points} of {surfaces_a_point(study)}"),
     ]
     rows += [(key, _range(plan, key)) for key in plan.axes]
