@@ -7,6 +7,7 @@ import pytest
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import (
+    DAMPING_LAWS,
     PRESETS,
     STIFFNESS_LAWS,
     HertzForRadian,
@@ -25,9 +26,12 @@ from asperity.coupling import (
     search_band,
     vibration_choices,
 )
-from asperity.ehl import ContactState
+from asperity.ehl import ContactState, solve_contact
 from asperity.errors import BadInput
+from asperity.grid import Grid
+from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.quantities import Parameter
+from asperity.surface import flat_surface
 
 CONDITIONS = ContactConditions(
     pair=ElasticPair((207e9, 207e9), (0.3, 0.3)),
@@ -226,6 +230,27 @@ def test_damping_laws_are_eq_5_with_radians_with_hertz_and_a_constant():
     assert springs["ratio"].damping == pytest.approx(2 * 2 * np.pi * f0 * 0.1 * 0.02)
     assert springs["hertz-for-radian"].damping == pytest.approx(2 * f0 * 0.1 * 0.02)
     assert springs["constant"].damping == pytest.approx(50.0)
+
+
+def test_damping_of_the_contact_itself_needs_it_solved():
+    model = VibrationModel(mass=0.1, damping_ratio=0.02, damping_law="contact")
+    assert model.needs_solution
+    with pytest.raises(BadInput, match="damping law contact needs the solved contact"):
+        oscillator(state(), CONDITIONS, model)
+    assert search_band(CONDITIONS, model) == search_band(CONDITIONS, MODEL)
+
+
+def test_a_film_that_feeds_more_than_the_rest_damps_is_refused():
+    """The smooth film's own damping ratio at 10 kHz is -0.0075."""
+    conditions = replace(CONDITIONS, pair=ElasticPair((200e9, 200e9), (0.3, 0.3)), load=500.0)
+    a = conditions.hertz.half_widths[0]
+    on = Grid((96, 8), (-4.5 * a, -a), (1.9 * a, a))
+    oil = Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian())
+    film = solve_contact(conditions, oil, flat_surface(on))
+    stiffness = 0.1 * (2.0 * np.pi * 10e3) ** 2
+    assert DAMPING_LAWS["contact"]()(mass=0.1, stiffness=stiffness, damping_ratio=0.02, solution=film) < 0.02
+    with pytest.raises(BadInput, match="feeds a vibration of 10000 Hz"):
+        DAMPING_LAWS["contact"]()(mass=0.1, stiffness=stiffness, damping_ratio=0.005, solution=film)
 
 
 def test_a_line_contacts_own_spring_is_the_slope_of_its_approach():

@@ -7,6 +7,7 @@ import pytest
 
 from asperity.case import load_case
 from asperity.coupling import VibrationModel
+from asperity.ehl import dynamic_stiffness, solve_contact
 from asperity.errors import BadInput
 from asperity.paper import SAMPLES_SQ_UM, Disturbance, RigRecording, Tones, simulate_rig, write_rig
 from asperity.signals import power_spectrum
@@ -143,6 +144,24 @@ def test_a_case_gives_its_own_load_shares():
     assert rough.crf_hz == pytest.approx(rig.full_load_crf_hz * rough.clr ** (1 / 6), rel=1e-6)
     assert rig.full_load_crf_hz == pytest.approx(3834.0, abs=1.0)  # E 200 GPa
     assert rig.split_sq_m is None
+
+
+def test_a_case_gives_its_contacts_own_damping_and_a_track_finds_it_again():
+    """Stated 0.02 and what the solved contact adds at the line's frequency; the fit of each quiet record returns it."""
+    case = load_case(Path(__file__).parents[2] / "examples" / "paper.toml").with_overrides(
+        {"grid.cells": [64, 64], "vibration.damping_law": "contact"}
+    )
+    quiet = Disturbance(snr_db=40.0, modes=0)
+    rig = simulate_rig(samples=3, repeats=1, duration_s=10.0, case=case, repeat_std_hz=0.0, disturbance=quiet)
+    damped = [one.damping_ratio for one in rig.recordings]
+    assert damped == sorted(damped, reverse=True)  # less oil, less damping
+    for one in rig.recordings:
+        again = case.with_overrides({"surface.sq": f"{one.true_sq_m * 1e6!r} um"})
+        solved = solve_contact(again.conditions, again.lubricant, again.surface(), options=again.options)
+        own = dynamic_stiffness(solved, one.crf_hz).damping_ratio
+        assert one.damping_ratio == pytest.approx(0.02 + own, rel=1e-3)
+        found = contact_resonance(power_spectrum(one.signal(), segment=40_000), band_hz=rig.band_hz)
+        assert found.damping_ratio == pytest.approx(one.damping_ratio, abs=4 * found.damping_ratio_std)
 
 
 @pytest.mark.parametrize("file_format", ["h5", "wav"])

@@ -144,5 +144,10 @@ def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     assert any("needs 6 recordings and has 1" in note for note in track.notes)
     trusted = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").recordings[0].resonance
     assert trusted.crf_hz == pytest.approx(3000.0, rel=0.01)
+    row = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").scalars()["recordings"][0]
+    assert row["damping_ratio"] == trusted.damping_ratio == pytest.approx(0.02, abs=4.0 * row["damping_std"])
+    assert 0.0 < row["damping_std"] < 0.004
+    peak = track_recordings([tmp_path / "a.npz"], case=CASE, method="peak").scalars()["recordings"][0]
+    assert (peak["damping_ratio"], peak["damping_std"]) == (None, None)
     with pytest.raises(BadInput, match="x needs one value for each of 1"):
         track_recordings([tmp_path / "a.npz"], case=CASE, x=[1.0, 2.0])

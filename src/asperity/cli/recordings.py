@@ -256,7 +256,7 @@ def _write(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Pat
 
 def _series(tracked: "Track") -> Block:
     """A row a recording, in the order of x."""
-    selected = [quantity(key) for key in ("crf_hz", "crfa", "severe_probability")]
+    selected = [quantity(key) for key in ("crf_hz", "crfa", "damping_ratio", "severe_probability")]
     rows = [
         [
             Path(row["file"]).name,

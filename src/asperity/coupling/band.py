@@ -5,7 +5,7 @@ import numpy as np
 from asperity.conditions import ContactConditions
 from asperity.coupling.laws import LoadedContact
 from asperity.coupling.model import VibrationModel
-from asperity.coupling.spring import loaded_oscillator
+from asperity.coupling.spring import natural_frequency_hz
 from asperity.ehl import ContactState
 from asperity.errors import BadInput
 
@@ -37,7 +37,7 @@ def search_band(conditions: ContactConditions, model: VibrationModel) -> tuple[f
     """Where the resonance of the asperities' own spring can be [Hz]: f0 from CLR 0.01 to 1, 5 % wider at both ends."""
     state = dry_full_load(conditions, 0.0)
     low, high = (
-        loaded_oscillator(model.stiffness_law, LoadedContact(share, state, conditions), model).natural_frequency_hz
+        natural_frequency_hz(model.stiffness_law, LoadedContact(share, state, conditions), model)
         for share in (SMALLEST_SHARE, 1.0)
     )
     return (1.0 - BAND_MARGIN) * low, (1.0 + BAND_MARGIN) * high
@@ -55,11 +55,11 @@ def require_sampling(conditions: ContactConditions, model: VibrationModel, sq: f
     `samples_per_period` times that resonance.
     """
     contact = LoadedContact(1.0, dry_full_load(conditions, sq), conditions)
-    spring = loaded_oscillator(model.stiffness_law.at_full_load(conditions), contact, model)
-    slowest = model.samples_per_period * spring.natural_frequency_hz
+    full_load_hz = natural_frequency_hz(model.stiffness_law.at_full_load(conditions), contact, model)
+    slowest = model.samples_per_period * full_load_hz
     if model.rate_hz < slowest:
         raise BadInput(
             f"vibration sampling rate must be at least {model.samples_per_period:g} times the full-load resonance of "
-            f"{spring.natural_frequency_hz:.0f} Hz, got {model.rate_hz:g} Hz; raise it to {np.ceil(slowest):.0f} Hz"
+            f"{full_load_hz:.0f} Hz, got {model.rate_hz:g} Hz; raise it to {np.ceil(slowest):.0f} Hz"
         )
-    return spring.natural_frequency_hz
+    return full_load_hz

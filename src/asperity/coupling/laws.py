@@ -149,12 +149,18 @@ STIFFNESS_LAWS: dict[str, type[StiffnessLaw]] = {
 
 
 class DampingLaw(ABC):
-    """Damping ratio ζ of the oscillator; `damping_ratio` is the one that the model states."""
+    """Damping ratio ζ of the oscillator; `damping_ratio` is the one that the model states.
+
+    `needs_solution`: only the solved contact can tell.
+    """
 
     name: ClassVar[str]
+    needs_solution: ClassVar[bool] = False
 
     @abstractmethod
-    def __call__(self, *, mass: float, stiffness: float, damping_ratio: float) -> float:
+    def __call__(
+        self, *, mass: float, stiffness: float, damping_ratio: float, solution: ContactSolution | None = None
+    ) -> float:
         """ζ, of a mass [kg] on a spring [N/m]."""
 
     def summary(self, damping_ratio: float) -> str:
@@ -168,7 +174,14 @@ class RatioDamping(DampingLaw):
 
     name = "ratio"
 
-    def __call__(self, *, mass: float, stiffness: float, damping_ratio: float) -> float:  # noqa: ARG002
+    def __call__(
+        self,
+        *,
+        mass: float,  # noqa: ARG002
+        stiffness: float,  # noqa: ARG002
+        damping_ratio: float,
+        solution: ContactSolution | None = None,  # noqa: ARG002
+    ) -> float:
         """ζ as stated."""
         return damping_ratio
 
@@ -185,7 +198,14 @@ class ConstantDamping(Parametric, DampingLaw):
 
     name = "constant"
 
-    def __call__(self, *, mass: float, stiffness: float, damping_ratio: float) -> float:  # noqa: ARG002
+    def __call__(
+        self,
+        *,
+        mass: float,
+        stiffness: float,
+        damping_ratio: float,  # noqa: ARG002
+        solution: ContactSolution | None = None,  # noqa: ARG002
+    ) -> float:
         """ζ of this C."""
         return self.damping / (2.0 * float(np.sqrt(stiffness * mass)))
 
@@ -200,9 +220,48 @@ class HertzForRadian(DampingLaw):
 
     name = "hertz-for-radian"
 
-    def __call__(self, *, mass: float, stiffness: float, damping_ratio: float) -> float:  # noqa: ARG002
+    def __call__(
+        self,
+        *,
+        mass: float,  # noqa: ARG002
+        stiffness: float,  # noqa: ARG002
+        damping_ratio: float,
+        solution: ContactSolution | None = None,  # noqa: ARG002
+    ) -> float:
         """ζ/2π."""
         return damping_ratio / (2.0 * float(np.pi))
 
 
-DAMPING_LAWS: dict[str, type[DampingLaw]] = {law.name: law for law in (RatioDamping, ConstantDamping, HertzForRadian)}
+@dataclass(frozen=True, slots=True)
+class ContactDamping(DampingLaw):
+    """The solved contact's own ω c/2k at the oscillator's frequency, on top of ζ of all the rest, which is stated.
+
+    Of asperities that have borne this load before; `asperity.ehl.dynamic_stiffness`.
+    """
+
+    name = "contact"
+    needs_solution = True
+
+    def __call__(
+        self, *, mass: float, stiffness: float, damping_ratio: float, solution: ContactSolution | None = None
+    ) -> float:
+        """ζ of both; raises BadInput without a solution, or where the contact feeds more than the rest damps."""
+        if solution is None:
+            raise BadInput("damping law contact needs the solved contact; solve the case, or take another law")
+        frequency_hz = float(np.sqrt(stiffness / mass) / (2.0 * np.pi))
+        own = ehl.dynamic_stiffness(solution, frequency_hz).damping_ratio
+        if own + damping_ratio <= 0.0:
+            raise BadInput(
+                f"the contact's oil feeds a vibration of {frequency_hz:.0f} Hz (damping ratio {own:.2g}) more than the "
+                f"stated {damping_ratio:g} damps: no steady vibration; state more damping, or another mass"
+            )
+        return own + damping_ratio
+
+    def summary(self, damping_ratio: float) -> str:
+        """What is added to what."""
+        return f"damping ratio {damping_ratio:.3g} and the solved contact's own"
+
+
+DAMPING_LAWS: dict[str, type[DampingLaw]] = {
+    law.name: law for law in (RatioDamping, ConstantDamping, HertzForRadian, ContactDamping)
+}

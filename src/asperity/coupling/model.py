@@ -130,7 +130,8 @@ class VibrationModel(Parametric):
     @property
     def needs_solution(self) -> bool:
         """Whether more is asked for than the dry, fully loaded contact of the paper's section 2 can tell."""
-        return not self.stiffness_law.asperities_alone or self.excitation.needs_solution
+        laws = (self.excitation, self.damping_law)
+        return not self.stiffness_law.asperities_alone or any(law.needs_solution for law in laws)
 
     def with_choices(self, **choices: Any) -> "VibrationModel":
         """The model with other keywords; parameters stated for laws that were not in use count if they now are."""

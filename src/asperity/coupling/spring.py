@@ -35,18 +35,31 @@ def resonance_at(clr: float, state: ContactState, conditions: ContactConditions,
         return None
     if clr <= 0.0 and law.asperities_alone:
         return 0.0
-    return loaded_oscillator(law, LoadedContact(clr, state, conditions), model).natural_frequency_hz
+    return natural_frequency_hz(law, LoadedContact(clr, state, conditions), model)
 
 
 def loaded_oscillator(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> ContactOscillator:
     """The model's mass and damping on the spring that `law` makes of a contact."""
     load = contact.asperity_load if law.asperities_alone else contact.conditions.load
-    return damped_oscillator(law(contact), load, model)
+    return damped_oscillator(law(contact), load, model, solution=contact.solution)
 
 
-def damped_oscillator(stiffness: float, load: float, model: VibrationModel) -> ContactOscillator:
-    """The model's mass and damping on a spring of `stiffness` [N/m] that carries `load` [N]."""
-    ratio = model.damping_law(mass=model.mass, stiffness=stiffness, damping_ratio=model.damping_ratio)
+def natural_frequency_hz(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> float:
+    """Of the model's mass on the spring that `law` makes of a contact [Hz], which may not be solved."""
+    known = model.with_choices(damping_law="ratio") if model.damping_law.needs_solution else model
+    return loaded_oscillator(law, contact, known).natural_frequency_hz
+
+
+def damped_oscillator(
+    stiffness: float, load: float, model: VibrationModel, *, solution: ContactSolution | None = None
+) -> ContactOscillator:
+    """The model's mass and damping on a spring of `stiffness` [N/m] that carries `load` [N].
+
+    Raises BadInput where the damping law needs the solved contact and there is none.
+    """
+    ratio = model.damping_law(
+        mass=model.mass, stiffness=stiffness, damping_ratio=model.damping_ratio, solution=solution
+    )
     return ContactOscillator(
         mass=model.mass, stiffness=stiffness, damping_ratio=require_damping_ratio(ratio), load=load
     )

@@ -100,7 +100,7 @@ def simulate_rig(
     repeat_std_hz : standard deviation of the true CRF from test to test
     seed : of everything drawn
     case : its contact solved at each Sq gives load and area shares, in place of `trend`; its load, radius, mass,
-        damping and excitation make the line
+        damping (the solved contact's own, by the damping law "contact") and excitation make the line
 
     Raises
     ------
@@ -116,7 +116,7 @@ def simulate_rig(
     positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
     sq, sq_std = (np.interp(positions, range(len(um)), um) * 1e-6 for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
     whole = replace(dry_full_load(conditions, float(sq[0])), clr=1.0)
-    full_load_crf_hz = oscillator(whole, conditions, model).natural_frequency_hz
+    full_load_crf_hz = oscillator(whole, conditions, model.with_choices(damping_law="ratio")).natural_frequency_hz
     disturbance = disturbance or Disturbance()
     own, *draws = np.random.SeedSequence(seed).spawn(1 + samples)
     frequency = np.arange(0.0, rate_hz / 2.0 + GRID_HZ, GRID_HZ)
@@ -127,14 +127,14 @@ def simulate_rig(
         true_sq = max(float(sq[number] + sq_std[number] * rng.standard_normal()), 0.1 * float(sq[number]))
         if case is None:
             clr = min((float(TRENDS[trend](np.array(true_sq))) / full_load_crf_hz) ** 6, 1.0)
-            state = replace(dry_full_load(conditions, true_sq), clr=clr)
+            state, ridden = replace(dry_full_load(conditions, true_sq), clr=clr), model
         else:
-            state = _solved(case, true_sq)
+            state, ridden = _solved(case, true_sq, model)
         for repeat in range(repeats):
             test = RigTest(number + 1, repeat + 1, float(sq[number]), float(sq_std[number]), rate_hz, duration_s)
             shift = repeat_std_hz * rng.standard_normal() / full_load_crf_hz
             clr = min(max(state.clr ** (1.0 / 6.0) + shift, 0.01) ** 6, 1.0)
-            line = contact_line(replace(state, clr=clr), conditions, model, frequency, rate_hz)
+            line = contact_line(replace(state, clr=clr), conditions, ridden, frequency, rate_hz)
             recordings.append(background.recorded(test, line, disturbance, rng))
     return Rig(
         recordings=tuple(recordings),
@@ -191,8 +191,8 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
     return case.conditions, model
 
 
-def _solved(case: Case, sq: float) -> ContactState:
-    """The case's contact at another roughness."""
+def _solved(case: Case, sq: float, model: VibrationModel) -> tuple[ContactState, VibrationModel]:
+    """The case's contact at another roughness; and the model with that contact's damping, where it is to have it."""
     rough = case.with_overrides({"surface.sq": f"{sq * 1e6!r} um"})
     solution = ehl.solve_contact(rough.conditions, rough.lubricant, rough.surface(), options=rough.options)
     state = ehl.contact_state(solution)
@@ -201,7 +201,10 @@ def _solved(case: Case, sq: float) -> ContactState:
             f"{case.source}: no asperity touches at Sq {sq * 1e6:.2f} um, and a rig without contact has no truth to "
             "tell; roughen the surface or thin the oil"
         )
-    return state
+    if model.damping_law.needs_solution:  # of the ring: its tests scatter in load share, not in damping
+        damped = oscillator(state, rough.conditions, model, solution=solution).damping_ratio
+        model = model.with_choices(damping_law="ratio", damping_ratio=damped)
+    return state, model
 
 
 def write_rig(

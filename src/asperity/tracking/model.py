@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crfa", "crfa_std", "clr", "clr_low", "clr_high",
-           "severe_probability", "duration_s", "rate_hz")  # fmt: skip
+NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crfa", "crfa_std", "damping_ratio", "damping_std",
+           "clr", "clr_low", "clr_high", "severe_probability", "duration_s", "rate_hz")  # fmt: skip
 TEXTS = ("file", "reason", "label", "started")
 ENDINGS = (".csv", ".parquet", ".nc")
 
@@ -61,6 +61,8 @@ class TrackedRecording:
             "crf_std_hz": finite_or_none(resonance.crf_std_hz),
             "crfa": finite_or_none(resonance.crfa),
             "crfa_std": finite_or_none(resonance.crfa_std),
+            "damping_ratio": finite_or_none(resonance.damping_ratio),
+            "damping_std": finite_or_none(resonance.damping_ratio_std),
             "found": resonance.found,
             "reason": resonance.reason,
             "clr": finite_or_none(self.clr),

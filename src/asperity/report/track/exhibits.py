@@ -13,7 +13,7 @@ from asperity.errors import BadInput
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes, neighbours, one_panel
-from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREY, VERMILION, Medium
+from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
 from asperity.tracking import ALERT, DANGER, Track, TrackedRecording
 from asperity.wear import INTERVAL
 
@@ -120,6 +120,29 @@ def amplitude(track: Track) -> Exhibit:
         draw,
         "Height of the fitted line at the CRF, without what lies below it.",
         "Trend of the contact resonance amplitude.",
+    )
+
+
+def damping(track: Track) -> Exhibit:
+    """Damping ratio of the fitted line over x, with 90 % intervals."""
+
+    @one_panel(3.1)
+    def draw(axes: Axes) -> None:
+        fitted = [one for one in track.recordings if np.isfinite(one.resonance.damping_ratio)]
+        ratio = np.array([recording.resonance.damping_ratio for recording in fitted])
+        std = np.array([recording.resonance.damping_ratio_std for recording in fitted])
+        factor = np.exp(INTERVAL * np.where(np.isfinite(std), std, 0.0) / ratio)
+        ends = [ratio - ratio / factor, ratio * factor - ratio]
+        x = [recording.x for recording in fitted]
+        _draw_intervals(axes, track, x, ratio, ends, "^", GREEN, "damping ratio with 90 % interval")
+        axes.set(yscale="log", ylabel=quantity("damping_ratio").axis, title="Damping of the contact resonance")
+
+    return Exhibit(
+        "damping",
+        draw,
+        "Half the width of the fitted line over its frequency. Where the rest of the machine damps the same "
+        "throughout, it falls as asperities take the load over from the oil.",
+        "Trend of the damping ratio.",
     )
 
 

@@ -101,6 +101,8 @@ def _pictures(chosen: list[Exhibit]) -> list[Picture]:
 def _details(track: Track) -> list[Exhibit]:
     """What is shown below the trend."""
     details = [exhibits.amplitude(track)] if track.resonance_count else []
+    if any(np.isfinite(recording.resonance.damping_ratio) for recording in track.recordings):
+        details.append(exhibits.damping(track))
     if track.resonance_count and _with_clr(track):
         details.append(exhibits.asperity_load_share(track))
     if any(recording.clean is not None for recording in track.recordings):
@@ -119,7 +121,7 @@ class _Row(NamedTuple):
 
 
 def _heads(track: Track) -> list[str]:
-    keys = ["crf_hz", "crfa", *(["clr"] if _with_clr(track) else []), "severe_probability"]
+    keys = ["crf_hz", "crfa", "damping_ratio", *(["clr"] if _with_clr(track) else []), "severe_probability"]
     heads = {key: quantity(key).label for key in keys}
     if not track.comparable:
         heads["crfa"] = quantity("crfa").short
@@ -129,7 +131,9 @@ def _heads(track: Track) -> list[str]:
 def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
     resonance, row = recording.resonance, recording.row()
     place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
-    resonant = [quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")]
+    resonant = [
+        quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa", "damping_ratio")
+    ]
     keys = [*(["clr"] if with_clr else []), "severe_probability"]
     cells = [place, *resonant, *(quantity(key).number(row[key]) for key in keys)]
     return _Row(
