@@ -24,6 +24,7 @@ KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of frict
     *("flash_temperature_max_k", "film_temperature_max_k"),
     *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),
     *("shear_stress_max_pa", "shear_stress_depth_m"),
+    *("cells", "notes", "regime_card", "determined"),
     *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
     *("contact_resonance_hz", "contact_stiffness_n_m", "contact_damping_ratio", "contact_damping_error"),
@@ -51,7 +52,9 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     code, out, _ = asp("solve", "case.toml")
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
-    assert out.splitlines()[0].startswith("Mixed lubrication: asperities carry ")
+    coarse = "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4 are needed): "
+    assert out.splitlines()[0].startswith(f"{coarse}on this grid asperities carry ")
+    assert (scalars["determined"], scalars["cells"]) == (False, [64, 64])
     assert f"{100 * scalars['clr']:.1f} % of the load (± not determined" in out.splitlines()[0]
     assert f"on {100 * scalars['car']:.1f} % of the Hertz zone" in out.splitlines()[0]
     assert f"resonance at {scalars['crf_hz']:.0f} Hz (± not determined" in out.splitlines()[0]
@@ -95,7 +98,7 @@ def test_solving_a_run_again_gives_the_same_numbers(asp):
     assert load_run("run.nc").case == load_case("case.toml")
     Path("case.toml").unlink()
     assert numbers(asp("solve", "run.nc", "--json")[1]) == first
-    assert load_run("run.nc").scalars() | {"seconds": 0} == first | {"seconds": 0}
+    assert load_run("run.nc").summary() | {"seconds": 0} == first | {"seconds": 0}
 
 
 def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
@@ -108,7 +111,7 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     first = load_run("run.nc")
     assert first.case.contents.surface.file == "maps/ring.x3p"
     Path("maps/ring.x3p").unlink()
-    assert numbers(asp("solve", "run.nc", "--json")[1]) == {k: v for k, v in first.scalars().items() if k != "seconds"}
+    assert numbers(asp("solve", "run.nc", "--json")[1]) == {k: v for k, v in first.summary().items() if k != "seconds"}
     assert any("removed a quadratic form" in note for note in first.notes)
     assert "note: removed a quadratic form" in asp("solve", "run.nc", "--out", "again.nc")[1]
     assert load_run("again.nc").notes == first.notes
@@ -136,7 +139,7 @@ def test_a_dry_smooth_contact_is_hertz_and_rings_at_full_load(asp):
 
 def test_python_and_command_line_agree(asp):
     run = solve_case(load_case("case.toml"))
-    assert {k: v for k, v in run.scalars().items() if k != "seconds"} == numbers(asp("solve", "case.toml", "--json")[1])
+    assert {k: v for k, v in run.summary().items() if k != "seconds"} == numbers(asp("solve", "case.toml", "--json")[1])
 
 
 def test_a_case_without_vibration_has_no_resonance(asp):

@@ -13,18 +13,18 @@ from typing import Any
 from asperity.case.amounts import plain
 from asperity.case.refusals import parse_section
 from asperity.case.sections import CaseFile, MotionSection
-from asperity.case.surfaces import GeneratedSection, composite_roughness, moving_roughness, two_bodies
+from asperity.case.surfaces import FileSection, GeneratedSection, composite_roughness, moving_roughness, two_bodies
 from asperity.case.text import parse_toml, read_text, replaced, restated
+from asperity.case.texture import texture_of
 from asperity.case.vibration import vibration_model
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel
-from asperity.ehl import Options
+from asperity.ehl import ACCURACY, Options, auto_grid, inlet_notes, plausibility_notes
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import Lubricant, Thermal
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 
-SHORTEST_INLET = 4.0  # half-widths; a shorter inlet starves the film (0.448 um at 1.9, 0.722 um at 4.5; docs/paper.md)
 # surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
 MANY_SURFACES, FEW_SURFACES = 5, 3
 FINE_GRID = 256 * 256  # cells above which there are few
@@ -46,7 +46,10 @@ class Case:
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
+        measured = isinstance(self.contents.surface, FileSection)  # a grid chosen by it asks for the file
         for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration"):
+            if name == "grid" and measured and self.contents.grid.chosen:
+                continue
             with self.naming({"conditions": "contact and material", "options": "solver"}.get(name, name)):
                 getattr(self, name)
 
@@ -95,18 +98,35 @@ class Case:
 
     @cached_property
     def grid(self) -> Grid:
-        """The rectangle to compute on; half-widths turned into metres, along a line contact's length too."""
-        section, line = self.contents.grid, self.conditions.geometry == "line"
-        a, b = self.conditions.hertz.half_widths
-        if line:
-            b = a  # y runs along the line: its piece is measured in the same half-width
-        (left, right), (front, back) = section.x, section.y
-        grid = Grid(section.cells, (left * a, front * b), (right * a, back * b), periodic=(False, line))
-        for axis, low, high in [("x", left, right)] if line else [("x", left, right), ("y", front, back)]:
-            if not (low < -1.0 and high > 1.0):
+        """The rectangle to compute on; half-widths turned into metres, along a line contact's length too.
+
+        What the case leaves out of it is chosen (`auto_grid`); roughness kept in a run brings its own.
+        """
+        section, conditions = self.contents.grid, self.conditions
+        line, (a, b) = conditions.geometry == "line", conditions.hertz.half_widths
+        if section.chosen and self.stored is not None:
+            return self.stored.grid
+        x, y = (
+            None if ends is None else (ends[0] * half, ends[1] * half)
+            for ends, half in ((section.x, a), (section.y, a if line else b))  # y runs along a line: in a too
+        )
+        if section.cells != "auto" and x is not None and y is not None:
+            grid = Grid(section.cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, line))
+        else:
+            grid = auto_grid(
+                conditions,
+                self.lubricant,
+                texture_of(self.contents.surface, self.folder),
+                accuracy=section.accuracy or ACCURACY,
+                x=x,
+                y=y,
+                cells=None if section.cells == "auto" else section.cells,
+            )
+        for axis, ends in [("x", section.x)] if line else [("x", section.x), ("y", section.y)]:
+            if ends is not None and not (ends[0] < -1.0 and ends[1] > 1.0):
                 raise BadInput(
-                    f"{axis} must reach beyond the contact on both sides, got {low:g} to {high:g} half-widths; "
-                    f"use {'-4.5 to 1.9' if axis == 'x' else '-3 to 3'}"
+                    f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to {ends[1]:g} half-widths; "
+                    f"use {'-4.5 to 1.9' if axis == 'x' else '-3 to 3'}, or leave it out"
                 )
         return grid
 
@@ -202,13 +222,8 @@ class Case:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader of the results has to know about the case, a sentence each."""
-        inlet = -self.contents.grid.x[0]
-        if inlet >= SHORTEST_INLET or self.lubricant is None:
-            return ()
-        return (
-            f"The inlet of {inlet:g} half-widths is shorter than {SHORTEST_INLET:g} and starves the film; "
-            "start grid.x at -4.5 unless that is meant.",
-        )
+        conditions, oil = self.conditions, self.lubricant
+        return (*plausibility_notes(conditions, oil), *inlet_notes(conditions, oil, self.grid))
 
     @property
     def text(self) -> str:

@@ -1,8 +1,8 @@
 """The sections of a case file, in the order in which it has them."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PlainValidator, Strict
+from pydantic import Field, PlainValidator, Strict, model_validator
 
 from asperity.case.amounts import (
     OPTIONAL,
@@ -18,7 +18,7 @@ from asperity.case.amounts import (
     parse_amount,
 )
 from asperity.case.laws import LubricantSection, ThermalSection, parse_lubricant
-from asperity.case.refusals import Section
+from asperity.case.refusals import LocatedError, Section, quoted
 from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.sweep import StudySection, parse_study
 from asperity.case.vibration import parse_vibration
@@ -56,12 +56,38 @@ class MaterialSection(Section):
     boundary_friction: Annotated[float, Strict(), Field(ge=0.0, le=2.0)] = BOUNDARY_FRICTION
 
 
-class GridSection(Section):
-    """[grid]: cells, and corners in half-widths of the smooth dry line contact."""
+def _parse_cells(value: object) -> Literal["auto"] | tuple[int, int]:
+    """[nx, ny], or "auto"."""
+    if value == "auto":
+        return "auto"
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise BadInput(f'must be a list of two such as [256, 128], or "auto", got {quoted(value)}')
+    for place, count in enumerate(value):
+        if type(count) is not int:
+            raise LocatedError((place,), f"must be a whole number, got {quoted(count)}")
+    return value[0], value[1]
 
-    cells: tuple[Annotated[int, Strict()], Annotated[int, Strict()]]
-    x: tuple[Number, Number]
-    y: tuple[Number, Number]
+
+class GridSection(Section):
+    """[grid]: cells, and corners in half-widths of the smooth dry line contact; what is left out is chosen."""
+
+    cells: Annotated[Literal["auto"] | tuple[int, int], PlainValidator(_parse_cells)] = "auto"
+    x: tuple[Number, Number] | None = None
+    y: tuple[Number, Number] | None = None
+    accuracy: Annotated[float | None, Strict(), Field(ge=1e-4, le=0.2)] = None  # relative, of the film
+
+    @model_validator(mode="after")
+    def _accuracy_has_a_choice(self) -> Self:
+        if self.accuracy is not None and not self.chosen:
+            raise BadInput(
+                'accuracy chooses a grid, and cells, x and y are all given; leave it out or set cells = "auto"'
+            )
+        return self
+
+    @property
+    def chosen(self) -> bool:
+        """Whether anything of the grid is left to be chosen."""
+        return self.cells == "auto" or self.x is None or self.y is None
 
 
 class SolverSection(Section):
@@ -92,7 +118,7 @@ class CaseFile(Section):
     material: MaterialSection
     lubricant: Annotated[LubricantSection | None, PlainValidator(parse_lubricant)]
     surface: Annotated[SurfaceSection, PlainValidator(parse_surface)]
-    grid: GridSection
+    grid: GridSection = GridSection()
     solver: SolverSection = SolverSection()
     thermal: ThermalSection = Field(default_factory=ThermalSection)
     vibration: Annotated[Any, PlainValidator(parse_vibration)] = None

@@ -16,7 +16,7 @@ from asperity.errors import AsperityError, BadInput
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}
-PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", **SUPERSCRIPTS}
+PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", "′": "'", **SUPERSCRIPTS}
 
 app = typer.Typer(
     help="Hears how a lubricated contact wears: film, load sharing of asperities and oil, contact resonance.",

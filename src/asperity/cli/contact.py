@@ -8,7 +8,7 @@ import typer
 
 from asperity import case, files, processes, report, results
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, CaseOrRun, Overrides, Quiet, SurfaceFile, chosen_case, require_output
+from asperity.cli.options import Accuracy, AsJson, CaseOrRun, Overrides, Quiet, SurfaceFile, chosen_case, require_output
 from asperity.cli.show import Block, SolverSteps, known, progress, show, table, text
 from asperity.errors import AsperityError
 from asperity.quantities import quantity
@@ -61,20 +61,21 @@ def solve(
             metavar="N", min=1, help="Surfaces of its kind to solve: the numbers are means; default 5, fine grids 3."
         ),
     ] = None,
+    accuracy: Accuracy = None,
     out: Annotated[Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Solve one contact on several surfaces of its kind: film, load sharing, contact resonance, and their scatter."""
     require_output(out, ".nc")
-    chosen = chosen_case(path, overrides, surface)
+    chosen = chosen_case(path, overrides, surface, accuracy)
     if surfaces is not None:
         chosen = chosen.with_overrides({"solver.surfaces": surfaces})
     run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None)
     if out is not None:
         run.save(out)
     kept = [] if out is None else [f"Kept in {out}; asperity report {out} makes a page of it"]
-    show(run.verdict(), run.scalars, run_table(run), kept, as_json=as_json, quiet=quiet)
+    show(run.verdict(), run.summary, run_table(run), kept, as_json=as_json, quiet=quiet)
     if not run.solution.convergence.converged:
         where = f"; the unfinished state is in {out}" if out is not None else ""
         raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
@@ -102,6 +103,8 @@ def run_table(run: "Run") -> Block:
         *known(run.scalars()),
         *results.doubt_rows(run.error),
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
+        ("cells", " x ".join(map(str, run.solution.grid.cells))),
+        *run.card.rows(),
         ("solver", run.solution.convergence.explain()),
     ]
     failure = [] if run.friction_failure is None else [f"no friction: {run.friction_failure}"]

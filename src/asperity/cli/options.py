@@ -25,6 +25,12 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Replace a value of the case, contact.load='400 N'; repeat."),
 ]
+Accuracy = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SHARE", help="Choose the cells for films this accurate, such as 0.01, whatever the case has."
+    ),
+]
 SurfaceFile = Annotated[
     Path | None, typer.Option("--surface", metavar="FILE", help="A measured surface in place of the case's own.")
 ]
@@ -84,14 +90,18 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only, and no progress.")]
 
 
-def chosen_case(path: Path, overrides: list[str] | None, surface: Path | None = None) -> "Case":
-    """The case of a case file or a run, with a measured surface and `--set KEY=VALUE` values put in."""
+def chosen_case(
+    path: Path, overrides: list[str] | None, surface: Path | None = None, accuracy: float | None = None
+) -> "Case":
+    """The case of a case file or a run, with a measured surface, `--set KEY=VALUE` values and an accuracy put in."""
     chosen = results.load_run(path).case if path.suffix == ".nc" else case.load_case(path)
     if surface is not None:
         if not surface.is_file():
             raise BadInput(f"--surface {surface} does not exist; check its name")
         chosen = chosen.with_overrides({"surface": {"file": case.relative_path(surface, chosen.folder)}})
-    replaced = {}
+    replaced: dict[str, object] = {}
+    if accuracy is not None:
+        replaced = {"grid.cells": "auto", "grid.accuracy": accuracy}
     for override in overrides or []:
         key, equals, value = override.partition("=")
         if not (equals and key.strip() and value.strip()):

@@ -157,8 +157,8 @@ class ContactState:
     over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap without touching, over the load:
     oil that the model holds at the hardness, which a coarser contact threshold would count as contact; `sq` composite
     roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies touch), `h_central` mean
-    over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the usual fit of the
-    smooth contact's least film over Sq (`smooth_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
+    over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the smooth contact's least
+    film, by the fit of its regime, over Sq (`least_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
     `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
     relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
     equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when

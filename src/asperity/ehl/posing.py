@@ -6,6 +6,8 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
+from asperity.ehl.films import least_films
+from asperity.ehl.gridding import inlet_length
 from asperity.ehl.outcome import ATTEMPTS, Options
 from asperity.ehl.problem import Form, Problem
 from asperity.ehl.scales import Scales
@@ -13,6 +15,7 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 FEWEST_COARSE_CELLS = 48
+FEWEST_IN_COARSE_INLET = 2.0
 
 
 def contact_problem(
@@ -65,21 +68,11 @@ def first_guess(
 
 
 def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """Least film of the smooth contact [m] by the usual fits.
+    """Least film of the smooth contact [m] by the fits of hard bodies and thickening oils, Dowson's and Hamrock's.
 
-    Line: H = 2.65 G^0.54 U^0.7 W^-0.13, Dowson (1968). Point and elliptic: H = 3.63 U^0.68 G^0.49 W^-0.073
-    (1 - exp(-0.68 k)), k the axis ratio across over along rolling, Hamrock and Dowson (1977).
+    A guess to start from, in every regime: `least_film` is the film to report.
     """
-    radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
-    material = float(lubricant.viscosity.log_slope(np.zeros(1))[0]) * modulus
-    speed = lubricant.viscosity.eta0 * conditions.entrainment_speed / (modulus * radius)
-    if conditions.geometry == "line":
-        load = conditions.line_load / (modulus * radius)
-        return float(2.65 * material**0.54 * speed**0.7 * load**-0.13 * radius)
-    a, b = conditions.hertz.half_widths
-    load = conditions.load / (modulus * radius**2)
-    side_leakage = 1.0 - np.exp(-0.68 * b / a)
-    return float(3.63 * speed**0.68 * material**0.49 * load**-0.073 * side_leakage * radius)
+    return least_films(conditions, lubricant)["piezoviscous-elastic"].film
 
 
 def grid_levels(finest: Problem) -> list[Problem]:
@@ -88,6 +81,18 @@ def grid_levels(finest: Problem) -> list[Problem]:
     while (cells := _halved(levels[-1].cells)) != levels[-1].cells:
         levels.append(levels[-1].coarsened(cells))
     return levels
+
+
+def levels_in_reach(finest: Problem, conditions: ContactConditions, lubricant: Lubricant | None) -> list[Problem]:
+    """The levels of a climb; those of a smooth line contact down to the coarsest that has 2 cells across the inlet.
+
+    On coarser ones the bodies touch, which is a worse start than Hertz's pressure. One is kept to tell the error.
+    """
+    levels = grid_levels(finest)
+    if not finest.uniform or lubricant is None:
+        return levels
+    most = inlet_length(conditions, lubricant) / conditions.hertz.half_widths[0] / FEWEST_IN_COARSE_INLET
+    return [level for number, level in enumerate(levels) if number < 2 or level.spacing[0] <= most]
 
 
 def _halved(cells: tuple[int, int]) -> tuple[int, int]:

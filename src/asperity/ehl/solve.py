@@ -10,7 +10,7 @@ from asperity.conditions import ContactConditions
 from asperity.ehl.conserving_solve import solve_conserving
 from asperity.ehl.mixed_solve import solve_mixed
 from asperity.ehl.outcome import ATTEMPTS, Options
-from asperity.ehl.posing import contact_problem, first_guess, grid_levels, on_one_line
+from asperity.ehl.posing import contact_problem, first_guess, levels_in_reach, on_one_line
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import Progress, Search
 from asperity.ehl.solution import ContactSolution
@@ -84,7 +84,7 @@ def solve_unified(
     finest = on_one_line(whole) if whole.uniform else whole
     search = Search(options, scales.gap, progress)
     if start is None:
-        levels = grid_levels(finest)
+        levels = levels_in_reach(finest, conditions, lubricant)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
     else:
         levels = [finest]

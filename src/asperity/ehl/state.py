@@ -7,11 +7,12 @@ import numpy as np
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import OilBalance, evaluate
 from asperity.ehl.conserving_solve import unknowns_of
+from asperity.ehl.films import least_film
 from asperity.ehl.mixed import MixedBalance
 from asperity.ehl.mixed import evaluate as evaluate_mixed
 from asperity.ehl.mixed_solve import pressures_of
 from asperity.ehl.outcome import CONSERVING, MIXED, ContactState
-from asperity.ehl.posing import contact_problem, on_one_line, smooth_film
+from asperity.ehl.posing import contact_problem, on_one_line
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import CENTRE, area_share, carried_share
@@ -74,7 +75,7 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance | OilBal
         h_min=float(solution.gap.min()),
         h_central=float(solution.gap[centre].mean()),
         h_mean=float(solution.gap[zone].mean()),
-        lambda_ratio=smooth_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
+        lambda_ratio=least_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None,
         p_max=float(solution.pressure.max()),
         reynolds_residual=balance.residual_rms,
         load_error=balance.load_error,

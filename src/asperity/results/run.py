@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -159,10 +159,41 @@ class Run:
         """Every number of the run by its key, SI: means over its surfaces, and intervals; of the first how it went."""
         return mean_row((self.own_scalars, *self.others)) | read(self, lines(DOUBT))
 
+    @cached_property
+    def card(self) -> ehl.RegimeCard:
+        """What kind of contact it is, and how far its film is from published fits."""
+        return ehl.regime_card(self.solution)
+
+    @cached_property
+    def undetermined(self) -> str | None:
+        """Why this grid cannot tell CLR; None where it can."""
+        solution = self.solution
+        reasons = list(ehl.grid_shortfalls(solution.conditions, solution.lubricant, solution.surface))
+        numerical = self.error.clr.numerical
+        if numerical is not None and max(numerical) > ehl.WIDEST_BAR:
+            bar, most = (quantity("clr").text(value) for value in (max(numerical), ehl.WIDEST_BAR))
+            reasons.append(f"an error bar of {bar}, where at most {most} tell something")
+        return "; ".join(reasons) or None
+
+    @property
+    def determined(self) -> bool:
+        """Whether CLR is more than a figure of this grid: converged, resolved, and with an error bar below 15 %."""
+        return self.solution.convergence.converged and self.undetermined is None
+
+    def summary(self) -> dict[str, Any]:
+        """What `solve --json` prints: every number, the grid's cells, the regime card and what is to be noted."""
+        return {
+            **self.scalars(),
+            "cells": list(self.solution.grid.cells),
+            "regime_card": self.card.to_dict(),
+            "notes": list(self.remarks),
+        }
+
     def verdict(self) -> str:
         """One sentence on the state of the contact, of its surfaces' means and with 90 % intervals.
 
-        Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more; mixed between.
+        Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more; mixed between. On a
+        grid that cannot tell CLR it says so instead, and why.
         """
         numbers, error = mean_row((self.crucial, *self.others)), self.error
         clr, car = (float(numbers[key]) for key in ("clr", "car"))
@@ -173,9 +204,10 @@ class Run:
         else:
             regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
         load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", car)))
-        sentence = (
-            f"{regime}: asperities carry {load} of the load {in_words('clr', error.clr)} on {area} of the Hertz zone"
-        )
+        shared = f"asperities carry {load} of the load {in_words('clr', error.clr)} on {area} of the Hertz zone"
+        sentence = f"{regime}: {shared}"
+        if self.undetermined is not None:
+            sentence = f"Grid too coarse, CLR not determined ({self.undetermined}): on this grid {shared}"
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
         return f"{sentence}; {self.resonance_in_words()}; {basis(error)}."
@@ -228,6 +260,7 @@ def run_of(case: Case, solution: ContactSolution, notes: Sequence[str], others: 
     model = case.vibration
     with case.naming("vibration"):
         vibration = None if model is None else contact_vibration(state, case.conditions, model, solution=solution)
+    notes = (*notes, *ehl.solution_notes(solution))
     if solution.options.model == "conserving":
         notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:

@@ -27,6 +27,7 @@ def _conditions(run: Run) -> dict[str, str]:
     solution = run.solution
     return {
         **_contact_rows(solution.conditions),
+        **{f"{name[0].upper()}{name[1:]}": value for name, value in run.card.rows()[1:]},
         **_lubricant_rows(solution.lubricant),
         **_thermal_rows(run),
         "Roughness": f"{quantity('sq_m').named(solution.surface.sq)}; case: {_roughness(run.case.text)}",

@@ -1,0 +1,91 @@
+"""What is implausible is noted: each note where its cause is, and not where it is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.conditions import ElasticPair
+from asperity.ehl import Options, inlet_notes, plausibility_notes, solution_notes, solve_contact
+from asperity.grid import Grid
+from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.surface import Surface, gaussian_surface
+from support.paper import barus, contact, grid
+
+HARD = {"load": 20000.0, "hardness": 7e9}
+
+
+def roelands(eta0, alpha):
+    return Lubricant(viscosity=Roelands(eta0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian())
+
+
+def test_the_papers_contact_is_plausible():
+    assert plausibility_notes(contact(hardness=2e9), barus()) == ()
+
+
+@pytest.mark.parametrize(
+    ("conditions", "oil", "said"),
+    [
+        (contact(), barus(4e-9), "4 1/GPa lies outside 5 to 40"),
+        (contact(), barus(18.2e-6), "1.82e+04 1/GPa lies outside 5 to 40"),
+        (contact(pair=ElasticPair((210e6, 200e9), (0.3, 0.3))), barus(), "Body 1 has a Young's modulus of 210 MPa"),
+        (contact(pair=ElasticPair((200e9, 200e12), (0.3, 0.3))), barus(), "Body 2 has a Young's modulus of 2e+05 GPa"),
+        (contact(hardness=0.5e9), barus(), "hardness of 0.5 GPa lies below Hertz's largest pressure of 0.569 GPa"),
+        (contact(**HARD), barus(), "thickens the oil by exp(65.5)"),
+        (contact(), roelands(0.001, 22e-9), "Roelands' exponent z is 1.56"),
+    ],
+)
+def test_what_cannot_well_be_meant_is_noted(conditions, oil, said):
+    assert any(said in note for note in plausibility_notes(conditions, oil))
+
+
+@pytest.mark.parametrize(
+    ("conditions", "oil"),
+    [
+        (contact(pair=ElasticPair((5e6, 70e9), (0.49, 0.22))), None),  # rubber on glass
+        (contact(**HARD), roelands(0.04, 22e-9)),  # gears
+    ],
+)
+def test_what_can_be_meant_is_not_noted(conditions, oil):
+    assert plausibility_notes(conditions, oil) == ()
+
+
+def test_a_light_contact_is_told_that_it_starves_and_a_heavy_one_that_it_need_not_reach_so_far():
+    a = contact().hertz.half_widths[0]
+    assert "starves the film by about 5" in inlet_notes(contact(), barus(), grid((256, 8), (-4.5, 1.9)))[0]
+    assert inlet_notes(contact(), barus(), grid((256, 8), (-12.0, 3.0))) == ()
+    heavy = contact(load=50000.0, speed=0.5)
+    wide = heavy.hertz.half_widths[0]
+    long, ample = (Grid((256, 8), (inlet * wide, -a), (1.9 * wide, a)) for inlet in (-4.5, -1.6))
+    (said,) = inlet_notes(heavy, roelands(0.04, 22e-9), long)
+    assert "is longer than the film needs (m* = 1.1): grid.x from -1.6" in said
+    assert inlet_notes(heavy, roelands(0.04, 22e-9), ample) == ()
+
+
+def test_contact_that_runs_into_an_edge_is_told_and_one_inside_is_not():
+    rough = {"sq": 1e-6, "correlation_length": 20e-6, "rng": np.random.default_rng(1)}
+    soft = contact(hardness=0.36e9)  # cannot carry the load within 1.24 half-widths
+    small = gaussian_surface(grid((64, 32), (-4.0, 1.3)), **rough)
+    assert any("runs into the outlet edge of" in note for note in solution_notes(solve_contact(soft, None, small)))
+    wide = gaussian_surface(grid((128, 32), (-5.0, 5.0)), **rough)
+    assert not any("runs into" in note for note in solution_notes(solve_contact(soft, None, wide)))
+
+
+def test_pressures_that_no_body_stands_and_heights_that_a_grid_does_not_show_are_told():
+    small = grid((64, 32), (-2.0, 1.3))
+    steep = gaussian_surface(small, sq=3e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
+    assert any(
+        "exceeds a twentieth of E' = 219.8 GPa" in n for n in solution_notes(solve_contact(contact(), None, steep))
+    )
+    noise = Surface(1e-9 * np.random.default_rng(1).standard_normal(small.cells), small)
+    (said,) = solution_notes(solve_contact(contact(), None, noise))
+    assert "cells along the correlation length in x, where 4 are needed" in said
+
+
+def test_a_film_far_from_its_fits_is_told_with_the_reason():
+    smooth = Surface(np.zeros((64, 8)), grid((64, 8), (-1.3, 1.9)))
+    oil = Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian())
+    starved = solve_contact(contact(), oil, smooth, options=Options())
+    assert any("nearest fit's" in note and "the inlet starves it" in note for note in solution_notes(starved))
+    flooded = replace(smooth, grid=grid((256, 8), (-12.0, 2.0)), heights=np.zeros((256, 8)))
+    assert solution_notes(solve_contact(contact(), oil, flooded)) == ()
