@@ -39,7 +39,7 @@ def demo(
     verdict = results.levels_verdict(runs)
     show(
         verdict,
-        lambda: {"verdict": verdict, "report": str(page), "runs": [run.scalars() for run in runs.values()]},
+        lambda: {"verdict": verdict, "report": str(page), "runs": [run.summary() for run in runs.values()]},
         table((f"Sq {sq}", run.verdict()) for sq, run in runs.items()),
         [f"Report: {page}", f"Try next: asperity solve {case_file} --set contact.load='400 N'"],
         as_json=as_json,
