@@ -208,3 +208,12 @@ def test_one_line_is_the_same_by_modes_and_noise_has_none():
     noise = [contact_resonance(several([], seed), band_hz=BAND, method="modes") for seed in range(25)]
     assert not any(seen.found for seen in noise)
     assert "nothing stands out" in noise[0].reason
+
+
+def test_sampling_is_for_the_fit_alone():
+    spectrum = Spectrum(
+        frequency_hz=np.arange(0.0, 5e3, 2.0), density=np.ones(2500), unit="1/Hz", duration_s=1.0, segment=5000,
+        window="boxcar", resolution_hz=2.0, averages=1.0,
+    )  # fmt: skip
+    with pytest.raises(BadInput, match="for the method likelihood, got 'peak'"):
+        contact_resonance(spectrum, band_hz=(1e3, 3e3), method="peak", seen=lambda f, f0_hz, damping_ratio: f / f)  # noqa: ARG005

@@ -33,6 +33,7 @@ from .model import VibrationModel as VibrationModel
 from .model import preset_choices as preset_choices
 from .model import vibration_choices as vibration_choices
 from .record import LINEAR_UP_TO as LINEAR_UP_TO
+from .record import SampledLine as SampledLine
 from .record import Vibration as Vibration
 from .record import contact_vibration as contact_vibration
 from .record import excitation as excitation

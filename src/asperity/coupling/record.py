@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.coupling.band import band_about, require_sampling, search_band
 from asperity.coupling.laws import LoadedContact
@@ -12,9 +13,17 @@ from asperity.coupling.spring import oscillator
 from asperity.ehl import ContactSolution, ContactState
 from asperity.errors import NotConverged
 from asperity.signals import Signal, Spectrum, power_spectrum
-from asperity.vibration import ContactOscillator, Excitation, acceleration, expected_spectrum, mass_motion
-from asperity.wear import Resonance, contact_resonance, no_resonance
+from asperity.vibration import (
+    ContactOscillator,
+    Excitation,
+    FilteredNoise,
+    acceleration,
+    expected_spectrum,
+    mass_motion,
+)
+from asperity.wear import Resonance, contact_resonance, line_shape, no_resonance
 
+ALIASES = 3
 LINEAR_UP_TO = 0.2  # rms dynamic force over load; the CRF is then 0.4 % lower than the linear spring's
 
 
@@ -41,6 +50,37 @@ class Vibration:
     expected_crfa: float | None = None
     dynamic_load: float | None = None
     contact_loss: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SampledLine:
+    """What a record's own sampling makes of an oscillator's line over noise that is white in acceleration.
+
+    Straight lines between samples, their aliases included, and the digital filter that the noise is behind; see
+    `ContactOscillator.sampled_gain`.
+    """
+
+    noise: FilteredNoise
+    rate_hz: float
+
+    def __call__(self, frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:
+        """A factor on the line at each frequency [Hz], 1 at f0."""
+        stiffness = (2.0 * np.pi * f0_hz) ** 2  # of a mass of 1 kg
+        spring = ContactOscillator(mass=1.0, stiffness=stiffness, damping_ratio=damping_ratio, load=1.0)
+        inside = np.clip(frequency_hz, 1e-3 * f0_hz, 0.5 * self.rate_hz)
+        here, there = (
+            spring.sampled_gain(at, self.rate_hz) * self._sampled_noise(at) for at in (inside, np.array(f0_hz))
+        )
+        return np.asarray(here / there / line_shape(inside, f0_hz, damping_ratio))
+
+    def _sampled_noise(self, frequency_hz: Field) -> Field:
+        """Density of the noise's samples: a continuous filter leaves something above rate/2, which folds back."""
+        density = self.noise.density(frequency_hz, self.rate_hz)
+        if self.noise.filter == "continuous":
+            for turn in range(1, ALIASES + 1):
+                for alias in (turn * self.rate_hz - frequency_hz, turn * self.rate_hz + frequency_hz):
+                    density = density + self.noise.density(alias, self.rate_hz)
+        return np.asarray(density)
 
 
 def excitation(
@@ -96,8 +136,11 @@ def contact_vibration(
     spectrum = power_spectrum(response, window="boxcar")
     heights = below.density(spectrum.frequency_hz, model.rate_hz)
     f0 = np.array(spring.natural_frequency_hz)
+    seen = None
+    if model.method == "likelihood" and model.linear and isinstance(below, FilteredNoise):
+        seen = SampledLine(below, model.rate_hz)
     return Vibration(
-        resonance=contact_resonance(spectrum, band_hz=band_hz, method=model.method),
+        resonance=contact_resonance(spectrum, band_hz=band_hz, method=model.method, seen=seen),
         band_hz=band_hz,
         full_load_crf_hz=full_load_crf_hz,
         oscillator=spring,

@@ -14,6 +14,8 @@ from .lines import CleanSpectrum as CleanSpectrum
 from .lines import Line as Line
 from .lines import remove_lines as remove_lines
 from .resonance import Resonance as Resonance
+from .resonance import SeenLine as SeenLine
+from .resonance import line_shape as line_shape
 from .resonance import no_resonance as no_resonance
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
 from .series import SeriesMethod as SeriesMethod

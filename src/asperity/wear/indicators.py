@@ -6,6 +6,7 @@ highest point is kept beside it. Where to look, the band, is the caller's to say
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import scipy
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum, smooth
-from asperity.wear.resonance import Resonance, fitted_resonance, line_and_slopes, line_shape, no_resonance
+from asperity.wear.resonance import Resonance, SeenLine, fitted_resonance, line_and_slopes, line_shape, no_resonance
 from asperity.wear.scoring import Bounds, Data, Fit, Model, fit_spectrum, whittle_cost
 
 IndicatorMethod = Literal["likelihood", "modes", "peak"]
@@ -27,11 +28,16 @@ MOST_MODES = 8
 MODE_BLOCKS = 600
 AMBIGUOUS = 0.5  # a second line with more than this share of the strongest's power could be the contact's as well
 START_DAMPINGS = (0.002, 0.007, 0.02, 0.06)
+SEEN_ROUNDS = 3  # what sampling makes of a line hardly depends on where it is: each round leaves a tenth
 MOST_BLOCKS = 512  # for the search of a start only
 
 
 def contact_resonance(
-    spectrum: Spectrum, *, band_hz: tuple[float, float], method: IndicatorMethod = "likelihood"
+    spectrum: Spectrum,
+    *,
+    band_hz: tuple[float, float],
+    method: IndicatorMethod = "likelihood",
+    seen: SeenLine | None = None,
 ) -> Resonance:
     """Find the contact resonance between the two ends of `band_hz` [Hz].
 
@@ -40,17 +46,24 @@ def contact_resonance(
     method : "likelihood" fits one oscillator over a floor and tests it against the floor alone; "modes" fits as many
         as the spectrum needs and takes the strongest, if it is so by far; "peak" takes the highest point after the
         paper's smoothing, whatever it is
+    seen : of "likelihood", what sampling makes of the line, where that is known: of a simulated record, whose profile
+        is straight between samples and perhaps noise behind a digital filter. What a machine does knows no samples
 
     Raises
     ------
     BadInput
-        for an unknown method, a band outside the spectrum or with fewer than 20 lines, a spectrum that is not finite,
-        or a smoothed one where its statistics matter.
+        for an unknown method, `seen` with another than "likelihood", a band outside the spectrum or with fewer than 20
+        lines, a spectrum that is not finite, or a smoothed one where its statistics matter.
     """
     if method not in INDICATOR_METHODS:
         raise BadInput(f"indicator method must be one of {', '.join(INDICATOR_METHODS)}, got {method!r}")
     inside = require_band(spectrum, band_hz)
-    return INDICATOR_METHODS[method](spectrum, inside, (band_hz[0], band_hz[1]))
+    ends = band_hz[0], band_hz[1]
+    if seen is None:
+        return INDICATOR_METHODS[method](spectrum, inside, ends)
+    if method != "likelihood":
+        raise BadInput(f"a line as sampling leaves it is for the method likelihood, got {method!r}; leave seen out")
+    return _likeliest_line(spectrum, inside, ends, seen)
 
 
 def require_band(spectrum: Spectrum, band_hz: tuple[float, float]) -> Mask:
@@ -165,13 +178,15 @@ def _objection(f0: float, f0_std: float, zeta: float, spectrum: Spectrum, band_h
     return None
 
 
-def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float]) -> Resonance:
+def _likeliest_line(
+    spectrum: Spectrum, inside: Mask, band_hz: tuple[float, float], seen: SeenLine | None = None
+) -> Resonance:
     """The oscillator line that makes the spectrum likeliest, if the spectrum needs one."""
     band = _band(spectrum, inside, band_hz)
     if band is None:
         return no_resonance("the band holds no vibration at all", band_hz, "likelihood")
     low, high = band_hz
-    fit = _fit_line(band, spectrum, band_hz)
+    fit = _fit_line(band, spectrum, band_hz, seen)
     evidence = 2.0 * (band.floor_only.cost - fit.cost) - band.price
     line = np.exp(fit.parameters[:3])
     std = fit.std[:3] * line
@@ -195,6 +210,7 @@ def _likeliest_line(spectrum: Spectrum, inside: Mask, band_hz: tuple[float, floa
         method="likelihood",
         floor=band.ends(fit.parameters[3:]),
         evidence=evidence,
+        seen=seen,
     )
 
 
@@ -281,15 +297,23 @@ def _bounds(lines: int, band_hz: tuple[float, float]) -> Bounds:
     )
 
 
-def _lines_model(frequency: Field, floors: Field, leakage: Field) -> Model:
-    """Expected density and slopes of any number of lines, as the window shows them, over the floor."""
+def _lines_model(
+    frequency: Field, floors: Field, leakage: Field, factor: Callable[[Field], Field] | None = None
+) -> Model:
+    """Expected density and slopes of any number of lines, as the window shows them, over the floor.
+
+    `factor` on the lines, of frequency, is held.
+    """
     reach = leakage.size // 2
     spacing = (frequency[-1] - frequency[0]) / (frequency.size - 1)
     wide = frequency[0] + spacing * np.arange(-reach, frequency.size + reach)
+    bent = None if factor is None else factor(wide)
 
     def model(theta: Field) -> tuple[Field, Field]:
         level, f0, zeta = np.exp(theta[:-2].reshape(-1, 3, 1)).transpose(1, 0, 2)
         parts = level[:, None] * np.stack(line_and_slopes(wide, f0, zeta), axis=1)  # (lines, 3, frequencies)
+        if bent is not None:
+            parts = parts * bent
         if reach:
             blurred = [np.convolve(part, leakage, "valid") for part in parts.reshape(-1, wide.size)]
             parts = np.reshape(blurred, (*parts.shape[:2], frequency.size))
@@ -306,7 +330,7 @@ INDICATOR_METHODS: dict[IndicatorMethod, Callable[[Spectrum, Mask, tuple[float, 
 }
 
 
-def _fit_line(band: _Band, spectrum: Spectrum, band_hz: tuple[float, float]) -> Fit:
+def _fit_line(band: _Band, spectrum: Spectrum, band_hz: tuple[float, float], seen: SeenLine | None) -> Fit:
     """Line and floor, started from blocks of the spectrum at several widths.
 
     The likelihood has a side maximum at every scatter peak.
@@ -316,8 +340,16 @@ def _fit_line(band: _Band, spectrum: Spectrum, band_hz: tuple[float, float]) -> 
     model = _lines_model(blocks.frequency, blocks.floors, np.ones(1))
     starts = _starts(blocks.frequency, blocks.data.density)
     best = min((fit_spectrum(model, start, bounds, blocks.data) for start in starts), key=lambda fit: fit.cost)
-    model = _lines_model(band.frequency, band.floors, _leakage(spectrum))
-    return fit_spectrum(model, best.parameters, bounds, band.data)
+    leakage = _leakage(spectrum)
+    if seen is None:
+        return fit_spectrum(_lines_model(band.frequency, band.floors, leakage), best.parameters, bounds, band.data)
+    for _ in range(SEEN_ROUNDS):
+        at_f0, at_zeta = (float(value) for value in np.exp(best.parameters[1:3]))
+        factor = partial(seen, f0_hz=at_f0, damping_ratio=at_zeta)
+        best = fit_spectrum(
+            _lines_model(band.frequency, band.floors, leakage, factor), best.parameters, bounds, band.data
+        )
+    return best
 
 
 def _starts(frequency: Field, density: Field) -> list[Field]:

@@ -1,11 +1,18 @@
 """What a contact resonance is: an oscillator's line in a spectrum with its deviations, or why there is none."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field
+
+
+class SeenLine(Protocol):
+    """What sampling makes of an oscillator's line."""
+
+    def __call__(self, frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:
+        """A factor on the line at each frequency [Hz], 1 at f0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,6 +25,7 @@ class Resonance:
     curve; where more than a floor was fitted, `background` in its place: frequencies and densities. `evidence` is how
     much better, by BIC, a line and the rest explain the band than the rest alone (found needs 10, very strong). All of
     a line's figures are nan when it was not `found`; `reason` then says why.
+    `seen` is how the record's sampling bends that line, where that was known.
     The paper's peak has no standard deviation, damping, floor or evidence: nan.
     """
 
@@ -34,6 +42,7 @@ class Resonance:
     floor: tuple[float, float] = (np.nan, np.nan)
     evidence: float = np.nan
     background: tuple[Field, Field] | None = field(default=None, compare=False, repr=False)
+    seen: SeenLine | None = field(default=None, compare=False, repr=False)
 
     @property
     def crf_std_hz(self) -> float:
@@ -52,7 +61,10 @@ class Resonance:
         else:
             curve = np.interp(frequency_hz, *self.background)
         if self.found:
-            curve = curve + self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
+            line = self.crfa * line_shape(frequency_hz, self.crf_hz, self.damping_ratio)
+            curve = curve + (
+                line if self.seen is None else line * self.seen(frequency_hz, self.crf_hz, self.damping_ratio)
+            )
         return curve
 
 
