@@ -12,6 +12,7 @@ from benchmarks import (
     films,
     friction,
     indicators,
+    intervals,
     motion,
     motion_table,
     recordings,
@@ -56,6 +57,7 @@ def main() -> None:
         for part in (
             speed,
             films,
+            intervals,
             robustness,
             motion,
             motion_table,

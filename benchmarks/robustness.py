@@ -82,8 +82,11 @@ def contacts(count: int = 600) -> list[Contact]:
     ]
 
 
-def prepared(contact: Contact, cells: int) -> tuple[ContactConditions, Surface]:
-    """Conditions and roughness; a length that the domain cannot hold is cut to 0.45 of its shorter side."""
+def prepared(contact: Contact, cells: int, *, shown: int | None = None) -> tuple[ContactConditions, Surface]:
+    """Conditions and roughness; a length that the domain cannot hold is cut to 0.45 of its shorter side.
+
+    The roughness has no waves that a grid of `shown` cells cannot show, so that it is the same one on finer grids.
+    """
     conditions = ContactConditions(
         pair=STEEL,
         geometry="line",
@@ -95,7 +98,7 @@ def prepared(contact: Contact, cells: int) -> tuple[ContactConditions, Surface]:
     )
     a = conditions.hertz.half_widths[0]
     grid = Grid((cells, cells), (contact.inlet * a, -1.6 * a), (1.9 * a, 1.6 * a))
-    cell, side = max(grid.spacing), min(grid.extent)
+    cell, side = max(grid.spacing) * cells / (shown or cells), min(grid.extent)
     length = min(max(contact.correlation_length_um * 1e-6, 4.0 * cell), 0.45 * side)
     rng = np.random.default_rng(contact.number)
     sq = contact.sq_um * 1e-6

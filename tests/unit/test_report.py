@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from asperity.case import load_case
 from asperity.coupling import contact_vibration
 from asperity.ehl import ContactError, ContactSolution, ContactState, Convergence, Iteration, SolveStatus, Uncertainty
-from asperity.ehl.outcome import Figures
+from asperity.ehl.outcome import Figures, GridError
 from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.hertz import line_gap, line_pressure
@@ -279,7 +279,9 @@ def test_several_runs_are_drawn_against_roughness(single, several):
 def test_figures_carry_their_error_where_it_shows():
     run = run_like()
     errors = Figures(car=0.0123, clr=0.0456, h_min=1e-12, h_central=7.1e-9)
-    convergence = replace(run.solution.convergence, iteration_error=errors.times(0.0), discretisation_error=errors)
+    none = errors.times(0.0)
+    cells = GridError(car=errors.car, clr=errors.clr, h_min=errors.h_min, h_central=errors.h_central, lean=none)
+    convergence = replace(run.solution.convergence, iteration_error=none, discretisation_error=cells)
     run = replace(run, solution=replace(run.solution, convergence=convergence))
     rows = {row[0].split(",")[0]: row[1] for row in Page(page.render_page([run])).rows if len(row) > 1}
     assert next(value for name, value in rows.items() if name.startswith("Load share of asperities")) == "54.2"

@@ -7,7 +7,7 @@ import xarray
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus, load_solution
-from asperity.ehl.outcome import ATTEMPTS, Figures
+from asperity.ehl.outcome import ATTEMPTS, Figures, GridError
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
@@ -20,6 +20,7 @@ def solution():
     cells = (12, 9)
     grid = Grid(cells, (-0.1 / 3.0, -1e-4 / 7.0), (0.2 / 3.0, 1e-4 / 7.0))
     steps = tuple(Iteration((6 * n, 9), n, *rng.random(3)) for n in (1, 2))
+    small = Figures(car=0.1 / 3.0, clr=0.1 / 7.0, h_min=1e-9 / 3.0, h_central=1e-9 / 7.0)
     return ContactSolution(
         conditions=ContactConditions(
             pair=ElasticPair((0.1 + 2e11, 2.07e11), (0.3, 1.0 / 3.0)),
@@ -43,7 +44,8 @@ def solution():
             3e-7,
             0.1 + 0.2,
             ATTEMPTS[2],
-            Figures(car=0.1 / 3.0, clr=0.1 / 7.0, h_min=1e-9 / 3.0, h_central=1e-9 / 7.0),
+            small,
+            GridError(car=0.2 / 3.0, clr=0.2 / 7.0, h_min=2e-9 / 3.0, h_central=2e-9 / 7.0, lean=small.times(-0.5)),
         ),
         attributes={"case": 'model = "unified"\n# größer\n', "notes": "[]"},
     )

@@ -10,7 +10,7 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.conserving import Earlier, OilBalance, Unknowns, evaluate
 from asperity.ehl.conserving_iterate import OilStep, newton
-from asperity.ehl.outcome import ATTEMPTS, Convergence, Figures, Iteration, Options, SolveStatus
+from asperity.ehl.outcome import ATTEMPTS, Convergence, Figures, GridError, Iteration, Options, SolveStatus
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels, on_one_line
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
@@ -128,17 +128,18 @@ class Climb:
         self.iteration_error: Figures | None = None
         self.settled = False
         self.steps_left = 0
+        self.cell = 0.0  # of the finest grid along x, in half-widths
 
     @property
-    def discretisation_error(self) -> Figures | None:
+    def discretisation_error(self) -> GridError | None:
         """From the last grids; see `grid_error`."""
-        return grid_error(self.figures, smooth=False)
+        return grid_error(self.figures, smooth=False, cell=self.cell)
 
     def up(
         self, levels: Sequence[Problem], conditions: ContactConditions, lubricant: Lubricant | None, *, grow: bool
     ) -> OilStep:
         """Solve on grid after grid, from the last, coarsest one to the first."""
-        self.figures = []
+        self.figures, self.cell = [], levels[0].spacing[0]
         for problem in reversed(levels):
             coarsest, finest = problem is levels[-1], problem is levels[0]
             tolerance = self.options.tolerance if finest else max(COARSE_TOLERANCE, self.options.tolerance)
@@ -266,7 +267,7 @@ class Climb:
         *,
         seconds: float,
         attempt: str = ATTEMPTS[0],
-        discretisation: Figures | None = None,
+        discretisation: GridError | None = None,
         viscosity_factor: Field | None = None,
     ) -> ContactSolution:
         """Where the way ended, in SI on the surface's grid, whether it was solved on one line of it or on all."""

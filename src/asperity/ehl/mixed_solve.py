@@ -87,6 +87,7 @@ class MixedSearch(Search):
         tolerance, most = self.options.tolerance, self.options.max_iterations
         roughly = max(COARSE_TOLERANCE, tolerance)
         step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
+        self.by_first_order, self.cell = self._figures(step), problem.spacing[0]
         return self.run(problem, newton(problem, _reached(step), second_order=True), tolerance, most)
 
     def climb_from(self, finest: Problem, pressure: Field, approach: float) -> Step:

@@ -1,5 +1,6 @@
 """How hard a contact is to be solved, and how its solution went."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -86,6 +87,14 @@ class Figures:
         """Absolute differences."""
         return self._each(other, lambda mine, theirs: abs(mine - theirs))
 
+    def minus(self, other: "Figures") -> "Figures":
+        """Differences."""
+        return self._each(other, lambda mine, theirs: mine - theirs)
+
+    def signed(self, other: "Figures") -> "Figures":
+        """Each with the other's sign."""
+        return self._each(other, math.copysign)
+
     def plus(self, other: "Figures") -> "Figures":
         """Sums."""
         return self._each(other, lambda mine, theirs: mine + theirs)
@@ -103,6 +112,22 @@ class Figures:
         return Figures(**{name: merge(getattr(self, name), getattr(other, name)) for name in names})
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridError(Figures):
+    """What the cells' size may have done to the figures: half-widths of 90 % intervals.
+
+    `lean` is how far the middle of each interval lies above the figure: a finer grid mostly goes on the way that the
+    figures took from the coarser one.
+    """
+
+    lean: Figures
+
+    def sides(self, name: str) -> tuple[float, float]:
+        """How far a figure may lie below and above, not less than not at all."""
+        half, lean = getattr(self, name), getattr(self.lean, name)
+        return max(0.0, half - lean), max(0.0, half + lean)
+
+
 @dataclass(frozen=True, slots=True)
 class Convergence:
     """How the solve went: status, every step on every grid level, and the time it took [s].
@@ -118,7 +143,7 @@ class Convergence:
     seconds: float
     attempt: str = ATTEMPTS[0]
     iteration_error: Figures | None = None
-    discretisation_error: Figures | None = None
+    discretisation_error: GridError | None = None
 
     @property
     def error(self) -> Figures | None:

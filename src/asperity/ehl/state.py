@@ -88,10 +88,8 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance | OilBal
 def _error(solution: ContactSolution) -> ContactError:
     """What the solution alone can tell: iteration and grid, and what was chosen."""
     convergence, options = solution.convergence, solution.options
-    iteration, grid = (
-        None if figures is None else (figures.clr, figures.clr)
-        for figures in (convergence.iteration_error, convergence.discretisation_error)
-    )
+    step, cells = convergence.iteration_error, convergence.discretisation_error
+    iteration, grid = None if step is None else (step.clr, step.clr), None if cells is None else cells.sides("clr")
     clr = carried_share(solution.pressure, solution.in_contact)
     cap, inlet = solution.p_cap, -solution.grid.lower[0] / solution.conditions.hertz.half_widths[0]
     return ContactError(

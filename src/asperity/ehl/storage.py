@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.outcome import Convergence, Figures, Iteration, Options, SolveStatus
+from asperity.ehl.outcome import Convergence, Figures, GridError, Iteration, Options, SolveStatus
 from asperity.ehl.solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, OIL, STEPS, ContactSolution, Oil
 from asperity.errors import UnreadableFile
 from asperity.grid import Grid
@@ -80,5 +80,11 @@ def _oil(dataset: "xarray.Dataset") -> Oil | None:
 
 def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> Convergence:
     rest: dict[str, Any] = {name: value for name, value in described.items() if name not in ("status", *ERRORS)}
-    errors: dict[str, Any] = {name: described.get(name) and Figures(**described[name]) for name in ERRORS}
+    errors: dict[str, Any] = dict.fromkeys(ERRORS)
+    if described.get("iteration_error"):
+        errors["iteration_error"] = Figures(**described["iteration_error"])
+    if described.get("discretisation_error"):
+        half = described["discretisation_error"]
+        lean = Figures(**(half.pop("lean", None) or dict.fromkeys(half, 0.0)))  # of a run that knew none
+        errors["discretisation_error"] = GridError(**half, lean=lean)
     return Convergence(**rest, **errors, status=SolveStatus(described["status"]), history=history)

@@ -108,7 +108,8 @@ def _clr_error(own: Uncertainty, rows: Sequence[Row]) -> Uncertainty:
     grid = own.grid
     if own.iteration is not None and grid is not None and None not in numerical:
         half = max(0.0, float(np.mean([error for error in numerical if error is not None])) - own.iteration[0])
-        grid = half, half
+        mean_half = 0.5 * (grid[0] + grid[1])  # of the first surface, whose leaning the others share
+        grid = (grid[0] * half / mean_half, grid[1] * half / mean_half) if mean_half > 0.0 else (half, half)
     return replace(own, value=mean, grid=grid, surfaces=surfaces)
 
 
