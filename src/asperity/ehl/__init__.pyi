@@ -34,6 +34,7 @@ from .outcome import ContactModel as ContactModel
 from .outcome import ContactState as ContactState
 from .outcome import Convergence as Convergence
 from .outcome import Figures as Figures
+from .outcome import GridError as GridError
 from .outcome import Iteration as Iteration
 from .outcome import Options as Options
 from .outcome import SolveStatus as SolveStatus
