@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks import (
     conserving,
+    damping,
     films,
     friction,
     indicators,
@@ -63,6 +64,7 @@ def main() -> None:
             motion_table,
             conserving,
             vibration,
+            damping,
             surfaces,
             friction,
             stress,
