@@ -32,6 +32,7 @@ FARTHEST = 30.0  # half-widths of inlet that a light contact is given at most
 ASPERITIES_REACH = 5.0  # a rough body touches out to X² = 1 + 5 Sq R/a²: 2.5 Sq above the mean plane
 CORRELATION_LENGTHS = 10.0  # along a line contact's piece
 DRY_FILM_RATIO = 0.05  # below it no film carries a load that matters, and its inlet need not be resolved
+LEAST_FILM_RATIO = 0.3  # Sq that count as film in rough contacts: asperities hold the inlet open as far as that
 MOST_CELLS = 130_000  # of a rough contact at ACCURACY
 WIDEST_BAR = 0.15  # of CLR: beyond it mixed cannot be told from boundary lubrication
 
@@ -95,10 +96,14 @@ def auto_grid(
     return Grid(cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, line))
 
 
-def inlet_length(conditions: ContactConditions, lubricant: Lubricant) -> float:
-    """The inlet over which the film's pressure builds up before a Hertz zone, (h R/a²)^(2/3) a [m]."""
+def inlet_length(conditions: ContactConditions, lubricant: Lubricant, sq: float = 0.0) -> float:
+    """The inlet over which the film's pressure builds up before a Hertz zone, (h R/a²)^(2/3) a [m].
+
+    Asperities of `sq` [m] hold it open where the film is thinner than 0.3 Sq.
+    """
     scales = Scales.of(conditions, lubricant)
-    return float(_film(conditions, lubricant) ** (2.0 / 3.0)) * scales.length
+    film = max(_film(conditions, lubricant), LEAST_FILM_RATIO * sq / scales.gap)
+    return float(film ** (2.0 / 3.0)) * scales.length
 
 
 def flooded_inlet(conditions: ContactConditions, lubricant: Lubricant, missing: float = ACCURACY / 2.0) -> float:
@@ -124,7 +129,7 @@ def grid_shortfalls(conditions: ContactConditions, lubricant: Lubricant | None, 
     found = []
     sq, (dx, dy) = surface.sq, surface.grid.spacing
     if lubricant is not None and least_film(conditions, lubricant) > DRY_FILM_RATIO * sq:
-        across = inlet_length(conditions, lubricant) / dx
+        across = inlet_length(conditions, lubricant, sq) / dx
         if across < FEWEST_IN_INLET:
             found.append(f"{across:.2g} cells across the inlet, where {FEWEST_IN_INLET:.0f} are needed")
     if sq > 0.0:
@@ -214,13 +219,11 @@ def _spacing(
     (a, b), line = conditions.hertz.half_widths, conditions.geometry == "line"
     dx = dy = 2.0 / max(CELLS_IN_CONTACT * finer, FEWEST_IN_CONTACT)
     if lubricant is not None:
-        film = _film(conditions, lubricant)
-        if texture is not None:
-            film = max(film, DRY_FILM_RATIO * texture.sq * conditions.radius_along_rolling / a**2)
+        inlet = inlet_length(conditions, lubricant, 0.0 if texture is None else texture.sq) / a
         kind = "rough" if texture is not None else "smooth line" if line else "smooth"
         across = max(CELLS_IN_INLET[kind] * finer, SPARE * FEWEST_IN_INLET)
-        dx = min(dx, film ** (2.0 / 3.0) / across)
-        dy = min(dy, film ** (2.0 / 3.0) / across / SIDES)
+        dx = min(dx, inlet / across)
+        dy = min(dy, inlet / across / SIDES)
     dx, dy = dx * a, math.inf if line else dy * b  # along a line nothing varies but the roughness
     if texture is not None:
         along = max(CELLS_IN_CORRELATION * finer, SPARE * FEWEST_IN_CORRELATION)
