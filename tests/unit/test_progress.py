@@ -41,3 +41,17 @@ def test_quiet_shows_nothing(capsys):
     with show.progress("case", quiet=True, compiles=True) as display:
         display("step 1")
     assert capsys.readouterr() == ("", "")
+
+
+def test_surfaces_that_are_done_are_counted_beside_the_steps():
+    shown = []
+    steps = show.SolverSteps(lambda *told: shown.append(told))
+    steps.step(Iteration((8, 8), 0, 1.0, 1.0, float("inf")))
+    steps.step(Iteration((8, 8), 1, 1e-2, 1.0, 1.0))
+    steps.surface(2, 5)
+    steps.step(Iteration((16, 8), 3, 1e-4, 1.0, 1.0))
+    assert shown == [
+        ("8 x 8 cells, step 1, residual 1.0e-02", None, None),
+        ("2 of 5 surfaces", 2, 5),
+        ("16 x 8 cells, step 3, residual 1.0e-04", 2, 5),
+    ]
