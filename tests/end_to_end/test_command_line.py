@@ -61,6 +61,21 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     assert asp("solve", "case.toml", "--quiet")[1:] == (out.splitlines()[0] + "\n", "")
 
 
+def test_an_accuracy_chooses_the_cells_and_keeps_the_domain(asp):
+    quick = ("--surfaces", "1", "--set", "surface=flat", "--set", "vibration=none")
+    said = json.loads(asp("solve", "case.toml", "--accuracy", "0.05", "--json", *quick)[1])
+    finer = json.loads(asp("solve", "case.toml", "--accuracy", "0.005", "--json", *quick)[1])
+    assert said["cells"][0] < finer["cells"][0] / 1.5
+    assert said["determined"] is finer["determined"] is True
+    assert said["h_central_m"] == pytest.approx(finer["h_central_m"], rel=0.05)
+    card = finer["regime_card"]
+    assert card["regime"] == "piezoviscous-elastic"
+    assert card["half_width_m"] == pytest.approx(55.93e-6, rel=1e-3)
+    assert [fit["source"] for fit in card["fits"]] == ["Moes", "Dowson (1968)"]
+    assert any("starves the film" in note for note in finer["notes"])
+    assert asp("solve", "case.toml", "--accuracy", "3")[:2] == (2, "")
+
+
 def test_several_surfaces_are_solved_and_kept(asp):
     quick = ("--set", "grid.cells=[48, 48]", "--set", "vibration.duration=0.2 s")
     code, out, _ = asp("solve", "case.toml", "--surfaces", "2", "--out", "run.nc", "--json", *quick)
