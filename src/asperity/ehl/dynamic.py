@@ -15,6 +15,7 @@ from asperity.ehl.solution import ContactSolution
 from asperity.ehl.state import balance_of
 from asperity.ehl.stiffness import ELASTIC, FLOWING, YIELDED, Yielded, checked_depth
 from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.hertz import line_stiffness
 
 TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
 SAME_FREQUENCY = 0.01  # a resonance is found when its own stiffness moves it by less
@@ -114,15 +115,25 @@ class ShakenContact:
     def resonance(self, mass: float) -> DynamicStiffness:
         """Where a mass [kg] on this contact resonates, k = m ω², to 1 % of its frequency; AsperityError if nowhere."""
         require_positive("mass", mass, "kg")
-        found = self.at(0.0)
+        stiffness = self._bodies()
         for _ in range(MOST_TRIALS):
+            found = self.at(math.sqrt(stiffness / mass) / (2.0 * math.pi))
             if found.stiffness <= 0.0:
                 break
-            frequency = math.sqrt(found.stiffness / mass) / (2.0 * math.pi)
+            stiffness, frequency = found.stiffness, math.sqrt(found.stiffness / mass) / (2.0 * math.pi)
             if abs(frequency - found.frequency_hz) <= SAME_FREQUENCY * frequency:
                 return found
-            found = self.at(frequency)
         raise AsperityError(f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere")
+
+    def _bodies(self) -> float:
+        """Stiffness of the smooth dry bodies under the whole load [N/m], near any contact's that has been loaded."""
+        conditions = self.conditions
+        if conditions.length is None or self.depth is None:
+            approach = conditions.hertz.approach
+            assert approach is not None  # a line's alone depends on the depth
+            return 1.5 * conditions.load / approach
+        radius, modulus = conditions.radius_along_rolling, conditions.pair.reduced_modulus
+        return line_stiffness(conditions.load, conditions.length, radius, modulus, self.depth)
 
     def _newtons_per_metre(self) -> float:
         """What one dimensionless cell's pressure per gap is worth, over the whole length of a line contact."""

@@ -56,6 +56,11 @@ class Linear:
         problem = self.balance.problem
         d_gap = problem.deflection(d_pressure)
         d_gap += self.dtype(d_approach)
+        return self.of_gap(d_pressure, d_gap)
+
+    def of_gap(self, d_pressure: Field, d_gap: Field) -> Field:
+        """The same, of a change of pressure and that of the gap."""
+        problem = self.balance.problem
         if self.film is None or self.faces is None:
             touching = self.rows.state == reynolds.TOUCHING
             return np.where(touching, d_gap * self.dtype(self.rows.contact_scale), d_pressure)

@@ -59,6 +59,11 @@ class MixedLinear:
         d_gap = problem.deflection(d_total)
         if d_approach:
             d_gap += self.real(d_approach)
+        return self.of_gap(d_oil, d_gap)
+
+    def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
+        """The same, of a change of the oil's pressure and that of the gap."""
+        problem = self.balance.problem
         wet, leaning = np.empty(self.cells, self.real), np.empty(self.cells, self.real)
         spacing = problem.spacing
         reynolds.jacobian_product(self.rows, self.film, self.faces, self.oil, d_oil, d_gap, spacing, 0.0, wet)

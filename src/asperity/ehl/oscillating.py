@@ -72,8 +72,8 @@ class _OnePressure:
 
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         d_pressure = vector.reshape(self.cells)
-        rows = self.linear.product(d_pressure, d_approach)
         d_gap = self.deflection(d_pressure) + self.real(d_approach)
+        rows = self.linear.of_gap(d_pressure, d_gap)
         stored = self.by_gap * d_gap + self.by_pressure * d_pressure
         return np.where(self.unknown, rows, d_pressure).ravel(), stored.ravel()
 
@@ -109,8 +109,8 @@ class _TwoPressures:
     def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
         d_oil, closed = self._split(vector)
         d_total = self.linear.total(d_oil, closed)
-        wet, gap_rows = self.linear.product(d_oil, d_total, d_approach)
         d_gap = self.deflection(d_total) + self.real(d_approach)
+        wet, gap_rows = self.linear.of_gap(d_oil, d_gap)
         stored = self.by_gap * d_gap + self.by_pressure * d_oil
         rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
         return rows, self._joined(stored, np.zeros_like(closed))
