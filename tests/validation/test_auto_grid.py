@@ -82,7 +82,9 @@ def test_light_contacts_are_flooded(m, l):  # noqa: E741
 def test_a_soft_ball_has_the_film_of_the_soft_fit_and_no_contact():
     """Hamrock and Dowson (1978); at 64 cells a hand-made grid had a load share of 89 %."""
     case = load_case(SOFT)
-    solution = solve_contact(case.conditions, case.lubricant, flat_surface(auto_grid(case.conditions, case.lubricant)))
+    run = solve_case(case.with_overrides({"surface": "flat"}))
+    solution = run.solution
+    assert run.determined  # though the next coarser grid, which shows 2 cells of the inlet, has a load share of 24 %
     fits = {fit.place: fit for fit in regime_card(solution).fits if fit.source == "Hamrock and Dowson, soft (1978)"}
     assert abs(fits["central"].deviation) < 0.05
     assert abs(fits["least"].deviation) < 0.05
