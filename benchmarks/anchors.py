@@ -1,7 +1,8 @@
-"""Three studies against what the paper prints: `python -m benchmarks.anchors [CELLS]`.
+"""Four studies against what the paper prints: `python -m benchmarks.anchors [CELLS]`.
 
-Default: examples/paper.toml; as printed: the domain that the paper prints, which starves the film; calibrated: the
-free parameters that meet the anchors best (docs/theory/calibration.md).
+Default: examples/paper.toml, by its own model and by the paper's; as printed: the domain that the paper prints, which
+starves the film; calibrated: the free parameters that meet the anchors best (docs/theory/calibration.md); both by the
+paper's model.
 """
 
 import sys
@@ -12,7 +13,12 @@ from asperity.paper import PAPER_ANCHORS, compare_with_anchors, rig_deviation
 from asperity.study import WearCurve, curve_of, plan_study, run_study, study_executor
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-CASES = {"default": "paper.toml", "as printed": "paper-as-printed.toml", "calibrated": "paper-calibrated.toml"}
+CASES = {
+    "default": ("paper.toml", "mixed"),
+    "default, the paper's model": ("paper.toml", "paper"),
+    "as printed": ("paper-as-printed.toml", "paper"),
+    "calibrated": ("paper-calibrated.toml", "paper"),
+}
 PERCENT = ("car", "car_domain", "clr")
 
 
@@ -27,8 +33,8 @@ def shown(quantity: str, value: float) -> str:
 def curves(cells: int | None) -> dict[str, WearCurve]:
     found = {}
     with study_executor() as executor:
-        for name, file in CASES.items():
-            case = load_case(EXAMPLES / file)
+        for name, (file, model) in CASES.items():
+            case = load_case(EXAMPLES / file).with_overrides({"model": model})
             if cells is not None:
                 case = case.with_overrides({"grid.cells": [cells, cells]})
             found[name] = curve_of(run_study(plan_study(case), executor=executor))

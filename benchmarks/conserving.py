@@ -19,17 +19,14 @@ from asperity.case import Case
 from asperity.ehl import (
     ContactSolution,
     LoadSharing,
-    Scales,
     Snapshot,
-    moving_conserving_contact,
+    moving_contact,
     sharing_by_film,
     solve_contact,
     solve_film,
 )
-from asperity.ehl.conserving import evaluate
-from asperity.ehl.conserving_solve import unknowns_of
-from asperity.ehl.outcome import CONSERVING
-from asperity.ehl.posing import contact_problem
+from asperity.ehl.outcome import CONSERVING, MIXED, PAPER
+from asperity.ehl.state import balance_of
 from asperity.surface import MovingSurfaces
 from benchmarks.roughness_levels import paper_case
 
@@ -106,15 +103,13 @@ def contacts(seeds: tuple[int, ...]) -> Iterator[Contact]:
 
 def lost(solution: ContactSolution) -> float:
     """Oil that all cells together lose, over the throughflow."""
-    scales = Scales.of(solution.conditions, solution.lubricant)
-    problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
-    balance = evaluate(problem, unknowns_of(solution, problem, scales))
-    dx, dy = problem.spacing
+    balance = balance_of(solution)
+    dx, dy = balance.problem.spacing
     return abs(float(balance.outflow.sum()) * dx * dy / balance.throughflow)
 
 
 def standing(seeds: tuple[int, ...]) -> Iterator[str]:
-    """Snapshots at 128 x 128 of both models."""
+    """Snapshots at 128 x 128 of all models."""
     solved: dict[int, int] = defaultdict(int)
     ratios, seconds, worst = [], [], 0.0
     shares: dict[tuple[str, float], list[LoadSharing]] = defaultdict(list)
@@ -122,7 +117,7 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
         case = one.case(128)
         surface, options = case.surface(), case.options
         spent = {}
-        for model in ("unified", CONSERVING):
+        for model in (PAPER, MIXED, CONSERVING):
             began = process_time()
             solution = solve_contact(
                 case.conditions, case.lubricant, surface, options=replace(options, model=model), strict=False
@@ -133,13 +128,13 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
         if solution.convergence.converged:
             solved[one.seed] += 1
             worst = max(worst, lost(solution))
-        ratios.append(spent[CONSERVING] / spent["unified"])
+        ratios.append(spent[CONSERVING] / spent[PAPER])
         seconds.append(spent[CONSERVING])
     each = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
     yield (
         f"Standing still, 128 x 128: solved {each}. Oil lost by all cells together at most {worst:.1e} of the "
         f"throughflow. Cold in {median(seconds):.2f} s in the median (longest {max(seconds):.1f} s), "
-        f"{median(ratios):.1f} times the unified model (longest {max(ratios):.0f} times).\n"
+        f"{median(ratios):.1f} times the paper's model (longest {max(ratios):.0f} times).\n"
     )
     yield from _shares(shares)
 
@@ -185,7 +180,7 @@ def moving(seeds: tuple[int, ...]) -> Iterator[str]:
 
 def _steps(case: Case) -> Iterator[Snapshot]:
     surfaces = MovingSurfaces.one_rough(case.surface(), case.conditions.surface_speeds)
-    yield from moving_conserving_contact(case.conditions, case.lubricant, surfaces, options=case.options)
+    yield from moving_contact(case.conditions, case.lubricant, surfaces, options=case.options)
 
 
 def cost() -> Iterator[str]:

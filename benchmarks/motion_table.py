@@ -1,6 +1,6 @@
 """One table over roughness: load and area shares, load by film, films and resonances, of three models of one contact.
 
-The paper's contact with a cap of 0.7 GPa and a correlation length of 40 um: snapshot and moving contact of the unified
+The paper's contact with a cap of 0.7 GPa and a correlation length of 40 um: snapshot and moving contact of the mixed
 model, moving contact of the conserving one. Means over one passage of the rough surface after oil has crossed the
 domain once; mean and standard deviation over seeds. What is computed is kept in build/motion_table.csv and not
 computed again: `python -m benchmarks.motion_table --cells 64 --seeds 0 1 2`.
@@ -24,7 +24,6 @@ from asperity.ehl import (
     FILMS,
     Snapshot,
     clr_below,
-    moving_conserving_contact,
     moving_contact,
     roller_depth,
     sharing_by_film,
@@ -39,8 +38,8 @@ from benchmarks.roughness_levels import paper_case
 KEPT = Path(__file__).parents[1] / "build" / "motion_table.csv"
 SQ_UM = (0.5, 1.0, 2.5, 4.0)
 SEEDS = (0, 1, 2)
-SNAPSHOT, UNIFIED, CONSERVING = "unified snapshot", "unified moving", "conserving moving"
-MODELS = {UNIFIED: moving_contact, CONSERVING: moving_conserving_contact}
+SNAPSHOT, MIXED, CONSERVING = "mixed snapshot", "mixed moving", "conserving moving"
+MODELS = {MIXED: "mixed", CONSERVING: "conserving"}
 KINDS: dict[str, type] = {"model": str, "cells": int, "seed": int, "steps": int, "bad": int}  # numbers else
 LOAD_STEP = 0.02
 MOMENTS = 2  # of a passage, at which the tangent stiffness is taken
@@ -79,8 +78,8 @@ def table_case(sq_um: float, seed: int, cells: int) -> Case:
 
 
 def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcome]:
-    """The moving contact of a model, and before it, of the unified one, its snapshot."""
-    case = table_case(sq_um, seed, cells)
+    """The moving contact of a model, and before it, of the mixed one, its snapshot."""
+    case = table_case(sq_um, seed, cells).with_overrides({"model": MODELS[model]})
     assert case.lubricant is not None
     surfaces = case.moving_surfaces()
     passage = surfaces.passage(0) / step_seconds(case.conditions, surfaces, 1.0)
@@ -88,9 +87,9 @@ def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcom
     began = perf_counter()
     settled: list[Snapshot] = []
     bad = 0
-    for snapshot in islice(MODELS[model](case.conditions, case.lubricant, surfaces, options=case.options), last + 1):
+    for snapshot in islice(moving_contact(case.conditions, case.lubricant, surfaces, options=case.options), last + 1):
         bad += not snapshot.solution.convergence.converged
-        if snapshot.number == 0 and model == UNIFIED:
+        if snapshot.number == 0 and model == MIXED:
             yield _outcome(SNAPSHOT, case, sq_um, seed, [snapshot], [snapshot], 0, perf_counter() - began)
         if snapshot.number > cells:
             settled.append(snapshot)
@@ -148,12 +147,12 @@ def _tangent(snapshot: Snapshot) -> float | None:
         return None
 
 
-def tangent_in_motion(sq_um: float, seed: int, cells: int, model: str = UNIFIED) -> tuple[float, float]:
+def tangent_in_motion(sq_um: float, seed: int, cells: int, model: str = MIXED) -> tuple[float, float]:
     """Resonance [Hz] by the tangent stiffness of the moving contact, and that by the standing one's at MOMENTS times.
 
     In motion: the same passage under a load 2 % less and 2 % more, difference of loads over that of mean approaches.
     """
-    case = table_case(sq_um, seed, cells)
+    case = table_case(sq_um, seed, cells).with_overrides({"model": MODELS[model]})
     assert case.lubricant is not None
     conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
     surfaces, depth = case.moving_surfaces(), roller_depth(conditions)
@@ -161,7 +160,7 @@ def tangent_in_motion(sq_um: float, seed: int, cells: int, model: str = UNIFIED)
     approaches = []
     for load in ((1.0 - LOAD_STEP) * conditions.load, (1.0 + LOAD_STEP) * conditions.load):
         pressed = replace(conditions, load=load)
-        taken = islice(MODELS[model](pressed, case.lubricant, surfaces, options=case.options), last + 1)
+        taken = islice(moving_contact(pressed, case.lubricant, surfaces, options=case.options), last + 1)
         approaches.append(float(np.mean([approach_of(one.solution, depth) for one in taken if one.number > cells])))
     stiffness = 2.0 * LOAD_STEP * conditions.load / (approaches[1] - approaches[0])
     compute(cells, [seed], [model], [sq_um])

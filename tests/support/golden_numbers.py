@@ -99,6 +99,7 @@ def curves() -> dict[str, Any]:
 
 CASES: dict[str, Callable[[], dict[str, Any]]] = {
     "paper": lambda: solved(*SMALL),
+    "paper-model": lambda: solved(*SMALL, "model=paper"),
     "smooth": lambda: solved(*SMALL, 'surface={kind="flat"}'),
     "printed-preset": lambda: solved(*SMALL, "vibration.preset=paper", "surface.sq=2.5 um"),
     "conserving": lambda: solved(*SMALL, "model=conserving", "surface.sq=0.6 um"),
@@ -111,10 +112,17 @@ CASES: dict[str, Callable[[], dict[str, Any]]] = {
         "surface.sq=2 um",
     ),
     "warm": lambda: solved(*SMALL, "thermal.feedback=true", 'lubricant.rheology={law="ree-eyring", tau0="5 MPa"}'),
+    "warm-paper-model": lambda: solved(
+        *SMALL, "thermal.feedback=true", 'lubricant.rheology={law="ree-eyring", tau0="5 MPa"}', "model=paper"
+    ),
     "ball": lambda: solved("grid.cells=[64, 64]", "vibration.duration=0.2 s", case="ball-on-disc.toml"),
+    "ball-paper-model": lambda: solved(
+        "grid.cells=[64, 64]", "vibration.duration=0.2 s", "model=paper", case="ball-on-disc.toml"
+    ),
     "ellipse": elliptic,
     "study": study,
     "history": lambda: history(*ROLLING, "motion.flattening=true", steps=6, listen=True),
+    "history-paper-model": lambda: history(*ROLLING, "motion.flattening=true", "model=paper", steps=6, listen=True),
     "history-conserving": lambda: history(*ROLLING, "model=conserving", "surface.sq=0.6 um", steps=2),
     "vibrate": lambda: {
         "sound": say("vibrate", str(EXAMPLES / "paper.toml")),

@@ -21,10 +21,9 @@ def compliance(problem):
 
 def faces_of(balance):
     """How the model takes content and mobility from cells to faces."""
-    if isinstance(balance, MixedBalance):
-        return {"wedge": (0.0, 0.0), "logarithmic": False}
     accurate = balance.problem.accurate
-    return {"wedge": (0.375, 0.125) if accurate else (0.0, 0.5), "logarithmic": accurate}
+    upwind = (0.0, 0.0) if isinstance(balance, MixedBalance) else (0.0, 0.5)
+    return {"wedge": (0.375, 0.125) if accurate else upwind, "logarithmic": accurate}
 
 
 def shaken_cells(balance, frequencies):
@@ -36,7 +35,7 @@ def shaken_cells(balance, frequencies):
     solid = balance.solid if two else balance.rows.state
     closed = (solid == TOUCHING).ravel()
     free = ~closed & (solid != CAPPED).ravel()
-    held = (balance.gap <= problem.contact_gap) & (solid != LUBRICATED)
+    held = balance.film.content_by_gap == 0.0 if two else (balance.gap <= problem.contact_gap) & (solid != LUBRICATED)
     bend = compliance(problem)
 
     def oil_rows(d_pressure, d_gap):
@@ -78,7 +77,7 @@ def _outflow(balance, pressure, gap):
     eta0 = oil.viscosity.eta0
     mobility = density * gap**3 * eta0 / (problem.speed * oil.viscosity(pascals))
     if isinstance(balance, MixedBalance):
-        least = problem.contact_gap**3 / problem.speed
+        least = problem.contact_gap**6 / problem.speed / gap.real**3
         mobility = np.where(mobility.real < least, least, mobility)
     ambient = gap[[0, -1]] ** 3 / problem.speed
     content = density * gap

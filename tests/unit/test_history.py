@@ -283,7 +283,7 @@ def fails_at_three(monkeypatch):
                 snapshot = replace(snapshot, solution=replace(snapshot.solution, convergence=ending))
             yield snapshot
 
-    monkeypatch.setitem(MODELS, "unified", steps)
+    monkeypatch.setitem(MODELS, "mixed", steps)
 
 
 @pytest.mark.usefixtures("fails_at_three")
@@ -294,7 +294,7 @@ def test_the_first_bad_step_stops_a_history_and_is_done_again(history, tmp_path,
     assert unfinished.steps == 3
     assert unfinished.failed == (3,)
     assert unfinished.verdict().startswith("NOT CONVERGED at step 3")
-    monkeypatch.setitem(MODELS, "unified", moving_contact)
+    monkeypatch.setitem(MODELS, "mixed", moving_contact)
     again = run_history(case(), steps=5, out=tmp_path / "kept")
     pd.testing.assert_frame_equal(again.table, history.table[:6], check_exact=True)
 
@@ -307,9 +307,9 @@ def test_bad_steps_are_marked_where_it_shall_go_on():
 
 
 def test_a_model_without_steps_in_time_is_refused(monkeypatch):
-    monkeypatch.delitem(MODELS, "unified")
+    monkeypatch.delitem(MODELS, "mixed")
     monkeypatch.setitem(MODELS, "another", moving_contact)
-    with pytest.raises(BadInput, match="take one of paper, conserving, another"):
+    with pytest.raises(BadInput, match="take one of unified, paper, conserving, another"):
         run_history(case(), steps=1)
 
 

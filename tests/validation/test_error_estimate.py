@@ -10,6 +10,9 @@ from benchmarks.robustness import contacts, prepared
 import asperity.ehl.search as searching
 from asperity.ehl import Options, contact_state, solve_contact
 from asperity.ehl.iterate import newton
+from asperity.ehl.mixed import Pressures
+from asperity.ehl.mixed_iterate import newton as mixed_newton
+from asperity.ehl.mixed_solve import FROM_ONE, MixedSearch
 from asperity.ehl.outcome import ATTEMPTS, Figures
 from asperity.ehl.search import grid_error
 from asperity.grid import Grid
@@ -130,8 +133,8 @@ def test_any_number_of_cells_will_do():
 
 
 def test_what_fails_at_first_is_tried_with_the_bodies_held(monkeypatch):
-    surface = rough(grid((64, 48)), 1e-6, correlation_length=40e-6)
-    usual = solved(surface)
+    surface, papers = rough(grid((64, 48)), 1e-6, correlation_length=40e-6), Options(model="paper")
+    usual = solved(surface, options=papers)
     assert usual.convergence.attempt == ATTEMPTS[0]
 
     def lame(problem, pressure, approach, *, held=False):
@@ -143,9 +146,26 @@ def test_what_fails_at_first_is_tried_with_the_bodies_held(monkeypatch):
     monkeypatch.setattr(searching, "newton", lame)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(searching.Search, "run", counted(searching.Search.run))
-        mended = solved(surface)
+        mended = solved(surface, options=papers)
     assert mended.convergence.attempt == ATTEMPTS[2]
     assert ATTEMPTS[2] in mended.convergence.explain()
+    assert contact_state(mended).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
+
+
+def test_two_pressures_start_at_last_from_one(monkeypatch):
+    surface = rough(grid((64, 48)), 1e-6, correlation_length=40e-6)
+    usual = solved(surface)
+
+    def lame(self, levels, *_):
+        problem = levels[0]
+        nothing = Pressures(np.zeros(problem.cells), np.zeros(problem.cells), 0.0)
+        return self.run(problem, mixed_newton(problem, nothing, second_order=False), 1e-4, 1)
+
+    monkeypatch.setattr(MixedSearch, "from_dry", lame)
+    monkeypatch.setattr(MixedSearch, "climb_from", lame)
+    mended = solved(surface)
+    assert usual.convergence.attempt != mended.convergence.attempt == FROM_ONE
+    assert FROM_ONE in mended.convergence.explain()
     assert contact_state(mended).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
 
 

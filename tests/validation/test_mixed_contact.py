@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.ehl import Options, SolveStatus, contact_state, solve_contact
+from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.posing import contact_problem
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
@@ -17,8 +18,8 @@ A, P_H = contact().hertz.half_widths[0], contact().hertz.p_max
 COARSE, FINE = grid((64, 64)), grid((128, 128))
 
 
-def solved(surface, *, tolerance=1e-4, speed=1.91, hardness=CAP, **more):
-    options = Options(tolerance=tolerance, contact_film=FLOOR)
+def solved(surface, *, tolerance=1e-4, speed=1.91, hardness=CAP, model="mixed", **more):
+    options = Options(tolerance=tolerance, contact_film=FLOOR, model=model)
     return solve_contact(contact(hardness=hardness, speed=speed), barus(), surface, options=options, **more)
 
 
@@ -26,9 +27,22 @@ def clr(solution):
     return contact_state(solution).clr
 
 
-@pytest.fixture(scope="module", params=[COARSE, FINE], ids=["64", "128"])
+@pytest.fixture(
+    scope="module",
+    params=[(COARSE, "mixed"), (FINE, "mixed"), (COARSE, "paper"), (FINE, "paper")],
+    ids=["64", "128", "64-paper", "128-paper"],
+)
 def tight(request):
-    return solved(rough(request.param, SQ), tolerance=1e-6)
+    on, model = request.param
+    return solved(rough(on, SQ), tolerance=1e-6, model=model)
+
+
+def flowing(solution):
+    """Pressure of the oil, and the cells in which Reynolds' equation decides it: touching ones too if it can."""
+    if solution.oil is None:
+        return solution.pressure, (solution.pressure > 0.0) & (solution.pressure < CAP) & ~solution.in_contact
+    oil = solution.oil.pressure
+    return oil, (oil > 0.0) & (oil < CAP)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +78,7 @@ def test_the_gap_is_the_surface_bent_by_the_pressure(tight):
 
 def test_lubricated_cells_conserve_oil(tight):
     """Net mass outflow of each, in SI and by plain NumPy, against what the surfaces drag through the contact."""
-    wet = (tight.pressure > 0.0) & (tight.pressure < CAP) & ~tight.in_contact
+    _, wet = flowing(tight)
     assert wet.mean() > 0.3
     dragged = 880.0 * 1.91 * tight.gap[np.abs(tight.grid.x) < A].mean()
     lost = mass_outflow(tight) * tight.grid.spacing[0] / dragged
@@ -75,22 +89,29 @@ def test_lubricated_cells_conserve_oil(tight):
 def test_ruptured_cells_only_let_oil_appear(tight):
     """p = 0 holds where a full film would need tension: more would leave than enters."""
     dragged = 880.0 * 1.91 * tight.gap[np.abs(tight.grid.x) < A].mean()
-    assert mass_outflow(tight)[tight.cavitated].min() * tight.grid.spacing[0] > -1e-4 * dragged
+    oil, _ = flowing(tight)
+    ruptured = (oil <= 0.0) & (tight.cavitated | (tight.oil is not None))
+    assert mass_outflow(tight)[ruptured].min() * tight.grid.spacing[0] > -1e-4 * dragged
 
 
 def test_the_equations_are_the_physical_ones(tight):
     """The solver's own net outflow, made dimensional, is rho u h - rho h^3/(12 eta) dp/dx face by face."""
     problem = contact_problem(tight.conditions, tight.lubricant, tight.surface, tight.options)
-    balance = problem.evaluate(tight.pressure / P_H, tight.rigid_approach * RADIUS / A**2)
+    approach = tight.rigid_approach * RADIUS / A**2
+    if tight.oil is None:
+        balance = problem.evaluate(tight.pressure / P_H, approach)
+    else:
+        unknowns = Pressures(tight.oil.pressure / P_H, tight.pressure / P_H, approach)
+        balance = evaluate(problem, unknowns, second_order=True)
     expected = mass_outflow(tight) * RADIUS / (880.0 * 1.91 * A)
     np.testing.assert_allclose(balance.outflow, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 def test_the_stated_imbalance_is_the_oil_that_non_lubricated_cells_make_or_lose(tight):
-    wet = (tight.pressure > 0.0) & (tight.pressure < CAP) & ~tight.in_contact
+    oil, wet = flowing(tight)
     zone = np.abs(tight.grid.x) <= A
     lost = np.abs(mass_outflow(tight))[zone][~wet[zone]].sum() * np.prod(tight.grid.spacing)
-    film = (tight.lubricant.density(tight.pressure) * tight.gap)[zone].mean()
+    film = (tight.lubricant.density(oil) * tight.gap)[zone].mean()
     state = contact_state(tight)
     assert state.mass_flux_imbalance == pytest.approx(lost / (1.91 * film * tight.grid.extent[1]), rel=1e-3)
 
@@ -162,13 +183,13 @@ def test_a_thin_film_on_a_smooth_surface_is_nearly_hertz():
     assert np.linalg.norm(crawl.pressure[:, 0] - hertz) < 0.05 * np.linalg.norm(hertz)
 
 
-@pytest.mark.xfail(strict=True, reason="without an oil balance, contact cells press oil into the valleys beside them")
-def test_hardly_any_oil_on_a_rough_surface_is_the_dry_contact():
-    """At a crawl an oil that does not thicken should leave the contact: CLR 1; the unified model keeps it near 0.5."""
+@pytest.mark.parametrize("model", ["mixed", "conserving"])
+def test_hardly_any_oil_on_a_rough_surface_is_the_dry_contact(model):
+    """At a crawl an oil that does not thicken leaves the contact; one pressure for both would keep CLR near 0.5."""
     surface = rough(COARSE, SQ)
-    options = Options(contact_film=0.1e-9)
+    options = Options(contact_film=0.1e-9, model=model)
     crawl = solve_contact(contact(hardness=CAP, speed=1e-7), barus(alpha=1e-11), surface, options=options)
-    assert clr(crawl) > 0.95
+    assert clr(crawl) > 0.999
 
 
 def test_a_flood_is_no_contact():
@@ -188,7 +209,7 @@ def test_a_purely_elastic_contact_is_solved_too(sq):
 def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
     surface = rough(COARSE, SQ)
     hurried = Options(max_iterations=3)
-    with pytest.raises(NotConverged, match=r"not solved: out of iterations, at last .* after 6 steps") as caught:
+    with pytest.raises(NotConverged, match=r"not solved: out of iterations.* after \d+ steps") as caught:
         solve_contact(contact(hardness=CAP), barus(), surface, options=hurried)
     unfinished = caught.value.solution
     assert unfinished.convergence.status is SolveStatus.OUT_OF_ITERATIONS

@@ -113,7 +113,7 @@ class MotionSection(Section):
 class CaseFile(Section):
     """A whole case file. `lubricant = "none"` is a dry contact: an oil is not something to forget."""
 
-    model: ContactModel = "unified"
+    model: ContactModel = "mixed"
     contact: ContactSection
     material: MaterialSection
     lubricant: Annotated[LubricantSection | None, PlainValidator(parse_lubricant)]

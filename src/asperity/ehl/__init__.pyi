@@ -1,6 +1,5 @@
 from .cavitation import FilmSolution as FilmSolution
 from .cavitation import solve_film as solve_film
-from .conserving_motion import moving_conserving_contact as moving_conserving_contact
 from .dynamic import DynamicStiffness as DynamicStiffness
 from .dynamic import OwnResonance as OwnResonance
 from .dynamic import ShakenContact as ShakenContact

@@ -14,7 +14,7 @@ MOST_STEPS = 300
 MOST_SHARINGS = 40  # rounds in which what the bounds cut off is put on other cells
 
 
-def dry_contact(problem: Problem, pressure: Field) -> tuple[Field, float, bool]:
+def dry_contact(problem: Problem, pressure: Field, *, most_steps: int = MOST_STEPS) -> tuple[Field, float, bool]:
     """Pressure (nx, ny) and approach of the dry contact from a first guess, and whether they met the tolerance."""
     deflection, cap = problem.deflection, problem.p_cap
     inside = np.ones(problem.cells, dtype=bool)
@@ -23,18 +23,18 @@ def dry_contact(problem: Problem, pressure: Field) -> tuple[Field, float, bool]:
     stiffness = 1.0 / (deflection.near[0] - deflection.near[3])
     pressure = _carrying(problem, np.where(inside, np.clip(pressure, 0.0, cap), 0.0), inside)
     direction, size, keep = np.zeros_like(pressure), 1.0, 0.0
-    for step in range(MOST_STEPS + 1):
+    for step in range(most_steps + 1):
         gap = problem.undeformed + deflection(pressure)
         free = (pressure > 0.0) & (pressure < cap) & inside
         approach = -float(gap[free].mean()) if free.any() else -float(gap.min())
         gap += approach
         left = np.where(inside, np.maximum(np.minimum(pressure, gap * stiffness), pressure - cap), 0.0)
         met = float(np.sqrt(np.mean(left**2))) < TOLERANCE
-        if met or step == MOST_STEPS:
+        if met or step == most_steps:
             break
         steepest = np.where(free, gap, 0.0)
         before, size = size, float((steepest**2).sum())
-        direction = np.where(free, steepest + keep * (size / before) * direction, 0.0)
+        direction = np.where(free, steepest + (keep * size / before if before > 0.0 else 0.0) * direction, 0.0)
         answer = deflection(direction)
         answer -= answer[free].mean() if free.any() else 0.0
         curvature = float((answer * direction).sum())

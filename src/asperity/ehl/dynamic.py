@@ -8,8 +8,8 @@ be negative where the film is carried through just late enough (the entraining m
 import math
 from dataclasses import dataclass
 
-from asperity.ehl.conserving import OilBalance
 from asperity.ehl.oscillating import Answer, Oscillating, elastic
+from asperity.ehl.outcome import CONSERVING
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.state import balance_of
@@ -69,9 +69,9 @@ class ShakenContact:
         line = conditions.geometry == "line"
         self.yielded, self.conditions = yielded, conditions
         self.depth = checked_depth(conditions, reference_depth) if line else None
-        balance = balance_of(solution, whole=False)
-        if isinstance(balance, OilBalance):
+        if solution.options.model == CONSERVING:
             raise BadInput("a dynamic stiffness needs the model unified or mixed, got conserving; solve by one of them")
+        balance = balance_of(solution, whole=False)
         self.balance = elastic(balance) if yielded == ELASTIC else balance
         self.scales = Scales.of(conditions, solution.lubricant)
         self.oscillating = Oscillating(self.balance)

@@ -15,6 +15,7 @@ Operator = Callable[[Any], Vector]
 CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what leaves this precision's range is found out below
 def gmres(product: Operator, precondition: Operator, wanted: Vector, *, tolerance: float, most_steps: int) -> Vector:
     """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x."""
     exact = np.result_type(wanted.dtype, float)

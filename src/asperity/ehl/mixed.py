@@ -14,21 +14,26 @@ A closed cell that takes in more oil than even q = P drives out again is lifted:
 long as its gap is still below H_c, what it lacks counts as oil that it lacks. So its row asks for an open gap at once.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from asperity.arrays import Codes, Field, Mask
-from asperity.ehl.problem import CLOSED_WITHIN, FIRST_ORDER, Problem
+from asperity.ehl.problem import CLOSED_WITHIN, FIRST_ORDER, THIRD_ORDER, Problem
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows, leaning_outflow
 from asperity.lubricant import Lubricant
 
+OPEN_FROM = 0.5  # contact films of gap beyond the contact film
 FREE = LUBRICATED  # code of a cell in which the oil's pressure is the total one
 
 
 class Pressures(NamedTuple):
-    """The unknowns: the oil's pressure q and the total pressure P, both (nx, ny), and the approach H0."""
+    """The unknowns: the oil's pressure q and the total pressure P, both (nx, ny), and the approach H0.
+
+    Where oil is conserved, `oil` is signed: below 0 the share of the film that is missing (there q = 0), above the cap
+    what presses the gap open for good (there q = P_cap).
+    """
 
     oil: Field
     total: Field
@@ -53,11 +58,59 @@ class MixedBalance:
     faces: Faces
     lean: Field
     outflow: Field  # net oil outflow per cell area
+    shut: Mask  # cells whose film does not change with the gap
+    surplus: Field | None = None  # content beyond the full film's, where oil is conserved: what is missing, negative
+    surplus_by_oil: Field | None = None  # slope of all content; 0 where the film is full and below the cap
+
+    @property
+    def solved(self) -> Mask:
+        """Cells in which Reynolds' equation decides: where oil is conserved, all but the rim's."""
+        if self.surplus is None:
+            return np.asarray(self.rows.state == LUBRICATED)
+        inside = np.ones(self.gap.shape, dtype=bool)
+        if not self.problem.form.periodic:
+            inside[:, [0, -1]] = False
+        return inside
+
+    @property
+    def content(self) -> Field:
+        """Oil over each cell, (nx, ny)."""
+        return self.film.content if self.surplus is None else self.film.content + self.surplus
 
     @property
     def pressure(self) -> Field:
         """The total pressure, (nx, ny)."""
         return self.unknowns.total
+
+    @property
+    def leant(self) -> Field:
+        """How far the wedge leans back from first order, in content, (nx, ny)."""
+        return self.lean * (self.film.content - _upstream(self.problem, self.film.content))
+
+    @property
+    def film_share(self) -> Field:
+        """Share of the gap that is oil, (nx, ny): below 1 in cavities, where oil is conserved."""
+        share = np.ones_like(self.gap)
+        return share if self.surplus is None else share + np.minimum(self.unknowns.oil, 0.0)
+
+    @property
+    def growth(self) -> Field:
+        """How far oil at the cap has pressed the gap open for good, where oil is conserved, (nx, ny)."""
+        nothing = np.zeros_like(self.gap)
+        return nothing if self.surplus is None else _growth(self.problem, self.unknowns.oil)
+
+    @property
+    def throughflow(self) -> float:
+        """Oil that enters the domain."""
+        (_, dy), oil = self.problem.spacing, self.oil_pressure
+        entering = self.problem.entering(self.gap)
+        return float((entering - 2.0 * self.faces.inlet * oil[0] / self.problem.spacing[0]).sum()) * dy
+
+    @property
+    def imbalance(self) -> float:
+        """Oil that cells lose and gain, in sum, over the throughflow: no less than what all lose together."""
+        dx, dy = self.problem.spacing
+        return float(np.abs(self.outflow[self.solved]).sum()) * dx * dy / abs(self.throughflow)
 
     @property
     def load_error(self) -> float:
@@ -69,6 +122,21 @@ class MixedBalance:
     def residual_rms(self) -> float:
         """Root mean square of both equations, as a share of p_h."""
         return float(np.sqrt(np.mean(self.oil_residual**2) + np.mean(self.solid_residual**2)))
+
+    @property
+    def oil_pressure(self) -> Field:
+        """What drives the oil, (nx, ny)."""
+        return np.clip(self.unknowns.oil, 0.0, self.problem.p_cap)
+
+    @property
+    def parted(self) -> Mask:
+        """Cells in which the bodies' pressure is the oil's."""
+        return np.asarray(self.solid == FREE)
+
+    @property
+    def yielded(self) -> Mask:
+        """Cells at the cap."""
+        return np.asarray(self.pressure >= self.problem.p_cap)
 
     @property
     def in_contact(self) -> Mask:
@@ -88,78 +156,192 @@ def evaluate(problem: Problem, unknowns: Pressures, *, second_order: bool, freed
 def _evaluate(
     problem: Problem, unknowns: Pressures, second_order: bool, freed: Mask | None, *, may_lift: bool
 ) -> MixedBalance:
-    oil, pressure, approach = unknowns
+    signed, pressure, approach = unknowns
     assert problem.lubricant is not None
     gap = problem.undeformed + problem.deflection(pressure)
     gap += approach
     contact_scale = 1.0 / (problem.deflection.near[0] - problem.deflection.near[3])
     touching = (gap - problem.contact_gap) * contact_scale
-    film, faces, outflow, fluid_scale = _flow(problem, oil, gap, problem.lubricant)
-    own_outflow = _own_outflow(film, faces, problem.spacing)
-    lean = _lean(film.content) if second_order else np.zeros_like(gap)
-    outflow += _leaning(film.content, lean, problem)
+    oil = np.clip(signed, 0.0, problem.p_cap)
+    height = np.maximum(gap, problem.contact_gap) + _growth(problem, signed) if problem.conserve else gap
+    film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
+    own_outflow = _own_outflow(problem, film, faces)
+    lean = _lean(problem, film.content, gap) if second_order and may_lean(problem) else np.zeros_like(gap)
+    surplus, surplus_by_oil = _surplus(problem, film, signed) if problem.conserve else (None, None)
+    outflow += _beyond_first_order(problem, film.content, lean, second_order=second_order)
+    if surplus is not None:
+        outflow += transported(problem, surplus)
+        upwind_at_outlet(problem, film.content, outflow)
 
     borne = pressure - oil
     free = borne < touching
-    lifted = ~free & (outflow + borne * own_outflow < 0.0)
+    yields = pressure - touching > problem.p_cap  # lifting it alone would take more than the cap
+    lifted = ~free & ~yields & (outflow + borne * own_outflow < 0.0) & (signed >= 0.0)
     if may_lift and np.any(lifted & (borne > 0.0)):
         freed = lifted if freed is None else freed | lifted
-        unknowns = Pressures(np.where(lifted, pressure, oil), pressure, approach)
+        unknowns = Pressures(np.where(lifted & (borne > 0.0), pressure, signed), pressure, approach)
         return _evaluate(problem, unknowns, second_order, freed, may_lift=False)
     free |= lifted & (borne <= 0.0)
     if freed is not None:
         free |= freed
-    solid_residual = np.where(free, borne, touching)
-    solid = np.where(free, np.int8(FREE), np.int8(TOUCHING))
-    capped = pressure - problem.p_cap > solid_residual
-    solid_residual[capped], solid[capped] = pressure[capped] - problem.p_cap, CAPPED
+    solid, solid_residual = _borne_by(problem, pressure, borne, touching, free)
 
-    sunk = (solid == FREE) & (touching < 0.0) & (pressure < problem.p_cap)
+    sunk = (solid == FREE) & (touching < 0.0) & ~yields
     lacking = np.where(sunk, film.content_by_gap * (gap - problem.contact_gap), 0.0)
-    outflow += lacking / problem.spacing[0] + _leaning(lacking, lean, problem)
-    outflow[1:] -= lacking[:-1] / problem.spacing[0]
+    outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean)
 
-    closed = (solid != FREE) & (touching <= 0.0)
-    film = film.held_where(closed)
+    closed = (solid != FREE) & (gap <= (1.0 + CLOSED_WITHIN) * problem.contact_gap)
+    shut = closed | ((touching <= 0.0) & ~sunk)
     scale = np.where(closed, 1.0 / own_outflow, fluid_scale)
-    balanced = outflow * scale
-    oil_residual = np.minimum(balanced, oil)
-    state = np.where(balanced < oil, np.int8(LUBRICATED), np.int8(RUPTURED))
-    full = ~closed & (oil - problem.p_cap > oil_residual)
-    oil_residual[full], state[full] = oil[full] - problem.p_cap, CAPPED
+    if surplus_by_oil is None:
+        oil_residual, state = _refilled(problem, outflow * scale, oil)
+    else:
+        # a cell closed to the contact film holds next to no oil: what it lacks counts as what would lift it
+        loose, lacks = surplus_by_oil > 0.0, np.maximum(surplus_by_oil, 1.0 / contact_scale) * _carried(problem)
+        scale = np.where(loose, 1.0 / lacks, scale)
+        oil_residual = outflow * scale
+        state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(np.int8)
+    pressed = problem.conserve & (signed > problem.p_cap)  # opened by the oil, not by the bodies' distance
+    film = film.held_where(shut & ~pressed)
+    if problem.conserve:
+        stiff = pressed & (film.log_mobility_by_gap == 0.0)
+        film = film._replace(log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap))
     if not problem.form.periodic:
         for rim in (0, -1):
-            state[:, rim], oil_residual[:, rim] = RUPTURED, oil[:, rim]
+            state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
             solid[:, rim], solid_residual[:, rim] = FREE, borne[:, rim]
-    rows = Rows(state, scale, contact_scale)
-    return MixedBalance(
-        problem, unknowns, gap, oil_residual, solid_residual, rows, solid, film, faces, lean, outflow
-    )  # fmt: skip
+    rows, left = Rows(state, scale, contact_scale), (oil_residual, solid_residual)
+    balance = MixedBalance(problem, unknowns, gap, *left, rows, solid, film, faces, lean, outflow, shut)
+    return replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil) if problem.conserve else balance
+
+
+def _borne_by(problem: Problem, pressure: Field, borne: Field, touching: Field, free: Mask) -> tuple[Codes, Field]:
+    """What decides each cell's total pressure, and what is left of its equation."""
+    residual = np.where(free, borne, touching)
+    solid = np.where(free, np.int8(FREE), np.int8(TOUCHING))
+    capped = pressure - problem.p_cap > residual
+    residual[capped], solid[capped] = pressure[capped] - problem.p_cap, CAPPED
+    return solid, residual
+
+
+def _refilled(problem: Problem, balanced: Field, oil: Field) -> tuple[Field, Codes]:
+    """What is left of the oil's equations, and which of them decides, where cavities are refilled."""
+    residual = np.minimum(balanced, oil)
+    state = np.where(balanced < oil, np.int8(LUBRICATED), np.int8(RUPTURED))
+    full = oil - problem.p_cap > residual
+    residual[full], state[full] = oil[full] - problem.p_cap, CAPPED
+    return residual, state
+
+
+def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]:
+    """Content beyond the full film's, negative in cavities, and the slope of all content in the signed unknown."""
+    missing = np.minimum(signed, 0.0)
+    pressed = signed > problem.p_cap
+    density = film.content_by_gap
+    surplus = film.content * missing
+    by_growth = 0.0 if np.isinf(problem.p_cap) else density * softness(problem)
+    return surplus, np.where(signed < 0.0, film.content, np.where(pressed, by_growth, 0.0))
+
+
+def softness(problem: Problem) -> float:
+    """What a pressure beyond the cap opens the gap by: a cell's compliance, less that of one far off."""
+    near = problem.deflection.near
+    return float(near[0] - near[3])
+
+
+def _growth(problem: Problem, signed: Field) -> Field:
+    beyond = np.maximum(signed - problem.p_cap, 0.0) if np.isfinite(problem.p_cap) else np.zeros_like(signed)
+    return beyond * softness(problem)
 
 
 def _flow(problem: Problem, oil: Field, gap: Field, lubricant: Lubricant) -> tuple[Film, Faces, Field, Field]:
-    return problem.flow(oil, gap, lubricant, FIRST_ORDER, least_mobility=problem.contact_gap**3 / problem.speed)
+    wedge = THIRD_ORDER if problem.accurate else FIRST_ORDER  # which cavities' borders need
+    return problem.flow(oil, gap, lubricant, wedge, least_mobility=problem.contact_gap**3 / problem.speed)
 
 
-def _leaning(content: Field, lean: Field, problem: Problem) -> Field:
+def may_lean(problem: Problem) -> bool:
+    """Whether the wedge leans back from first order: on smooth bodies it has its own, and borders of cavities jump."""
+    return not problem.accurate and not problem.conserve
+
+
+def _followed(problem: Problem) -> bool:
+    return problem.past is not None and problem.past.followed
+
+
+def _upstream(problem: Problem, content: Field) -> Field:
+    """Of each cell, the content that its oil comes from: of followed oil, from a step before, (nx, ny)."""
+    upstream = np.concatenate([content[:1], content[:-1]])
+    if problem.past is not None and problem.past.upstream is not None:
+        upstream[2:] = problem.past.upstream[2:]
+    return upstream
+
+
+def _lean(problem: Problem, content: Field, gap: Field) -> Field:
+    """Half of 2 m₁ m₂/(m₁² + m₂²) of each cell and what is upstream of it, (nx, ny): 1/2 where the film is even.
+
+    Less beside cells that are nearly closed, and nothing beside closed ones: there the film is even, and its content
+    the oil's density.
+    """
+    upstream = _upstream(problem, content)
+    lean = upstream * content / (upstream**2 + content**2)
+    closed = problem.contact_gap
+    opened = np.clip((gap - closed) / (OPEN_FROM * closed), 0.0, 1.0)
+    lean *= opened
+    lean[1:] *= opened[:-1]
+    lean[0] = 0.0
+    return lean
+
+
+def _beyond_first_order(problem: Problem, content: Field, lean: Field, *, second_order: bool) -> Field:
+    """What the wedge's second order adds to each cell's outflow, (nx, ny)."""
+    if not _followed(problem):
+        return added_by_lean(problem, content, lean)
+    assert problem.past is not None
+    added = lean * (content - _upstream(problem, content)) / problem.spacing[0]
+    leant = problem.past.leant
+    return added - leant / problem.spacing[0] if second_order and leant is not None else added
+
+
+def added_by_lean(problem: Problem, content: Field, lean: Field) -> Field:
+    """What second order adds to each cell's outflow for a content on top of the film's own, (nx, ny)."""
+    if _followed(problem):
+        return lean * content * content.dtype.type(1.0 / problem.spacing[0])
     added = np.empty_like(content)
     leaning_outflow(content, lean, problem.spacing[0], added)
     return added
 
 
-def _lean(content: Field) -> Field:
-    """Half of 2 m₁ m₂/(m₁² + m₂²) of the cells upstream of each face east, (nx, ny): 1/2 where the film is even."""
-    lean = np.zeros_like(content)
-    upstream, here = content[:-1], content[1:]
-    lean[1:] = upstream * here / (upstream**2 + here**2)
-    return lean
+def transported(problem: Problem, content: Field) -> Field:
+    """What each cell gains and passes on of a content that moves with the oil, upwind to first order, (nx, ny)."""
+    past, dx = problem.past, problem.spacing[0]
+    if past is None or not past.followed:
+        outflow = np.diff(content, axis=0, prepend=np.zeros_like(content[:1])) / dx
+    else:
+        outflow = np.zeros_like(content)
+        if not problem.conserve:
+            outflow[0], outflow[1] = content[0] / dx, (content[1] - content[0]) / dx
+    return outflow if past is None else outflow + past.rate * content
 
 
-def _own_outflow(film: Film, faces: Faces, spacing: tuple[float, float]) -> Field:
+def upwind_at_outlet(problem: Problem, content: Field, outflow: Field) -> None:
+    """Take the film's last face, which leans, back to first order: where oil is missing, all of it has to be upwind."""
+    if not _followed(problem):
+        dx = problem.spacing[0]
+        outflow[-1] -= (content[-1] - content[-2]) * content.dtype.type(0.5 / dx)
+
+
+def _own_outflow(problem: Problem, film: Film, faces: Faces) -> Field:
     """Derivative of each cell's net outflow by its own pressure, its film held, (nx, ny)."""
-    dx, dy = spacing
+    dx, dy = problem.spacing
     east, west = faces.east.copy(), np.empty_like(faces.east)
     east[-1] *= 2.0
     west[0], west[1:] = 2.0 * faces.inlet, faces.east[:-1]
     across = faces.north + np.roll(faces.north, 1, axis=1)
-    return (east + west) / dx**2 + across / dy**2 + film.content_by_pressure / dx
+    return (east + west) / dx**2 + across / dy**2 + film.content_by_pressure * _carried(problem)
+
+
+def _carried(problem: Problem) -> float:
+    """Derivative of a cell's outflow by its own content."""
+    past = problem.past
+    wedge = 0.0 if past is not None and past.followed else 1.0 / problem.spacing[0]
+    return wedge if past is None else wedge + past.rate

@@ -5,13 +5,16 @@ from itertools import count
 
 import numpy as np
 
+from asperity.arrays import Field
 from asperity.ehl.iterate import Step
 from asperity.ehl.limit import StepLimit
-from asperity.ehl.mixed import FREE, Pressures, evaluate
+from asperity.ehl.mixed import FREE, MixedBalance, Pressures, evaluate
 from asperity.ehl.mixed_linear import newton_step
 from asperity.ehl.problem import Problem
 
-WHOLE, PATIENCE = 24, 8  # so many whole steps; then, by turns, so many halves and wholes, lest cells flip to and fro
+PATIENCE, PROGRESS = 8, 0.9  # steps without progress, after which halves are taken, or whole ones again
+LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
+BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
 FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
 
 
@@ -25,15 +28,25 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change, freed = 0.0, np.inf, None
+    lowest, idle, share = np.inf, 0, 1.0
     for number in count():
         balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         step = newton_step(balance)
         change = float(np.mean(np.abs(step.total)) / wanted_mean)
-        share = 0.5 if number >= WHOLE and number // PATIENCE % 2 else 1.0
+        idle += 1
+        if balance.residual_rms < PROGRESS * lowest:
+            lowest, idle = balance.residual_rms, 0
+        elif idle == PATIENCE:
+            lowest, idle, share = balance.residual_rms, 0, 1.5 - share
         free = balance.solid == FREE
-        oil = np.clip(unknowns.oil + share * oil_limit.limited(step.oil, unknowns.oil, 0.0), 0.0, problem.p_cap)
+        closed = ~free & (balance.gap <= problem.contact_gap) & (balance.oil_pressure == unknowns.oil)
+        d_oil = np.where(
+            closed | (unknowns.oil < 0.0), step.oil, oil_limit.limited(step.oil, np.abs(unknowns.oil), 0.0)
+        )
+        signed = _moved(balance, share * d_oil)
+        oil = np.clip(signed, 0.0, problem.p_cap)
         total = np.clip(unknowns.total + share * limit.limited(step.total, unknowns.total, 0.0), 0.0, problem.p_cap)
         total = np.where(free, oil, total)
         freed = ~free & (oil > total)
@@ -41,4 +54,19 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         furthest = 0.5 * furthest if turned_back else min(1.2 * furthest, most)
         approach_before = step.approach
         approach = unknowns.approach + share * float(np.clip(step.approach, -furthest, furthest))
-        unknowns = Pressures(np.where(freed, total, oil), total, approach)
+        unknowns = Pressures(np.where(freed, total, signed), total, approach)
+
+
+def _moved(balance: MixedBalance, step: Field) -> Field:
+    """The oil's unknown after a step: within its bounds; where oil is conserved, up to the next state."""
+    before, cap = balance.unknowns.oil, balance.problem.p_cap
+    signed = before + step
+    if balance.surplus is None:
+        return np.clip(signed, 0.0, cap)
+    ruptured, pressed = before < 0.0, before > cap
+    full = ~ruptured & ~pressed
+    signed = np.where(ruptured, np.maximum(signed, LEAST_CONTENT * (1.0 + before) - 1.0), signed)
+    signed = np.where(ruptured & (signed >= 0.0), 0.0, signed)
+    signed = np.where(full & (signed < 0.0), -BESIDE, signed)
+    signed = np.where(full & (signed > cap), cap * (1.0 + BESIDE), signed)
+    return np.where(pressed & (signed <= cap), cap * (1.0 - BESIDE), signed)

@@ -16,10 +16,11 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.ehl.krylov import gmres
-from asperity.ehl.linear import Blocks, LineRelaxation, single_faces
-from asperity.ehl.mixed import FREE, MixedBalance, Pressures
+from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces
+from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, softness, transported, upwind_at_outlet
+from asperity.ehl.problem import Past
 from asperity.kernels import reynolds
-from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Stencil
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
 
 LEFT = 0.1  # share to which the linearised equations are left
 MOST_KRYLOV_STEPS = 60
@@ -32,15 +33,31 @@ class MixedLinear:
     def __init__(self, balance: MixedBalance, dtype: Any = np.float32) -> None:
         self.balance, problem = balance, balance.problem
         self.cells, self.real = problem.cells, dtype
-        self.lubricated = balance.rows.state == LUBRICATED
+        self.full = balance.rows.state == LUBRICATED
+        self.lubricated = balance.solved
         self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
-        self.oil = balance.unknowns.oil.astype(self.real)
+        self.oil = balance.oil_pressure.astype(self.real)
+        self.conserves = balance.surplus is not None
+        if balance.surplus is not None and balance.surplus_by_oil is not None:
+            self.surplus_by_oil = balance.surplus_by_oil.astype(self.real)
+            missing = np.minimum(balance.unknowns.oil, 0.0)
+            self.missing_by_oil = np.where(balance.unknowns.oil < 0.0, self.surplus_by_oil, self.real(0.0))
+            pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
+            self.growth_by_oil = np.where(pressed, self.real(softness(problem)), self.real(0.0))
+            self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
         self.lean = balance.lean.astype(self.real)
-        self.rows = balance.rows._replace(fluid_scale=balance.rows.fluid_scale.astype(self.real))
+        state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
+        self.rows = Rows(state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale)
         self.film = Film(*(part.astype(self.real) for part in balance.film))
         self.faces = single_faces(balance.faces, dtype)
+        self.content_by_gap, self.content_by_pressure = self.film.content_by_gap, self.film.content_by_pressure
+        self.kept = self._kept(problem.past)
+        if problem.past is not None and problem.past.followed:
+            self.film = self.film.followed
         stencil = self._stencil()
-        self.blocks = Blocks(stencil, np.where(self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0)))
+        self.blocks = Blocks(
+            stencil, np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
+        )
         self.lines = LineRelaxation(stencil)
 
     def _stencil(self) -> Stencil:
@@ -51,7 +68,33 @@ class MixedLinear:
         near = np.array([own, 0.0, 0.0, 0.0])
         reynolds.local_stencil(rows, film, self.faces, near, problem.spacing, 0.0, stencil)
         reynolds.add_mobility_slopes(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
+        if self.kept is not None:
+            by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
+            stencil.centre[:] += np.where(self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0)
+        if self.conserves:
+            self._loosen(stencil)
         return stencil
+
+    def _loosen(self, stencil: Stencil) -> None:
+        """Cells whose unknown is not a pressure hand what they hold to the next cell downstream, and to no other."""
+        past, real, scale = self.balance.problem.past, self.real, self.rows.fluid_scale
+        loose = self.lubricated & ~self.full
+        followed = past is not None and past.followed
+        wedge = real(0.0 if followed else 1.0 / self.balance.problem.spacing[0])
+        own = wedge + real(0.0 if past is None else past.rate)
+        stencil.centre[loose] = (self.surplus_by_oil * own * scale)[loose]
+        stencil.west[1:][loose[:-1]] = (-wedge * self.surplus_by_oil[:-1] * scale[1:])[loose[:-1]]
+        stencil.west[1:][loose[:-1] & ~self.lubricated[1:]] = 0.0
+        stencil.east[:-1][loose[1:]] = 0.0
+        stencil.north[np.roll(loose, -1, axis=1)] = 0.0
+        stencil.south[np.roll(loose, 1, axis=1)] = 0.0
+
+    def _kept(self, past: Past | None) -> Kept | None:
+        """What the first rows of followed oil draw in by the wedge is left out, as in `asperity.ehl.linear`."""
+        if past is None:
+            return None
+        scaled = self.rows.fluid_scale * self.real(past.rate)
+        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
         """Changes of the oil's equations and, in touching cells, of the asperities'; zero elsewhere."""
@@ -62,14 +105,23 @@ class MixedLinear:
         return self.of_gap(d_oil, d_gap)
 
     def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
-        """The same, of a change of the oil's pressure and that of the gap."""
+        """The same, of a change of the oil's unknown and that of the gap."""
         problem = self.balance.problem
-        wet, leaning = np.empty(self.cells, self.real), np.empty(self.cells, self.real)
-        spacing = problem.spacing
-        reynolds.jacobian_product(self.rows, self.film, self.faces, self.oil, d_oil, d_gap, spacing, 0.0, wet)
-        d_content = self.film.content_by_gap * d_gap + self.film.content_by_pressure * d_oil
-        reynolds.leaning_outflow(d_content, self.lean, spacing[0], leaning)
-        wet += leaning * self.rows.fluid_scale
+        wet = np.empty(self.cells, self.real)
+        spacing, d_pressure, d_height = problem.spacing, self.pressure_of(d_oil), d_gap
+        if self.conserves:
+            d_height = np.where(self.balance.shut, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
+        reynolds.jacobian_product(self.rows, self.film, self.faces, self.oil, d_pressure, d_height, spacing, 0.0, wet)
+        if self.kept is not None:
+            wet += self.kept.by_gap * d_height + self.kept.by_pressure * d_pressure
+        if self.conserves:
+            rest = transported(problem, self.missing_by_oil * d_oil + self.surplus_by_gap * d_height)
+            d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
+            upwind_at_outlet(problem, d_content, rest)
+            wet += rest * self.rows.fluid_scale
+        else:
+            d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
+            wet += added_by_lean(problem, d_content, self.lean) * self.rows.fluid_scale
         zero = self.real(0.0)
         return (
             np.where(self.lubricated, wet, zero),
@@ -82,7 +134,11 @@ class MixedLinear:
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
         """Change of the total pressure: the oil's in free cells, their own in touching ones."""
-        return np.where(self.free, d_oil, d_closed)
+        return np.where(self.free, self.pressure_of(d_oil), d_closed)
+
+    def pressure_of(self, d_oil: Field) -> Field:
+        """Change of the oil's pressure: none where its unknown is no pressure."""
+        return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
 
 
 def newton_step(balance: MixedBalance) -> Pressures:
@@ -92,7 +148,7 @@ def newton_step(balance: MixedBalance) -> Pressures:
     zero = real(0.0)
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
     known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
-    known = np.where(linear.free, known_oil - balance.solid_residual, known)
+    known = np.where(linear.free, linear.pressure_of(known_oil) - balance.solid_residual, known)
     wet, closed = linear.product(known_oil.astype(real), known.astype(real), 0.0)
     wet = np.where(linear.lubricated, -balance.oil_residual - wet, zero).astype(real)
     closed = np.where(linear.touching, -balance.solid_residual - closed, zero).astype(real)
@@ -134,5 +190,7 @@ def newton_step(balance: MixedBalance) -> Pressures:
     solved = gmres(product, precondition, wanted, tolerance=LEFT, most_steps=MOST_KRYLOV_STEPS)
     d_oil, d_closed = split(solved)
     d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)
-    d_total = np.where(linear.free, d_oil - balance.solid_residual, np.where(linear.touching, d_closed, known))
+    d_total = np.where(
+        linear.free, linear.pressure_of(d_oil) - balance.solid_residual, np.where(linear.touching, d_closed, known)
+    )
     return Pressures(d_oil, d_total, float(solved[-1]))

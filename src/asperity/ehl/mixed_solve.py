@@ -1,7 +1,9 @@
 """The contact with two pressures solved: from the dry contact, or coarse to fine from Hertz's pressure."""
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,11 +11,12 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.dry import dry_contact
 from asperity.ehl.iterate import Step
-from asperity.ehl.mixed import MixedBalance, Pressures
+from asperity.ehl.iterate import newton as one_pressure
+from asperity.ehl.mixed import MixedBalance, Pressures, evaluate, may_lean
 from asperity.ehl.mixed_iterate import newton
 from asperity.ehl.outcome import ATTEMPTS, Options
-from asperity.ehl.posing import contact_problem, first_guess, grid_levels, on_one_line, smooth_film
-from asperity.ehl.problem import Problem
+from asperity.ehl.posing import contact_problem, first_guess, grid_levels, levels_in_reach, on_one_line, smooth_film
+from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import COARSE_TOLERANCE, MOST_COARSE_ITERATIONS, Progress, Search
 from asperity.ehl.solution import ContactSolution, Oil
@@ -22,9 +25,16 @@ from asperity.errors import BadInput
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
-CLIMB, FROM_DRY = ATTEMPTS[0], "from the dry contact"
+CLIMB, STURDY = ATTEMPTS[:2]
+FROM_DRY, FROM_ONE = "from the dry contact", "from one pressure for oil and asperities"
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 MOST_ROUGHLY = 80
+MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
+MOST_AT_ONCE = 40
+BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
+FIRST_PORTION, LEAST_PORTION = 0.35, 0.01  # of the oil that refilled cavities made, taken back at a time ...
+MOST_A_PORTION, EASY = 20, 8  # ... and Newton steps for it
+LED_NOWHERE = 1e-2  # a smooth contact's coarse solution that misses by more
 THIN = 1.0  # film ratio below which the dry contact is the nearer start
 
 
@@ -38,35 +48,24 @@ def solve_mixed(
     viscosity_factor: Field | None = None,
     progress: Progress | None = None,
 ) -> ContactSolution:
-    """Solve the contact with a pressure each for oil and asperities; as `solve_contact`, which calls this.
-
-    Raises
-    ------
-    BadInput
-        for a dry contact.
-    """
+    """Solve the contact with a pressure each for oil and asperities; as `solve_contact`, which calls this."""
     began = time.perf_counter()
-    if lubricant is None:
-        raise BadInput('model "mixed" is about oil, got a dry contact; take model "unified" or name a lubricant')
+    assert lubricant is not None  # without oil there is one pressure
     scales = Scales.of(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    whole = replace(whole, accurate=False)
     finest = on_one_line(whole) if whole.uniform else whole
     search = MixedSearch(options, scales.gap, progress)
     if start is not None:
-        way, step = CLIMB, search.finish(finest, pressures_of(start, finest, scales))
+        way, step = CLIMB, search.go_on(finest, pressures_of(start, finest, scales))
     else:
-        ways = [FROM_DRY, CLIMB] if smooth_film(conditions, lubricant) < THIN * surface.sq else [CLIMB, FROM_DRY]
-        for way in ways:
-            if way == CLIMB:
-                guess = first_guess(grid_levels(finest)[-1], conditions, lubricant, scales)
-                step = search.climb_from(finest, *guess)
-            else:
-                step = search.from_dry(finest)
+        for way in _ways(surface, smooth_film(conditions, lubricant)):
+            posed = finest if way == CLIMB else replace(finest, accurate=False)
+            levels = levels_in_reach(posed, conditions, lubricant)
+            step = search.along(way, levels, lambda on: first_guess(on, conditions, lubricant, scales))
             if search.settled(options.tolerance):
                 search.coarser(finest)
                 break
-    solution = search.solution(
+    return search.solution(
         step,
         surface,
         conditions,
@@ -76,48 +75,170 @@ def solve_mixed(
         discretisation=search.discretisation_error if start is None else start.convergence.discretisation_error,
         viscosity_factor=viscosity_factor,
     )
-    return replace(solution, oil=_oil(step, surface, scales))
+
+
+def _ways(surface: Surface, film: float) -> tuple[str, ...]:
+    """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
+    if not np.any(surface.heights):
+        return CLIMB, STURDY, FROM_ONE
+    return (FROM_DRY, CLIMB, FROM_ONE) if film < THIN * surface.sq else (CLIMB, FROM_DRY, FROM_ONE)
+
+
+class Lubricated(NamedTuple):
+    """A contact on one grid without oil and with it."""
+
+    dry: Pressures
+    wet: Pressures
+
+    def granted(self, dry: Pressures, cap: float) -> Pressures:
+        """About what oil makes of the dry contact on another grid."""
+        cells = dry.total.shape
+        changed = interpolated(self.wet.total - self.dry.total, cells)
+        total = np.clip(dry.total + changed, 0.0, cap)
+        oil = np.minimum(interpolated(np.maximum(self.wet.oil, 0.0), cells), total)
+        return Pressures(oil, total, dry.approach + self.wet.approach - self.dry.approach)
 
 
 class MixedSearch(Search):
     """The ways to the solution, all steps of them on record."""
 
-    def finish(self, problem: Problem, unknowns: Pressures) -> Step:
-        """On the finest grid: with the first-order wedge until that is met roughly, then with the second-order one."""
+    imbalance = 0.0  # of the last step, where no oil may be lost
+
+    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
+        """Whether the last step met the tolerance, and the one of the whole solve with all oil accounted for."""
+        closely = tolerance <= self.options.tolerance
+        return super().settled(tolerance, of_load=of_load) and not (closely and self.imbalance > BALANCED)
+
+    def solution(
+        self,
+        step: Step,
+        surface: Surface,
+        conditions: ContactConditions,
+        lubricant: Lubricant | None,
+        **how: Any,
+    ) -> ContactSolution:
+        """Where the search ended, the oil's own pressure with it."""
+        solution = super().solution(step, surface, conditions, lubricant, **how)
+        oil = _oil(step, surface, Scales.of(conditions, lubricant))
+        return replace(solution, oil=oil, gap=solution.gap + oil.growth)
+
+    def along(self, way: str, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]) -> Step:
+        """Solve in one of the manners that are tried, on the first of the levels."""
+        if way == FROM_DRY:
+            return self.from_dry(levels)
+        if way == FROM_ONE:
+            return self.from_one(levels, guess)
+        step = self.climb_from(levels, guess)
+        if self.smooth and not self.settled(self.options.tolerance):  # one pressure is all that smooth bodies have
+            step = self.from_one(levels, guess)
+        return step
+
+    def from_one(self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]) -> Step:
+        """From the paper's solution, in which oil and asperities have one pressure."""
+        finest = levels[0]
+        for held in (False, True):
+            step = self.climb(levels, *guess(levels[-1]), held=held)
+            if self.settled(self.options.tolerance):
+                break
+        self.figures = self.figures[:-1]
+        step = self.go_on(finest, Pressures(step.balance.pressure, step.balance.pressure, step.approach))
+        self.figures.append(self._figures(step))
+        return step
+
+    def go_on(self, problem: Problem, unknowns: Pressures) -> Step:
+        """From a neighbouring solution: second order at once, or if that leads nowhere as from afar."""
+        most = min(self.options.max_iterations, MOST_AT_ONCE)
+        step = self.run(problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most)
+        return step if self.settled(self.options.tolerance) else self.finish(problem, unknowns)
+
+    def finish(self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False) -> Step:
+        """With the first-order wedge until that is met roughly, then with the second-order one; `coarsely` to 1e-3."""
         tolerance, most = self.options.tolerance, self.options.max_iterations
+        if coarsely:
+            tolerance, most = max(COARSE_TOLERANCE, tolerance), min(MOST_BESIDE, most)
+        if problem.conserve:
+            return self.take_back(problem, unknowns)
+        if not may_lean(problem):
+            return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
         roughly = max(COARSE_TOLERANCE, tolerance)
         step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
         self.by_first_order, self.cell = self._figures(step), problem.spacing[0]
         return self.run(problem, newton(problem, _reached(step), second_order=True), tolerance, most)
 
-    def climb_from(self, finest: Problem, pressure: Field, approach: float) -> Step:
-        """Coarse to fine from Hertz's pressure, all of it the oil's."""
-        self.figures, self.smooth = [], not np.any(finest.roughness)
-        unknowns = Pressures(pressure, pressure, approach)
-        for problem in reversed(grid_levels(finest)):
-            if problem.cells != unknowns.total.shape:
+    def take_back(self, problem: Problem, unknowns: Pressures) -> Step:
+        """The contact that loses no oil, from the one whose cavities are refilled: all that was made is taken back.
+
+        Little by little, each time by Newton's steps from what was reached; by less where that leads nowhere.
+        """
+        refilled, most = replace(problem, conserve=False), self.options.max_iterations
+        tolerance = max(COARSE_TOLERANCE, self.options.tolerance)
+        start = Pressures(np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach)
+        step = self.run(refilled, newton(refilled, start, second_order=False), tolerance, min(most, MOST_ROUGHLY))
+        unknowns = _reached(step)
+        made = evaluate(problem, unknowns, second_order=False).outflow
+        left, portion = 1.0, FIRST_PORTION
+        while left > 0.0 and portion > LEAST_PORTION:
+            wanted = left - portion if left > 1.2 * portion else 0.0
+            led = replace(problem, past=_with_source(problem, -wanted * made))
+            tried = self.run(led, newton(led, unknowns, second_order=False), tolerance, min(most, MOST_A_PORTION))
+            if self.settled(tolerance):
+                left, unknowns = wanted, _reached(tried)
+                portion *= 1.5 if tried.number < EASY else 1.0
+            else:
+                portion *= 0.4
+        return self.run(problem, newton(problem, unknowns, second_order=False), self.options.tolerance, most)
+
+    def climb_from(self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]) -> Step:
+        """Coarse to fine from Hertz's pressure, all of it the oil's; from there again after a grid that led nowhere."""
+        self.figures, self.smooth = [], not np.any(levels[0].roughness)
+        unknowns = None
+        for problem in reversed(levels):
+            if unknowns is None:
+                pressure, approach = guess(problem)
+                unknowns = Pressures(pressure, pressure, approach)
+            elif problem.cells != unknowns.total.shape:
                 total = interpolated(unknowns.total, problem.cells)
                 unknowns = Pressures(
                     np.minimum(interpolated(unknowns.oil, problem.cells), total), total, unknowns.approach
                 )
-            if problem is finest:
+            if problem is levels[0]:
                 step = self.finish(problem, unknowns)
             else:
-                steps = newton(problem, unknowns, second_order=False)
+                steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
                 step = self.run(problem, steps, max(COARSE_TOLERANCE, self.options.tolerance), MOST_COARSE_ITERATIONS)
-            unknowns = _reached(step)
-            self.figures.append(self._figures(step))
+            if self.smooth and not self.settled(LED_NOWHERE):
+                self.figures, unknowns = [], None
+            else:
+                self.figures.append(self._figures(step))
+                unknowns = _reached(step)
+        if levels[0].conserve:  # on coarser grids oil was made
+            self.figures = self.figures[-1:]
         return step
 
-    def from_dry(self, finest: Problem) -> Step:
-        """From bodies that carry all the load themselves."""
+    def from_dry(self, levels: Sequence[Problem]) -> Step:
+        """From bodies that carry all the load themselves, on grid after grid.
+
+        What oil changed on a grid is granted to the dry contact of the next finer one.
+        """
         self.figures, self.smooth = [], False
-        across = finest.y / finest.form.aspect
-        pressure = np.sqrt(np.maximum(1.0 - (finest.x**2)[:, None] - across**2, 0.0))
-        total, approach, _ = dry_contact(replace(finest, lubricant=None, contact_gap=0.0), pressure)
-        step = self.finish(finest, Pressures(np.zeros_like(total), total, approach + finest.contact_gap))
-        self.figures.append(self._figures(step))
+        before: Lubricated | None = None
+        for problem in reversed(levels):
+            total, approach = _dry(problem)
+            dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
+            finest = problem is levels[0]
+            start = dry if before is None else before.granted(dry, problem.p_cap)
+            step = self.finish(problem, start, coarsely=not finest)
+            if finest or self.settled(max(COARSE_TOLERANCE, self.options.tolerance)):
+                self.figures.append(self._figures(step))
+                before = Lubricated(dry, _reached(step))
+            else:
+                self.figures, before = [], None
         return step
+
+    def _record(self, problem: Problem, step: Step) -> None:
+        balance = step.balance
+        self.imbalance = balance.imbalance if isinstance(balance, MixedBalance) and problem.conserve else 0.0
+        super()._record(problem, step)
 
     def coarser(self, finest: Problem) -> None:
         """Solve the next coarser grid from dry, for what the cells' size may have done; nothing if that fails."""
@@ -125,21 +246,56 @@ class MixedSearch(Search):
         if len(levels) == 1 or len(self.figures) != 1:
             return
         beside = MixedSearch(replace(self.options, max_iterations=MOST_BESIDE), self.gap_scale, self.progress)
-        beside.from_dry(levels[1])
+        beside.from_dry(levels[1:2])
         self.history = [*beside.history, *self.history]
         if beside.settled(self.options.tolerance):
             self.figures = [*beside.figures, *self.figures]
 
 
+def _dry(problem: Problem) -> tuple[Field, float]:
+    """Pressure and approach without oil: by conjugate gradients, and by Newton's steps where the cap is too busy."""
+    across = problem.y / problem.form.aspect
+    pressure = np.sqrt(np.maximum(1.0 - (problem.x**2)[:, None] - across**2, 0.0))
+    dry = replace(problem, lubricant=None, contact_gap=0.0)
+    pressure, approach, met = dry_contact(dry, pressure, most_steps=MOST_GRADIENTS)
+    if not met:
+        for step in one_pressure(dry, pressure, approach):
+            left = max(step.balance.residual_rms, abs(step.balance.load_error))
+            if left < COARSE_TOLERANCE or step.number == MOST_DRY:
+                break
+        pressure, approach = step.balance.pressure, step.approach
+    return pressure, approach
+
+
 def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:
     """The unknowns of a solution of any model, on the grid of `problem`."""
     total = solution.pressure / scales.pressure
-    oil = total if solution.oil is None else solution.oil.pressure / scales.pressure
+    signed = total if solution.oil is None else _signed(solution.oil, problem, scales)
     if problem.cells[1] == 1:
-        total, oil = (field.mean(axis=1, keepdims=True) for field in (total, oil))
+        total, signed = (field[:, :1] for field in (total, signed))
     if total.shape != problem.cells:
         raise BadInput(f"start has {solution.grid.cells} cells, the surface {problem.cells}; solve without start")
-    return Pressures(oil, total, solution.rigid_approach / scales.gap)
+    return Pressures(signed, total, solution.rigid_approach / scales.gap)
+
+
+def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
+    """The oil's unknown: below 0 what is missing, above the cap what has pressed the gap open."""
+    if not problem.conserve:
+        return oil.pressure / scales.pressure
+    near, growth = problem.deflection.near, oil.growth / scales.gap
+    pressed = problem.p_cap + growth / float(near[0] - near[3])
+    return np.where(
+        oil.content < 1.0, oil.content - 1.0, np.where(growth > 0.0, pressed, oil.pressure / scales.pressure)
+    )
+
+
+def _with_source(problem: Problem, source: Field) -> Past:
+    """The problem's past, or none, with oil that is taken out on top, (nx, ny)."""
+    return (
+        Past(0.0, source, followed=False)
+        if problem.past is None
+        else replace(problem.past, source=problem.past.source + source)
+    )
 
 
 def _reached(step: Step) -> Pressures:
@@ -148,6 +304,10 @@ def _reached(step: Step) -> Pressures:
 
 
 def _oil(step: Step, surface: Surface, scales: Scales) -> Oil:
-    oil = _reached(step).oil
-    whole = np.repeat(oil, surface.grid.cells[1] // oil.shape[1], axis=1) * scales.pressure
-    return Oil(content=np.ones_like(whole), pressure=whole, growth=np.zeros_like(whole))
+    balance = step.balance
+    assert isinstance(balance, MixedBalance)
+    lines = surface.grid.cells[1] // balance.gap.shape[1]
+    content, pressure, growth = (
+        np.repeat(part, lines, axis=1) for part in (balance.film_share, balance.oil_pressure, balance.growth)
+    )
+    return Oil(content=content, pressure=pressure * scales.pressure, growth=growth * scales.gap)

@@ -17,16 +17,18 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
-from asperity.ehl.outcome import ATTEMPTS, LONGEST_STEP, ContactState, Options, Start
+from asperity.ehl.iterate import Step
+from asperity.ehl.mixed import MixedBalance, Pressures, evaluate
+from asperity.ehl.mixed_solve import MixedSearch, pressures_of
+from asperity.ehl.outcome import ATTEMPTS, CONSERVING, LONGEST_STEP, MIXED, TWO_PRESSURES, ContactState, Options, Start
 from asperity.ehl.posing import contact_problem
 from asperity.ehl.problem import Balance, Past, Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import Progress, Search
-from asperity.ehl.solution import ContactSolution
+from asperity.ehl.solution import ContactSolution, Oil
 from asperity.ehl.solve import solve_contact
 from asperity.ehl.state import state_of
 from asperity.errors import BadInput, require_positive
-from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces, Surface
 
@@ -151,10 +153,17 @@ class _Contact:
         solution = solve_contact(self.conditions, oil, surface, options=self.options, progress=self.progress)
         solution = replace(solution, lubricant=self.lubricant)
         approach = solution.rigid_approach / self.scales.gap
-        balance = self._problem(surface, None).evaluate(solution.pressure / self.scales.pressure, approach)
+        pressure, problem = solution.pressure / self.scales.pressure, self._problem(surface, None)
+        unknowns = Pressures(np.zeros_like(pressure), pressure, approach)
+        if solution.oil is not None:
+            unknowns = pressures_of(solution, problem, self.scales)
+        balance = self._balance(problem, unknowns)
         if not standing:  # what was touching dry has the contact film between
-            gap = np.maximum(solution.gap, self.options.contact_film)
+            gap, nothing = np.maximum(solution.gap, self.options.contact_film), np.zeros_like(solution.gap)
             solution = replace(solution, gap=gap)
+            if self.options.model in TWO_PRESSURES:
+                full = Oil(content=np.ones_like(nothing), pressure=nothing, growth=nothing)
+                solution = replace(solution, oil=full)
         memory = {} if not standing else {"content_before": _content(balance)}
         return self._snapshot(0, solution, balance, approach, memory, self.surfaces)
 
@@ -167,27 +176,46 @@ class _Contact:
         surface = surfaces.at(number * self.seconds)
         whole = self._problem(surface, self._past(memory))
         problem = _on_one_line(whole) if self.one_line else whole
-        pressure, approach = memory["pressure"][:, : problem.cells[1]], float(memory["approach"])
-        search = Search(self.options, self.scales.gap, self.progress)
-        for held in (False, True):  # where Newton's steps lead nowhere, the bodies are held and their distance searched
-            step = search.climb([problem], pressure, approach, held=held)
-            if search.settled(self.options.tolerance):
-                break
+        lines = problem.cells[1]
+        unknowns = Pressures(memory["oil"][:, :lines], memory["pressure"][:, :lines], float(memory["approach"]))
+        search, step, attempt = self._search(problem, unknowns)
         solution = search.solution(
             step,
             surface,
             self.conditions,
             self.lubricant,
             seconds=time.perf_counter() - began,
-            attempt=HELD if held else ATTEMPTS[0],
+            attempt=attempt,
         )
         balance = step.balance
-        assert isinstance(balance, Balance)
         if self.one_line:
-            balance = whole.evaluate(np.repeat(balance.pressure, whole.cells[1], axis=1), step.approach)
+            across = whole.cells[1]
+            unknowns = Pressures(
+                np.repeat(balance.oil_pressure, across, axis=1),
+                np.repeat(balance.pressure, across, axis=1),
+                step.approach,
+            )
+            balance = self._balance(whole, unknowns)
         kept = {"content_before": memory["content"]}
         kept |= {name: memory[name] for name in _LOWERED if self.flattening}
         return self._snapshot(number, solution, balance, step.approach, kept, surfaces)
+
+    def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, str]:
+        """The step's way to its solution, and by which attempt."""
+        if self.options.model in TWO_PRESSURES:
+            mixed = MixedSearch(self.options, self.scales.gap, self.progress)
+            return mixed, mixed.go_on(problem, unknowns), ATTEMPTS[0]
+        search = Search(self.options, self.scales.gap, self.progress)
+        for held in (False, True):  # where Newton's steps lead nowhere, the bodies are held and their distance searched
+            step = search.climb([problem], unknowns.total, unknowns.approach, held=held)
+            if search.settled(self.options.tolerance):
+                break
+        return search, step, HELD if held else ATTEMPTS[0]
+
+    def _balance(self, problem: Problem, unknowns: Pressures) -> Balance | MixedBalance:
+        if self.options.model in TWO_PRESSURES:
+            return evaluate(problem, unknowns, second_order=True)
+        return problem.evaluate(unknowns.total, unknowns.approach)
 
     def _problem(self, surface: Surface, past: Past | None) -> Problem:
         posed = contact_problem(self.conditions, self.lubricant, surface, self.options, attempt=self.attempt)
@@ -195,20 +223,31 @@ class _Contact:
 
     def _past(self, memory: Memory) -> Past:
         content = memory["content"]
-        if "content_before" in memory:
+        leans = self.options.model == MIXED and self.followed
+        first_order = leans or self.options.model == CONSERVING
+        if "content_before" in memory and not first_order:
             before, rate, once, twice = memory["content_before"], 1.5, -2.0, 0.5
-        else:  # a start from rest has no time before it that flowed
+        else:  # first order: a start from rest has no time before it that flowed, and what leans back does so in space
             before, rate, once, twice = content, 1.0, -1.0, 0.0
         source = once * content + twice * before
-        if self.followed:
-            source[2:] = once * content[1:-1] + twice * before[:-2]
-        return Past(rate / self.length, source / self.length, self.followed)
+        if not self.followed:
+            return Past(rate / self.length, source / self.length, self.followed)
+        if self.options.model == CONSERVING:
+            source[0], source[1:] = 0.0, -content[:-1]
+            return Past(rate / self.length, source / self.length, self.followed)
+        source[2:] = once * content[1:-1] + twice * before[:-2]
+        past = Past(rate / self.length, source / self.length, self.followed)
+        if not leans:
+            return past
+        upstream, leant = (np.concatenate([memory[name][:1], memory[name][:-1]]) for name in ("content", "leant"))
+        leant[:2] = 0.0
+        return replace(past, upstream=upstream, leant=leant)
 
     def _snapshot(
         self,
         number: int,
         solution: ContactSolution,
-        balance: Balance,
+        balance: Balance | MixedBalance,
         approach: float,
         kept: dict[str, Any],
         surfaces: MovingSurfaces,
@@ -217,9 +256,12 @@ class _Contact:
         memory = kept | {
             "number": np.array(number),
             "pressure": balance.pressure,
+            "oil": _oil(balance),
             "approach": np.array(approach),
             "content": _content(balance),
         }
+        if isinstance(balance, MixedBalance):
+            memory["leant"] = balance.leant
         flow, elastic = _powers(balance)
         grid, conditions = solution.grid, self.conditions
         area = self.scales.length**2 * (1.0 if conditions.length is None else conditions.length / grid.extent[1])
@@ -245,15 +287,20 @@ class _Contact:
         )
 
 
-def _content(balance: Balance) -> Field:
+def _oil(balance: Balance | MixedBalance) -> Field:
+    """The oil's unknown."""
+    return balance.unknowns.oil if isinstance(balance, MixedBalance) else balance.pressure
+
+
+def _content(balance: Balance | MixedBalance) -> Field:
     assert balance.film is not None  # a moving contact has oil
-    return balance.film.content
+    return balance.content if isinstance(balance, MixedBalance) else balance.film.content
 
 
-def _overlap(balance: Balance) -> Field:
+def _overlap(balance: Balance | MixedBalance) -> Field:
     """How deep the cap has let the bodies overlap, dimensionless."""
     depth = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)
-    return np.where(balance.rows.state == CAPPED, depth, 0.0)
+    return np.where(balance.yielded, depth, 0.0)
 
 
 def _on_one_line(problem: Problem) -> Problem:
@@ -263,18 +310,18 @@ def _on_one_line(problem: Problem) -> Problem:
         problem,
         roughness=problem.roughness[:, :1],
         spacing=(dx, problem.cells[1] * dy),
-        past=None if past is None else replace(past, source=past.source[:, :1]),
+        past=None if past is None else past.on_one_line,
     )
 
 
-def _powers(balance: Balance) -> tuple[float, float]:
+def _powers(balance: Balance | MixedBalance) -> tuple[float, float]:
     """∫ ε |grad P|² where a film parts the bodies on both sides of a face, and the elastic energy ½ ∫ P V."""
-    problem, pressure, faces = balance.problem, balance.pressure, balance.faces
+    problem, pressure, faces, parted = balance.problem, balance.oil_pressure, balance.faces, balance.parted
     assert faces is not None
     dx, dy = problem.spacing
-    parted = (balance.rows.state == LUBRICATED) | (balance.rows.state == RUPTURED)
     along = faces.east[:-1] * np.diff(pressure, axis=0) ** 2 * (parted[:-1] & parted[1:])
     across = faces.north * (np.roll(pressure, -1, axis=1) - pressure) ** 2 * (parted & np.roll(parted, -1, axis=1))
     ends = 2.0 * (faces.inlet * pressure[0] ** 2 * parted[0] + faces.east[-1] * pressure[-1] ** 2 * parted[-1])
     flow = float((along.sum() + ends.sum()) / dx**2 + across.sum() / dy**2) * dx * dy
-    return flow, 0.5 * float((pressure * problem.deflection(pressure)).sum()) * dx * dy
+    total = balance.pressure
+    return flow, 0.5 * float((total * problem.deflection(total)).sum()) * dx * dy

@@ -11,6 +11,7 @@ from asperity.errors import BadInput, require_positive
 
 ContactModel = Literal["unified", "paper", "mixed", "conserving"]
 UNIFIED, PAPER, MIXED, CONSERVING = MODELS = get_args(ContactModel)  # the first two are one
+TWO_PRESSURES = (MIXED, CONSERVING)
 Start = Literal["steady", "stationary"]
 LONGEST_STEP = 8.0  # cells that the oil may travel in one step of time
 
@@ -32,7 +33,7 @@ class Options:
     tolerance: float = 1e-4
     max_iterations: int = 200
     contact_film: float = 5e-9
-    model: ContactModel = "unified"
+    model: ContactModel = "mixed"
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 0.1:

@@ -8,7 +8,7 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.films import least_films
 from asperity.ehl.gridding import inlet_length
-from asperity.ehl.outcome import ATTEMPTS, Options
+from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
 from asperity.ehl.problem import Form, Problem
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
@@ -51,7 +51,8 @@ def contact_problem(
         p_scale=scales.pressure,
         lubricant=lubricant,
         viscosity_factor=viscosity_factor,
-        accurate=attempt == ATTEMPTS[0] and not np.any(surface.heights),
+        accurate=attempt == ATTEMPTS[0] and not np.any(surface.heights) and options.model != CONSERVING,
+        conserve=options.model == CONSERVING and lubricant is not None,
     )
 
 

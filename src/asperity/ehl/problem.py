@@ -46,13 +46,24 @@ class Form:
 class Past:
     """What a step in time adds to the oil's balance: `rate` times its content now, and `source` from before, (nx, ny).
 
-    `followed` oil is balanced along its way, so that `source` holds the wedge too (not in the first two rows of cells,
-    which it has no way to).
+    `followed` oil is balanced along its way, so that `source` holds the wedge too (unless oil is conserved, not in the
+    first two rows of cells, which it has no way to). `leant` is then by how much the wedge, second order, leant back a
+    cell and a step before, and `upstream` the content there; None where the source is of second order already.
     """
 
     rate: float
     source: Field
     followed: bool
+    upstream: Field | None = None
+    leant: Field | None = None
+
+    @property
+    def on_one_line(self) -> "Past":
+        """The same where nothing varies along y, on the first line of cells."""
+        parts = (None if part is None else part[:, :1] for part in (self.source, self.upstream, self.leant))
+        source, upstream, leant = parts
+        assert source is not None
+        return Past(self.rate, source, self.followed, upstream, leant)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,8 +74,8 @@ class Problem:
     P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the speed number. For the oil's laws
     `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]; `viscosity_factor` is what warmth
     leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by
-    lines of cells at ambient pressure. `accurate` takes the third-order wedge and logarithmic mean mobilities. `past`
-    is None where nothing moves but the oil.
+    lines of cells at ambient pressure. `accurate` takes the third-order wedge and logarithmic mean mobilities.
+    `conserve` lets no oil appear or vanish. `past` is None where nothing moves but the oil.
     """
 
     form: Form
@@ -80,6 +91,7 @@ class Problem:
     lubricant: Lubricant | None
     viscosity_factor: Field | None = None
     accurate: bool = False
+    conserve: bool = False
     past: Past | None = None
 
     @property
@@ -188,7 +200,7 @@ class Problem:
             3.0 * ambient / height[[0, -1]],
         )
         if least_mobility > 0.0:
-            film = film.no_stiffer_than(least_mobility)
+            film = film.no_stiffer_than(least_mobility * (self.contact_gap / height) ** 3)
         east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty((6, *self.cells))
         faces = Faces(
             east,
@@ -204,11 +216,8 @@ class Problem:
         log_mobility = np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
         reynolds.face_mobilities(film, log_mobility, self.accurate, faces)
         dx, dy = self.spacing
-        ahead = gap[0] + ((self.x[0] - dx) ** 2 - self.x[0] ** 2) / 2.0  # the gap one cell before the inlet
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
-        entering = 0.5 * (
-            np.maximum(ahead, self.contact_gap) + height[0]
-        )  # unit density: the inlet is at ambient pressure
+        entering = self.entering(gap)
         near = self.deflection.near
         if self.past is None:
             reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
@@ -216,6 +225,14 @@ class Problem:
         else:
             self._move(self.past, pressure, film, faces, entering, outflow, diagonal)
         return film, faces, outflow, 1.0 / diagonal
+
+    def entering(self, gap: Field) -> Field:
+        """Content that the surfaces carry in, shape (ny,): the inlet is at ambient pressure, where density is 1."""
+        x, dx = self.x[0], self.spacing[0]
+        ahead = np.maximum(gap[0] + ((x - dx) ** 2 - x**2) / 2.0, self.contact_gap)  # one cell before the inlet
+        if self.conserve:  # upwind
+            return np.asarray(ahead)
+        return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
 
     def _move(
         self,
@@ -233,8 +250,10 @@ class Problem:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
             reynolds.fluid_diagonal(film.followed, faces, near, dx, dy, diagonal)
-            outflow[0] += (content[0] - entering) / dx
-            outflow[1] += 1.5 * (content[1] - content[0]) / dx
+            outflow[0] -= entering / dx
+            if not self.conserve:  # else all oil is followed, the first cell's from before the inlet
+                outflow[0] += content[0] / dx
+                outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx
         else:
             reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
@@ -266,6 +285,21 @@ class Balance:
     def residual_rms(self) -> float:
         """Root mean square of phi, as a share of p_h."""
         return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def oil_pressure(self) -> Field:
+        """What drives the oil, (nx, ny): in this model the one pressure there is."""
+        return self.pressure
+
+    @property
+    def parted(self) -> Mask:
+        """Cells in which a film parts the bodies, or a cavity."""
+        return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == RUPTURED))
+
+    @property
+    def yielded(self) -> Mask:
+        """Cells at the cap."""
+        return np.asarray(self.rows.state == CAPPED)
 
     @property
     def in_contact(self) -> Mask:

@@ -46,10 +46,10 @@ class Search:
         """From the last grids; see `grid_error`."""
         return grid_error(self.figures, smooth=self.smooth, cell=self.cell, by_first_order=self.by_first_order)
 
-    def settled(self, tolerance: float) -> bool:
-        """Whether the last step met the tolerance in residual, load and change."""
+    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
+        """Whether the last step met the tolerance in residual, change and, `of_load`, load."""
         last = self.history[-1]
-        return last.residual < tolerance and last.load_error < tolerance and last.change < tolerance
+        return max(last.residual, last.load_error if of_load else 0.0, last.change) < tolerance
 
     def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
         """Solve on grid after grid, from the last, coarsest one to the first."""
@@ -80,10 +80,8 @@ class Search:
         before = step = next(steps)
         while True:
             self._record(problem, step)
-            last = self.history[-1]
-            load_error = last.load_error if of_load else 0.0
             self.lost = step.number > 0 and not np.isfinite(step.change)
-            if max(last.residual, load_error, last.change) < tolerance or step.number >= most or self.lost:
+            if self.settled(tolerance, of_load=of_load) or step.number >= most or self.lost:
                 break
             before, step = step, next(steps)
         self.iteration_error = self._figures(step).off(self._figures(before))

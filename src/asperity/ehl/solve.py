@@ -7,9 +7,8 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
-from asperity.ehl.conserving_solve import solve_conserving
 from asperity.ehl.mixed_solve import solve_mixed
-from asperity.ehl.outcome import ATTEMPTS, Options
+from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
 from asperity.ehl.posing import contact_problem, first_guess, levels_in_reach, on_one_line
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import Progress, Search
@@ -53,7 +52,8 @@ def solve_contact(
     _check_grid(conditions, surface)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
-    solution = SOLVERS[options.model](
+    solve = SOLVERS[options.model if lubricant else PAPER]  # without oil there is one pressure, and nothing to lose
+    solution = solve(
         conditions,
         lubricant,
         surface,
@@ -109,7 +109,7 @@ def solve_unified(
     )
 
 
-SOLVERS = {"unified": solve_unified, "paper": solve_unified, "mixed": solve_mixed, "conserving": solve_conserving}
+SOLVERS = {"unified": solve_unified, "paper": solve_unified, "mixed": solve_mixed, "conserving": solve_mixed}
 
 
 def _warm_start(start: ContactSolution, cells: tuple[int, int], scales: Scales) -> tuple[Field, float]:

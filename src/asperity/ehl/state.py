@@ -1,17 +1,12 @@
 """What a tribologist reads off a solved contact: load and area shares, film, and how well the equations are met."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from asperity.conditions import ContactConditions
-from asperity.ehl.conserving import OilBalance, evaluate
-from asperity.ehl.conserving_solve import unknowns_of
 from asperity.ehl.films import least_film
-from asperity.ehl.mixed import MixedBalance
-from asperity.ehl.mixed import evaluate as evaluate_mixed
+from asperity.ehl.mixed import MixedBalance, evaluate
 from asperity.ehl.mixed_solve import pressures_of
-from asperity.ehl.outcome import CONSERVING, MIXED, ContactState
+from asperity.ehl.outcome import TWO_PRESSURES, ContactState
 from asperity.ehl.posing import contact_problem, on_one_line
 from asperity.ehl.problem import Balance
 from asperity.ehl.scales import Scales
@@ -27,7 +22,7 @@ def contact_state(solution: ContactSolution) -> ContactState:
     return state_of(solution, balance_of(solution))
 
 
-def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | MixedBalance | OilBalance:
+def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | MixedBalance:
     """What is left of a solution's equations, evaluated anew from its fields on its own grid.
 
     Unless `whole`, a contact in which nothing varies along y is taken on one line of cells.
@@ -41,31 +36,29 @@ def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | Mi
         solution.viscosity_factor,
         attempt=solution.convergence.attempt,
     )
-    if not whole and problem.uniform and solution.options.model != CONSERVING:
+    if not whole and problem.uniform:
         problem = on_one_line(problem)
-    if solution.options.model == MIXED:
-        problem = replace(problem, accurate=False)
-        return evaluate_mixed(problem, pressures_of(solution, problem, scales), second_order=True)
-    if solution.oil is not None:
-        return evaluate(problem, unknowns_of(solution, problem, scales))
+    if solution.options.model in TWO_PRESSURES and solution.lubricant is not None:
+        return evaluate(problem, pressures_of(solution, problem, scales), second_order=True)
     pressure = solution.pressure[:, : problem.cells[1]] / scales.pressure
     return problem.evaluate(pressure, solution.rigid_approach / scales.gap)
 
 
-def state_of(solution: ContactSolution, balance: Balance | MixedBalance | OilBalance) -> ContactState:
+def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> ContactState:
     """The scalars of a solution whose equations, those of a moving contact perhaps, are left with `balance`."""
     grid, touching, problem = solution.grid, solution.in_contact, balance.problem
     sq, oil = solution.surface.sq, solution.lubricant
     zone, centre = problem.zone(), problem.zone(CENTRE)
     dx, dy = problem.spacing
     width = grid.cells[1] * dy if problem.form.periodic else 2.0 * problem.form.aspect
-    if isinstance(balance, OilBalance):
-        capped = balance.unknowns.pressure >= problem.p_cap
-        unbalanced, carried = np.abs(balance.outflow[zone]).sum(), balance.flow.content[zone].mean()
+    lost = balance.rows.state != LUBRICATED
+    if isinstance(balance, MixedBalance):
+        capped, carried = balance.yielded, balance.content[zone].mean()
+        lost |= balance.surplus is not None  # what is left of any cell's equation
     else:
         capped = balance.rows.state == CAPPED
-        unbalanced = np.abs(balance.outflow[zone & (balance.rows.state != LUBRICATED)]).sum()
         carried = balance.film.content[zone].mean() if balance.film else np.inf
+    unbalanced = np.abs(balance.outflow[zone & lost]).sum()
     return ContactState(
         car=area_share(touching, zone),
         car_domain=float(touching.mean() * _hertz_areas(solution.conditions, grid)),

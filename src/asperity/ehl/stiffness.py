@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from asperity.conditions import ContactConditions
-from asperity.ehl.conserving import OilBalance
+from asperity.ehl.outcome import CONSERVING
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.solve import solve_contact
@@ -98,7 +98,7 @@ def tangent_stiffness(
 def _shaken_down(solution: ContactSolution) -> ContactSolution:
     """The same contact, its asperities as flat as the load has made them and hard enough to stay so."""
     balance, surface, conditions = balance_of(solution), solution.surface, solution.conditions
-    if isinstance(balance, OilBalance) or conditions.hardness is None:
+    if solution.options.model == CONSERVING or conditions.hardness is None:
         raise BadInput("a contact is shaken down in the models unified and mixed only; solve by one of them")
     overlap = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)  # the solution's own gap ends at the film
     overlap *= balance.pressure >= balance.problem.p_cap

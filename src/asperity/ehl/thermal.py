@@ -23,7 +23,7 @@ from asperity.surface import Surface
 
 SETTLED = 1e-3  # change of the film's temperature, over its largest rise
 LEAST_RISE = 1.0  # [K]; below it the change is measured against this
-MOST_ROUNDS = 100
+MOST_ROUNDS = 400
 HOT = 30.0  # rise of the film [K] that no oil stays as viscous through
 MOST_SOLVES = 25
 MOST_WARM_ITERATIONS = 40  # a solve that starts from one a little colder takes ten

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
-from asperity.ehl import Snapshot, Steps, moving_conserving_contact, moving_contact
+from asperity.ehl import Snapshot, Steps, moving_contact
 from asperity.errors import BadInput, NotConverged
 from asperity.history.history import History, steps_a_pass
 from asperity.history.rows import Row, step_row
@@ -17,9 +17,10 @@ from asperity.history.store import open_keeper
 from asperity.surface import MovingSurfaces
 
 MODELS: dict[str, Steps] = {  # by the case's `model`
+    "mixed": moving_contact,
     "unified": moving_contact,
     "paper": moving_contact,
-    "conserving": moving_conserving_contact,
+    "conserving": moving_contact,
 }
 
 

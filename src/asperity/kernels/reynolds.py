@@ -40,8 +40,11 @@ class Film(NamedTuple):
             ambient_by_gap=np.where(held[[0, -1]], 0.0, self.ambient_by_gap),
         )
 
-    def no_stiffer_than(self, mobility: float) -> "Film":
-        """The same film, no cell of which moves its oil less easily than with this mobility."""
+    def no_stiffer_than(self, mobility: Field) -> "Film":
+        """The same film, no cell of which moves its oil less easily than with this mobility, as if that were constant.
+
+        Newton's steps do not converge with its slope in H.
+        """
         stiff = self.mobility < mobility
         return self._replace(
             mobility=np.where(stiff, mobility, self.mobility),
