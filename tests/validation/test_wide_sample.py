@@ -4,8 +4,7 @@ import pytest
 from benchmarks.robustness import OIL, contacts, overlap, prepared
 
 from asperity.ehl import Options, solve_contact
-from asperity.ehl.mixed_solve import FROM_DRY
-from asperity.ehl.outcome import ATTEMPTS
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
 
 
 @pytest.mark.parametrize(

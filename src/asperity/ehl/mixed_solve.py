@@ -14,7 +14,7 @@ from asperity.ehl.iterate import Step
 from asperity.ehl.iterate import newton as one_pressure
 from asperity.ehl.mixed import MixedBalance, Pressures, evaluate, may_lean
 from asperity.ehl.mixed_iterate import newton
-from asperity.ehl.outcome import ATTEMPTS, Options
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels, levels_in_reach, on_one_line, smooth_film
 from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
@@ -26,7 +26,7 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 CLIMB, STURDY = ATTEMPTS[:2]
-FROM_DRY, FROM_ONE = "from the dry contact", "from one pressure for oil and asperities"
+FROM_ONE = "from one pressure for oil and asperities"
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 MOST_ROUGHLY = 80
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact

@@ -51,6 +51,7 @@ ATTEMPTS = (
     "with the second-order wedge of rough bodies",  # smooth bodies only: they have a better one at first
     "with the bodies held while their distance was searched",
 )
+FROM_DRY = "from the dry contact"  # of two pressures only
 
 
 class SolveStatus(StrEnum):
@@ -167,6 +168,8 @@ class Convergence:
         """One sentence on how the solve ended."""
         last = self.history[-1]
         tried = "" if self.attempt == ATTEMPTS[0] else f", at last {self.attempt},"
+        if self.attempt == FROM_DRY:  # of thin films the first attempt, of thick ones the second
+            tried = f", {FROM_DRY},"
         return (
             f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "
             f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change {last.change:.1e}; "
