@@ -128,13 +128,13 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
         if solution.convergence.converged:
             solved[one.seed] += 1
             worst = max(worst, lost(solution))
-        ratios.append(spent[CONSERVING] / spent[PAPER])
+        ratios.append(spent[CONSERVING] / spent[MIXED])
         seconds.append(spent[CONSERVING])
     each = ", ".join(f"{solved[seed]} of 16 on surface {seed}" for seed in seeds)
     yield (
         f"Standing still, 128 x 128: solved {each}. Oil lost by all cells together at most {worst:.1e} of the "
         f"throughflow. Cold in {median(seconds):.2f} s in the median (longest {max(seconds):.1f} s), "
-        f"{median(ratios):.1f} times the paper's model (longest {max(ratios):.0f} times).\n"
+        f"{median(ratios):.1f} times the default model (longest {max(ratios):.0f} times).\n"
     )
     yield from _shares(shares)
 

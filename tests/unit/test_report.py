@@ -445,6 +445,15 @@ def test_every_axis_of_friction_and_heat_has_a_label_with_its_unit():
     assert labels_of(rubbing.temperature_line(run, run.heat)) == ["x along rolling [µm]", "rise above ambient [K]"]
 
 
+def test_resonance_over_roughness_has_its_whole_interval():
+    """Not the fit's alone, which leaves out what cells and surfaces do."""
+    points = [{**run_like().scalars(), "crf_hz": 2500.0, "crf_low_hz": 2300.0, "crf_high_hz": 2550.0}]
+    figure = against_roughness.resonance_against_roughness(points, None).figure()
+    (bars,) = [lines for axes in figure.axes for lines in axes.collections]
+    (bar,) = bars.get_segments()
+    assert bar[:, 1].tolist() == [2300.0, 2550.0]
+
+
 def test_every_axis_over_roughness_and_frequency_has_a_label_with_its_unit():
     run = run_like()
     points = [run.scalars()]

@@ -12,8 +12,10 @@ from asperity.ehl import Options, contact_state, solve_contact
 from asperity.ehl.iterate import newton
 from asperity.ehl.mixed import Pressures
 from asperity.ehl.mixed_iterate import newton as mixed_newton
-from asperity.ehl.mixed_solve import FROM_ONE, MixedSearch
-from asperity.ehl.outcome import ATTEMPTS, Figures
+from asperity.ehl.mixed_solve import CLIMB, FROM_ONE, MixedSearch
+from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Figures
+from asperity.ehl.posing import contact_problem, first_guess, grid_levels
+from asperity.ehl.scales import Scales
 from asperity.ehl.search import grid_error
 from asperity.grid import Grid
 from asperity.lubricant import Barus
@@ -167,6 +169,22 @@ def test_two_pressures_start_at_last_from_one(monkeypatch):
     assert usual.convergence.attempt != mended.convergence.attempt == FROM_ONE
     assert FROM_ONE in mended.convergence.explain()
     assert contact_state(mended).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
+
+
+@pytest.mark.parametrize("way", [CLIMB, FROM_DRY, FROM_ONE])
+@pytest.mark.parametrize("model", ["mixed", "conserving"])
+def test_a_way_is_judged_by_its_own_steps(model, way):
+    """What a way that failed has left says nothing of the next one's error; how wide cells are always does."""
+    options = Options(model=model)
+    scales = Scales.of(CONDITIONS, OIL)
+    problem = contact_problem(CONDITIONS, OIL, rough(grid((96, 96)), 1e-6, correlation_length=40e-6), options)
+    search = MixedSearch(options, scales.gap, None)
+    search.by_first_order = Figures(car=50.0, clr=50.0, h_min=50.0, h_central=50.0)
+    search.along(way, grid_levels(problem), lambda on: first_guess(on, CONDITIONS, OIL, scales))
+    assert search.settled(options.tolerance)
+    search.coarser(problem)
+    assert search.cell == problem.spacing[0]
+    assert 0.0 < search.discretisation_error.clr < 1.0
 
 
 @pytest.mark.parametrize(("model", "attempt"), [("paper", ATTEMPTS[1]), ("mixed", ATTEMPTS[0])])

@@ -67,6 +67,21 @@ def test_one_answer_from_two_starts():
     assert dry.figures[-1].clr == pytest.approx(hertz.figures[-1].clr, abs=0.002)
 
 
+def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
+    """The same answer in half the steps on the fine grid."""
+    conditions, oil, surface = contact(hardness=2e9), barus(), rough(grid((192, 192)), 2.5e-6, seed=7)
+    levels, scales = grid_levels(contact_problem(conditions, oil, surface, MIXED)), Scales.of(conditions, oil)
+    searches = {number: MixedSearch(MIXED, scales.gap, None) for number in (1, len(levels))}
+    steps = {}
+    for number, search in searches.items():
+        search.from_dry(levels[:number])
+        assert search.settled(MIXED.tolerance)
+        steps[number] = sum(step.cells == (192, 192) for step in search.history)
+    assert steps[len(levels)] < 0.6 * steps[1]
+    at_once, climbed = (search.figures[-1].clr for search in searches.values())
+    assert climbed == pytest.approx(at_once, abs=0.002)
+
+
 def test_the_asperities_bear_what_the_oil_does_not():
     """Oil bears no tension and never more than all; asperities bear only where they touch."""
     solution = solve_contact(contact(hardness=2e9), barus(), rough(COARSE, 1e-6, seed=7), options=MIXED)

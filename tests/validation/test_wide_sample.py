@@ -28,7 +28,7 @@ def test_stubborn_contacts_are_solved_at_the_first_attempt(number):
         24,  # cells whose wedge was switched on and off as their gap crossed the contact film
         118,  # the same, beside cells that the oil floods
         224,  # cells that oil at the cap had flooded, taken for lifted
-        372,  # lifted cells deep in plastic overlap
+        372,  # as 8, and lifted cells asked their neighbours for the film that overlap lacks
     ],
 )
 def test_two_pressures_solve_what_once_went_round_in_circles(number):

@@ -20,7 +20,7 @@ def dry_contact(problem: Problem, pressure: Field, *, most_steps: int = MOST_STE
     inside = np.ones(problem.cells, dtype=bool)
     if not problem.form.periodic:
         inside[:, [0, -1]] = False
-    stiffness = 1.0 / (deflection.near[0] - deflection.near[3])
+    stiffness = 1.0 / problem.softness
     pressure = _carrying(problem, np.where(inside, np.clip(pressure, 0.0, cap), 0.0), inside)
     direction, size, keep = np.zeros_like(pressure), 1.0, 0.0
     for step in range(most_steps + 1):

@@ -12,6 +12,10 @@ first order, or second order that leans back where the film's content jumps, as 
 
 A closed cell that takes in more oil than even q = P drives out again is lifted: it gets q = P, counts as free, and as
 long as its gap is still below H_c, what it lacks counts as oil that it lacks. So its row asks for an open gap at once.
+Not so a cell so deep in plastic overlap that lifting it would take more than the cap.
+
+Where oil is conserved, R = 0 in every cell, and one signed unknown tells q, what is missing of the film, and how far
+oil at the cap has pressed the gap open.
 """
 
 from dataclasses import dataclass, replace
@@ -100,6 +104,11 @@ class MixedBalance:
         return nothing if self.surplus is None else _growth(self.problem, self.unknowns.oil)
 
     @property
+    def height(self) -> Field:
+        """Gap between the bodies with what oil at the cap has added, no less than the contact film, (nx, ny)."""
+        return np.maximum(self.gap, self.problem.contact_gap) + self.growth
+
+    @property
     def throughflow(self) -> float:
         """Oil that enters the domain."""
         (_, dy), oil = self.problem.spacing, self.oil_pressure
@@ -115,8 +124,7 @@ class MixedBalance:
     @property
     def load_error(self) -> float:
         """Relative."""
-        dx, dy = self.problem.spacing
-        return float(self.pressure.sum() * dx * dy / self.problem.load - 1.0)
+        return self.problem.load_error(self.pressure)
 
     @property
     def residual_rms(self) -> float:
@@ -160,7 +168,7 @@ def _evaluate(
     assert problem.lubricant is not None
     gap = problem.undeformed + problem.deflection(pressure)
     gap += approach
-    contact_scale = 1.0 / (problem.deflection.near[0] - problem.deflection.near[3])
+    contact_scale = 1.0 / problem.softness
     touching = (gap - problem.contact_gap) * contact_scale
     oil = np.clip(signed, 0.0, problem.p_cap)
     height = np.maximum(gap, problem.contact_gap) + _growth(problem, signed) if problem.conserve else gap
@@ -239,23 +247,17 @@ def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]
     pressed = signed > problem.p_cap
     density = film.content_by_gap
     surplus = film.content * missing
-    by_growth = 0.0 if np.isinf(problem.p_cap) else density * softness(problem)
+    by_growth = 0.0 if np.isinf(problem.p_cap) else density * problem.softness
     return surplus, np.where(signed < 0.0, film.content, np.where(pressed, by_growth, 0.0))
-
-
-def softness(problem: Problem) -> float:
-    """What a pressure beyond the cap opens the gap by: a cell's compliance, less that of one far off."""
-    near = problem.deflection.near
-    return float(near[0] - near[3])
 
 
 def _growth(problem: Problem, signed: Field) -> Field:
     beyond = np.maximum(signed - problem.p_cap, 0.0) if np.isfinite(problem.p_cap) else np.zeros_like(signed)
-    return beyond * softness(problem)
+    return beyond * problem.softness
 
 
 def _flow(problem: Problem, oil: Field, gap: Field, lubricant: Lubricant) -> tuple[Film, Faces, Field, Field]:
-    wedge = THIRD_ORDER if problem.accurate else FIRST_ORDER  # which cavities' borders need
+    wedge = THIRD_ORDER if problem.accurate else FIRST_ORDER
     return problem.flow(oil, gap, lubricant, wedge, least_mobility=problem.contact_gap**3 / problem.speed)
 
 

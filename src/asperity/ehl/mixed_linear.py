@@ -17,7 +17,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.ehl.krylov import gmres
 from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces
-from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, softness, transported, upwind_at_outlet
+from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, transported, upwind_at_outlet
 from asperity.ehl.problem import Past
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
@@ -43,7 +43,7 @@ class MixedLinear:
             missing = np.minimum(balance.unknowns.oil, 0.0)
             self.missing_by_oil = np.where(balance.unknowns.oil < 0.0, self.surplus_by_oil, self.real(0.0))
             pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
-            self.growth_by_oil = np.where(pressed, self.real(softness(problem)), self.real(0.0))
+            self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
             self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
         self.lean = balance.lean.astype(self.real)
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)

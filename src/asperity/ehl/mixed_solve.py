@@ -119,11 +119,11 @@ class MixedSearch(Search):
     ) -> ContactSolution:
         """Where the search ended, the oil's own pressure with it."""
         solution = super().solution(step, surface, conditions, lubricant, **how)
-        oil = _oil(step, surface, Scales.of(conditions, lubricant))
-        return replace(solution, oil=oil, gap=solution.gap + oil.growth)
+        return replace(solution, oil=_oil(step, surface, Scales.of(conditions, lubricant)))
 
     def along(self, way: str, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]) -> Step:
         """Solve in one of the manners that are tried, on the first of the levels."""
+        self.cell, self.by_first_order = levels[0].spacing[0], None  # what a way before has left is not this one's
         if way == FROM_DRY:
             return self.from_dry(levels)
         if way == FROM_ONE:
@@ -162,7 +162,7 @@ class MixedSearch(Search):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
         roughly = max(COARSE_TOLERANCE, tolerance)
         step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
-        self.by_first_order, self.cell = self._figures(step), problem.spacing[0]
+        self.by_first_order = self._figures(step)
         return self.run(problem, newton(problem, _reached(step), second_order=True), tolerance, most)
 
     def take_back(self, problem: Problem, unknowns: Pressures) -> Step:
@@ -282,8 +282,8 @@ def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
     """The oil's unknown: below 0 what is missing, above the cap what has pressed the gap open."""
     if not problem.conserve:
         return oil.pressure / scales.pressure
-    near, growth = problem.deflection.near, oil.growth / scales.gap
-    pressed = problem.p_cap + growth / float(near[0] - near[3])
+    growth = oil.growth / scales.gap
+    pressed = problem.p_cap + growth / problem.softness
     return np.where(
         oil.content < 1.0, oil.content - 1.0, np.where(growth > 0.0, pressed, oil.pressure / scales.pressure)
     )

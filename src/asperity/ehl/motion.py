@@ -164,7 +164,7 @@ class _Contact:
             if self.options.model in TWO_PRESSURES:
                 full = Oil(content=np.ones_like(nothing), pressure=nothing, growth=nothing)
                 solution = replace(solution, oil=full)
-        memory = {} if not standing else {"content_before": _content(balance)}
+        memory = {} if not standing else {"content_before": balance.content}
         return self._snapshot(0, solution, balance, approach, memory, self.surfaces)
 
     def step(self, number: int, memory: Memory) -> Snapshot:
@@ -258,7 +258,7 @@ class _Contact:
             "pressure": balance.pressure,
             "oil": _oil(balance),
             "approach": np.array(approach),
-            "content": _content(balance),
+            "content": balance.content,
         }
         if isinstance(balance, MixedBalance):
             memory["leant"] = balance.leant
@@ -290,11 +290,6 @@ class _Contact:
 def _oil(balance: Balance | MixedBalance) -> Field:
     """The oil's unknown."""
     return balance.unknowns.oil if isinstance(balance, MixedBalance) else balance.pressure
-
-
-def _content(balance: Balance | MixedBalance) -> Field:
-    assert balance.film is not None  # a moving contact has oil
-    return balance.content if isinstance(balance, MixedBalance) else balance.film.content
 
 
 def _overlap(balance: Balance | MixedBalance) -> Field:

@@ -121,6 +121,12 @@ class Problem:
         return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic)
 
     @property
+    def softness(self) -> float:
+        """Compliance of a cell to its own pressure, less that of one far off."""
+        near = self.deflection.near
+        return float(near[0] - near[3])
+
+    @property
     def uniform(self) -> bool:
         """Whether nothing varies along y, so that one line of cells tells all."""
         fields = [self.roughness] if self.viscosity_factor is None else [self.roughness, self.viscosity_factor]
@@ -141,11 +147,16 @@ class Problem:
         """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
         return within_ellipse(self.x, self.y, (share, share * self.form.aspect), self.spacing)
 
+    def load_error(self, pressure: Field) -> float:
+        """By how much a pressure carries more than the load, relative."""
+        dx, dy = self.spacing
+        return float(pressure.sum() * dx * dy / self.load - 1.0)
+
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
         gap = self.undeformed + self.deflection(pressure)
         gap += approach
-        contact_scale = 1.0 / (self.deflection.near[0] - self.deflection.near[3])
+        contact_scale = 1.0 / self.softness
         touching = (gap - self.contact_gap) * contact_scale
         if self.lubricant is None:
             film, faces, outflow, fluid_scale = None, None, np.zeros_like(pressure), np.ones_like(pressure)
@@ -259,7 +270,7 @@ class Problem:
             reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
         outflow += past.rate * content + past.source
         # less what far cells would answer too, as in a cell that touches: stored oil is as stiff as that
-        diagonal += past.rate * (film.content_by_gap * (near[0] - near[3]) + film.content_by_pressure)
+        diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,8 +289,18 @@ class Balance:
     @property
     def load_error(self) -> float:
         """Relative."""
-        dx, dy = self.problem.spacing
-        return float(self.pressure.sum() * dx * dy / self.problem.load - 1.0)
+        return self.problem.load_error(self.pressure)
+
+    @property
+    def height(self) -> Field:
+        """Gap between the bodies, no less than the contact film, (nx, ny)."""
+        return np.maximum(self.gap, self.problem.contact_gap)
+
+    @property
+    def content(self) -> Field:
+        """Oil over each cell, (nx, ny); the contact has to have some."""
+        assert self.film is not None
+        return self.film.content
 
     @property
     def residual_rms(self) -> float:

@@ -135,14 +135,14 @@ class Search:
         scales, balance = Scales.of(conditions, lubricant), step.balance
         stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
         lines = surface.grid.cells[1] // balance.problem.cells[1]
-        pressure, gap = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.gap, lines, axis=1)
+        pressure, height = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.height, lines, axis=1)
         return ContactSolution(
             conditions=conditions,
             lubricant=lubricant,
             surface=surface,
             options=self.options,
             pressure=pressure * scales.pressure,
-            gap=np.maximum(gap, 0.0 if lubricant is None else balance.problem.contact_gap) * scales.gap,
+            gap=height * scales.gap,
             in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
             rigid_approach=step.approach * scales.gap,
             convergence=Convergence(
@@ -159,9 +159,8 @@ class Search:
 
     def _figures(self, step: Step) -> Figures:
         balance = step.balance
-        gap = np.maximum(balance.gap, balance.problem.contact_gap)
         touching = balance.in_contact & (balance.pressure > 0.0)
-        return figures(balance.problem, balance.pressure, touching, gap, self.gap_scale)
+        return figures(balance.problem, balance.pressure, touching, balance.height, self.gap_scale)
 
     def _record(self, problem: Problem, step: Step) -> None:
         balance = step.balance

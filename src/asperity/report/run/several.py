@@ -32,16 +32,17 @@ def shares_against_roughness(points: Points) -> Exhibit:
 
 
 def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) -> Exhibit:
-    """CRF against Sq, with two standard deviations."""
+    """CRF against Sq, with its whole 90 % interval."""
     line = quantity("crf_hz")
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
-        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{line.short} ± 2 std of its fit")
+        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{line.short}, 90 % interval")
         for point in points:
-            if point["crf_hz"] is not None and point["crf_std_hz"] is not None:
-                place, reach = display("sq_m", point["sq_m"]), 2.0 * point["crf_std_hz"]
-                axes.errorbar(place, point["crf_hz"], reach, color=VERMILION, capsize=5, linewidth=1.0, zorder=1)
+            crf, low, high = (point[key] for key in ("crf_hz", "crf_low_hz", "crf_high_hz"))
+            if crf is not None and low is not None and high is not None:
+                place, reach = display("sq_m", point["sq_m"]), [[max(crf - low, 0.0)], [max(high - crf, 0.0)]]
+                axes.errorbar(place, crf, reach, color=VERMILION, capsize=5, linewidth=1.0, zorder=1)
         if full_load_crf_hz is not None:
             label = "asperities carry all the load"
             axes.axhline(full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label=label)
@@ -50,7 +51,8 @@ def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) 
     return Exhibit(
         "resonance-against-roughness",
         draw,
-        "Contact resonance frequency with two standard deviations of its fit." + _unfinished(points),
+        "Contact resonance frequency with its whole 90 % interval: record, cells and, of several, surfaces."
+        + _unfinished(points),
         _values(points, "crf_hz"),
     )
 
