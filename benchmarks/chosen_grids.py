@@ -16,7 +16,16 @@ import scipy
 from threadpoolctl import threadpool_limits
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import ContactModel, Options, Texture, auto_grid, contact_state, least_film, solve_contact
+from asperity.ehl import (
+    ContactModel,
+    Options,
+    Texture,
+    auto_grid,
+    contact_state,
+    least_film,
+    solve_contact,
+    undetermined,
+)
 from asperity.grid import Grid
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import gaussian_surface
@@ -38,13 +47,20 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solve went: cells, whether it converged, seconds, CLR and its numerical error bar."""
+    """How a solve went: cells, whether it converged, seconds, CLR, its interval, and whether the grid can tell it."""
 
     cells: tuple[int, int]
     converged: bool
     seconds: float
     clr: float
-    bar: float
+    interval: tuple[float, float] | None
+    determined: bool
+
+    @property
+    def told(self) -> str:
+        """CLR and its interval in words."""
+        ends = "no interval" if self.interval is None else f"{self.interval[0]:.3f} to {self.interval[1]:.3f}"
+        return f"{self.clr:.3f} ({ends}{'' if self.determined else ', not determined'})"
 
 
 def samples(count: int, seed: int = 14) -> Iterator[Sample]:
@@ -104,9 +120,10 @@ def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -
         strict=False,
     )
     seconds = time.perf_counter() - began
-    error = solution.convergence.error
-    bar = float("nan") if error is None else error.clr
-    return Outcome(grid.cells, solution.convergence.converged, seconds, contact_state(solution).clr, bar)
+    state = contact_state(solution)
+    interval = None if state.error is None else state.error.clr.interval
+    determined = state.error is not None and undetermined(solution, state.error.clr) is None
+    return Outcome(grid.cells, solution.convergence.converged, seconds, state.clr, interval, determined)
 
 
 def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
@@ -114,12 +131,13 @@ def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     chosen, both = [one for one, _ in pairs], [(one, two) for one, two in pairs if one.converged and two.converged]
     seconds = [one.seconds for one in chosen]
     off = [abs(one.clr - two.clr) for one, two in both]
-    held = sum(difference <= one.bar for difference, (one, _) in zip(off, both, strict=True))
+    told = [(one, two) for one, two in both if one.determined and one.interval is not None]
+    held = sum(one.interval is not None and one.interval[0] <= two.clr <= one.interval[1] for one, two in told)
     return (
         f"{sum(one.converged for one in chosen)} of {len(chosen)} solved on the chosen grid, median "
-        f"{np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of {len(both)} solved on both, {held} hold the "
-        f"finer CLR in their bar; difference median {np.median(off) if off else np.nan:.3f}, "
-        f"largest {max(off, default=np.nan):.3f}"
+        f"{np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of {len(both)} solved on both, {len(told)} are "
+        f"determined, {held} of them hold the finer CLR in their interval; difference "
+        f"median {np.median(off) if off else np.nan:.3f}, largest {max(off, default=np.nan):.3f}"
     )
 
 
@@ -140,8 +158,8 @@ def main() -> None:
             ratio = least_film(sample.conditions, sample.oil) / sample.texture.sq
             print(
                 f"| {number} {sample.conditions.geometry} | {ratio:.2f} | {sample.conditions.hertz.p_max / 1e9:.2f} | "
-                f"{one.cells[0]} x {one.cells[1]} | {one.converged} | {one.seconds:.1f} | {one.clr:.3f} ± {one.bar:.3f}"
-                f" | {two.converged} | {two.seconds:.1f} | {two.clr:.3f} ± {two.bar:.3f} |",
+                f"{one.cells[0]} x {one.cells[1]} | {one.converged} | {one.seconds:.1f} | {one.told} | "
+                f"{two.converged} | {two.seconds:.1f} | {two.told} |",
                 flush=True,
             )
     print(f"\n{summary(pairs)}")

@@ -15,7 +15,6 @@ from .films import lubrication_regime as lubrication_regime
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
 from .gridding import ACCURACY as ACCURACY
-from .gridding import WIDEST_BAR as WIDEST_BAR
 from .gridding import Texture as Texture
 from .gridding import auto_grid as auto_grid
 from .gridding import flooded_inlet as flooded_inlet
@@ -41,6 +40,7 @@ from .outcome import Start as Start
 from .plausible import inlet_notes as inlet_notes
 from .plausible import plausibility_notes as plausibility_notes
 from .plausible import solution_notes as solution_notes
+from .plausible import undetermined as undetermined
 from .regime import FittedFilm as FittedFilm
 from .regime import RegimeCard as RegimeCard
 from .regime import regime_card as regime_card

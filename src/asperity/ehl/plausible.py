@@ -3,11 +3,20 @@
 from collections.abc import Iterator
 
 from asperity.conditions import ContactConditions
-from asperity.ehl.gridding import CELLS_IN_INLET, flooded_inlet, grid_shortfalls, inlet_length, missing_inlet
+from asperity.ehl.gridding import (
+    CELLS_IN_INLET,
+    WIDEST_BAR,
+    flooded_inlet,
+    grid_shortfalls,
+    inlet_length,
+    missing_inlet,
+)
 from asperity.ehl.regime import far_from_fits
 from asperity.ehl.solution import ContactSolution
+from asperity.ehl.uncertainty import Uncertainty
 from asperity.grid import Grid
 from asperity.lubricant import Barus, Lubricant, Roelands
+from asperity.quantities import quantity
 
 OILS = 5e-9, 40e-9  # pressure-viscosity coefficients [1/Pa]
 SOFT = 1e9  # Young's modulus below which a body is rubber or a slip of the unit [Pa]
@@ -55,6 +64,16 @@ def inlet_notes(conditions: ContactConditions, lubricant: Lubricant | None, grid
 def solution_notes(solution: ContactSolution) -> tuple[str, ...]:
     """What a reader should know of this solution: pressure, edges, resolution, and a film far from its fits."""
     return tuple(_of_solution(solution))
+
+
+def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
+    """Why the solution's grid cannot tell CLR, of which `clr` says how far it may be off; None where it can."""
+    reasons = list(grid_shortfalls(solution.conditions, solution.lubricant, solution.surface))
+    # between smooth bodies the coarser grid touches because it does not show the inlet, which this one does
+    if solution.surface.sq > 0.0 and clr.numerical is not None and max(clr.numerical) > WIDEST_BAR:
+        bar, most = (quantity("clr").text(value) for value in (max(clr.numerical), WIDEST_BAR))
+        reasons.append(f"an error bar of {bar}, where at most {most} tell something")
+    return "; ".join(reasons) or None
 
 
 def _solids(conditions: ContactConditions) -> Iterator[str]:

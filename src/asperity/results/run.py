@@ -167,14 +167,7 @@ class Run:
     @cached_property
     def undetermined(self) -> str | None:
         """Why this grid cannot tell CLR; None where it can."""
-        solution = self.solution
-        reasons = list(ehl.grid_shortfalls(solution.conditions, solution.lubricant, solution.surface))
-        numerical = self.error.clr.numerical
-        # between smooth bodies the coarser grid touches because it does not show the inlet, which this one does
-        if solution.surface.sq > 0.0 and numerical is not None and max(numerical) > ehl.WIDEST_BAR:
-            bar, most = (quantity("clr").text(value) for value in (max(numerical), ehl.WIDEST_BAR))
-            reasons.append(f"an error bar of {bar}, where at most {most} tell something")
-        return "; ".join(reasons) or None
+        return ehl.undetermined(self.solution, self.error.clr)
 
     @property
     def determined(self) -> bool:
