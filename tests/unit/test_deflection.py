@@ -51,6 +51,15 @@ def test_a_pressure_that_does_not_vary_in_y_meets_the_logarithm(deflection):
     np.testing.assert_allclose(found, np.repeat(expected[:, None], CELLS[1], axis=1), rtol=1e-12, atol=1e-13)
 
 
+def test_some_lines_deflect_as_among_all(deflection):
+    pressure = np.zeros(CELLS)
+    pressure[5:9] = np.random.default_rng(2).random((4, CELLS[1]))
+    np.testing.assert_allclose(deflection.among(4)(pressure[5:9]), deflection(pressure)[5:9], rtol=1e-13)
+    single = deflection.among(4)(pressure[5:9].astype(np.float32))
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(single, deflection(pressure)[5:9], rtol=1e-5)
+
+
 @pytest.mark.parametrize("cells", [64, 128, 256])
 def test_a_hertz_pressure_flattens_the_parabola(cells):
     """V = const - X^2/2 inside |X| < 1, within 3/cells^1.5 of it; the pressure's edge sets the order."""

@@ -15,6 +15,7 @@ import scipy
 from asperity.arrays import Field
 
 FAR = 8  # cells along x beyond which the compliance counts as a background
+ALL_OF_K0 = 40.0  # to which its integral from 0 is π/2 to the last digit
 NEAR_ALIASES, FAR_ALIASES, NEAR_CELLS = 200, 2, 3
 
 
@@ -44,6 +45,14 @@ class Deflection:
         waves = scipy.fft.fft(scipy.fft.rfft(displacement, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
         waves /= np.abs(self.spectrum[0])  # the mean of a line contact has a sign of its own
         return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
+
+    def among(self, lines: int) -> "Deflection":
+        """The same among that many neighbouring lines along x, none longer than the grid is."""
+        (_, ny), (_, wide) = self.cells, self.padded
+        kernel = scipy.fft.ifft(self.spectrum[0], axis=0)[:lines].real
+        long = scipy.fft.next_fast_len(2 * lines - 1)
+        spectrum = np.ascontiguousarray(scipy.fft.fft(_mirrored(kernel, long), axis=0).real)
+        return Deflection((lines, ny), (long, wide), (spectrum, spectrum.astype(np.float32)), self.row[:lines])
 
     @property
     def near(self) -> Field:
@@ -90,9 +99,15 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
     for alias in range(-NEAR_ALIASES, NEAR_ALIASES + 1):
         number = waves + alias * ny
         real = number != 0
+        if not real.any():  # one line of cells has the mean alone
+            continue
         wavenumber = 2.0 * np.pi * np.abs(number[real]) / (ny * dy)
+        excited = np.sinc(number[real] / ny)
+        if 0.5 * dx * wavenumber.min() >= ALL_OF_K0:  # all of it lies over the cell itself
+            kernel[0, real] += np.pi / wavenumber * excited
+            continue
         count = nx if abs(alias) <= FAR_ALIASES else min(NEAR_CELLS, nx)
-        kernel[:count, real] += _k0_over_cells(wavenumber, cell[:count], dx) * np.sinc(number[real] / ny)
+        kernel[:count, real] += _k0_over_cells(wavenumber, cell[:count], dx) * excited
     return kernel
 
 
@@ -100,7 +115,9 @@ def _k0_over_cells(wavenumber: Field, cell: np.ndarray, dx: float) -> Field:
     """∫ K₀(q|x|) dx over each cell, shape (cells, wavenumbers)."""
     edges = (np.arange(cell.size + 1) - 0.5) * dx
     argument = np.abs(edges)[:, None] * wavenumber
-    integral = np.where(argument < 500.0, scipy.special.iti0k0(np.minimum(argument, 500.0))[1], np.pi / 2.0)
+    integral = np.full(argument.shape, np.pi / 2.0)
+    short = argument < ALL_OF_K0
+    integral[short] = scipy.special.iti0k0(argument[short])[1]
     integral[0] *= -1.0  # the first edge lies left of the origin
     return np.asarray(np.diff(integral, axis=0) / wavenumber)
 

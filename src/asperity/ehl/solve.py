@@ -1,21 +1,28 @@
 """From conditions, oil and surface to a solved contact, by the model that the options name."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
+from asperity.ehl.elastic import elastic_contact
+from asperity.ehl.iterate import Step, newton
 from asperity.ehl.mixed_solve import solve_mixed
 from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
 from asperity.ehl.posing import contact_problem, first_guess, levels_in_reach, on_one_line
+from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.search import Progress, Search
+from asperity.ehl.search import COARSE_TOLERANCE, Progress, Search
 from asperity.ehl.solution import ContactSolution
+from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
+
+ELASTIC_TO = 0.1  # of the tolerance that a step of Newton's then has to meet
 
 
 def solve_contact(
@@ -82,7 +89,8 @@ def solve_unified(
     scales = Scales.of(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = on_one_line(whole) if whole.uniform else whole
-    search = Search(options, scales.gap, progress)
+    elastic = lubricant is None and conditions.hardness is None
+    search = (ElasticSearch if elastic else Search)(options, scales.gap, progress)
     if start is None:
         levels = levels_in_reach(finest, conditions, lubricant)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
@@ -107,6 +115,30 @@ def solve_unified(
         discretisation=search.discretisation_error if start is None else start.convergence.discretisation_error,
         viscosity_factor=viscosity_factor,
     )
+
+
+class ElasticSearch(Search):
+    """Dry elastic bodies coarse to fine; a step of Newton's on the finest grid says whether it is solved."""
+
+    def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
+        """Solve on grid after grid; by Newton's steps alone where the bodies are `held`."""
+        if held:
+            return super().climb(levels, pressure, approach, held=True)
+        options, start = self.options, pressure
+        self.figures, self.smooth, self.cell = [], not np.any(levels[0].roughness), levels[0].spacing[0]
+        for problem in reversed(levels):
+            finest = problem is levels[0]
+            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            if problem.cells != pressure.shape:
+                pressure = interpolated(pressure, problem.cells)
+            pressure, near, met = elastic_contact(problem, pressure, ELASTIC_TO * tolerance)
+            if not met:
+                return super().climb(levels, start, approach, held=False)
+            step = self.run(
+                problem, newton(problem, pressure, near), tolerance, options.max_iterations if finest else 0
+            )
+            self.figures.append(self._figures(step))
+        return step
 
 
 SOLVERS = {"unified": solve_unified, "paper": solve_unified, "mixed": solve_mixed, "conserving": solve_mixed}
