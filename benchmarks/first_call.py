@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
@@ -22,3 +23,13 @@ def first_call() -> tuple[float, bool]:
             text=True,
         )
         return perf_counter() - began, "compiles" in done.stderr
+
+
+def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - there is but one first call
+    """The figure as Markdown."""
+    yield "## The first call\n"
+    seconds, said = first_call()
+    yield (
+        f"First `asperity solve` after installation, compilation included: {seconds:.1f} s; "
+        f"{'says what the wait is for' if said else 'SAYS NOTHING about the wait'}."
+    )

@@ -1,0 +1,111 @@
+"""What benchmarks said, kept as csv that `docs/benchmarks.md` includes, and what became of each number since.
+
+A part's tables go to docs/benchmarks/PART.csv, PART-2.csv ... as they stand, its headings and sentences to
+PART-said.csv, where a table is named by its file.
+"""
+
+import csv
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+DOCS = Path(__file__).parents[1] / "docs"
+FOLDER, PAGE = DOCS / "benchmarks", DOCS / "benchmarks.md"
+CHANGED = 0.1  # relative, from which a number is told: less is a shared machine's mood
+NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+Table = list[list[str]]
+
+
+def taken_apart(lines: Iterable[str]) -> tuple[list[str], list[Table]]:
+    """Sentences and headings of Markdown lines, each table among them as its number in braces; and the tables."""
+    said: list[str] = []
+    tables: list[Table] = []
+    for line in (line for text in lines for line in text.splitlines()):
+        if not line.startswith("|"):
+            said += [line] if line.strip() else []
+        elif said and said[-1] == f"{{{len(tables)}}}":
+            tables[-1].append(cells(line))
+        else:
+            tables.append([cells(line)])
+            said.append(f"{{{len(tables)}}}")
+    return said, [[row for row in table if not all(set(cell) <= set("-: ") for cell in row)] for table in tables]
+
+
+def cells(line: str) -> list[str]:
+    """What stands between the bars of a row."""
+    return [cell.strip() for cell in line.strip().strip("|").split("|")]
+
+
+def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
+    """Write a part's csv in place of the last ones; what changed against these, a line each."""
+    said, tables = taken_apart(lines)
+    before = {path.name: read(path) for path in _files(part, folder)}
+    now = {_name(part, number): table for number, table in enumerate(tables, 1)}
+    now[f"{part}-said.csv"] = [["said"], *([text] for text in said)]
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in before.keys() - now.keys():
+        (folder / name).unlink()
+    for name, table in now.items():
+        with (folder / name).open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(table)
+    return [line for name in now for line in changes(name, before.get(name), now[name])]
+
+
+def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
+    """Numbers that moved by more than a tenth, with the first cell of their row and the head of their column."""
+    if before is None:
+        yield f"{name}: new"
+        return
+    if [len(row) for row in before] != [len(row) for row in now]:
+        yield f"{name}: has another shape"
+        return
+    for old_row, row in zip(before[1:], now[1:], strict=True):
+        for head, old, new in zip(now[0], old_row, row, strict=True):
+            pairs = zip(NUMBER.findall(old), NUMBER.findall(new), strict=False)
+            moved = [f"{a} is now {b}" for a, b in pairs if _moved(*(float(n.replace("−", "-")) for n in (a, b)))]
+            if moved or NUMBER.sub("", old) != NUMBER.sub("", new):
+                yield f"{name}: {row[0][:60]}, {head}: {'; '.join(moved) or f'{old[:60]!r} is now {new[:60]!r}'}"
+
+
+def _moved(old: float, new: float) -> bool:
+    return abs(new - old) > CHANGED * max(abs(old), abs(new))
+
+
+def page(folder: Path = FOLDER, parts: Iterable[str] = ()) -> str:
+    """The page that includes every csv."""
+    text = [
+        "# Benchmarks",
+        "",
+        "Written by `make bench` from the csv files in `docs/benchmarks`; not by hand. Times are those of the machine",
+        "that ran them, shared with other work: ratios within a table are the result.",
+    ]
+    for part in parts:
+        if not (folder / f"{part}-said.csv").is_file():
+            continue
+        for (line,) in read(folder / f"{part}-said.csv")[1:]:
+            number = re.fullmatch(r"\{(\d+)\}", line)
+            if number:
+                head, *rows = read(folder / _name(part, int(number[1])))
+                text += ["", _row(head), _row(["---"] * len(head)), *map(_row, rows)]
+            else:
+                text += ["", line]
+    return "\n".join(text) + "\n"
+
+
+def read(path: Path) -> Table:
+    """The rows of a csv file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _name(part: str, number: int) -> str:
+    return f"{part}.csv" if number == 1 else f"{part}-{number}.csv"
+
+
+def _files(part: str, folder: Path) -> list[Path]:
+    return [path for path in sorted(folder.glob("*.csv")) if re.fullmatch(rf"{part}(-said|-\d+)?\.csv", path.name)]
