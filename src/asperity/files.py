@@ -4,11 +4,11 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from platform import python_version
 from typing import Any
 
+import asperity
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 
 MANIFEST = "manifest.json"
@@ -63,12 +63,14 @@ def make_folder(path: Path) -> None:
 
 def versions() -> dict[str, str]:
     """Versions of what decides numbers, to stand beside them."""
+    from importlib.metadata import version  # here: it takes longer to load than the rest of the room
+
     return {**{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")}, "python": python_version()}
 
 
 def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
     """Refuse to go on in a folder that another asperity began: its numbers would stand beside ours."""
-    theirs, ours = manifest.get("versions", {}).get("asperity"), version("asperity")
+    theirs, ours = manifest.get("versions", {}).get("asperity"), asperity.__version__
     if theirs != ours:
         raise BadInput(f"{folder} was computed by asperity {theirs}, this is {ours}; choose another folder")
 

@@ -1,10 +1,8 @@
 """What all that starts processes needs: how many, that Ctrl-C is the parent's business, and that they end with it."""
 
-import multiprocessing
 import os
 import signal
 import threading
-from multiprocessing.connection import wait
 
 
 def cores() -> int:
@@ -19,6 +17,8 @@ def leave_interrupts_to_the_parent() -> None:
 
 def set_up_worker() -> None:
     """Leave Ctrl-C to the parent, and end with it: a parent that is killed cannot tell its workers to stop."""
+    import multiprocessing  # here, and below: only those who start processes need it
+
     leave_interrupts_to_the_parent()
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -26,5 +26,7 @@ def set_up_worker() -> None:
 
 
 def _end_with(sentinel: int) -> None:
+    from multiprocessing.connection import wait
+
     wait([sentinel])
     os._exit(1)

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from importlib.resources import files
 from typing import Any, get_type_hints
 
 from asperity.errors import require_positive
@@ -162,6 +161,8 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
 @cache
 def catalogue() -> dict[str, Quantity]:
     """Every quantity by its key, in the order in which tables have them."""
+    from importlib.resources import files  # here: `asperity --help` shows no quantity
+
     lines = files("asperity").joinpath("quantities.csv").read_text("utf-8").splitlines()
     return {row["key"]: Quantity(detail=bool(row.pop("detail")), **row) for row in csv.DictReader(lines)}
 

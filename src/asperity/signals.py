@@ -13,6 +13,7 @@ from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, require_positive
 
 SAMPLES_AT_ONCE = 1 << 18  # of a record, transformed together: what stays in a processor's cache
+SAMPLES_A_BLOCK = 1 << 15  # filtered together
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,19 +100,19 @@ def averaged_spectrum(
     if segment < 8:
         raise BadInput(f"a spectrum's segment must have at least 8 samples, got {segment}; change it")
     try:
-        taper = scipy.signal.get_window(window, segment)
+        weights = taper(window, segment)
     except ValueError as error:
         raise BadInput(f"spectrum window {window!r} is unknown ({error}); try hann or boxcar") from None
 
     step = segment if window == "boxcar" else segment - segment // 2
-    total, complete, samples = _summed_periodograms(blocks, taper, step)
+    total, complete, samples = _summed_periodograms(blocks, weights, step)
     if not complete.any():
         gaps = " without a gap" if complete.size else ""
         raise BadInput(
             f"a spectrum needs at least one piece of {segment} samples{gaps}, the record has {samples}; "
             "shorten the segment"
         )
-    density = 2.0 * total / (np.count_nonzero(complete) * rate_hz * np.sum(taper**2))
+    density = 2.0 * total / (np.count_nonzero(complete) * rate_hz * np.sum(weights**2))
     density[0] /= 2.0
     if segment % 2 == 0:
         density[-1] /= 2.0
@@ -122,14 +123,14 @@ def averaged_spectrum(
         duration_s=samples / rate_hz,
         segment=segment,
         window=window,
-        resolution_hz=float(rate_hz * np.sum(taper**2) / np.sum(taper) ** 2),
-        averages=_averages(taper, complete, step),
+        resolution_hz=float(rate_hz * np.sum(weights**2) / np.sum(weights) ** 2),
+        averages=_averages(weights, complete, step),
     )
 
 
-def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tuple[Field, Mask, int]:
+def _summed_periodograms(blocks: Iterable[Field], weights: Field, step: int) -> tuple[Field, Mask, int]:
     """Sum over the pieces of |rfft|^2, which of the pieces were whole, and how many samples there were."""
-    segment = taper.size
+    segment = weights.size
     many = max(1, SAMPLES_AT_ONCE // segment)
     work = np.empty((many, segment))  # used again and again: fresh memory costs more than the arithmetic
     total = np.zeros(segment // 2 + 1)
@@ -148,7 +149,7 @@ def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tu
             if not finite.all():
                 group, means = group[finite], means[finite]
             tapered = np.subtract(group, means, out=work[: group.shape[0]])
-            tapered *= taper
+            tapered *= weights
             lines = scipy.fft.rfft(tapered, axis=1)
             total += np.einsum("ij,ij->j", lines.real, lines.real) + np.einsum("ij,ij->j", lines.imag, lines.imag)
             kept.append(finite)
@@ -156,19 +157,45 @@ def _summed_periodograms(blocks: Iterable[Field], taper: Field, step: int) -> tu
     return total, np.concatenate(kept), samples
 
 
-def _averages(taper: Field, kept: Mask, step: int) -> float:
+def _averages(weights: Field, kept: Mask, step: int) -> float:
     """How many independent ordinates a line is worth: 1 / (n sum w_t^2), w_t the share of sample t in the estimate.
 
     Var of integral(phi P_hat) = rate integral(phi^2 P^2) sum w_t^2 for a smooth phi, whatever pieces and taper. The sum
     runs over pairs of pieces that overlap: those `apart` steps from each other share taper_t^2 taper_(t+apart)^2.
     """
-    energy = taper**2 / np.sum(taper**2)
+    energy = weights**2 / np.sum(weights**2)
     pieces = np.count_nonzero(kept)
     shared = pieces * float(energy @ energy)
-    for apart in range(1, -(-taper.size // step)):
+    for apart in range(1, -(-weights.size // step)):
         pairs = np.count_nonzero(kept[apart:] & kept[:-apart])
         shared += 2.0 * pairs * float(energy[apart * step :] @ energy[: -apart * step])
-    return float(pieces**2 / (taper.size * shared))
+    return float(pieces**2 / (weights.size * shared))
+
+
+def taper(window: str, samples: int) -> Field:
+    """The window of a piece, as scipy.signal.get_window names it, which is only loaded for a rarer one."""
+    if window == "boxcar":
+        return np.ones(samples)
+    if window == "hann":
+        return np.asarray(0.5 - 0.5 * np.cos(2.0 * np.pi / samples * np.arange(samples)))
+    return np.asarray(scipy.signal.get_window(window, samples))
+
+
+def recursion(numerator: Field, denominator: Field, values: Field) -> Field:
+    """What a recursive filter makes of `values`, from rest: a0 y_n + a1 y_(n-1) + ... = b0 x_n + b1 x_(n-1) + ...
+
+    scipy.signal.lfilter, by LAPACK's banded triangles block by block: scipy.signal takes longer to load than a record.
+    """
+    driven: Field = np.convolve(values, numerator)[: values.size] / denominator[0]
+    back = denominator[1:] / denominator[0]
+    for first in range(0, driven.size, SAMPLES_A_BLOCK):
+        block = driven[first : first + SAMPLES_A_BLOCK]
+        for ago, weight in enumerate(back if first else (), 1):
+            block[:ago] -= weight * driven[first - ago : first][: block.size]
+        bands = np.empty((back.size + 1, block.size), order="F")
+        bands[:] = np.append(1.0, back)[:, None]
+        block[:], _ = scipy.linalg.lapack.dtbtrs(bands, block, uplo="L", diag="U")
+    return driven
 
 
 def smooth(spectrum: Spectrum, passes: int) -> Spectrum:

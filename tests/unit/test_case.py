@@ -2,6 +2,7 @@ import math
 import pickle
 import re
 from contextlib import suppress
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from asperity.case import load_case
+from asperity.case import amounts, load_case
 from asperity.coupling import VibrationModel
 from asperity.ehl import Options
 from asperity.errors import BadInput, UnreadableFile
@@ -228,3 +229,20 @@ def test_ball_and_barrel_are_measured_in_their_own_half_widths(paper):
     assert load_case(barrel.text) == barrel
     with pytest.raises(BadInput, match="y must reach beyond the contact on both sides"):
         barrel.with_overrides({"grid.y": [-0.9, 0.9]})
+
+
+@pytest.mark.parametrize("text", amounts._COMMON)
+@pytest.mark.parametrize("number", ["1", "5.4", "1e-3", "219.78"])
+def test_a_common_unit_is_worth_what_pint_says(text, number):
+    amount = amounts._units().Quantity(Decimal(number), text)
+    for unit, expected in (
+        (None, amount.to_base_units()),
+        (amounts._COMMON[text][0], amount.to(amounts._COMMON[text][0])),
+    ):
+        assert str(amounts._convert(number, text, unit)) == str(expected.magnitude)
+
+
+def test_one_common_unit_in_another():
+    assert amounts._convert("5", "nm", "um") == Decimal("0.005")
+    with pytest.raises(ValueError, match="something else"):
+        amounts._convert("5", "nm", "s")

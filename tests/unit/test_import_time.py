@@ -10,6 +10,7 @@ import asperity
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 HEAVY = ("numpy", "scipy", "numba", "matplotlib", "xarray", "pandas", "pint", "pydantic", "plotly", "SurfaceTopography")
+HEAVY += ("importlib.resources", "importlib.metadata", "multiprocessing")  # of the standard library
 
 
 def loaded_after(statement: str) -> list[str]:
@@ -37,23 +38,42 @@ def test_help_imports_nothing_heavy():
     assert done.stdout.splitlines()[-1] == ""
 
 
+VIBRATED = (
+    "--set",
+    "grid.cells=[32, 24]",
+    "--set",
+    "surface.correlation_length=40 um",
+    "--set",
+    "vibration.duration=1 s",
+)
 SMALL = ("--set", "grid.cells=[32, 24]", "--set", "surface.correlation_length=40 um", "--set", "vibration=none")
-COMPUTE = {"numba", "scipy.optimize"}
-DRAW = {"matplotlib", "plotly"}  # jinja2 comes with pint, by way of dask
+STATISTICS = {"scipy.signal", "scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.integrate", "scipy.spatial"}
+COMPUTE = {"numba", *STATISTICS}
+DRAW = {"matplotlib", "plotly", "jinja2"}
+UNITS = {"pint", "dask"}
 STUDY = {"distributed", "SALib", "zarr"}
 READ = {"SurfaceTopography", "soundfile", "nptdms", "pyuff", "idelib"}  # libraries of single formats
 TABLES = {"pandas", "pyarrow", "xarray"}
 NOT_LOADED = {  # a command, and what it must not load
     ("--version",): {"numpy", "scipy", "pydantic", "pint", "rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
-    ("solve", "absent.toml"): {"rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
+    ("solve", "absent.toml"): {"rich"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
     ("surface", "ring.x3p"): {"rich", "numba", "xarray", "jinja2"} | STUDY,  # SurfaceTopography brings matplotlib
-    ("check", "noise.npy", "--rate", "20000"): {"rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
+    ("check", "noise.npy", "--rate", "20000"): {"rich", "scipy.fft", "h5py"}
+    | COMPUTE
+    | UNITS
+    | DRAW
+    | STUDY
+    | READ
+    | TABLES,
+    ("check", "noise.csv"): {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
+    ("check", str(PAPER)): {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
     ("track", "noise.npy", "--rate", "20000", "--method", "peak"): {"numba", "rich"} | DRAW | STUDY | READ | TABLES,
     ("rig", "--out", "rig", "--samples", "1", "--repeats", "1", "--duration", "1 s"): {"rich", "numba"}
     | DRAW
     | STUDY
     | TABLES,
-    ("solve", str(PAPER), *SMALL, "--quiet"): {"rich"} | DRAW | STUDY | READ | TABLES,
+    ("solve", str(PAPER), *SMALL, "--out", "run.nc"): {"rich"} | STATISTICS | UNITS | DRAW | STUDY | READ | TABLES,
+    ("solve", str(PAPER), *VIBRATED): {"rich"} | STATISTICS | UNITS | DRAW | STUDY | READ | TABLES,
     ("vibrate", str(PAPER), "--quiet"): {"rich"} | DRAW | STUDY | READ | TABLES,
 }
 
@@ -62,7 +82,9 @@ NOT_LOADED = {  # a command, and what it must not load
 def test_a_command_loads_only_what_it_needs(tmp_path, arguments):
     heights = np.random.default_rng(5).standard_normal((32, 48)) * 1e-6
     x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=3e-6)
-    np.save(tmp_path / "noise.npy", np.random.default_rng(0).standard_normal(40_000))
+    noise = np.random.default_rng(0).standard_normal(40_000)
+    np.save(tmp_path / "noise.npy", noise)
+    np.savetxt(tmp_path / "noise.csv", np.column_stack([np.arange(8000) / 2e4, noise[:8000]]), "%.6g", ",")
     names = sorted(NOT_LOADED[arguments])
     probe = (
         f"import atexit, sys\natexit.register(lambda: print('loaded', *[m for m in {names!r} if m in sys.modules]))\n"

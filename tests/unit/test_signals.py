@@ -1,9 +1,18 @@
 import numpy as np
 import pytest
-from scipy.signal import get_window, welch
+from scipy.signal import get_window, lfilter, welch
 
 from asperity.errors import BadInput
-from asperity.signals import Signal, Spectrum, averaged_spectrum, power_spectrum, smooth
+from asperity.signals import (
+    SAMPLES_A_BLOCK,
+    Signal,
+    Spectrum,
+    averaged_spectrum,
+    power_spectrum,
+    recursion,
+    smooth,
+    taper,
+)
 
 
 def white(samples: int, seed: int = 0) -> Signal:
@@ -148,3 +157,19 @@ def test_averages_count_what_the_pieces_beside_a_gap_share():
     for start in starts:
         weight[start : start + 100] += taper**2 / np.sum(taper**2) / len(starts)
     assert spectrum.averages == pytest.approx(1.0 / (100 * np.sum(weight**2)), rel=1e-12)
+
+
+@pytest.mark.parametrize("samples", [1, 2, SAMPLES_A_BLOCK - 1, SAMPLES_A_BLOCK, 2 * SAMPLES_A_BLOCK + 1])
+@pytest.mark.parametrize("filter_", [([0.3], [1.0]), ([0.1, 0.2], [2.0, -1.9]), ([1.0, 0.5, 0.1], [1.0, -1.9, 0.95])])
+def test_recursion_is_lfilter(samples, filter_):
+    numerator, denominator = map(np.array, filter_)
+    values = np.random.default_rng(3).standard_normal(samples)
+    expected = lfilter(numerator, denominator, values)
+    found = recursion(numerator, denominator, values)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("samples", [8, 9, 1000])
+def test_tapers_are_scipys(samples):
+    for window in ("hann", "boxcar", "hamming"):
+        np.testing.assert_allclose(taper(window, samples), get_window(window, samples), rtol=1e-12, atol=1e-15)

@@ -1,6 +1,7 @@
 """Quantities with units, as a case file and the command line write them: read to SI, and written back as they stood.
 
-The only module that knows pint. Nothing deeper in the package has units other than SI.
+The only module that knows pint, which is loaded for a unit that is not in the table of common ones. Nothing deeper in
+the package has units other than SI.
 """
 
 import math
@@ -34,6 +35,36 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "1/K": ("an inverse temperature", "0.037 1/K"),
     "W/m/K": ("a thermal conductivity", "46 W/m/K"),
     "J/kg/K": ("a heat capacity", "460 J/kg/K"),
+}
+_COMMON = {  # unit -> its SI unit, and what one is worth in it: pint and its registry take longer to load than a case
+    "m": ("m", "1"),
+    "mm": ("m", "1e-3"),
+    "um": ("m", "1e-6"),
+    "µm": ("m", "1e-6"),
+    "nm": ("m", "1e-9"),
+    "N": ("N", "1"),
+    "kN": ("N", "1e3"),
+    "m/s": ("m/s", "1"),
+    "mm/s": ("m/s", "1e-3"),
+    "Pa": ("Pa", "1"),
+    "MPa": ("Pa", "1e6"),
+    "GPa": ("Pa", "1e9"),
+    "1/Pa": ("1/Pa", "1"),
+    "1/GPa": ("1/Pa", "1e-9"),
+    "Pa s": ("Pa s", "1"),
+    "mPa s": ("Pa s", "1e-3"),
+    "kg/m^3": ("kg/m^3", "1"),
+    "g/cm^3": ("kg/m^3", "1e3"),
+    "kg": ("kg", "1"),
+    "g": ("kg", "1e-3"),
+    "s": ("s", "1"),
+    "Hz": ("Hz", "1"),
+    "kHz": ("Hz", "1e3"),
+    "N s/m": ("N s/m", "1"),
+    "K": ("K", "1"),
+    "1/K": ("1/K", "1"),
+    "W/m/K": ("W/m/K", "1"),
+    "J/kg/K": ("J/kg/K", "1"),
 }
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 
@@ -71,6 +102,9 @@ def _units() -> "pint.UnitRegistry[Decimal]":
 @lru_cache(4096)  # a case states forty quantities, and a study states most of them a thousand times over
 def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
     """A number of `unit_text` in `unit`; None is the SI unit of its kind."""
+    own, wanted = _COMMON.get(unit_text), _COMMON.get(unit_text if unit is None else unit)
+    if own is not None and wanted is not None and own[0] == wanted[0]:
+        return Decimal(number) * Decimal(own[1]) / (1 if unit is None else Decimal(wanted[1]))
     import pint
 
     try:

@@ -14,7 +14,9 @@ S = TypeVar("S", bound="Section")
 class Section(BaseModel):
     """A table of the case file; keys that are not fields are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, serialize_by_alias=True)
+    model_config = ConfigDict(
+        defer_build=True, extra="forbid", frozen=True, allow_inf_nan=False, serialize_by_alias=True
+    )
 
 
 class LocatedError(BadInput):

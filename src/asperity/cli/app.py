@@ -1,6 +1,7 @@
 """The application: its commands are in the modules beside this one; what asperity refuses becomes an exit code here."""
 
 import codecs
+import gc
 import sys
 import unicodedata
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from asperity import quantities
 from asperity.cli.options import with_flags
 from asperity.errors import AsperityError, BadInput
 
+GARBAGE_FROM = 100_000  # objects; libraries make that many while they load, and every hundredth search is of them all
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}
 PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", "′": "'", **SUPERSCRIPTS}
@@ -29,6 +31,7 @@ app = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; what asperity refuses is one line on stderr."""
+    gc.set_threshold(GARBAGE_FROM)
     codecs.register_error("plain", _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):

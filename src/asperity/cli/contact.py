@@ -1,12 +1,11 @@
 """`asperity demo` and `asperity solve`: contacts from case file to numbers."""
 
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import case, files, processes, report, results
+from asperity import case, files, paper, processes, report, results
 from asperity.cli.app import app
 from asperity.cli.options import Accuracy, AsJson, CaseOrRun, Overrides, Quiet, SurfaceFile, chosen_case, require_output
 from asperity.cli.show import Block, SolverSteps, known, progress, show, table, text
@@ -29,7 +28,7 @@ def demo(
     """Solve the paper's contact at a few roughness levels, from case file to report."""
     files.make_folder(out)
     case_file, page = out / "paper.toml", out / "report.html"
-    files.write_text(case_file, resources.files("asperity.paper").joinpath("paper.toml").read_text("utf-8"))
+    files.write_text(case_file, paper.papers_text())
     chosen = case.load_case(case_file)
     runs = {}
     for sq in DEMO_SQ:

@@ -4,7 +4,7 @@ import json
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Protocol
@@ -109,19 +109,17 @@ def progress(label: str, doing: str = "", *, quiet: bool, compiles: bool = False
     if quiet or not (compiles or sys.stderr.isatty()):
         yield _unseen
         return
+    notice = f"{label}: no step yet; the first solve after installation compiles the solver, up to a minute ..."
+    if not sys.stderr.isatty():
+        announcement = threading.Timer(SILENT_FOR, print, [notice], {"file": sys.stderr, "flush": True})
+        with _announced(announcement):
+            yield lambda *_, **__: announcement.cancel()
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    announcement = threading.Timer(
-        SILENT_FOR,
-        console.print,
-        [f"{label}: no step yet; the first solve after installation compiles the solver, up to a minute ..."],
-        {"soft_wrap": True, "highlight": False},
-    )
-    announcement.daemon = True
-    if compiles:
-        announcement.start()
+    announcement = threading.Timer(SILENT_FOR, console.print, [notice], {"soft_wrap": True, "highlight": False})
     label_column, doing_column = (
         TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[doing]")
     )
@@ -129,18 +127,26 @@ def progress(label: str, doing: str = "", *, quiet: bool, compiles: bool = False
         *(label_column, BarColumn(20), doing_column, TimeElapsedColumn()),
         console=console,
         transient=True,
-        disable=not console.is_terminal,
+        disable=not console.is_terminal,  # as where TERM=dumb
         redirect_stdout=sys.stdout.isatty(),  # what goes to a file must not end beside the bar
     )
+    with _announced(announcement) if compiles else nullcontext(), bar:
+        task = bar.add_task(label, total=None, doing=doing)
+
+        def show_progress(doing: str, done: int | None = None, total: int | None = None) -> None:
+            announcement.cancel()
+            bar.update(task, doing=doing, completed=done, total=total)
+
+        yield show_progress
+
+
+@contextmanager
+def _announced(announcement: threading.Timer) -> Iterator[None]:
+    """Let it speak unless it is cancelled or what it is about has ended."""
+    announcement.daemon = True
+    announcement.start()
     try:
-        with bar:
-            task = bar.add_task(label, total=None, doing=doing)
-
-            def show_progress(doing: str, done: int | None = None, total: int | None = None) -> None:
-                announcement.cancel()
-                bar.update(task, doing=doing, completed=done, total=total)
-
-            yield show_progress
+        yield
     finally:
         announcement.cancel()
 

@@ -51,8 +51,8 @@ from .sharing import LoadSharing as LoadSharing
 from .sharing import clr_below as clr_below
 from .sharing import sharing_by_film as sharing_by_film
 from .solution import ContactSolution as ContactSolution
+from .solution import Contents as Contents
 from .solution import Oil as Oil
-from .solution import save_dataset as save_dataset
 from .solve import solve_contact as solve_contact
 from .state import contact_state as contact_state
 from .stiffness import TangentStiffness as TangentStiffness

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,48 @@ STEPS = {  # variable: what it is
     "step_load_error": "relative load error",
     "step_change": "relative change",
 }
+
+
+class Contents(NamedTuple):
+    """What a netCDF file holds: variables and coordinates by name, as (dimensions, values, attributes), and attributes.
+
+    Written without xarray, which with pandas takes longer to load than to write.
+    """
+
+    variables: dict[str, Any]
+    coordinates: dict[str, Any]
+    attributes: dict[str, Any]
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The same in memory."""
+        import xarray
+
+        return xarray.Dataset(*self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a file, whole or not at all, and return the path.
+
+        Raises
+        ------
+        BadInput
+            if the folder does not exist or cannot be written to.
+        AsperityError
+            if writing fails half way, as on a full disk; nothing is left behind then.
+        """
+        import h5netcdf
+
+        path = Path(path)
+        checked = {"compression": "gzip", "compression_opts": 1, "shuffle": True}  # zlib tells a flipped bit on reading
+        with whole_file(path) as part, h5netcdf.File(part, "w") as file:
+            for name, (dimensions, given, attributes) in {**self.coordinates, **self.variables}.items():
+                along, values = (dimensions,) if isinstance(dimensions, str) else dimensions, np.asarray(given)
+                for dimension, length in zip(along, values.shape, strict=True):
+                    if dimension not in file.dimensions:
+                        file.dimensions[dimension] = length
+                kind = checked if values.ndim == 2 else {}
+                file.create_variable(name, along, data=values, **kind).attrs.update(attributes)
+            file.attrs.update(self.attributes)
+        return path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +135,11 @@ class ContactSolution:
         return self.conditions.hardness
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The solution as an xarray dataset with CF attributes; all that `load_solution` needs is in it.
+        """The solution as an xarray dataset: its `contents`; raises what they do."""
+        return self.contents().to_dataset()
+
+    def contents(self) -> Contents:
+        """The solution with CF attributes; all that `load_solution` needs is in it.
 
         Fields lie on (x, y), the convergence history on (step). What is not a field travels as JSON in the attributes
         `conditions`, `lubricant`, `options`, `grid`, `convergence` and `versions`, floats in full; the solution's own
@@ -104,8 +150,6 @@ class ContactSolution:
         BadInput
             if one of the solution's attributes bears a name that the format uses itself.
         """
-        import xarray
-
         taken = sorted({*HEADINGS, *DESCRIBED} & set(self.attributes))
         if taken:
             raise BadInput(f"attribute {taken[0]!r} of the solution is a name that the run file uses itself; rename it")
@@ -122,7 +166,7 @@ class ContactSolution:
             **{name: json.dumps(value) for name, value in described.items()},
             **self.attributes,
         }
-        return xarray.Dataset({**self._maps(), **self._steps()}, coordinates, attributes)
+        return Contents({**self._maps(), **self._steps()}, coordinates, attributes)
 
     def _maps(self) -> dict[str, Any]:
         fields = {"pressure": self.pressure, "gap": self.gap, "surface_height": self.surface.heights}
@@ -169,26 +213,5 @@ class ContactSolution:
         }
 
     def save(self, path: str | Path) -> Path:
-        """Write the solution as netCDF, whole or not at all, and return the path; raises what `save_dataset` does."""
-        return save_dataset(self.to_dataset(), path)
-
-
-def save_dataset(dataset: "xarray.Dataset", path: str | Path) -> Path:
-    """Write a solution's dataset, with whatever was added to it, as netCDF, whole or not at all; return the path.
-
-    Raises
-    ------
-    BadInput
-        if the folder does not exist or cannot be written to.
-    AsperityError
-        if writing fails half way, as on a full disk; nothing is left behind then.
-    """
-    path = Path(path)
-    checked = {"zlib": True, "complevel": 1, "shuffle": True}  # zlib's checksum tells a flipped bit on reading
-    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in dataset.variables}
-    for name, variable in dataset.variables.items():
-        if variable.ndim == 2:
-            encoding[str(name)] |= checked
-    with whole_file(path) as part:
-        dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
-    return path
+        """Write the solution as netCDF, whole or not at all, and return the path; raises what `Contents.save` does."""
+        return self.contents().save(path)

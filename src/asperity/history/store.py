@@ -23,7 +23,7 @@ import xarray
 
 from asperity.arrays import Field
 from asperity.case import Case, load_case, relative_path
-from asperity.ehl import Memory, Snapshot, save_dataset
+from asperity.ehl import Contents, Memory, Snapshot
 from asperity.errors import BadInput, UnreadableFile
 from asperity.files import (
     MANIFEST,
@@ -112,7 +112,7 @@ class Keeper:
         touching, heights = solution.in_contact.astype(np.int8), solution.surface.heights.astype(np.float32)
         maps = {"gap": gap, "pressure": pressure, "in_contact": touching, "surface_height": heights}
         about = {"title": "Step of a moving contact", "step": snapshot.number, "time_s": snapshot.time}
-        dataset = xarray.Dataset(
+        contents = Contents(
             {name: (("x", "y"), values, quantity(name).attributes) for name, values in maps.items()},
             {
                 "x": ("x", grid.x, {**quantity("x_m").attributes, "axis": "X"}),
@@ -120,8 +120,10 @@ class Keeper:
             },
             {"Conventions": "CF-1.11", **about},
         )
-        dataset["in_contact"].attrs |= {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "apart touching"}
-        save_dataset(dataset, self.folder / MAPS / f"step-{snapshot.number:06d}.nc")
+        contents.variables["in_contact"][2].update(
+            {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "apart touching"}
+        )
+        contents.save(self.folder / MAPS / f"step-{snapshot.number:06d}.nc")
 
     def write(self, folder: Path) -> None:
         """Rows first, then what the next step needs: a crash between them leaves rows too many, which are dropped."""

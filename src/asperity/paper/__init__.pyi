@@ -10,6 +10,7 @@ from .anchors import rig_prediction as rig_prediction
 from .contact import is_papers_contact as is_papers_contact
 from .contact import papers_case as papers_case
 from .contact import papers_contact as papers_contact
+from .contact import papers_text as papers_text
 from .numbers import CITATION as CITATION
 from .numbers import CRF_ENDS_HZ as CRF_ENDS_HZ
 from .numbers import DAMPING_RATIO as DAMPING_RATIO

@@ -16,9 +16,14 @@ def papers_contact(load: float) -> ContactConditions:
     return ContactConditions(pair=PAIR, geometry="point", radius=RADIUS, load=load, surface_speeds=(2.12, 1.70))
 
 
+def papers_text() -> str:
+    """The paper's case file, as the package brings it along."""
+    return files("asperity.paper").joinpath("paper.toml").read_text("utf-8")
+
+
 def papers_case() -> Case:
-    """The paper's contact as a case, as the package brings it along."""
-    return load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8"), name="paper.toml")
+    """The paper's contact as a case."""
+    return load_case(papers_text(), name="paper.toml")
 
 
 def rig_case() -> Case:

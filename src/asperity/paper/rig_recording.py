@@ -13,7 +13,7 @@ from asperity.coupling import VibrationModel, excitation, oscillator
 from asperity.ehl import ContactState
 from asperity.errors import BadInput
 from asperity.paper.numbers import SHAFT_HZ
-from asperity.signals import Signal, Spectrum, power_spectrum
+from asperity.signals import Signal, Spectrum, power_spectrum, taper
 
 MAINS_HZ = 50.0
 RING_HARMONICS, MAINS_HARMONICS = 40, 20
@@ -113,7 +113,7 @@ class RigRecording:
         samples = round(self.duration_s * self.rate_hz)
         if not 8 <= segment <= samples:
             raise BadInput(f"a spectrum's segment must have 8 to {samples} samples (the record), got {segment}")
-        taper = scipy.signal.get_window("hann", segment)
+        weights = taper("hann", segment)
         spacing = self.rate_hz / segment
         frequency = np.arange(segment // 2 + 1) * spacing
         smooth = np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
@@ -122,7 +122,7 @@ class RigRecording:
         # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as those behind a Hann taper do
         drawn = rng.gamma(averages, 1.0 / averages, frequency.size + 2)
         scatter = (drawn[:-2] + 4.0 * drawn[1:-1] + drawn[2:]) / 6.0
-        mean_square = 2.0 / (self.rate_hz * float(np.sum(taper**2)))
+        mean_square = 2.0 / (self.rate_hz * float(np.sum(weights**2)))
         tonal = np.zeros(frequency.size)
         nearest = np.rint(self.tones.frequency_hz / spacing).astype(int)
         for shift in range(-3, 4):
@@ -141,7 +141,7 @@ class RigRecording:
             duration_s=self.duration_s,
             segment=segment,
             window="hann",
-            resolution_hz=float(self.rate_hz * np.sum(taper**2) / np.sum(taper) ** 2),
+            resolution_hz=float(self.rate_hz * np.sum(weights**2) / np.sum(weights) ** 2),
             averages=averages,
         )
 

@@ -27,6 +27,7 @@ SUFFIXES = {"", "txt", "csv", "tsv", "asc", "dat", "lvm", "prn"}
 _LARGE = 64 << 20  # bytes, from which a file is read piece by piece
 _HEAD = 1 << 18  # bytes, in which the header and the first rows must lie
 _CHUNK = 1 << 22
+_WORTH_PANDAS = 1 << 20  # bytes of rows, below which they are read line by line before pandas is even loaded
 _LONGEST_HEADER = 400  # lines
 _MOST_BLOCKS = 64
 _FEWEST_ROWS = 8  # of a block; fewer are a table in a header
@@ -247,7 +248,7 @@ def _tables(stream: BinaryIO, table: _Table, column: int | None = None) -> Itera
         chunk, rest = chunk[:cut], chunk[cut:]
         if len(rest) > _CHUNK:
             return  # no line is as long as that
-        rows = None if table.stamped else _parsed(chunk, table, column)
+        rows = None if table.stamped or len(chunk) < _WORTH_PANDAS else _parsed(chunk, table, column)
         if rows is None:
             rows, ended = _line_by_line(chunk, table, at, column)
             yield rows

@@ -224,28 +224,32 @@ class Run:
         return f"contact resonance at {error.value:.0f} Hz {in_words('crf_hz', error)}{most}"
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The solution's dataset, with every number of the run and maps of traction, temperature and von Mises stress.
+        """The run as an xarray dataset: its `contents`."""
+        return self.contents().to_dataset()
+
+    def contents(self) -> ehl.Contents:
+        """The solution's contents, with every number of the run and maps of traction, temperature and von Mises stress.
 
         A run that is loaded takes nothing from these: they are worked out anew. Maps are in single precision.
         """
-        dataset, stress = self.solution.to_dataset(), self.stress
+        (variables, coordinates, attributes), stress = self.solution.contents(), self.stress
         axis = {"axis": "Z", "positive": "down"}
-        dataset = dataset.assign_coords(depth=("depth", stress.depths, quantity("depth").attributes | axis))
+        coordinates["depth"] = ("depth", stress.depths, quantity("depth").attributes | axis)
         for entry in map(quantity, MAPS):
             values: Field | None = entry.at(self)
             if values is not None:
-                dataset[entry.key] = (("x", "y"), values.astype(np.float32), entry.attributes)
-        dataset["von_mises"].attrs["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"
+                variables[entry.key] = (("x", "y"), values.astype(np.float32), entry.attributes)
+        variables["von_mises"][2]["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"
         section = quantity("von_mises_section").attributes | {"comment": f"in the plane y = {stress.peak.y:g} m"}
-        dataset["von_mises_section"] = (("x", "depth"), stress.von_mises[:, stress.row].astype(np.float32), section)
+        variables["von_mises_section"] = (("x", "depth"), stress.von_mises[:, stress.row].astype(np.float32), section)
         for key, value in self.scalars().items():
             if value is not None and not isinstance(value, bool):
-                dataset[key] = ((), value, quantity(key).attributes)
-        return dataset
+                variables[key] = ((), value, quantity(key).attributes)
+        return ehl.Contents(variables, coordinates, attributes)
 
     def save(self, path: str | Path) -> Path:
         """Write the run as one netCDF that restates its case, whole or not at all, and return the path."""
-        return ehl.save_dataset(self.to_dataset(), path)
+        return self.contents().save(path)
 
 
 def run_of(case: Case, solution: ContactSolution, notes: Sequence[str], others: Sequence[Row] = ()) -> Run:

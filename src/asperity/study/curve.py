@@ -134,7 +134,7 @@ class WearCurve:
 
 def student_reach(std: ArrayLike, counts: ArrayLike, level: float = MEAN_CONFIDENCE) -> Field:
     """Half the width of Student's interval of a mean over `counts` values of this standard deviation."""
-    quantile = scipy.stats.t.ppf(0.5 + level / 2.0, np.maximum(np.asarray(counts) - 1, 1))
+    quantile = scipy.special.stdtrit(np.maximum(np.asarray(counts) - 1, 1), 0.5 + level / 2.0)
     return np.asarray(quantile * std / np.sqrt(np.maximum(counts, 1)))
 
 

@@ -207,10 +207,18 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
     ]
     known = np.isfinite(heights)
     sums = scipy.fft.irfft2(np.abs(scipy.fft.rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape)
-    pairs = np.rint(scipy.fft.irfft2(np.abs(scipy.fft.rfft2(known.astype(float), shape)) ** 2, shape))
     lags = np.ix_(*(np.arange(-m, m + 1) % size for m, size in zip(reach, shape, strict=True)))
-    means = np.divide(sums[lags], pairs[lags], out=np.zeros_like(sums[lags]), where=pairs[lags] > 0)
+    if known.all():
+        pairs = np.outer(*map(_pairs, grid.cells, reach, grid.periodic))
+    else:
+        pairs = np.rint(scipy.fft.irfft2(np.abs(scipy.fft.rfft2(known.astype(float), shape)) ** 2, shape))[lags]
+    means = np.divide(sums[lags], pairs, out=np.zeros_like(pairs), where=pairs > 0)
     return means / means[reach], reach
+
+
+def _pairs(cells: int, reach: int, repeats: bool) -> Field:
+    """How many pairs of cells lie each lag apart along an axis."""
+    return np.full(2 * reach + 1, float(cells)) if repeats else cells - np.abs(np.arange(-reach, reach + 1.0))
 
 
 def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:

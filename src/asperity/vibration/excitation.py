@@ -13,7 +13,7 @@ import scipy
 
 from asperity.arrays import Field
 from asperity.errors import BadInput, require_choice, require_positive
-from asperity.signals import Signal
+from asperity.signals import Signal, recursion
 from asperity.surface import Surface
 
 FilterName: TypeAlias = Literal["continuous", "bilinear"]
@@ -282,4 +282,4 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
     settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))  # 12 time constants: what is left of the start is e^-12
     white = white_noise(settling + samples, seed)
     to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)  # unit white noise would have variance 1 / (2 √2 ω^3)
-    return np.asarray(to_rms * scipy.signal.lfilter(numerator, denominator, white)[settling:])
+    return np.asarray(to_rms * recursion(numerator, denominator, white)[settling:])

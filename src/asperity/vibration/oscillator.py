@@ -13,7 +13,7 @@ import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput, require_choice, require_positive
-from asperity.signals import Signal, Spectrum
+from asperity.signals import Signal, Spectrum, recursion
 
 ResponseMethod: TypeAlias = Literal["exact", "rk5", "nonlinear"]
 RESPONSE_METHODS: tuple[ResponseMethod, ...] = get_args(ResponseMethod)
@@ -193,7 +193,7 @@ def _exact(oscillator: ContactOscillator, profile: Signal, read: Field) -> Field
     denominator, numerator = oscillator._recursion(profile.rate_hz, read)
     jumps = np.zeros(profile.values.size)
     jumps[1:-1] = np.diff(profile.values, 2) * profile.rate_hz
-    return np.asarray(scipy.signal.lfilter(numerator, denominator, jumps))
+    return recursion(numerator, denominator, jumps)
 
 
 def _runge_kutta(

@@ -14,7 +14,7 @@ import scipy
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
-from asperity.signals import Spectrum, smooth
+from asperity.signals import Spectrum, smooth, taper
 from asperity.wear.resonance import Resonance, SeenLine, fitted_resonance, line_and_slopes, line_shape, no_resonance
 from asperity.wear.scoring import Bounds, Data, Fit, Model, fit_spectrum, whittle_cost
 
@@ -368,7 +368,7 @@ def _starts(frequency: Field, density: Field) -> list[Field]:
 
 def _leakage(spectrum: Spectrum) -> Field:
     """What the window spreads over the lines around one; sums to 1. Exact for a spectrum smooth between lines."""
-    power = np.abs(np.fft.fft(scipy.signal.get_window(spectrum.window, spectrum.segment))) ** 2
+    power = np.abs(np.fft.fft(taper(spectrum.window, spectrum.segment))) ** 2
     half = min(8, (spectrum.segment - 1) // 2)
     near = np.concatenate([power[-half:], power[: half + 1]]) / power.sum()
     reach = int(np.flatnonzero(near[half:] > 1e-4)[-1])

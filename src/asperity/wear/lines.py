@@ -123,13 +123,13 @@ def _level(spectrum: Spectrum) -> Field:
     """Mean density beside each line: the running median, and what the median of a gamma distribution lacks."""
     shape = _shape(spectrum)
     middle = scipy.ndimage.median_filter(spectrum.density, 2 * NEIGHBOURS + 1, mode="nearest")
-    return np.asarray(middle / float(scipy.stats.gamma.ppf(0.5, shape) / shape))
+    return np.asarray(middle / float(scipy.special.gammaincinv(shape, 0.5) / shape))
 
 
 def _bound(spectrum: Spectrum, chance: float) -> float:
     """How far above its neighbours a line may stand by chance; the level itself is known to 1.25/sqrt(41) of that."""
     shape = _shape(spectrum)
-    return float(scipy.stats.gamma.isf(chance, shape) / shape * (1.0 + 0.6 / np.sqrt(shape)))
+    return float(scipy.special.gammainccinv(shape, chance) / shape * (1.0 + 0.6 / np.sqrt(shape)))
 
 
 def _peaks(rise: Field, bound: float) -> Field:
@@ -221,7 +221,7 @@ def _evidence(tones: Field, speed: float, spectrum: Spectrum) -> float:
     if count < FEWEST_HARMONICS:
         return 0.0
     by_chance = min(1.5 * spectrum.spacing_hz / speed, 1.0)
-    return float(-scipy.stats.binom.logsf(count - 1, tones.size, by_chance))
+    return float(-np.log(scipy.special.betainc(count, tones.size - count + 1, by_chance)))
 
 
 def _weak_harmonics(spectrum: Spectrum, rise: Field, combs: Sequence[float], peaks: Field) -> Field:
