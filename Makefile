@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check bench docs clean
+.PHONY: demo test check bench docs installed attacks clean
 .DEFAULT_GOAL := demo
 
 demo: $(READY)
@@ -21,6 +21,13 @@ check: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks
+
+# a wheel in environments that are not ours: base, with extras, lowest and newest dependencies, a folder nobody can write
+installed: $(READY)
+	PYTHON="$(PYTHON)" ./.ci/installed
+
+attacks: $(READY)
+	$(BIN)/python -m benchmarks.attacks --share 0.02
 
 docs: $(READY)
 	$(BIN)/python docs/make_quantities.py

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, get_args
 
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput, articled, require_positive
 from asperity.hertz import HertzContact, elliptic_contact, line_contact, point_contact
 
 Geometry = Literal["line", "point", "elliptic"]
@@ -81,7 +81,8 @@ class ContactConditions:
             require_positive("length", self.length, "m")
         elif self.length is not None:
             raise BadInput(
-                f"length belongs to a line contact, got {self.length:g} m for a {self.geometry} contact; leave it out"
+                f"length belongs to a line contact, got {self.length:g} m for {articled(self.geometry)} contact; "
+                "leave it out"
             )
         if self.hardness is not None:
             require_positive("hardness", self.hardness, "Pa")
@@ -118,7 +119,7 @@ class ContactConditions:
     def line_load(self) -> float:
         """Load per length of a line contact [N/m]."""
         if self.length is None:
-            raise BadInput(f"a {self.geometry} contact has no load per length; use load")
+            raise BadInput(f"{articled(self.geometry)} contact has no load per length; use load")
         return self.load / self.length
 
     @cached_property

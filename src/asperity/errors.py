@@ -24,6 +24,11 @@ class NotConverged(AsperityError):
         self.solution = solution
 
 
+def articled(noun: str) -> str:
+    """A noun with its indefinite article."""
+    return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
+
+
 def require_positive(name: str, value: float, unit: str = "") -> float:
     """Return `value`, or say which quantity has to be positive and finite."""
     if not 0.0 < value < float("inf"):

@@ -1,17 +1,18 @@
 """What all that writes files and folders shares: whole or not at all, refused before the work, versions beside it."""
 
-import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from platform import python_version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import asperity
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 
-MANIFEST = "manifest.json"
+if TYPE_CHECKING:
+    import pandas
+
+FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # what begins one in a spreadsheet
 
 
 @contextmanager
@@ -34,10 +35,40 @@ def whole_file(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all; raises as `whole_file`."""
+    with whole_file(path) as part:
+        part.write_bytes(content)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file, whole or not at all; raises as `whole_file`."""
-    with whole_file(path) as part:
-        part.write_text(text, "utf-8")
+    write_bytes(path, text.encode())
+
+
+def write_csv(path: Path, table: "pandas.DataFrame") -> None:
+    """Write a table as csv, whole or not at all; raises as `whole_file`.
+
+    Text that a spreadsheet would take for a formula begins with an apostrophe: names and units are other people's.
+    """
+    told = table.select_dtypes(exclude=["number", "bool"]).columns
+    safe = table.assign(**{name: table[name].map(_no_formula) for name in told})
+    write_text(path, safe.to_csv(index=False, lineterminator="\n"))
+
+
+def _no_formula(value: Any) -> Any:
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value
+
+
+def require_file(path: Path) -> None:
+    """Raise UnreadableFile for what is no file to be read to its end: nothing, a folder, a pipe or a device."""
+    if path.is_file():
+        return
+    if path.is_dir():
+        raise UnreadableFile(f"{path} is a folder; name a file")
+    if path.exists():
+        raise UnreadableFile(f"{path} is a pipe or a device; write what it gives to a file, and name that")
+    raise UnreadableFile(f"{path} does not exist; check its name")
 
 
 def require_writable(path: Path) -> None:
@@ -66,27 +97,3 @@ def versions() -> dict[str, str]:
     from importlib.metadata import version  # here: it takes longer to load than the rest of the room
 
     return {**{name: version(name) for name in ("asperity", "numpy", "scipy", "numba")}, "python": python_version()}
-
-
-def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:
-    """Refuse to go on in a folder that another asperity began: its numbers would stand beside ours."""
-    theirs, ours = manifest.get("versions", {}).get("asperity"), asperity.__version__
-    if theirs != ours:
-        raise BadInput(f"{folder} was computed by asperity {theirs}, this is {ours}; choose another folder")
-
-
-def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
-    """What a folder that holds a study or a history (`of`) in a layout of that number says about itself.
-
-    Raises UnreadableFile where it says nothing that can be read.
-    """
-    path = folder / MANIFEST
-    try:
-        manifest = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise UnreadableFile(f"{folder} holds no {of}: it has no {MANIFEST}; check its name") from None
-    except (OSError, ValueError):
-        raise UnreadableFile(f"{path} is damaged; compute the {of} into another folder") from None
-    if not isinstance(manifest, dict) or manifest.get("format") != layout or manifest.get("of") != of:
-        raise UnreadableFile(f"{path} is not a {of}'s manifest that this asperity can read; choose another folder")
-    return manifest

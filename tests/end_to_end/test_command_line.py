@@ -235,3 +235,14 @@ def test_demo_goes_from_case_to_report(asp):
     assert [run.case.grid.cells for run in runs] == [(256, 256)] * 3
     shares = [run.state.clr for run in runs]
     assert shares == sorted(shares)
+
+
+def test_new_writes_a_case_once(asp):
+    code, said, _ = asp("new", "point")
+    assert code == 0
+    assert "point.toml" in said
+    assert 'geometry = "point"' in Path("point.toml").read_text("utf-8")
+    code, _, refused = asp("new", "point")
+    assert code == 2
+    assert "is there already" in refused
+    assert asp("new", "sphere")[0] == 2

@@ -33,6 +33,7 @@ EXCEPTIONS = {  # what is right but of none of these kinds
     '["Rx", "Ry"]': "stands for two lengths",
     "SeedSequence(base seed, realisation, hash of the swept values)": "its arguments in words",
     "linspace(0, fs/2, n/2)": "of another program",
+    "NUMBA_CACHE_DIR": "a variable of the environment, of numba",
     "rms_gradient": "of SurfaceTopography",
     "detrend": "of SurfaceTopography",
     "bullet_land.x3p": "among the developers' data",

@@ -222,6 +222,18 @@ def test_a_history_goes_on_bit_for_bit(history, tmp_path):
     assert loaded.case == history.case
 
 
+def test_a_history_killed_before_its_manifest_is_begun_again(tmp_path):
+    folder = tmp_path / "begun"
+    (folder / "fields").mkdir(parents=True)
+    for name in (".lock", ".manifest.json.123.part"):
+        (folder / name).write_text("")
+    assert run_history(case(), steps=1, out=folder).steps == 1
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "letter.part").write_text("")
+    with pytest.raises(BadInput, match="is not empty and holds no history"):
+        run_history(case(), steps=1, out=tmp_path / "other")
+
+
 def test_a_history_killed_at_any_moment_goes_on_bit_for_bit(history, tmp_path):
     folder = tmp_path / "killed"
     script = f"""
@@ -233,7 +245,7 @@ case = load_case("examples/paper.toml").with_overrides({SMALL!r})
 run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
 """
     running = subprocess.Popen([sys.executable, "-c", script])
-    for _ in range(600):
+    for _ in range(2400):
         if (folder / "memory.npz").exists() and int(np.load(folder / "memory.npz")["number"]) >= 3:
             break
         time.sleep(0.05)

@@ -1,7 +1,7 @@
 import errno
 from dataclasses import replace
+from pathlib import Path
 
-import h5netcdf
 import numpy as np
 import pytest
 import xarray
@@ -9,8 +9,10 @@ import xarray
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus, load_solution
 from asperity.ehl.outcome import ATTEMPTS, Figures, GridError
+from asperity.ehl.solution import FORMAT
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.grid import Grid
+from asperity.kept import netcdf_bytes, write_sealed
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
 from asperity.surface import Surface
 
@@ -108,27 +110,32 @@ def test_a_file_cut_short_is_refused(solution, tmp_path, share):
         load_solution(path)
 
 
-def test_a_flipped_bit_in_a_field_is_noticed(solution, tmp_path):
-    import h5py
-
+def test_a_flipped_bit_anywhere_is_noticed(solution, tmp_path):
     path = solution.save(tmp_path / "run.nc")
-    with h5py.File(path) as opened:
-        chunk = opened["pressure"].id.get_chunk_info(0)
-    content = bytearray(path.read_bytes())
-    content[chunk.byte_offset + chunk.size // 2] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(UnreadableFile, match="damaged"):
-        load_solution(path)
+    whole = path.read_bytes()
+    for place in np.random.default_rng(2).integers(8 * len(whole), size=100):
+        content = bytearray(whole)
+        content[place // 8] ^= 1 << place % 8
+        path.write_bytes(content)
+        with pytest.raises(UnreadableFile, match="digest"):
+            load_solution(path)
 
 
 def test_what_is_no_run_is_refused(tmp_path):
     (tmp_path / "text.nc").write_text("pressure 1 GPa")
     xarray.Dataset({"pressure": ("x", [1.0])}).to_netcdf(tmp_path / "foreign.nc", engine="h5netcdf")
-    xarray.Dataset(attrs={"asperity_format": 99}).to_netcdf(tmp_path / "newer.nc", engine="h5netcdf")
-    xarray.Dataset(attrs={"asperity_format": 1}).to_netcdf(tmp_path / "empty.nc", engine="h5netcdf")
+    for name, attributes in {
+        "other": {},
+        "newer": {"asperity_format": 99},
+        "empty": {"asperity_format": FORMAT},
+    }.items():
+        write_sealed(tmp_path / f"{name}.nc", netcdf_bytes(xarray.Dataset(attrs=attributes), {}))
+    write_sealed(tmp_path / "letter.nc", b"pressure 1 GPa")
     reasons = {
-        "text": "damaged or not a run",
-        "foreign": "not a run of asperity",
+        "text": "carries no digest",
+        "foreign": "carries no digest",
+        "letter": "no netCDF file",
+        "other": "not a run of asperity",
         "newer": "run format 99",
         "empty": "damaged",
         "absent": "does not exist",
@@ -146,10 +153,12 @@ def test_an_interrupted_save_leaves_what_was_there(solution, tmp_path, monkeypat
     path = solution.save(tmp_path / "run.nc")
     before = path.read_bytes()
 
-    def half_written(*_, **__):
+    def half_written(part, content):
+        with part.open("wb") as file:
+            file.write(content[: len(content) // 2])
         raise failure
 
-    monkeypatch.setattr(h5netcdf.File, "create_variable", half_written)
+    monkeypatch.setattr(Path, "write_bytes", half_written)
     with pytest.raises(raised):
         solution.save(path)
     assert path.read_bytes() == before

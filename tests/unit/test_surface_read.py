@@ -105,7 +105,7 @@ def test_a_missing_file(tmp_path):
 
 
 def test_a_folder(tmp_path):
-    refused(tmp_path, "cannot be opened")
+    refused(tmp_path, "is a folder")
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@ from .amounts import read_amount as read_amount
 from .amounts import read_length as read_length
 from .amounts import split_amount as split_amount
 from .amounts import to_si as to_si
+from .beginnings import KINDS as KINDS
+from .beginnings import beginning as beginning
 from .case import Case as Case
 from .case import load_case as load_case
 from .laws import LubricantSection as LubricantSection

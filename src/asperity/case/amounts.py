@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, Field, PlainValidator, PositiveInt, Strict
 
-from asperity.case.refusals import none_from_word, quoted
+from asperity.case.refusals import none_from_word, quoted, remedy_for
 from asperity.errors import BadInput
 
 if TYPE_CHECKING:
@@ -88,6 +88,9 @@ def plain(value: Any) -> Any:
     return float(value) if isinstance(value, float) else value
 
 
+_KINEMATIC = "; a kinematic viscosity times the density is one: 100 cSt of 0.88 g/cm^3 are 88 mPa s"
+
+
 class _UnusableUnit(ValueError):
     """What is wrong with a unit, as the end of a sentence."""
 
@@ -113,7 +116,10 @@ def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
     except pint.UndefinedUnitError:
         raise _UnusableUnit("whose unit is not known; capitals matter") from None
     except pint.DimensionalityError:
-        raise _UnusableUnit("which is something else") from None
+        kinematic = unit == "Pa s" and re.search(r"St\b|stokes|m(m)?(\^|\*\*)?2/s|m²/s", unit_text)
+        raise _UnusableUnit(
+            f"which is something else; {_KINEMATIC}" if kinematic else "which is something else"
+        ) from None
     except (pint.PintError, ValueError, TypeError, AssertionError, ArithmeticError, SyntaxError, TokenError):
         raise _UnusableUnit("whose unit cannot be read") from None
 
@@ -134,7 +140,7 @@ def parse_amount(unit: str, value: object) -> Amount:
         raise BadInput(f"{expected}, got the bare number {value}; give it its unit")
     parts = _split(value)
     if parts is None:
-        raise BadInput(f"{expected}, got {quoted(value)}")
+        raise BadInput(f"{expected}, got {quoted(value)}{remedy_for(value)}")
     number, unit_text = parts
     if not unit_text:
         raise BadInput(f"{expected}, got {quoted(value)} without a unit")

@@ -22,12 +22,14 @@ from asperity.coupling import VibrationModel
 from asperity.ehl import ACCURACY, Options, auto_grid, inlet_notes, plausibility_notes
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
+from asperity.limits import require_affordable
 from asperity.lubricant import Lubricant, Thermal
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 
 # surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
 MANY_SURFACES, FEW_SURFACES = 5, 3
 FINE_GRID = 256 * 256  # cells above which there are few
+CELL_BYTES, CELL_S = 800.0, 1e-4  # what a cell takes of memory and time while a contact is solved
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,7 @@ class Case:
                     f"{axis} must reach beyond the contact on both sides, got {ends[0]:g} to {ends[1]:g} half-widths; "
                     f"use {'-4.5 to 1.9' if axis == 'x' else '-3 to 3'}, or leave it out"
                 )
+        _require_affordable(grid)
         return grid
 
     @cached_property
@@ -167,6 +170,7 @@ class Case:
         """
         section, rough, speeds = self.contents.surface, self.motion.rough, self.conditions.surface_speeds
         track = track_grid(self.grid, self.motion.track)
+        _require_affordable(track)
         with self.naming("surface"):
             if self.stored is not None:
                 raise BadInput("is kept in a run, and what it had beside the contact is not; let the case file move")
@@ -241,6 +245,12 @@ class Case:
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface
         return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case
+
+
+def _require_affordable(grid: Grid) -> None:
+    nx, ny = grid.cells
+    cells = float(nx) * float(ny)
+    require_affordable(f"a grid of {nx:.10g} x {ny:.10g} cells", memory=CELL_BYTES * cells, seconds=CELL_S * cells)
 
 
 def load_case(

@@ -8,6 +8,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from asperity.errors import BadInput
 
+SIGNS = {"°C": "write degC for °C", "ºC": "write degC for °C", "°": "write deg", "%": "write a share, 0.05 for 5 %"}
+LONGEST = 80  # characters of a value in a message
+
 S = TypeVar("S", bound="Section")
 
 
@@ -29,8 +32,15 @@ class LocatedError(BadInput):
 
 
 def quoted(value: object) -> str:
-    """A value as a message shows it: text in quotation marks."""
-    return f'"{value}"' if isinstance(value, str) else str(value)
+    """A value as a message shows it: text in quotation marks, and of what is long its beginning."""
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} characters)"
+
+
+def remedy_for(value: object) -> str:
+    """What to write instead of a sign that is none of ours, as the end of a sentence; nothing for most values."""
+    text = value if isinstance(value, str) else ""
+    return next((f"; {remedy}" for sign, remedy in SIGNS.items() if sign in text), "")
 
 
 def none_from_word(value: object) -> object:
@@ -94,7 +104,7 @@ def _first_mistake(model: type[Section], error: ValidationError) -> LocatedError
     if expected.startswith("be a valid dictionary"):
         expected = "be a table"
     expected = expected.replace("'", '"').replace("a valid tuple", "a list")
-    return LocatedError(keys, f"must {expected}, got {quoted(given)}")
+    return LocatedError(keys, f"must {expected}, got {quoted(given)}{remedy_for(given)}")
 
 
 def _keys_of(model: type[Section], keys: tuple[str | int, ...]) -> list[str]:

@@ -10,19 +10,24 @@ from typing import Any
 import tomli_w
 
 from asperity.case.amounts import Amount
-from asperity.case.refusals import Section
+from asperity.case.refusals import Section, quoted
 from asperity.case.sections import CaseFile
 from asperity.case.sweep import StudySection
 from asperity.case.vibration import preset_keys
 from asperity.errors import BadInput, UnreadableFile
+from asperity.files import require_file
+from asperity.quiet import first_line
+
+LONGEST = 4_000_000  # bytes of a case file
 
 
 def read_text(path: Path) -> str:
     """A case file's text; `UnreadableFile` if it is missing or no text."""
+    require_file(path)
+    if path.stat().st_size > LONGEST:
+        raise UnreadableFile(f"{path} has {path.stat().st_size} bytes, too many for a case; check its name")
     try:
         return path.read_text("utf-8")
-    except FileNotFoundError:
-        raise UnreadableFile(f"{path} does not exist; check its name") from None
     except UnicodeDecodeError:
         raise UnreadableFile(f"{path} is not a text file; a case is TOML") from None
     except OSError as error:
@@ -33,8 +38,8 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a text; `UnreadableFile` for what is no TOML."""
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise UnreadableFile(f"{source} is not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:  # no TOML, or numbers and brackets beyond what Python reads
+        raise UnreadableFile(f"{source} is not valid TOML: {first_line(error)}") from None
 
 
 def restated(contents: CaseFile) -> str:
@@ -76,9 +81,12 @@ def relative_path(file: str | Path, folder: Path) -> str:
 
 def _toml_value(text: str) -> object:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        read = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text  # the shell took the quotes away
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"a value cannot be read ({first_line(error)}), got {quoted(text)}") from None
+    return read["value"] if len(read) == 1 else text  # a line of another key is no part of the value
 
 
 def _plain(section: Section) -> dict[str, Any]:

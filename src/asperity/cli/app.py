@@ -2,6 +2,7 @@
 
 import codecs
 import gc
+import os
 import sys
 import unicodedata
 from collections.abc import Sequence
@@ -14,9 +15,11 @@ import asperity
 from asperity import quantities
 from asperity.cli.options import with_flags
 from asperity.errors import AsperityError, BadInput
+from asperity.quiet import printable
 
 GARBAGE_FROM = 100_000  # objects; libraries make that many while they load, and every hundredth search is of them all
 INTERRUPTED = 130  # what typer makes of Ctrl-C
+LONGEST = 480  # characters of a complaint
 SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}
 PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", "′": "'", **SUPERSCRIPTS}
 
@@ -38,20 +41,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="plain")
     try:
         code = app(args=arguments, prog_name="asperity", standalone_mode=False)
+        sys.stdout.flush()
         if code == INTERRUPTED:
             code = _complain("interrupted; nothing half written was left behind", 1)
     except BadInput as error:
         code = _complain(with_flags(str(error)), 2)
     except AsperityError as error:
         code = _complain(str(error), 1)
+    except typer.Abort:  # what typer makes of a library that met the end of a file
+        code = _complain("a file ended before it should; read or copy it again", 1)
     except typer.TyperException as error:  # usage
         code = _complain(f"{error.format_message().rstrip('.')}; asperity --help says what there is", error.exit_code)
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        code = _unheard(error)
     sys.exit(code)
 
 
 def _complain(sentence: str, code: int) -> int:
-    print(f"error: {sentence}", file=sys.stderr)
+    shown = printable(sentence)
+    print(f"error: {shown if len(shown) <= LONGEST else f'{shown[: LONGEST - 3]}...'}", file=sys.stderr)
     return code
+
+
+def _unheard(error: OSError) -> int:
+    """Say that standard output could not be written, and drop what is left for it."""
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - for what exits write
+    if isinstance(error, BrokenPipeError):  # whoever listened has heard enough
+        return 1
+    return _complain(f"the output could not be written: {error.strerror}; what --out names is whole", 1)
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

@@ -87,7 +87,7 @@ def sensitivity(
     kept: dict[str, str] = {}
     if out is not None:
         kept["effects"] = str(out / "effects.csv")
-        files.write_text(out / "effects.csv", result.effects.to_csv(index=False))
+        files.write_csv(out / "effects.csv", result.effects)
     if figure is not None:
         kept["figure"] = str(report.write_figure(report.sensitivity_figure(result), figure))
     show(
@@ -216,7 +216,7 @@ def _keep(result: "Calibration", out: Path) -> dict[str, str]:
     """Write the case, the table and the figure."""
     paths = {"calibrated": out / "calibrated.toml", "anchors": out / "anchors.csv"}
     files.write_text(paths["calibrated"], study.calibrated_text(result, out))
-    files.write_text(paths["anchors"], study.anchor_table(result).to_csv(index=False))
+    files.write_csv(paths["anchors"], study.anchor_table(result))
     paths["figure"] = report.write_figure(report.calibration_figure(result), out / "calibration.png")
     return {name: str(kept) for name, kept in paths.items()}
 

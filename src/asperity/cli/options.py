@@ -96,8 +96,7 @@ def chosen_case(
     """The case of a case file or a run, with a measured surface, `--set KEY=VALUE` values and an accuracy put in."""
     chosen = results.load_run(path).case if path.suffix == ".nc" else case.load_case(path)
     if surface is not None:
-        if not surface.is_file():
-            raise BadInput(f"--surface {surface} does not exist; check its name")
+        files.require_file(surface)
         chosen = chosen.with_overrides({"surface": {"file": case.relative_path(surface, chosen.folder)}})
     replaced: dict[str, object] = {}
     if accuracy is not None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from asperity.cli.options import with_flags
 from asperity.quantities import catalogue, quantity, select
+from asperity.quiet import printable
 
 if TYPE_CHECKING:
     from asperity.ehl import Iteration
@@ -38,12 +39,12 @@ def show(
     if as_json:
         print(json.dumps(values(), indent=None if a_line else 2, allow_nan=False), flush=a_line)
         return
-    print(with_flags(verdict), flush=a_line)
+    print(printable(with_flags(verdict)), flush=a_line)
     if quiet:
         return
     for block in blocks:
         for number, line in enumerate(block):
-            print("" if number else "\n", with_flags(line), sep="", flush=a_line)
+            print("" if number else "\n", printable(with_flags(line)), sep="", flush=a_line)
 
 
 def table(rows: Iterable[Row], notes: Iterable[str] = ()) -> Block:
@@ -109,6 +110,7 @@ def progress(label: str, doing: str = "", *, quiet: bool, compiles: bool = False
     if quiet or not (compiles or sys.stderr.isatty()):
         yield _unseen
         return
+    label = printable(label)
     notice = f"{label}: no step yet; the first solve after installation compiles the solver, up to a minute ..."
     if not sys.stderr.isatty():
         announcement = threading.Timer(SILENT_FOR, print, [notice], {"file": sys.stderr, "flush": True})

@@ -13,7 +13,7 @@ import numpy as np
 from asperity import ehl
 from asperity.conditions import ContactConditions
 from asperity.ehl import ContactSolution, ContactState
-from asperity.errors import BadInput
+from asperity.errors import BadInput, articled
 from asperity.hertz import line_stiffness, point_stiffness
 from asperity.quantities import Parameter, Parametric
 
@@ -91,7 +91,9 @@ class HertzLine(_LineApproach, StiffnessLaw):
         """S [N/m]; raises BadInput for a contact that is no line."""
         conditions = contact.conditions
         if conditions.length is None:
-            raise BadInput(f"stiffness law hertz-line needs a line contact, got a {conditions.geometry} contact")
+            raise BadInput(
+                f"stiffness law hertz-line needs a line contact, got {articled(conditions.geometry)} contact"
+            )
         return line_stiffness(
             contact.asperity_load,
             conditions.length,

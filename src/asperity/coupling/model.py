@@ -18,10 +18,12 @@ from asperity.coupling.excitations import (
 )
 from asperity.coupling.laws import DAMPING_LAWS, STIFFNESS_LAWS, DampingLaw, HertzPoint, RatioDamping, StiffnessLaw
 from asperity.errors import BadInput, require_choice
+from asperity.limits import require_affordable
 from asperity.quantities import Parameter, Parametric, parameters
 from asperity.vibration import RESPONSE_METHODS, SUBSTEPS, ResponseMethod, require_damping_ratio
 from asperity.wear import INDICATOR_METHODS, IndicatorMethod
 
+SAMPLE_BYTES, SAMPLE_S = 150.0, 1e-6  # what a sample of a record takes of memory and time
 SAMPLES_PER_PERIOD = 15.0  # below it the straight lines between samples cost the resonance over 3 % of its power
 LAWS: dict[str, Mapping[str, type[Any]]] = {
     "damping_law": DAMPING_LAWS,
@@ -110,6 +112,12 @@ class VibrationModel(Parametric):
                 f"samples per period must be at least 2, got {self.samples_per_period:g}; "
                 f"{SAMPLES_PER_PERIOD:g} is the default"
             )
+        samples = self.duration_s * self.rate_hz
+        require_affordable(
+            f"a vibration record of {self.duration_s:g} s at {self.rate_hz:g} Hz",
+            memory=SAMPLE_BYTES * samples,
+            seconds=SAMPLE_S * samples * (1.0 if self.linear else float(self.substeps)),
+        )
         if self.seed < 0:
             raise BadInput(f"vibration seed must be 0 or more, got {self.seed}")
         if self.substeps < 1:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,8 +13,9 @@ from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
 from asperity.ehl.outcome import CONSERVING, Convergence, Options
 from asperity.errors import BadInput
-from asperity.files import versions, whole_file
+from asperity.files import versions
 from asperity.grid import Grid
+from asperity.kept import write_sealed
 from asperity.lubricant import Lubricant, describe_lubricant
 from asperity.quantities import quantity
 from asperity.surface import Surface
@@ -21,7 +23,7 @@ from asperity.surface import Surface
 if TYPE_CHECKING:
     import xarray
 
-FORMAT = 1  # counts up when a reader of the format before could not read the file
+FORMAT = 2  # counts up when a reader of the format before could not read the file
 HEADINGS = ("Conventions", "title", "source", "asperity_format")  # attributes of the file, and those that hold JSON
 DESCRIBED = ("conditions", "lubricant", "options", "grid", "convergence", "versions")
 ERRORS = ("iteration_error", "discretisation_error")
@@ -53,7 +55,7 @@ class Contents(NamedTuple):
         return xarray.Dataset(*self)
 
     def save(self, path: str | Path) -> Path:
-        """Write a file, whole or not at all, and return the path.
+        """Write a file with its digest, whole or not at all, and return the path.
 
         Raises
         ------
@@ -64,17 +66,18 @@ class Contents(NamedTuple):
         """
         import h5netcdf
 
-        path = Path(path)
-        checked = {"compression": "gzip", "compression_opts": 1, "shuffle": True}  # zlib tells a flipped bit on reading
-        with whole_file(path) as part, h5netcdf.File(part, "w") as file:
+        path, made = Path(path), BytesIO()  # in memory: the HDF5 library does not survive a disk that is full
+        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+        with h5netcdf.File(made, "w") as file:
             for name, (dimensions, given, attributes) in {**self.coordinates, **self.variables}.items():
                 along, values = (dimensions,) if isinstance(dimensions, str) else dimensions, np.asarray(given)
                 for dimension, length in zip(along, values.shape, strict=True):
                     if dimension not in file.dimensions:
                         file.dimensions[dimension] = length
-                kind = checked if values.ndim == 2 else {}
+                kind = packed if values.ndim == 2 else {}
                 file.create_variable(name, along, data=values, **kind).attrs.update(attributes)
             file.attrs.update(self.attributes)
+        write_sealed(path, made.getvalue())
         return path
 
 
@@ -114,6 +117,7 @@ class ContactSolution:
     viscosity_factor: Field | None = None  # what warmth left of the oil's viscosity, (nx, ny); None where it left all
     oil: Oil | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)  # free text kept with the run, such as its case
+    versions: Mapping[str, str] = field(default_factory=dict)  # of a solution read from a file: what solved it
 
     @property
     def grid(self) -> Grid:

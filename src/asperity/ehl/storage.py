@@ -9,6 +9,7 @@ from asperity.ehl.outcome import Convergence, Figures, GridError, Iteration, Opt
 from asperity.ehl.solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, OIL, STEPS, ContactSolution, Oil
 from asperity.errors import UnreadableFile
 from asperity.grid import Grid
+from asperity.kept import read_netcdf
 from asperity.lubricant import make_lubricant
 from asperity.surface import Surface
 
@@ -24,25 +25,18 @@ def load_solution(path: str | Path) -> ContactSolution:
     UnreadableFile
         if the file is missing, damaged, or not a run of asperity.
     """
-    import xarray
-
-    path = Path(path)
-    if not path.is_file():
-        raise UnreadableFile(f"{path} does not exist; check its name" if not path.exists() else f"{path} is not a file")
+    path, remedy = Path(path), "solve its case again"
+    dataset = read_netcdf(path, remedy)
+    if "asperity_format" not in dataset.attrs:
+        raise UnreadableFile(f"{path} is netCDF but not a run of asperity; solve a case to get one")
+    if dataset.attrs["asperity_format"] != FORMAT:
+        raise UnreadableFile(
+            f"{path} has run format {dataset.attrs['asperity_format']}, this asperity reads format {FORMAT}; {remedy}"
+        )
     try:
-        with xarray.open_dataset(path, engine="h5netcdf", decode_cf=False) as opened:
-            if "asperity_format" not in opened.attrs:
-                raise UnreadableFile(f"{path} is netCDF but not a run of asperity; solve a case to get one")
-            if opened.attrs["asperity_format"] != FORMAT:
-                raise UnreadableFile(
-                    f"{path} has run format {opened.attrs['asperity_format']}, this asperity reads format {FORMAT}; "
-                    "solve its case again"
-                )
-            return _solution(opened.load())
-    except UnreadableFile:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError):  # as h5py and xarray find it
-        raise UnreadableFile(f"{path} is damaged or not a run of asperity; solve its case again") from None
+        return _solution(dataset)
+    except (ValueError, KeyError, TypeError, RuntimeError, AttributeError):
+        raise UnreadableFile(f"{path} is damaged or not a run of asperity; {remedy}") from None
 
 
 def _solution(dataset: "xarray.Dataset") -> ContactSolution:
@@ -68,6 +62,7 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
         convergence=_convergence(described["convergence"], history),
         viscosity_factor=dataset["viscosity_factor"].values if "viscosity_factor" in dataset else None,
         oil=_oil(dataset),
+        versions=described["versions"],
         attributes={str(name): value for name, value in dataset.attrs.items() if name not in (*HEADINGS, *DESCRIBED)},
     )
 

@@ -53,7 +53,7 @@ class History:
     `table` has a row a step, step 0 the start: `step`, `heat_j` (friction's and the flow's, summed over time by the
     trapezoidal rule) and the columns of `history.rows`, which the catalogue of quantities describes; `resonance_hz` is
     nan without an oscillator. `seconds` is what computing took this time, of `computed` steps; `folder` where it is
-    kept, `memory` what the next step needs to know.
+    kept, `memory` what the next step needs to know, `remarks` what the folder's files have to say of themselves.
     """
 
     case: Case
@@ -63,6 +63,7 @@ class History:
     seconds: float = 0.0
     computed: int = 0
     memory: Memory | None = field(default=None, repr=False)
+    remarks: tuple[str, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -72,7 +73,7 @@ class History:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences that a reader of the numbers has to know."""
-        return (*self.case.surface_notes, *self.case.notes)
+        return (*self.remarks, *self.case.surface_notes, *self.case.notes)
 
     @property
     def failed(self) -> tuple[int, ...]:

@@ -14,6 +14,7 @@ from asperity.errors import BadInput, NotConverged
 from asperity.history.history import History, steps_a_pass
 from asperity.history.rows import Row, step_row
 from asperity.history.store import open_keeper
+from asperity.limits import require_affordable
 from asperity.surface import MovingSurfaces
 
 MODELS: dict[str, Steps] = {  # by the case's `model`
@@ -22,6 +23,7 @@ MODELS: dict[str, Steps] = {  # by the case's `model`
     "paper": moving_contact,
     "conserving": moving_contact,
 }
+STEP_S, ROW_BYTES = 1e-5, 2000.0  # what a step takes: time a cell, memory
 
 
 class HistoryProgress(NamedTuple):
@@ -116,4 +118,7 @@ def _last_step(case: Case, surfaces: MovingSurfaces, steps: int | None, passes: 
         wanted = math.ceil(exact - 1e-9)
     if wanted < 1:
         raise BadInput(f"steps must be at least 1, got {wanted}")
+    nx, ny = case.grid.cells
+    seconds = STEP_S * nx * ny * float(wanted)
+    require_affordable(f"a history of {float(wanted):.10g} steps", memory=ROW_BYTES * float(wanted), seconds=seconds)
     return wanted

@@ -11,6 +11,7 @@ import time
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -18,31 +19,34 @@ import filelock
 import numpy as np
 import pandas
 import pyarrow
-import pyarrow.parquet
-import xarray
 
 from asperity.arrays import Field
 from asperity.case import Case, load_case, relative_path
 from asperity.ehl import Contents, Memory, Snapshot
 from asperity.errors import BadInput, UnreadableFile
-from asperity.files import (
-    MANIFEST,
-    make_folder,
-    read_manifest,
-    require_same_version,
-    require_writable,
-    versions,
-    whole_file,
-    write_text,
-)
+from asperity.files import make_folder, require_writable, versions
 from asperity.history.history import Frame, History
 from asperity.history.rows import Row
+from asperity.kept import (
+    MANIFEST,
+    read_manifest,
+    read_netcdf,
+    read_sealed,
+    read_table,
+    require_case,
+    require_same_version,
+    version_notes,
+    write_json,
+    write_sealed,
+    write_table,
+)
 from asperity.quantities import quantity
 from asperity.surface import MovingSurfaces
 
-FORMAT = 1  # counts up when a reader of the format before could not read the folder
-TABLE, MEMORY, MAPS = "history.parquet", "memory.npz", "fields"
+FORMAT = 2  # counts up when a reader of the format before could not read the folder
+TABLE, MEMORY, MAPS, LOCK = "history.parquet", "memory.npz", "fields", ".lock"
 KEPT_EVERY_S = 2.0  # what a crash may cost
+IDENTITY, REMEDY = "identity", "run the case into another folder"
 MAPS_KEPT = 40  # in a whole history, unless said otherwise
 
 
@@ -58,33 +62,41 @@ def load_history(folder: str | Path) -> History:
     manifest = read_manifest(folder, of="history", layout=FORMAT)
     home = (folder / manifest["case_folder"]).resolve()
     case = load_case(manifest["case"], folder=home, name=manifest["source"])
-    rows = _rows(folder)
+    identity: str = manifest["digest"]
+    rows = _rows(folder, identity)
     if not rows:
         raise UnreadableFile(f"{folder} holds a history without a step; run its case again")
-    frames = _frames(folder, int(rows[-1]["step"]))
-    return History(case=case, table=pandas.DataFrame(rows), frames=frames, folder=folder, memory=_memory(folder))
+    return History(
+        case=case,
+        table=pandas.DataFrame(rows),
+        frames=_frames(folder, identity, int(rows[-1]["step"])),
+        folder=folder,
+        memory=_memory(folder, identity),
+        remarks=version_notes(manifest["versions"]),
+    )
 
 
 def is_history(folder: Path) -> bool:
     """Whether a folder says of itself that it holds a history."""
+    path = folder / MANIFEST
     try:
-        return (folder / TABLE).exists() and json.loads((folder / MANIFEST).read_text("utf-8"))["of"] == "history"
-    except (OSError, ValueError, KeyError, TypeError):
+        return (folder / TABLE).exists() and path.is_file() and json.loads(path.read_text("utf-8"))["of"] == "history"
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 
 class Keeper:
     """The rows and maps of a history as they come, in memory and, with a folder, on disk."""
 
-    def __init__(self, case: Case, folder: Path | None, every: int) -> None:
-        self.case, self.folder, self.every = case, folder, every
+    def __init__(self, case: Case, folder: Path | None, every: int, identity: str = "") -> None:
+        self.case, self.folder, self.every, self.identity = case, folder, every, identity
         self.rows: list[Row] = []
         self.frames: list[Frame] = []
         self.memory: Memory | None = None
         self.kept_at = time.monotonic()
-        if folder is not None and (memory := _memory(folder)) is not None:
+        if folder is not None and (memory := _memory(folder, identity)) is not None:
             self.memory = memory
-            self.rows = [row for row in _rows(folder) if row["step"] <= int(memory["number"])]
+            self.rows = [row for row in _rows(folder, identity) if row["step"] <= int(memory["number"])]
             if self.last != int(memory["number"]):
                 raise UnreadableFile(f"{folder / TABLE} ends before {folder / MEMORY}; start another folder")
 
@@ -112,6 +124,7 @@ class Keeper:
         touching, heights = solution.in_contact.astype(np.int8), solution.surface.heights.astype(np.float32)
         maps = {"gap": gap, "pressure": pressure, "in_contact": touching, "surface_height": heights}
         about = {"title": "Step of a moving contact", "step": snapshot.number, "time_s": snapshot.time}
+        about |= {"case": self.identity}
         contents = Contents(
             {name: (("x", "y"), values, quantity(name).attributes) for name, values in maps.items()},
             {
@@ -130,11 +143,11 @@ class Keeper:
         if self.memory is None:
             return
         table = pyarrow.Table.from_pylist(self.rows).replace_schema_metadata({"case": self.case.text})
-        with whole_file(folder / TABLE) as part:
-            pyarrow.parquet.write_table(table, part)
-        arrays: dict[str, Any] = dict(self.memory)
-        with whole_file(folder / MEMORY) as part, part.open("wb") as file:
-            np.savez(file, **arrays)
+        write_table(folder / TABLE, table, self.identity)
+        arrays: dict[str, Any] = {**self.memory, IDENTITY: np.array(self.identity)}
+        packed = BytesIO()
+        np.savez(packed, **arrays)
+        write_sealed(folder / MEMORY, packed.getvalue())
         self.kept_at = time.monotonic()
 
     def history(self, seconds: float, computed: int) -> History:
@@ -144,7 +157,7 @@ class Keeper:
         return History(
             case=self.case,
             table=pandas.DataFrame(self.rows),
-            frames=tuple(self.frames) if self.folder is None else _frames(self.folder, self.last),
+            frames=tuple(self.frames) if self.folder is None else _frames(self.folder, self.identity, self.last),
             folder=self.folder,
             seconds=seconds,
             computed=computed,
@@ -176,18 +189,23 @@ def open_keeper(
             remedy = "choose another folder, or the case as it was"
             raise BadInput(f"{folder} holds the history of another case than {case.source}; {remedy}")
         usual = kept["every"]
-    elif folder.exists() and any(folder.iterdir()):
+    elif folder.exists() and not all(map(_just_begun, folder.iterdir())):
         raise BadInput(f"{folder} is not empty and holds no history; name a new folder")
     make_folder(folder / MAPS)
     require_writable(manifest)
     try:
-        with filelock.FileLock(folder / ".lock", timeout=0):
+        with filelock.FileLock(folder / LOCK, timeout=0):
             for left in (*folder.glob(".*.part"), *(folder / MAPS).glob(".*.part")):
                 left.unlink(missing_ok=True)
-            write_text(manifest, json.dumps(_manifest(case, digest, every or usual, folder), indent=1))
-            yield Keeper(case, folder, every or usual)
+            write_json(manifest, _manifest(case, digest, every or usual, folder))
+            yield Keeper(case, folder, every or usual, digest)
     except filelock.Timeout:
         raise BadInput(f"another process computes this history in {folder}; wait for it, or stop it") from None
+
+
+def _just_begun(entry: Path) -> bool:
+    """Whether a file is of a history that another process is beginning, or was killed at."""
+    return entry.name in (LOCK, MAPS) or (entry.name.startswith(f".{MANIFEST}.") and entry.suffix == ".part")
 
 
 def _digest(case: Case, surfaces: MovingSurfaces) -> str:
@@ -214,38 +232,33 @@ def _manifest(case: Case, digest: str, every: int, folder: Path) -> dict[str, An
     }
 
 
-def _rows(folder: Path) -> list[Row]:
+def _rows(folder: Path, identity: str) -> list[Row]:
     path = folder / TABLE
     if not path.exists():
         return []
-    try:
-        rows: list[Row] = pyarrow.parquet.read_table(path).to_pylist()
-    except (OSError, pyarrow.ArrowException) as error:
-        raise UnreadableFile(f"{path} is damaged ({error}); run the case into another folder") from None
+    rows: list[Row] = read_table(path, identity, REMEDY).to_pylist()
     return rows
 
 
-def _memory(folder: Path) -> Mapping[str, Field] | None:
+def _memory(folder: Path, identity: str) -> Mapping[str, Field] | None:
     path = folder / MEMORY
     if not path.exists():
         return None
-    try:
-        with np.load(path, allow_pickle=False) as kept:
-            return {name: kept[name] for name in kept.files}
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise UnreadableFile(f"{path} is damaged ({error}); run the case into another folder") from None
+    with np.load(BytesIO(read_sealed(path, REMEDY)), allow_pickle=False) as kept:
+        memory = {name: kept[name] for name in kept.files}
+    require_case(path, str(memory.pop(IDENTITY, None)), identity, REMEDY)
+    return memory
 
 
-def _frames(folder: Path, last: int) -> tuple[Frame, ...]:
+def _frames(folder: Path, identity: str, last: int) -> tuple[Frame, ...]:
     """The maps on disk, up to the last step kept."""
     frames = []
     for path in sorted((folder / MAPS).glob("step-*.nc")):
-        try:
-            with xarray.open_dataset(path, engine="h5netcdf", decode_cf=False) as opened:
-                number, when = int(opened.attrs["step"]), float(opened.attrs["time_s"])
-                maps = [opened[name].values for name in ("gap", "pressure", "in_contact")]
-        except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError):
-            raise UnreadableFile(f"{path} is damaged; delete it, or run the case into another folder") from None
+        remedy = f"delete it, or {REMEDY}"
+        kept = read_netcdf(path, remedy)
+        require_case(path, kept.attrs.get("case"), identity, remedy)
+        number, when = int(kept.attrs["step"]), float(kept.attrs["time_s"])
+        maps = [kept[name].values for name in ("gap", "pressure", "in_contact")]
         if number <= last:
             frames.append(Frame(number, when, maps[0], maps[1], maps[2].astype(bool)))
     return tuple(frames)

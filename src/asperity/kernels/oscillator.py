@@ -8,9 +8,9 @@ Source: J. R. Dormand and P. J. Prince, J. Comput. Appl. Math. 6 (1980) 19, the 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from asperity.arrays import Field
+from asperity.kernels.compiled import njit
 
 
 class Contact(NamedTuple):

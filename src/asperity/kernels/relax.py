@@ -7,9 +7,9 @@ loop runs along a contiguous axis. All arrays of a call share one precision, whi
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from asperity.arrays import Field
+from asperity.kernels.compiled import njit
 from asperity.kernels.reynolds import Stencil
 
 

@@ -10,9 +10,9 @@ that would be at zero pressure. Knows no units, no oil and no tolerance.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from asperity.arrays import Codes, Field, Mask
+from asperity.kernels.compiled import njit
 
 RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # what decides a cell
 

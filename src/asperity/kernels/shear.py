@@ -4,9 +4,9 @@ Knows no oil and no contact; arrays in, array filled.
 """
 
 import numpy as np
-from numba import njit
 
 from asperity.arrays import Field
+from asperity.kernels.compiled import njit
 
 SUBSTEPS = 8
 STIFF = 30.0  # relaxation times a step beyond which one implicit step is as good as many

@@ -7,6 +7,7 @@ fools a search for the highest point, is drawn anew for each rig: structural mod
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -21,6 +22,7 @@ from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, osc
 from asperity.ehl import ContactState
 from asperity.errors import BadInput, require_choice, require_positive
 from asperity.files import whole_file, write_text
+from asperity.limits import require_affordable
 from asperity.paper.contact import papers_contact, rig_case
 from asperity.paper.numbers import CRF_ENDS_HZ, DAMPING_RATIO, MASS, RIG_LOAD, SAMPLES_SQ_UM, SAMPLES_STD_UM, SHAFT_HZ
 from asperity.paper.rig_recording import GRID_HZ, Disturbance, RigRecording, RigTest, contact_line, draw_background
@@ -34,6 +36,7 @@ SATURATION_UM = 0.8
 CONSTANT_HZ = 3400.0
 RATE_PER_BAND = 3.0  # sampling rate over the upper end of the search band, at least
 SHORTEST_RECORD = 1000
+SAMPLE_BYTES, SAMPLE_S = 50.0, 2e-7  # what a sample takes of memory and time
 AT_ONCE = 2  # recordings made at the same time: 300 s at 20 kHz take 0.3 GB each
 
 
@@ -161,7 +164,13 @@ def _require_settings(
 
     require_positive("rig recording's duration", duration_s, "s")
     require_positive("rig sampling rate", rate_hz, "Hz")
-    if round(duration_s * rate_hz) < SHORTEST_RECORD:
+    length = duration_s * rate_hz
+    require_affordable(
+        f"a wear test of {samples} samples x {repeats} recordings of {duration_s:g} s at {rate_hz:g} Hz",
+        memory=AT_ONCE * SAMPLE_BYTES * length + 8.0 * rate_hz / GRID_HZ * samples * repeats,
+        seconds=SAMPLE_S * length * samples * repeats,
+    )
+    if round(length) < SHORTEST_RECORD:
         record = f"{duration_s:g} s at {rate_hz:g} Hz"
         raise BadInput(f"a rig recording needs at least {SHORTEST_RECORD} samples, got {record}; lengthen it")
 
@@ -273,10 +282,12 @@ def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
 def _write_hdf5(path: Path, signal: Signal) -> None:
     import h5py
 
-    with h5py.File(path, "w") as file:
+    made = BytesIO()  # in memory: the HDF5 library does not survive a disk that is full
+    with h5py.File(made, "w") as file:
         values = file.create_dataset("acceleration", data=signal.values.astype(np.float32))
         values.attrs["sampling_rate_hz"] = signal.rate_hz
         values.attrs["unit"] = signal.unit
+    path.write_bytes(made.getvalue())
 
 
 def _write_wav(path: Path, signal: Signal) -> None:

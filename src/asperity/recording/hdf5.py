@@ -28,16 +28,19 @@ def read(path: Path) -> Contents:
     with refused_as(path, "no readable HDF5 file"):
         file = h5py.File(path, "r")
     with file, refused_as(path, "a damaged HDF5 file"):
-        channels = list(_channels(path, file, "", {}, notes))
+        channels = list(_channels(path, file, "", {}, notes, set()))
         matlab = any(str(key).startswith("MATLAB") for member in file.values() for key in member.attrs)
     return Contents(format="mat v7.3" if matlab else "hdf5", channels=channels, notes=notes)
 
 
-def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
+def _channels(
+    path: Path, group: Any, name: str, above: dict[str, Any], notes: list[str], seen: set[Any]
+) -> Iterator[Channel]:
     import h5py
 
-    if name.count("/") > _DEEPEST:
+    if name.count("/") > _DEEPEST or group.id in seen:  # a group may be linked into itself
         return
+    seen.add(group.id)
     around = above | dict(group.attrs)
     members = [(str(key), group.get(key)) for key in group if not str(key).startswith("#")]
     for key, member in members:
@@ -46,7 +49,7 @@ def _channels(path: Path, group: Any, name: str, above: dict[str, Any], notes: l
     for key, member in members:
         inner = f"{name}/{key}" if name else key
         if isinstance(member, h5py.Group):
-            yield from _channels(path, member, inner, around, notes)
+            yield from _channels(path, member, inner, around, notes, seen)
         elif isinstance(member, h5py.Dataset) and numeric(member) and member.size is not None and member.size > 64:
             facts = facts_in(path.name, around | dict(member.attrs))
             yield from columns(inner, _OnDisk(path, member.name, member.shape), notes, **facts)

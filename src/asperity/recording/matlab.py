@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import scipy
 
-from asperity.recording.common import columns, facts_in, numeric, refused_as
-from asperity.recording.model import Channel, Contents
+from asperity.apart import read_apart
+from asperity.recording.common import REMEDY, columns, facts_in, numeric, refused_as
+from asperity.recording.model import Contents
 
 _DEEPEST = 8
 
@@ -26,31 +27,40 @@ def is_matlab(head: bytes) -> bool:
 
 
 def read(path: Path) -> Contents:
-    """Channels named by variable and field: bearing.gs."""
+    """Channels named by variable and field: bearing.gs; scipy, which does not survive every file, reads them apart."""
     notes: list[str] = []
-    with refused_as(path, "no readable MATLAB file"):
-        held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
-        held = {key: value for key, value in held.items() if not key.startswith("__")}
-        channels = list(_channels(path.name, held, "", {}, notes))
+    rows = read_apart(path.absolute(), "asperity.recording.matlab:rows", remedy=REMEDY, library="scipy.io")
+    channels = [channel for name, values, facts in rows for channel in columns(name, values, notes, **facts)]
     return Contents(format="mat v5", channels=channels, notes=notes)
 
 
-def _channels(file: str, held: dict[str, Any], name: str, above: dict[str, Any], notes: list[str]) -> Iterator[Channel]:
+Row = tuple[str, Any, dict[str, Any]]  # name, array, and what the file states of it
+
+
+def rows(path: Path) -> list[Row]:
+    """All arrays of numbers in a file."""
+    with refused_as(path, "no readable MATLAB file"):
+        held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+        held = {key: value for key, value in held.items() if not key.startswith("__")}
+        return list(_rows(path.name, held, "", {}))
+
+
+def _rows(file: str, held: dict[str, Any], name: str, above: dict[str, Any]) -> Iterator[Row]:
     if name.count(".") > _DEEPEST:
         return
     around = above | {key: value for key, value in held.items() if np.size(value) == 1 and not _fields(value)}
     for key, value in held.items():
         inner = f"{name}.{key}" if name else key
         if fields := _fields(value):
-            yield from _channels(file, fields, inner, around, notes)
+            yield from _rows(file, fields, inner, around)
         elif isinstance(value, np.ndarray) and value.dtype == object:
             for number, entry in enumerate(value.reshape(-1)[:64], 1):
                 if fields := _fields(entry):
-                    yield from _channels(file, fields, f"{inner}({number})", around, notes)
+                    yield from _rows(file, fields, f"{inner}({number})", around)
                 elif isinstance(entry, np.ndarray) and numeric(entry) and entry.size > 64:
-                    yield from columns(f"{inner}({number})", entry, notes, **facts_in(file, around))
+                    yield f"{inner}({number})", entry, facts_in(file, around)
         elif isinstance(value, np.ndarray) and numeric(value) and value.size > 64:
-            yield from columns(inner, value, notes, **facts_in(file, around))
+            yield inner, value, facts_in(file, around)
 
 
 def _fields(value: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 Nothing is guessed: what neither the file, nor a sidecar beside it, nor the caller states is asked for.
 """
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -10,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import BadInput, UnreadableFile, require_positive
+from asperity.files import require_file
+from asperity.limits import require_unpacked
 from asperity.quiet import first_line, quietly
 from asperity.recording import hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
-from asperity.recording.common import REMEDY, parse_time
+from asperity.recording.common import MOST_CHANNELS, REMEDY, parse_time
 from asperity.recording.model import (
     ACCELERATION,
     FULL_SCALE,
@@ -108,9 +111,9 @@ def read_contents(path: Path) -> Contents:
     UnreadableFile
         for a file that is missing, damaged, in no known format or without a time record.
     """
-    if not path.is_file():
-        refusal = "is a folder; name the files in it" if path.is_dir() else "does not exist; check its name"
-        raise UnreadableFile(f"{path} {refusal}")
+    if path.is_dir():
+        raise UnreadableFile(f"{path} is a folder; name the files in it")
+    require_file(path)
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
@@ -140,6 +143,9 @@ def read_contents(path: Path) -> Contents:
         raise UnreadableFile(f"{path.name} claims more data than fits into memory; {REMEDY}") from None
     except Exception as error:
         raise UnreadableFile(f"{path.name} is damaged ({first_line(error)}); {REMEDY}") from error
+    if len(contents.channels) > MOST_CHANNELS:
+        raise UnreadableFile(f"{path.name} holds {len(contents.channels)} channels, {MOST_CHANNELS} at most; {REMEDY}")
+    require_unpacked(path, 8.0 * sum(channel.samples or 0 for channel in contents.channels), REMEDY)
     if not contents.channels:
         raise UnreadableFile(f"{path.name} holds no row of samples; give a file with a recording in it")
     return contents
@@ -158,6 +164,8 @@ def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecordi
     total = 1.0
     if "scale" in stated:
         total = float(stated["scale"].value)
+        if not 0.0 < abs(total) < math.inf:
+            raise BadInput(f"scale must be finite and not 0, got {total:g}; give scale, what a stored 1 stands for")
         facts["scale"] = Fact(total, stated["scale"].source)
     facts["unit"] = _unit(path, selected, stated.get("unit"), scaled="scale" in stated)
     unit_text = str(facts["unit"].value)

@@ -4,8 +4,10 @@ Nothing is solved or fitted for a page; it is self-contained and loads nothing.
 """
 
 import re
+from base64 import b64encode
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +20,8 @@ from asperity.files import require_writable, whole_file
 from asperity.paper import CITATION
 from asperity.quantities import Quantity, quantity, with_deviation
 from asperity.report.style import ON_PAGE, ON_PAPER, Medium, svg, write_figure
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none';"
 
 
 class Picture(NamedTuple):
@@ -117,8 +121,13 @@ def in_print(text: str) -> str:
     return re.sub(r"(?<=\d) (?=[%±]|Hz|GPa|[µn]m\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
 
 
-def render(template: str, **values: Any) -> str:
-    """A page as HTML text, escaped and complete; quantities are asked for their names and numbers where they stand."""
+def render(template: str, *, script: str = "", **values: Any) -> str:
+    """A page as HTML text, escaped and complete; quantities are asked for their names and numbers where they stand.
+
+    The page may load nothing and run nothing but `script`, whatever stands in the names that it shows.
+    """
+    runs = f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
+    values |= {"script": script, "policy": f"{POLICY} script-src {runs}"}
     environment = Environment(
         loader=PackageLoader("asperity.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,

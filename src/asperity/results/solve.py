@@ -14,6 +14,7 @@ from asperity import ehl
 from asperity.case import Case, load_case
 from asperity.coupling import require_sampling
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.kept import version_notes
 from asperity.processes import cores, set_up_worker
 from asperity.results.run import Run, run_of
 from asperity.results.spread import Row
@@ -170,5 +171,9 @@ def load_run(path: str | Path) -> Run:
         alone = f"{path} holds a solution without its case"
         raise UnreadableFile(f"{alone}; save the run (Run.save), not its solution alone") from None
     case = load_case(text, folder=path.parent, name=str(path), stored=solution.surface)
+    if (case.conditions, case.grid) != (solution.conditions, solution.grid) or (
+        case.lubricant != solution.lubricant or case.options != solution.options
+    ):
+        raise UnreadableFile(f"{path} holds a case that is not the one solved in it; solve its case again")
     case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
-    return run_of(case, solution, notes, others)
+    return run_of(case, solution, (*version_notes(solution.versions), *notes), others)

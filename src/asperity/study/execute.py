@@ -29,17 +29,19 @@ import pandas
 
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, require_positive
-from asperity.files import MANIFEST, versions
+from asperity.files import versions
+from asperity.kept import MANIFEST
 from asperity.processes import cores, set_up_worker
-from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, evaluate_batch, timed_batch
+from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, timed_batch
 from asperity.study.plan import StudyCase, StudyPlan
-from asperity.study.store import Store, in_order, manifest_of, open_read, open_store, read_plan, require_zarr, table_of
+from asperity.study.store import Store, in_order, manifest_of, open_kept, open_read, open_store, require_zarr, table_of
 
 BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose
 LARGEST_BATCH = 200
 BATCHES_AHEAD = 2  # a worker; more would only be lost in a crash
 MOST_DEATHS = 3  # of the processes that computed one case, the last of them with nothing beside it
 DASK_WAIT_S = 10.0
+PROCESS_S = 2.0  # until a worker process is there, with its libraries
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ def load_study(folder: str | Path) -> StudyResult:
     UnreadableFile
         if the folder holds no study, or something in it is damaged.
     """
-    store = Store(Path(folder), read_plan(Path(folder)))
+    store = open_kept(Path(folder))
     return StudyResult(store.plan, store.table(), store.folder, store.merged)
 
 
@@ -381,11 +383,14 @@ class StudyCost:
     case_s: float  # one worker, mean of those tried
     tried: int
     workers: int
+    start_s: float = 0.0  # until a worker has loaded and compiled
 
     @property
     def seconds(self) -> float:
-        """Wall-clock time that is left."""
-        return (self.cases - self.kept) * self.case_s / self.workers
+        """Wall-clock time that is left; workers start beside one another, on as many processors as there are."""
+        left = self.cases - self.kept
+        at_once = max(1, min(self.workers, cores(), left))
+        return left * self.case_s / at_once + (self.start_s if left else 0.0)
 
 
 def estimate_study(
@@ -403,10 +408,12 @@ def estimate_study(
     if not share:
         return StudyCost(0, 0, 0.0, 0, workers or cores())
     chosen = [share[round(part * (len(share) - 1))].overrides for part in (0.0, 0.5, 1.0)]
-    evaluate_batch(plan.case, plan.kind, [chosen[1]])  # loads and compiles
+    _, first = timed_batch(plan.case, plan.kind, [chosen[1]])  # loads and compiles
     _, seconds = timed_batch(plan.case, plan.kind, chosen)
     kept = sum(case.id in known for case in share)
-    return StudyCost(len(share), kept, seconds / len(chosen), len(chosen), workers or cores())
+    case_s = seconds / len(chosen)
+    start_s = PROCESS_S + max(0.0, first - case_s)
+    return StudyCost(len(share), kept, case_s, len(chosen), workers or cores(), start_s)
 
 
 def _share(plan: StudyPlan, shard: tuple[int, int]) -> list[StudyCase]:

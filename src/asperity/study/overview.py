@@ -10,6 +10,7 @@ import pandas
 from threadpoolctl import threadpool_limits
 
 from asperity.errors import AsperityError, BadInput
+from asperity.kept import version_notes
 from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anchors, is_papers_contact, rig_prediction
 from asperity.quantities import quantity
 from asperity.results import Run, solve_case
@@ -134,7 +135,7 @@ class StudyOverview:
     @cached_property
     def notes(self) -> list[str]:
         """Sentences to read before the numbers."""
-        notes = []
+        notes = list(version_notes(self.result.versions))
         if self.result.missing:
             share = f"{self.result.missing} of {len(self.result.plan.cases)} cases"
             notes.append(f"{share} have not been computed yet: run the study again.")

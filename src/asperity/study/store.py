@@ -8,7 +8,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -17,25 +17,16 @@ from typing import Any
 import filelock
 import pandas
 import pyarrow
-import pyarrow.parquet
 
 from asperity.arrays import Field
 from asperity.case import load_case, relative_path, to_si
 from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.files import (
-    MANIFEST,
-    make_folder,
-    read_manifest,
-    require_same_version,
-    require_writable,
-    versions,
-    whole_file,
-    write_text,
-)
+from asperity.files import make_folder, require_writable, versions, write_bytes
+from asperity.kept import MANIFEST, read_manifest, read_table, require_same_version, write_json, write_table
 from asperity.study.evaluate import Row
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
-FORMAT = 1  # counts up when a reader of the format before could not read the folder
+FORMAT = 2  # counts up when a reader of the format before could not read the folder
 PARTS, TABLE, MAPS = "parts", "table.parquet", "fields.zarr"
 LEFT_BEHIND_S = 3600.0  # age of a temporary file that no shard elsewhere can still be writing
 _LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
@@ -47,12 +38,13 @@ class Store:
 
     folder: Path
     plan: StudyPlan
+    design: str  # as the folder has it: of another asperity, perhaps not the plan's
 
     def finished(self) -> dict[str, tuple[str, int]]:
         """Status and attempt of every case that some part holds."""
         newest: dict[str, tuple[str, int]] = {}
         for path in self._parts():
-            part = _read_part(path, ["case_id", "status", "attempt"]).to_pydict()
+            part = self._read_part(path).select(["case_id", "status", "attempt"]).to_pydict()
             for case_id, status, attempt in zip(*(part[name] for name in part), strict=True):
                 if attempt >= newest.get(case_id, ("", 0))[1]:
                     newest[case_id] = status, attempt
@@ -92,23 +84,24 @@ class Store:
 
     def table(self) -> pandas.DataFrame:
         """What is finished, a row a case in the order of the plan."""
-        return in_order([_read_part(path) for path in self._parts()], self.plan)
+        return in_order([self._read_part(path) for path in self._parts()], self.plan)
 
     def take_from(self, other: Path) -> None:
         """Copy the parts of another folder of the same study (a shard computed elsewhere)."""
         for path in open_read(other, self.plan)._parts():
             target = self.folder / PARTS / path.name
             if not target.exists():
-                with whole_file(target) as part:
-                    part.write_bytes(path.read_bytes())
+                write_bytes(target, path.read_bytes())
 
     def _parts(self) -> list[Path]:
         return sorted((self.folder / PARTS).glob("*.parquet"))
 
+    def _read_part(self, path: Path) -> pyarrow.Table:
+        return read_table(path, self.design, "delete it, and its cases are computed again")
+
     def _write(self, path: Path, table: pyarrow.Table) -> None:
         try:
-            with whole_file(path) as part:
-                pyarrow.parquet.write_table(table, part)
+            write_table(path, table, self.design)
         except AsperityError as refused:
             raise type(refused)(f"{refused}; finished cases are kept, make room and run the study again") from refused
 
@@ -133,14 +126,14 @@ def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterato
         for left in (folder / PARTS).glob(".*.part"):
             if shard == (1, 1) or time.time() - left.stat().st_mtime > LEFT_BEHIND_S:
                 left.unlink(missing_ok=True)
-        write_text(manifest, json.dumps(_manifest(plan, folder), indent=1))
-        yield Store(folder, plan)
+        write_json(manifest, _manifest(plan, folder))
+        yield Store(folder, plan, plan.design)
 
 
 def open_read(folder: Path, plan: StudyPlan) -> Store:
     """A study's folder to read from; BadInput where it holds another study than `plan`."""
     _require_same(plan, folder)
-    return Store(folder, plan)
+    return Store(folder, plan, plan.design)
 
 
 def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
@@ -159,8 +152,8 @@ def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
         raise BadInput(f"cannot write into {folder}: {error.strerror}; choose another") from None
 
 
-def read_plan(folder: Path) -> StudyPlan:
-    """The plan of a study's folder; `UnreadableFile` if it holds no study, or its manifest is damaged."""
+def open_kept(folder: Path) -> Store:
+    """A study as its folder keeps it; `UnreadableFile` if it holds no study, or its manifest is damaged."""
     manifest = manifest_of(folder)
     try:
         home = (folder / manifest["case_folder"]).resolve()
@@ -176,7 +169,10 @@ def read_plan(folder: Path) -> StudyPlan:
         ids = tuple(manifest["ids"])
         if len(ids) != len(plan.points) * plan.realisations:
             raise KeyError("ids")
-        return replace(plan, ids=ids)
+        with suppress(UnreadableFile):  # the measured surface need not be at hand
+            if plan.design == manifest["design"] and ids != tuple(case.id for case in plan.cases):
+                raise KeyError("ids")  # another design is that of an asperity whose case file had other keys
+        return Store(folder, replace(plan, ids=ids), manifest["design"])
     except KeyError:
         raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
 
@@ -208,13 +204,6 @@ def _require_same(plan: StudyPlan, folder: Path) -> None:
     if manifest.get("design") != plan.design:
         remedy = "choose another folder, or the case as it was"
         raise BadInput(f"{folder} holds a study of another case than {plan.case.source}; {remedy}")
-
-
-def _read_part(path: Path, columns: list[str] | None = None) -> pyarrow.Table:
-    try:
-        return pyarrow.parquet.read_table(path, columns=columns)
-    except (OSError, pyarrow.ArrowException) as error:
-        raise UnreadableFile(f"{path} is damaged ({error}); delete it, and its cases are computed again") from None
 
 
 def require_zarr() -> Any:

@@ -15,9 +15,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from asperity.apart import read_apart
 from asperity.arrays import Field
 from asperity.errors import BadInput, UnreadableFile, require_positive
+from asperity.files import require_file
 from asperity.grid import FEWEST_CELLS, Grid
+from asperity.limits import require_unpacked
 from asperity.quiet import first_line, quietly
 from asperity.surface.model import MeasuredSurface, length_text
 from asperity.surface.text import SUFFIXES as TABLES
@@ -76,6 +79,18 @@ def read_surface(
     sizes = None if pixel is None else pixel if isinstance(pixel, tuple) else (pixel, pixel)
     for size in sizes or ():
         require_positive("pixel", size, "m")
+    require_file(path)
+    stated = (unit, lateral_unit, sizes)
+    surface: MeasuredSurface = read_apart(
+        path.absolute(), "asperity.surface.read:measured", *stated, remedy=_REMEDY, library="SurfaceTopography"
+    )
+    return surface
+
+
+def measured(
+    path: Path, unit: str | None, lateral_unit: str | None, sizes: tuple[float, float] | None
+) -> MeasuredSurface:
+    """What `read_surface` gives, worked out in this process."""
     raw = _read(path, matrix=sizes is not None)
     height_scale, sizes = _sizes(path.name, raw, unit, lateral_unit, sizes)
     heights = np.where(np.isfinite(raw.heights), raw.heights, np.nan) * height_scale
@@ -161,13 +176,14 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
     try:
         with path.open("rb") as file:
             start = file.read(1)
-    except FileNotFoundError:
-        raise UnreadableFile(f"{path} does not exist; correct the path") from None
     except OSError as error:
         raise UnreadableFile(f"{path} cannot be opened ({error.strerror}); name a file that can be read") from error
     if not start:
         raise UnreadableFile(f"{name} is empty; {_REMEDY}")
 
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            require_unpacked(path, sum(part.file_size for part in archive.infolist()), _REMEDY)
     if suffix == "npy":
         return _array(path)
     if matrix and suffix in TABLES:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.errors import BadInput, UnreadableFile
+from asperity.files import require_file
 from asperity.recording import is_sidecar
 
 _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
@@ -92,6 +93,7 @@ def read_table(path: str | Path) -> Table:
         for a row without a number where one is due.
     """
     path = Path(path)
+    require_file(path)
     try:
         text = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

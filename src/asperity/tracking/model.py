@@ -12,7 +12,8 @@ import numpy as np
 
 from asperity.arrays import finite_or_none
 from asperity.errors import BadInput
-from asperity.files import whole_file
+from asperity.files import whole_file, write_csv
+from asperity.kept import netcdf_bytes
 from asperity.quantities import quantity
 from asperity.tracking.reading import Reading
 from asperity.tracking.target import Target
@@ -209,10 +210,11 @@ class Track:
         suffix = path.suffix.lower()
         if suffix not in ENDINGS:
             raise BadInput(f"a track is kept as .csv, .parquet or .nc, got {path.name}; change its ending")
+        if suffix == ".csv":
+            write_csv(path, self.table)
+            return path
         with whole_file(path) as part:
-            if suffix == ".csv":
-                self.table.to_csv(part, index=False, lineterminator="\n")
-            elif suffix == ".parquet":
+            if suffix == ".parquet":
                 try:
                     self.table.to_parquet(part, index=False)
                 except ImportError:
@@ -222,7 +224,7 @@ class Track:
                 packed = {"zlib": True, "complevel": 1, "shuffle": True}
                 dataset = self.to_dataset()
                 encoding = {name: packed for name in ("density", "kept") if name in dataset}
-                dataset.to_netcdf(part, engine="h5netcdf", encoding=encoding)
+                part.write_bytes(netcdf_bytes(dataset, encoding))
         return path
 
 

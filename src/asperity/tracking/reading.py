@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
+from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
@@ -17,6 +18,7 @@ import numpy as np
 import scipy
 
 from asperity.errors import BadInput, UnreadableFile
+from asperity.kept import read_sealed, write_sealed
 from asperity.processes import leave_interrupts_to_the_parent
 from asperity.recording import Gauge, Quality, ReadOptions, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
@@ -149,14 +151,15 @@ def _size(path: Path) -> int:
 
 
 def save_reading(reading: Reading, path: Path) -> None:
-    """Write a reading, to be read by `load_reading`; the caller sees to it that it is written whole."""
+    """Write a reading, whole or not at all, to be read by `load_reading`; raises as `files.whole_file`."""
     density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
     content: dict[str, Any] = asdict(replace(reading, spectrum=None))
     if reading.spectrum is not None:
         kept = ("unit", "duration_s", "segment", "window", "resolution_hz", "averages")
         content["spectrum"] = {name: getattr(reading.spectrum, name) for name in kept}
-    with path.open("wb") as file:
-        np.savez(file, density=density, told=json.dumps(content))
+    packed = BytesIO()
+    np.savez(packed, density=density, told=np.array(json.dumps(content)))
+    write_sealed(path, packed.getvalue())
 
 
 def load_reading(path: Path) -> Reading:
@@ -167,8 +170,10 @@ def load_reading(path: Path) -> Reading:
     UnreadableFile
         for anything else.
     """
+    remedy = "delete it, and its recording is read again"
+    body = BytesIO(read_sealed(path, remedy))
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        with np.load(body, allow_pickle=False) as stored:
             density, content = stored["density"], json.loads(str(stored["told"]))
         quality = content.pop("quality")
         spectrum = content.pop("spectrum")
@@ -180,4 +185,4 @@ def load_reading(path: Path) -> Reading:
             quality = Quality(**quality | {name: tuple(quality[name]) for name in ("faults", "remarks")})
         return Reading(spectrum=spectrum, quality=quality, **content)
     except Exception as error:
-        raise UnreadableFile(f"{path} is damaged; delete it, and its recording is read again") from error
+        raise UnreadableFile(f"{path} is no reading of a recording; {remedy}") from error

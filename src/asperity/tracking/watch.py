@@ -3,18 +3,16 @@
 What was read is kept in files of its own, so that a watch can stop at any moment and go on later.
 """
 
-import json
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
 from time import sleep, time
-from typing import Any
 
 from asperity.case import Case
 from asperity.errors import BadInput, UnreadableFile
-from asperity.files import make_folder, whole_file
+from asperity.files import make_folder
+from asperity.kept import read_json, write_json
 from asperity.recording import ReadOptions
 from asperity.tracking.files import read_table, recordings_in
 from asperity.tracking.model import Track
@@ -111,7 +109,8 @@ class _Memory:
         self._loaded: dict[str, Reading] = {}
         make_folder(self.folder)
         self.expected = {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options)
-        begun = _read_json(self.settings) if self.settings.is_file() else self.expected
+        remedy = "delete its folder, and recordings are read again"
+        begun = read_json(self.settings, remedy) if self.settings.is_file() else self.expected
         self.spacing_hz: float | None = begun.get("spacing_hz")
         for name, value in self.expected.items():
             if begun.get(name) != value:
@@ -136,13 +135,11 @@ class _Memory:
             return ()
         if self.spacing_hz is None:
             self.spacing_hz = common_spacing(paths, self.options, self.target)
-            with whole_file(self.settings) as part:
-                part.write_text(json.dumps(self.expected | {"spacing_hz": self.spacing_hz}, indent=2), "utf-8")
+            write_json(self.settings, self.expected | {"spacing_hz": self.spacing_hz})
         keys = [_key(path) for path in paths]  # before reading: what changes meanwhile is read again
         reader = read_spectra(paths, self.options, self.target, self.spacing_hz, workers=workers, progress=progress)
         for number, reading in reader:
-            with whole_file(self.folder / keys[number]) as part:
-                save_reading(reading, part)
+            save_reading(reading, self.folder / keys[number])
             self._loaded[keys[number]] = reading
         return tuple(self._loaded[key] for key in keys)
 
@@ -163,11 +160,3 @@ def _key(path: Path) -> str:
 def _settled(path: Path, seconds: float) -> bool:
     status = path.stat()
     return status.st_size > 0 and time() - status.st_mtime >= seconds
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    with suppress(OSError, ValueError):
-        content = json.loads(path.read_text("utf-8"))
-        if isinstance(content, dict):
-            return content
-    raise UnreadableFile(f"{path} is damaged; delete its folder, and recordings are read again")

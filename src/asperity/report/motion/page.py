@@ -6,6 +6,7 @@ The maps are small pictures in the page, shown one after the other by a few line
 import json
 from base64 import b64encode
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from asperity.quantities import quantity
 from asperity.report.base import Picture, in_print, render, tile, write_page
 from asperity.report.motion import exhibits
 
+SCRIPT = resources.files("asperity.report.motion").joinpath("page.js").read_text("utf-8")
 NUMBERS = (
     "clr", "car", "car_domain", "contact_force_n", "h_min_m", "h_central_m", "h_mean_m", "p_max_pa",
     "friction_coefficient", "friction_power_w", "flow_power_w", "resonance_hz", "mass_flux_imbalance",
@@ -64,8 +66,6 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
         ],
         maps=[_map(history, kind, reach) for kind in exhibits.KINDS],
         curves=over_time.picture_of(figure),
-        begins=100.0 * box.x0,
-        ends=100.0 * box.x1,
         running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
         motion=motion,
         numbers=[quantity(key) for key in NUMBERS],
@@ -73,7 +73,8 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
         settled_from=int(rows["step"].iloc[0]),
         model=history.case.contents.model,
         imbalance=quantity("mass_flux_imbalance").text(rows["mass_flux_imbalance"].mean()),
-        script_data=_script_data(history, reach),
+        script=SCRIPT,
+        script_data=_script_data(history, reach, (100.0 * box.x0, 100.0 * box.x1)),
     )
 
 
@@ -88,18 +89,20 @@ def _map(history: History, kind: exhibits.Kind, reach: exhibits.Ranges) -> Movin
     return MovingMap(exhibit.picture_of(figure), left, top, width, height, zone)
 
 
-def _script_data(history: History, reach: exhibits.Ranges) -> str:
+def _script_data(history: History, reach: exhibits.Ranges, ends: tuple[float, float]) -> str:
     """What the page's script shows of each kept step: its maps, its numbers in words, its place in time."""
     pictures = [exhibits.frame_picture(frame, reach) for frame in history.frames]
     last = float(history.table["time_s"].iloc[-1])
-    return json.dumps(
+    held = json.dumps(
         {
+            "ends": ends,
             "frames": ["data:image/png;base64," + b64encode(packed).decode() for packed, _ in pictures],
             "size": pictures[0][1],
             "words": [_in_words(history, frame.number) for frame in history.frames],
             "place": [frame.time / last if last else 0.0 for frame in history.frames],
         }
     )
+    return held.replace("<", "\\u003c")  # nothing in it ends the script
 
 
 def _in_words(history: History, number: int) -> str:

@@ -24,7 +24,7 @@ def traction_map(run: Run, friction: Friction) -> Exhibit:
     values, coefficient = np.abs(friction.shear), quantity("friction_coefficient").text(friction.coefficient)
     top = float(display("shear", values).max()) or 1.0
     ticks = [float(f"{share * top:.2g}") for share in (0.0, 0.04, 0.16, 0.36, 0.64, 0.98)]
-    title, norm = f"Shear stress, friction coefficient {coefficient}", PowerNorm(0.5, 0.0, top)
+    title, norm = f"Shear stress (colours by its square root), friction {coefficient}", PowerNorm(0.5, 0.0, top)
     speed = quantity("sliding_speed_m_s").text(run.solution.conditions.sliding_speed)
     return Exhibit(
         "traction",

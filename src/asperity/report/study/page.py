@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.files import make_folder, require_writable, whole_file
+from asperity.files import make_folder, require_writable, write_csv
 from asperity.paper import Anchor
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit, Picture, Tile, heading, render, write_exhibits, write_page
@@ -78,8 +78,7 @@ def _folder(path: Path) -> Path:
 def _write_tables(study: StudyOverview, folder: Path) -> None:
     """Each table as csv."""
     for name, table in study.tables.items():
-        with whole_file(folder / f"{name}.csv") as part:
-            table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
+        write_csv(folder / f"{name}.csv", table)
 
 
 def study_exhibits(study: StudyOverview) -> list[Exhibit]:

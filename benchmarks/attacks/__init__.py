@@ -1,0 +1,1 @@
+"""Attacks: what is thrown at asperity, and a runner that sees whether it holds. `python -m benchmarks.attacks`."""

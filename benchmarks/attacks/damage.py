@@ -1,0 +1,181 @@
+"""Damage of files: what lies on disk is flipped, cut, filled and mixed up, and has to be refused or read as it was."""
+
+import json
+import random
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from asperity.errors import BadInput
+
+SHARED = Path(__file__).parents[2].parent / "shared" / "data"
+RECORDINGS = ("vibration/mfpt-formats/*", "vibration/mfpt/*.mat", "vibration/endaq/*", "vibration/uff/*")
+SURFACES = ("surfaces/*",)
+LARGEST = 3_000_000  # bytes of an original; larger ones take too long a thousand times
+SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um"}
+
+
+def damaged(content: bytes, rng: random.Random) -> bytes:
+    """A content with one kind of damage that disks, cables and hands do."""
+    changed, size = bytearray(content), len(content)
+    kind = rng.randrange(7)
+    at = rng.randrange(size)
+    if kind <= 2:  # most often a bit; half of them where headers are
+        at = at if kind else rng.randrange(min(size, 4096))
+        changed[at] ^= 1 << rng.randrange(8)
+    elif kind == 3:
+        del changed[at:]
+    elif kind == 4:
+        end = min(size, at + rng.choice((4, 64, 4096)))
+        changed[at:end] = bytes(end - at)
+    elif kind == 5:
+        end = min(size, at + rng.choice((4, 64, 4096)))
+        changed[at:end] = rng.randbytes(end - at)
+    else:
+        other = rng.randrange(size)
+        changed[at:at] = changed[other : other + 512]
+    return bytes(changed)
+
+
+# Results --------------------------------------------------------------------------------------------------------------
+
+
+def make_results(folder: Path) -> None:
+    """A run, a history and a study, each small."""
+    from asperity.history import run_history
+    from asperity.paper import papers_case
+    from asperity.results import solve_case
+    from asperity.study import plan_study, run_study
+
+    case = papers_case().with_overrides(SMALL)
+    solve_case(case, strict=False).save(folder / "run.nc")
+    run_history(case, steps=3, every=1, out=folder / "history", strict=False)
+    swept = case.with_overrides({"study": {"sq": ["1 um", "2 um"], "seeds": 2}})
+    run_study(plan_study(swept), out=folder / "study", workers=1)
+
+
+def numbers_of(folder: Path, which: str) -> str:
+    """All that a result gives, as text to compare."""
+    from asperity.history import load_history
+    from asperity.results import load_run
+    from asperity.study import load_study
+
+    def text(values: Any) -> str:
+        return json.dumps(values, default=str, sort_keys=True)
+
+    if which == "run.nc":
+        run = load_run(folder / which)
+        fields = (run.solution.pressure, run.solution.gap, run.solution.surface.heights)
+        return text([run.verdict(), run.case.text, [field.tobytes().hex()[:2000] for field in fields]])
+    if which == "history":
+        moved = load_history(folder / which)
+        values = {key: value for key, value in moved.scalars().items() if key != "folder"}
+        return text([values, moved.table.to_dict(), moved.case.text, len(moved.frames), str(moved.memory)])
+    result = load_study(folder / which)
+    return text([result.table.to_dict(), result.plan.points, [case.id for case in result.plan.cases]])
+
+
+def results(folder: Path) -> Callable[[int], str | None]:
+    """An attack by number on one file of a result."""
+    make_results(folder)
+    told = {which: numbers_of(folder, which) for which in ("run.nc", "history", "study")}
+    files = {which: sorted(_files(folder / which)) for which in told}
+
+    def attack(number: int) -> str | None:
+        rng = random.Random(number)
+        which = ("run.nc", "history", "study")[number % 3]
+        path = rng.choice(files[which])
+        whole = path.read_bytes()
+        path.write_bytes(damaged(whole, rng))
+        try:
+            return None if numbers_of(folder, which) == told[which] else f"{path.name}: silently different"
+        except BadInput as refusal:
+            return too_long(refusal)
+        finally:
+            path.write_bytes(whole)
+
+    return attack
+
+
+def _files(path: Path) -> Iterator[Path]:
+    if path.is_file():
+        yield path
+    else:
+        yield from (file for file in path.rglob("*") if file.is_file() and "lock" not in file.name)
+
+
+def too_long(refusal: BadInput) -> str | None:
+    """What is wrong with a refusal."""
+    text = str(refusal)
+    return f"refusal of {len(text)} characters" if len(text) > 500 or "\n" in text else None
+
+
+# What was measured ----------------------------------------------------------------------------------------------------
+
+
+def originals(folder: Path) -> list[Path]:
+    """Measured files of every format, as far as they are at hand; else such as can be made."""
+    found = [
+        path
+        for pattern in (*RECORDINGS, *SURFACES)
+        for path in sorted(SHARED.glob(pattern))
+        if path.is_file() and path.stat().st_size < LARGEST
+    ]
+    return found or _made(folder)
+
+
+def _made(folder: Path) -> list[Path]:
+    import h5py
+    import numpy as np
+    import pandas
+    import scipy.io
+    import soundfile
+    import x3pio
+
+    values = np.random.default_rng(1).standard_normal(5000)
+    np.save(folder / "a.npy", values)
+    np.savez(folder / "a.npz", x=values, rate_hz=2e4)
+    scipy.io.savemat(folder / "a.mat", {"x": values, "rate": 2e4}, do_compression=True)
+    soundfile.write(folder / "a.wav", values / 10.0, 20000)
+    pandas.DataFrame({"x": values}).to_parquet(folder / "a.parquet")
+    pandas.DataFrame({"time (s)": np.arange(5000) / 2e4, "x (g)": values}).to_csv(folder / "a.csv", index=False)
+    with h5py.File(folder / "a.h5", "w") as file:
+        file.create_dataset("x", data=values, compression="gzip").attrs["sampling_rate_hz"] = 2e4
+    x3pio.write(folder / "b.x3p", values[:4900].reshape(70, 70) * 1e-6, x_scale=1e-6, y_scale=1e-6)
+    np.savetxt(folder / "b.txt", values[:4900].reshape(70, 70))
+    return sorted(path for path in folder.iterdir() if path.is_file())
+
+
+def measured(folder: Path) -> Callable[[int], str | None]:
+    """An attack by number on a recording or a surface: what is wrong with it is said, or it is read."""
+    from asperity.recording import open_channels
+    from asperity.surface import read_surface
+
+    files = originals(folder)
+    contents = {path: path.read_bytes() for path in files}
+
+    def attack(number: int) -> str | None:
+        rng = random.Random(number)
+        path = files[number % len(files)]
+        copy = folder / f"damaged-{path.name}"
+        copy.write_bytes(damaged(contents[path], rng))
+        surface = path.parent.name == "surfaces" or path.name.startswith("b.")
+        try:
+            if surface:
+                read_surface(copy)
+            else:
+                for opened in open_channels(copy, rate_hz=None)[:2]:
+                    opened.read()
+        except BadInput as refusal:
+            return too_long(refusal)
+        finally:
+            copy.unlink()
+        return None
+
+    return attack
+
+
+def copied(folder: Path, source: Path) -> Path:
+    """A copy of a folder of results."""
+    return Path(shutil.copytree(source, folder))

@@ -1,0 +1,24 @@
+"""`asperity new`: a commented case file to start from."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asperity import case, files
+from asperity.cli.app import app
+from asperity.errors import BadInput, require_choice
+
+
+@app.command()
+def new(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="line, point, elliptic, dry, measured, motion or study.")],
+    out: Annotated[Path | None, typer.Option(metavar="CASE.toml", help="File to write; default: KIND.toml.")] = None,
+) -> None:
+    """Write a commented case to start from."""
+    require_choice("kind of case", kind, case.KINDS)
+    path = out or Path(f"{kind}.toml")
+    if path.exists():
+        raise BadInput(f"{path} is there already; name another with --out")
+    files.write_text(path, case.beginning(kind))
+    print(f"{path}: a case to start from. Try next: asperity solve {path}")

@@ -1,0 +1,76 @@
+"""numba's compilation with a cache that can be damaged, emptied or nowhere to be kept: then kernels compile anew.
+
+numba loads what its cache holds as it stands, machine code included, and raises where it holds nothing sensible. Here
+a digest follows everything in it; what does not fit is thrown away.
+"""
+
+import pickle
+from collections.abc import Callable
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+_DIGEST = 32  # bytes behind what is kept; pickle passes over them
+
+
+class _CheckedFile(IndexDataCacheFile):
+    """The cache of one function on disk."""
+
+    def _dump(self, obj: Any) -> bytes:
+        body: bytes = super()._dump(obj)
+        return body + sha256(body).digest()
+
+    def _load_index(self) -> dict[Any, str]:
+        kept: dict[Any, str] = self._checked(Path(self._index_path), super()._load_index, versioned=True) or {}
+        return kept
+
+    def _load_data(self, name: str) -> Any:
+        return self._checked(Path(self._data_path(name)), lambda: super(_CheckedFile, self)._load_data(name))
+
+    def _checked(self, path: Path, load: Callable[[], Any], *, versioned: bool = False) -> Any:
+        """What a file of the cache gives; None, and no file, where it is not what was written."""
+        try:
+            with path.open("rb") as file:
+                if versioned:
+                    pickle.load(file)
+                content = file.read()
+            if sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]:
+                return load()
+        except FileNotFoundError:
+            return None
+        except Exception:  # noqa: BLE001 - whatever damage makes of a pickle
+            pass
+        with suppress(OSError):
+            path.unlink()
+        return None
+
+
+class _Cache(FunctionCache):
+    """The cache of one function; where nothing can be written, nothing is kept."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        kept = self._cache_file
+        self._cache_file = _CheckedFile(kept._cache_path, self._impl.filename_base, kept._source_stamp)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled, if the disk lets us."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """As numba's, with a cache that is checked; without one where no folder for it can be written."""
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        kernel = numba.njit(**options)(function)
+        if cache:
+            with suppress(RuntimeError):  # no folder: every process compiles for itself
+                kernel._cache = _Cache(function)
+        return kernel
+
+    return compiled

@@ -1,0 +1,41 @@
+"""A disk that is full, or a quota: one sentence, nothing half written, whatever is being written."""
+
+import resource
+import subprocess
+import sys
+
+import pytest
+
+SMALL = ("--set", "grid.cells=[32, 24]", "--set", "surface.correlation_length=40 um", "-q")
+
+
+def limited(kilobytes: int):
+    """What lets the files of a process grow no further; the system's own limit is as good as a full disk."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (kilobytes << 10, kilobytes << 10))
+
+
+COMMANDS = {  # what writes, and kilobytes that are too few for it
+    "run": (("solve", "case.toml", "--surfaces", "1", *SMALL, "--out", "new/run.nc"), 30),
+    "history": (("run", "case.toml", "--steps", "2", *SMALL, "--out", "new/history"), 5),
+    "study": (("study", "case.toml", "--workers", "1", *SMALL, "--set", "study.sq=['1 um']", "--out", "new/study"), 4),
+    "rig": (("rig", "--out", "new/rig", "--samples", "1", "--repeats", "1", "--duration", "5 s"), 50),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_full_disk_is_one_sentence(asp, tmp_path, name):
+    assert asp
+    arguments, kilobytes = COMMANDS[name]
+    (tmp_path / "new").mkdir()
+    ended = subprocess.run(
+        [sys.executable, "-m", "asperity", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limited(kilobytes),
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.count("\n") == 1
+    assert "could not be written" in ended.stderr
+    assert not list(tmp_path.rglob("*.part"))
+    assert not list(tmp_path.rglob("*.nc"))

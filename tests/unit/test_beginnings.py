@@ -1,0 +1,18 @@
+import pytest
+
+from asperity.case import KINDS, beginning, load_case
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_case_to_start_from_is_a_case(kind):
+    case = load_case(beginning(kind), name=kind)
+    assert case.conditions.geometry == (kind if kind in ("point", "elliptic") else "line")
+    assert (case.lubricant is None) == (kind == "dry")
+    assert (case.contents.study is not None) == (kind == "study")
+    assert (case.contents.motion is not None) == (kind == "motion")
+    assert case.vibration is not None
+
+
+def test_every_quantity_is_explained():
+    lines = [line for line in beginning("line").splitlines() if "=" in line and not line.startswith("#")]
+    assert sum("#" in line for line in lines) > len(lines) / 2

@@ -1,0 +1,131 @@
+"""What lies on disk is what was written: damage, another case's files and another version are said, not believed."""
+
+import json
+import shutil
+
+import numpy as np
+import pyarrow
+import pytest
+
+from asperity.errors import UnreadableFile
+from asperity.history import load_history, run_history
+from asperity.kept import (
+    digest,
+    read_json,
+    read_sealed,
+    read_table,
+    version_notes,
+    write_json,
+    write_sealed,
+    write_table,
+)
+from asperity.paper import papers_case
+
+TABLE = pyarrow.Table.from_pylist(
+    [{"name": "a", "car": 0.1, "steps": 3, "fine": True}, {"name": "b", "car": None, "steps": 4, "fine": False}]
+)
+
+
+def flipped(content: bytes, seed: int, count: int):
+    for place in np.random.default_rng(seed).integers(8 * len(content), size=count):
+        changed = bytearray(content)
+        changed[place // 8] ^= 1 << place % 8
+        yield bytes(changed)
+
+
+def test_a_digest_is_of_names_types_shapes_and_values():
+    array = np.arange(6.0)
+    contents = [
+        {"a": array},
+        {"b": array},
+        {"a": array.astype(np.float32)},
+        {"a": array.reshape(2, 3)},
+        {"a": array + 1e-15},
+        {"a": array, "b": 1},
+        {"a": array, "b": 1.0},
+        b"a",
+    ]
+    assert len({digest(content) for content in contents}) == len(contents)
+    assert digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1})
+
+
+def test_what_was_sealed_comes_back_and_nothing_else_does(tmp_path):
+    path = tmp_path / "file"
+    for body in (b"", b"some bytes"):
+        write_sealed(path, body)
+        assert read_sealed(path, "write it again") == body
+    path.write_bytes(b"short")
+    with pytest.raises(UnreadableFile, match=r"no digest.*; write it again"):
+        read_sealed(path, "write it again")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_flipped_bit_in_a_table_gives_the_same_table_or_a_refusal(tmp_path, seed):
+    path = tmp_path / "table.parquet"
+    write_table(path, TABLE, "this case")
+    refused = 0
+    for changed in flipped(path.read_bytes(), seed, 50):
+        path.write_bytes(changed)
+        try:
+            assert read_table(path, "this case", "compute it again").equals(TABLE)
+        except UnreadableFile:
+            refused += 1
+    assert refused > 20
+
+
+def test_a_table_of_another_case_is_refused(tmp_path):
+    write_table(tmp_path / "table.parquet", TABLE, "another case")
+    with pytest.raises(UnreadableFile, match="another case than its folder"):
+        read_table(tmp_path / "table.parquet", "this case", "compute it again")
+
+
+def test_a_changed_value_in_a_manifest_is_refused(tmp_path):
+    path = tmp_path / "manifest.json"
+    write_json(path, {"points": [{"surface.sq": "0.5 um"}], "pair": (1, 2)})
+    assert read_json(path, "") == {"points": [{"surface.sq": "0.5 um"}], "pair": [1, 2]}
+    path.write_text(path.read_text().replace("0.5 um", "0.7 um"))
+    with pytest.raises(UnreadableFile, match="other content"):
+        read_json(path, "compute it again")
+    path.write_text(json.dumps({"points": []}))
+    with pytest.raises(UnreadableFile, match="no digest"):
+        read_json(path, "compute it again")
+
+
+def test_another_version_is_said():
+    assert version_notes({"asperity": "0.0.1"})[0].startswith("Computed by asperity 0.0.1")
+
+
+@pytest.fixture(scope="module")
+def histories(tmp_path_factory):
+    """Folders of two cases that differ in their load."""
+    case = papers_case().with_overrides({"grid.cells": [32, 32], "surface.correlation_length": "60 um"})
+    folders = []
+    for load in ("500 N", "400 N"):
+        folder = tmp_path_factory.mktemp("histories") / load.split()[0]
+        run_history(case.with_overrides({"contact.load": load}), steps=2, every=1, out=folder)
+        folders.append(folder)
+    return folders
+
+
+@pytest.mark.parametrize("name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"])
+def test_files_of_another_case_are_refused(histories, tmp_path, name):
+    mine, other = histories
+    folder = shutil.copytree(mine, tmp_path / "mixed")
+    load_history(folder)
+    shutil.copy(other / name, folder / name)
+    with pytest.raises(UnreadableFile, match="another case"):
+        load_history(folder)
+
+
+@pytest.mark.parametrize("name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"])
+def test_a_flipped_bit_in_a_history_is_refused_or_changes_nothing(histories, tmp_path, name):
+    folder = shutil.copytree(histories[0], tmp_path / "damaged")
+    whole, told = (folder / name).read_bytes(), load_history(folder)
+    for changed in flipped(whole, 1, 25):
+        (folder / name).write_bytes(changed)
+        try:
+            again = load_history(folder)
+        except UnreadableFile:
+            continue
+        assert again.table.equals(told.table)
+        assert again.case == told.case
