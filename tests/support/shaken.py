@@ -84,10 +84,11 @@ def _outflow(balance, pressure, gap):
     dx, dy = problem.spacing
     ahead = gap[0] + ((problem.x[0] - dx) ** 2 - problem.x[0] ** 2) / 2.0
     outflow = net_outflow(pressure, content, mobility, ambient, (ahead + gap[0]) / 2.0, dx, dy, **faces_of(balance))
-    if isinstance(balance, MixedBalance):  # second order, less where the film's content jumps; the weights stay
-        lean = balance.lean
+    if isinstance(balance, MixedBalance):  # second order, less where the film's content jumps; how open it is stays
+        here, before = content[1:-1], content[:-2]
+        lean = here * before / (here**2 + before**2)
         added = np.zeros_like(content)
-        added[1:-1] = lean[1:-1] * (content[1:-1] - content[:-2])
+        added[1:-1] = balance.lean[1:-1] / lean.real * lean * (here - before)
         leaning = added.copy()
         leaning[1:] -= added[:-1]
         outflow = outflow + leaning / dx

@@ -195,17 +195,17 @@ def test_mobility_slopes_are_the_complex_step_of_the_twin(rng, film, rows):
 
 
 def test_leaning_outflow_is_its_twins(rng):
-    content, lean, found = rng.random(CELLS), rng.random(CELLS), np.empty(CELLS)
-    reynolds.leaning_outflow(content, lean, DX, found)
+    content, own, upstream, found = (*rng.random((3, *CELLS)), np.empty(CELLS))
+    reynolds.leaning_outflow(content, own, upstream, DX, found)
     through = np.zeros((CELLS[0] + 1, CELLS[1]))  # x faces; the outer two and the first inner one stay as they are
-    through[2:-1] = lean[1:-1] * np.diff(content, axis=0)[:-1]
+    through[2:-1] = own[1:-1] * content[1:-1] - upstream[1:-1] * content[:-2]
     np.testing.assert_allclose(found, np.diff(through, axis=0) / DX, rtol=1e-12, atol=1e-12)
 
 
 def test_a_film_that_leans_by_a_half_has_the_second_order_wedge(rng, film):
     pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
-    added = np.empty(CELLS)
-    reynolds.leaning_outflow(film.content, np.full(CELLS, 0.5), DX, added)
+    added, half = np.empty(CELLS), np.full(CELLS, 0.5)
+    reynolds.leaning_outflow(film.content, half, half, DX, added)
     first = outflow(pressure, film, inlet, wedge=(0.0, 0.0))
     np.testing.assert_allclose(first + added, outflow(pressure, film, inlet), rtol=1e-12, atol=1e-12)
 

@@ -364,7 +364,7 @@ def test_a_bad_step_is_marked():
     rolling = contact(hardness=CAP, surface_speeds=PURE_ROLLING)
     bad = next(moving_contact(rolling, barus(), marked, options=few, resume=good.memory))
     assert not bad.solution.convergence.converged
-    assert bad.solution.convergence.iterations <= 40
+    assert bad.solution.convergence.iterations <= 100
 
 
 @pytest.mark.parametrize("how", [{"time_step": 0.5}, {"time_step": 2.0}, {"flattening": True}])

@@ -10,11 +10,15 @@ from asperity.case import load_case
 from asperity.ehl import Options, contact_state, solve_contact
 from asperity.ehl.dry import dry_contact
 from asperity.ehl.mixed import Pressures, evaluate
+from asperity.ehl.mixed_iterate import newton
+from asperity.ehl.mixed_linear import MixedLinear
 from asperity.ehl.mixed_solve import MixedSearch
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
+from asperity.ehl.shares import carried_share
 from asperity.grid import Grid
 from asperity.kernels.reynolds import LUBRICATED, TOUCHING
+from asperity.lubricant import Roelands
 from asperity.surface import flat_surface, gaussian_surface
 from support.paper import barus, contact, grid, rough
 
@@ -68,7 +72,7 @@ def test_one_answer_from_two_starts():
 
 
 def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
-    """The same answer in half the steps on the fine grid."""
+    """The same answer in two thirds of the steps on the fine grid."""
     conditions, oil, surface = contact(hardness=2e9), barus(), rough(grid((192, 192)), 2.5e-6, seed=7)
     levels, scales = grid_levels(contact_problem(conditions, oil, surface, MIXED)), Scales.of(conditions, oil)
     searches = {number: MixedSearch(MIXED, scales.gap, None) for number in (1, len(levels))}
@@ -77,9 +81,63 @@ def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
         search.from_dry(levels[:number])
         assert search.settled(MIXED.tolerance)
         steps[number] = sum(step.cells == (192, 192) for step in search.history)
-    assert steps[len(levels)] < 0.6 * steps[1]
+    assert steps[len(levels)] < 0.7 * steps[1]
     at_once, climbed = (search.figures[-1].clr for search in searches.values())
     assert climbed == pytest.approx(at_once, abs=0.002)
+
+
+def hard_ball():
+    """A ball of through-hardened steel at a film ratio of 0.2, its problem and the dry start."""
+    hard = contact(geometry="point", radius=9.6e-3, load=45.0, length=None, speed=0.41, hardness=6.5e9)
+    a = hard.hertz.half_widths[0]
+    on = Grid((120, 80), (-2.0 * a, -1.4 * a), (1.4 * a, 1.4 * a), periodic=(False, False))
+    surface = gaussian_surface(on, sq=0.25e-6, correlation_length=(38e-6, 56e-6), rng=np.random.default_rng(2))
+    oil = replace(barus(), viscosity=Roelands(14e-3, 20e-9))
+    problem, scales = contact_problem(hard, oil, surface, MIXED), Scales.of(hard, oil)
+    total, approach, _ = dry_contact(replace(problem, lubricant=None, contact_gap=0.0), hertz_pressure(problem))
+    dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
+    return problem, dry, MixedSearch(MIXED, scales.gap, None)
+
+
+def hertz_pressure(problem):
+    across = problem.y / problem.form.aspect
+    return np.sqrt(np.maximum(1.0 - (problem.x**2)[:, None] - across**2, 0.0))
+
+
+def test_steps_of_time_lead_where_newtons_steps_alone_do_not():
+    """Hard steel: eighty of Newton's steps from the dry contact go round, the film that builds up in time arrives."""
+    problem, dry, search = hard_ball()
+    search.run(problem, newton(problem, dry, second_order=False), 1e-2, 80)
+    assert not search.settled(1e-2)
+    assert len(search.history) > 80
+
+    search.history.clear()
+    arrived = search.march(problem, dry, 1.0, met=1e-2)
+    still = search.run(problem, newton(problem, arrived.balance.unknowns, second_order=False), 1e-4, 80)
+    assert search.settled(1e-4)
+    assert len(search.history) < 200
+    # the last step of time was long: the oil that it still had from before is hardly to be seen
+    shares = [carried_share(one.balance.pressure, one.balance.in_contact) for one in (arrived, still)]
+    assert shares[0] == pytest.approx(shares[1], abs=0.02)
+
+
+def test_newtons_steps_know_how_the_wedge_leans():
+    """The linearised equations of an open, rough film are its outflow's slopes, second order too."""
+    problem = contact_problem(contact(load=500.0), barus(), rough(COARSE, 0.2e-6, correlation_length=80e-6), MIXED)
+    rng, start = np.random.default_rng(3), 0.01 + hertz_pressure(problem)
+    at = Pressures(start, start, 2.0)
+    balance = evaluate(problem, at, second_order=True)
+    assert balance.lean.max() > 0.4
+    assert balance.parted.all()
+    change = rng.standard_normal(start.shape) * balance.solved
+    wet, _ = MixedLinear(balance, float).product(change, change, 0.0)
+    tiny = 1e-6
+    outflows = [
+        evaluate(problem, Pressures(start + way * change, start + way * change, 2.0), second_order=True).outflow
+        for way in (tiny, -tiny)
+    ]
+    slope = (outflows[0] - outflows[1]) / (2.0 * tiny) * balance.rows.fluid_scale
+    np.testing.assert_allclose(wet[balance.solved], slope[balance.solved], atol=1e-6 * np.abs(wet).max())
 
 
 def test_the_asperities_bear_what_the_oil_does_not():

@@ -196,7 +196,7 @@ def _evaluate(
 
     sunk = (solid == FREE) & (touching < 0.0) & ~yields
     lacking = np.where(sunk, film.content_by_gap * (gap - problem.contact_gap), 0.0)
-    outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean)
+    outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
 
     closed = (solid != FREE) & (gap <= (1.0 + CLOSED_WITHIN) * problem.contact_gap)
     shut = closed | ((touching <= 0.0) & ~sunk)
@@ -294,22 +294,35 @@ def _lean(problem: Problem, content: Field, gap: Field) -> Field:
     return lean
 
 
+def lean_slopes(balance: MixedBalance) -> tuple[Field, Field]:
+    """How far the wedge leans for a change of each cell's content, and back for one of that upstream, both (nx, ny).
+
+    Of m₁ m₂/(m₁² + m₂²) (m₂ - m₁); how open the cells are is held.
+    """
+    content, upstream = balance.film.content, _upstream(balance.problem, balance.film.content)
+    bend = (content - upstream) ** 2 * (content + upstream) / (content**2 + upstream**2)
+    return balance.lean * (1.0 - bend / content), balance.lean * (1.0 - bend / upstream)
+
+
 def _beyond_first_order(problem: Problem, content: Field, lean: Field, *, second_order: bool) -> Field:
     """What the wedge's second order adds to each cell's outflow, (nx, ny)."""
     if not _followed(problem):
-        return added_by_lean(problem, content, lean)
+        return added_by_lean(problem, content, lean, lean)
     assert problem.past is not None
     added = lean * (content - _upstream(problem, content)) / problem.spacing[0]
     leant = problem.past.leant
     return added - leant / problem.spacing[0] if second_order and leant is not None else added
 
 
-def added_by_lean(problem: Problem, content: Field, lean: Field) -> Field:
-    """What second order adds to each cell's outflow for a content on top of the film's own, (nx, ny)."""
+def added_by_lean(problem: Problem, content: Field, own: Field, upstream: Field) -> Field:
+    """What second order adds to each cell's outflow for a content on top of the film's own, (nx, ny).
+
+    The wedge leans by `own` of a cell's content less `upstream` of that before it: the lean itself, or its slopes.
+    """
     if _followed(problem):
-        return lean * content * content.dtype.type(1.0 / problem.spacing[0])
+        return own * content * content.dtype.type(1.0 / problem.spacing[0])
     added = np.empty_like(content)
-    leaning_outflow(content, lean, problem.spacing[0], added)
+    leaning_outflow(content, own, upstream, problem.spacing[0], added)
     return added
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.ehl.krylov import gmres
 from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces
-from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, transported, upwind_at_outlet
+from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, lean_slopes, transported, upwind_at_outlet
 from asperity.ehl.problem import Past
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
@@ -45,7 +45,7 @@ class MixedLinear:
             pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
             self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
             self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
-        self.lean = balance.lean.astype(self.real)
+        self.lean_own, self.lean_upstream = (part.astype(self.real) for part in lean_slopes(balance))
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale)
         self.film = Film(*(part.astype(self.real) for part in balance.film))
@@ -121,7 +121,7 @@ class MixedLinear:
             wet += rest * self.rows.fluid_scale
         else:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
-            wet += added_by_lean(problem, d_content, self.lean) * self.rows.fluid_scale
+            wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.rows.fluid_scale
         zero = self.real(0.0)
         return (
             np.where(self.lubricated, wet, zero),

@@ -18,7 +18,7 @@ from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels, levels_in_reach, on_one_line, smooth_film
 from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.search import COARSE_TOLERANCE, MOST_COARSE_ITERATIONS, Progress, Search
+from asperity.ehl.search import COARSE_TOLERANCE, FAR_OFF, MOST_COARSE_ITERATIONS, Progress, Search
 from asperity.ehl.solution import ContactSolution, Oil
 from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput
@@ -26,14 +26,17 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 CLIMB, STURDY = ATTEMPTS[:2]
-FROM_ONE = "from one pressure for oil and asperities"
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
+ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
 MOST_AT_ONCE = 40
 BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
-FIRST_PORTION, LEAST_PORTION = 0.35, 0.01  # of the oil that refilled cavities made, taken back at a time ...
-MOST_A_PORTION, EASY = 20, 8  # ... and Newton steps for it
+LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
+SHORTEST = 0.05  # step of time, over the first one that was tried
+LEAP = 10.0  # from a long step of time that was easy to the next one
+IN_TIME = 5e-2  # what a step of time is met to ...
+MOST_A_STEP, MOST_IN_TIME = 10, 60  # ... in so many of Newton's, and how many there are
 LED_NOWHERE = 1e-2  # a smooth contact's coarse solution that misses by more
 THIN = 1.0  # film ratio below which the dry contact is the nearer start
 
@@ -80,8 +83,8 @@ def solve_mixed(
 def _ways(surface: Surface, film: float) -> tuple[str, ...]:
     """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
     if not np.any(surface.heights):
-        return CLIMB, STURDY, FROM_ONE
-    return (FROM_DRY, CLIMB, FROM_ONE) if film < THIN * surface.sq else (CLIMB, FROM_DRY, FROM_ONE)
+        return CLIMB, STURDY
+    return (FROM_DRY, CLIMB) if film < THIN * surface.sq else (CLIMB, FROM_DRY)
 
 
 class Lubricated(NamedTuple):
@@ -126,8 +129,6 @@ class MixedSearch(Search):
         self.cell, self.by_first_order = levels[0].spacing[0], None  # what a way before has left is not this one's
         if way == FROM_DRY:
             return self.from_dry(levels)
-        if way == FROM_ONE:
-            return self.from_one(levels, guess)
         step = self.climb_from(levels, guess)
         if self.smooth and not self.settled(self.options.tolerance):  # one pressure is all that smooth bodies have
             step = self.from_one(levels, guess)
@@ -151,42 +152,65 @@ class MixedSearch(Search):
         step = self.run(problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most)
         return step if self.settled(self.options.tolerance) else self.finish(problem, unknowns)
 
-    def finish(self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False) -> Step:
-        """With the first-order wedge until that is met roughly, then with the second-order one; `coarsely` to 1e-3."""
+    def finish(
+        self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, length: float = 1.0, last: bool = True
+    ) -> Step:
+        """From afar: in steps of time first, from `length` half-widths on; then what stands still; `coarsely` roughly.
+
+        The wedge is of first order until that is met roughly, then of second; where oil is conserved of first order
+        throughout. Where time leads nowhere the `last` resort is the contact whose cavities are refilled, if oil is
+        conserved, and then what stands still at once.
+        """
         tolerance, most = self.options.tolerance, self.options.max_iterations
         if coarsely:
-            tolerance, most = max(COARSE_TOLERANCE, tolerance), min(MOST_BESIDE, most)
-        if problem.conserve:
-            return self.take_back(problem, unknowns)
+            roughly = COARSE_TOLERANCE if problem.accurate else 0.5 * ROUGHLY
+            tolerance, most = max(roughly, tolerance), min(MOST_BESIDE, most)
+        if problem.conserve or not problem.accurate:
+            step = self.march(problem, unknowns, length)
+            if not self.settled(IN_TIME) and not last:
+                return step
+            if not self.settled(IN_TIME) and problem.conserve:
+                step = self.refilled(problem, unknowns, length)
+            unknowns = _reached(step) if self.settled(IN_TIME) else unknowns
         if not may_lean(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
-        roughly = max(COARSE_TOLERANCE, tolerance)
+        roughly = max(ROUGHLY, tolerance)
         step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
+        if not self.settled(roughly):  # too much was left to the last: closer now
+            unknowns = _reached(self.march(problem, unknowns, length, met=ROUGHLY))
+            step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
+        if not self.settled(FAR_OFF):
+            return step
         self.by_first_order = self._figures(step)
         return self.run(problem, newton(problem, _reached(step), second_order=True), tolerance, most)
 
-    def take_back(self, problem: Problem, unknowns: Pressures) -> Step:
-        """The contact that loses no oil, from the one whose cavities are refilled: all that was made is taken back.
+    def march(self, problem: Problem, unknowns: Pressures, first: float, *, met: float = IN_TIME) -> Step:
+        """Towards what stands still in steps of time, longer and longer ones, each from where the last led.
 
-        Little by little, each time by Newton's steps from what was reached; by less where that leads nowhere.
+        A step begins with the oil that was there and has little to change: where Newton's steps lead nowhere all the
+        same, it was too long. From a start that tells too little of the oil no step is short enough.
         """
-        refilled, most = replace(problem, conserve=False), self.options.max_iterations
-        tolerance = max(COARSE_TOLERANCE, self.options.tolerance)
+        length, content = first, evaluate(problem, unknowns, second_order=False).content
+        most = min(MOST_A_STEP, self.options.max_iterations)
+        for _ in range(MOST_IN_TIME):
+            led = replace(problem, past=_kept_for(problem, length, content))
+            step = self.run(led, newton(led, unknowns, second_order=False), met, most)
+            if self.settled(met):
+                unknowns, content = _reached(step), step.balance.content
+                if length >= LAST_LENGTH:
+                    break
+                length *= (LEAP if length >= 1.0 else 3.0) if step.number <= 2 else 2.0 if step.number <= 4 else 1.2
+            elif length < SHORTEST * first:
+                break
+            else:  # what was left of the steps before may be what goes round: closer from now on
+                length, met = 0.25 * length, min(met, ROUGHLY)
+        return step
+
+    def refilled(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
+        """Towards what loses no oil from the contact whose cavities are refilled."""
         start = Pressures(np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach)
-        step = self.run(refilled, newton(refilled, start, second_order=False), tolerance, min(most, MOST_ROUGHLY))
-        unknowns = _reached(step)
-        made = evaluate(problem, unknowns, second_order=False).outflow
-        left, portion = 1.0, FIRST_PORTION
-        while left > 0.0 and portion > LEAST_PORTION:
-            wanted = left - portion if left > 1.2 * portion else 0.0
-            led = replace(problem, past=_with_source(problem, -wanted * made))
-            tried = self.run(led, newton(led, unknowns, second_order=False), tolerance, min(most, MOST_A_PORTION))
-            if self.settled(tolerance):
-                left, unknowns = wanted, _reached(tried)
-                portion *= 1.5 if tried.number < EASY else 1.0
-            else:
-                portion *= 0.4
-        return self.run(problem, newton(problem, unknowns, second_order=False), self.options.tolerance, most)
+        step = self.march(replace(problem, conserve=False), start, length)
+        return self.march(problem, _reached(step), length) if self.settled(IN_TIME) else step
 
     def climb_from(self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]) -> Step:
         """Coarse to fine from Hertz's pressure, all of it the oil's; from there again after a grid that led nowhere."""
@@ -198,9 +222,8 @@ class MixedSearch(Search):
                 unknowns = Pressures(pressure, pressure, approach)
             elif problem.cells != unknowns.total.shape:
                 total = interpolated(unknowns.total, problem.cells)
-                unknowns = Pressures(
-                    np.minimum(interpolated(unknowns.oil, problem.cells), total), total, unknowns.approach
-                )
+                oil = interpolated(np.maximum(unknowns.oil, 0.0), problem.cells)
+                unknowns = Pressures(np.minimum(oil, total), total, unknowns.approach)
             if problem is levels[0]:
                 step = self.finish(problem, unknowns)
             else:
@@ -227,8 +250,10 @@ class MixedSearch(Search):
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
             start = dry if before is None else before.granted(dry, problem.p_cap)
-            step = self.finish(problem, start, coarsely=not finest)
-            if finest or self.settled(max(COARSE_TOLERANCE, self.options.tolerance)):
+            step = self.finish(problem, start, coarsely=not finest, last=before is None)
+            if before is not None and not self.settled(FAR_OFF):  # what oil changed on the coarser grid was no start
+                step = self.finish(problem, dry, coarsely=not finest, length=2.0 * problem.spacing[0])
+            if finest or self.settled(max(ROUGHLY, self.options.tolerance)):
                 self.figures.append(self._figures(step))
                 before = Lubricated(dry, _reached(step))
             else:
@@ -289,13 +314,10 @@ def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
     )
 
 
-def _with_source(problem: Problem, source: Field) -> Past:
-    """The problem's past, or none, with oil that is taken out on top, (nx, ny)."""
-    return (
-        Past(0.0, source, followed=False)
-        if problem.past is None
-        else replace(problem.past, source=problem.past.source + source)
-    )
+def _kept_for(problem: Problem, length: float, content: Field) -> Past:
+    """The problem's past, or none, and on top the oil that was there when it was `length` farther back."""
+    past = Past(0.0, np.zeros_like(content), followed=False) if problem.past is None else problem.past
+    return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
 
 
 def _reached(step: Step) -> Pressures:

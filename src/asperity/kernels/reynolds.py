@@ -157,8 +157,8 @@ def net_outflow(
 
 
 @njit(cache=True)
-def leaning_outflow(content: Field, lean: Field, dx: float, out: Field) -> None:
-    """What a wedge of face values m + `lean` (m - m_upstream) adds to the outflow of each cell, per cell area.
+def leaning_outflow(content: Field, own: Field, upstream: Field, dx: float, out: Field) -> None:
+    """What a wedge of face values m + `own` m - `upstream` m_upstream adds to the outflow of each cell, per cell area.
 
     The first and the last face along x stay as they are.
     """
@@ -168,9 +168,9 @@ def leaning_outflow(content: Field, lean: Field, dx: float, out: Field) -> None:
         for j in range(ny):
             east, west = content.dtype.type(0.0), content.dtype.type(0.0)
             if 0 < i < nx - 1:
-                east = lean[i, j] * (content[i, j] - content[i - 1, j])
+                east = own[i, j] * content[i, j] - upstream[i, j] * content[i - 1, j]
             if i > 1:
-                west = lean[i - 1, j] * (content[i - 1, j] - content[i - 2, j])
+                west = own[i - 1, j] * content[i - 1, j] - upstream[i - 1, j] * content[i - 2, j]
             out[i, j] = (east - west) * over_dx
 
 
