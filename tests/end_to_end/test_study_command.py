@@ -149,7 +149,8 @@ def test_a_dry_run_tells_what_it_would_cost(asp):
     assert (code, err) == (0, "")
     told = json.loads(out)
     assert (told["cases"], told["kept"], told["points"], told["seeds"], told["workers"]) == (24, 0, 4, 6, 4)
-    assert told["seconds"] == pytest.approx(24 * told["seconds_a_case"] / 4)
+    at_work = 24 * told["seconds_a_case"] / min(4, execution.cores())
+    assert at_work < told["seconds"] < at_work + 120.0  # workers have to start before
 
 
 @pytest.mark.parametrize(

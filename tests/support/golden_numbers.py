@@ -20,6 +20,7 @@ import numpy as np
 TESTS = Path(__file__).parents[1]
 REFERENCE = TESTS / "reference" / "golden"
 EXAMPLES = TESTS.parent / "examples"
+ROUNDING = 1e-11  # of what would be nothing
 TIMES = ("seconds", "solve_seconds")  # what no two runs share
 SMALL = ("grid.cells=[64, 48]", "vibration.duration=0.2 s")
 ROLLING = ("grid.cells=[48, 32]", "surface.correlation_length=40 um")
@@ -152,7 +153,7 @@ def differences(then: Any, now: Any, tolerance: float, where: str = "") -> list[
         each = [differences(*pair, tolerance, f"{where}[{n}]") for n, pair in enumerate(zip(then, now, strict=True))]
         return [line for lines in each for line in lines]
     if type(then) is type(now) is float:
-        same = then == now or abs(then - now) <= tolerance * max(abs(then), abs(now))
+        same = then == now or abs(then - now) <= max(tolerance * max(abs(then), abs(now)), ROUNDING)
     elif isinstance(then, str) and isinstance(now, str) and tolerance > 0.0:
         same = True  # digits in a sentence follow the numbers beside it
     else:

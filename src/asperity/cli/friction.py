@@ -93,7 +93,7 @@ def _friction_command(
     verdicts = [drawn.verdict() for drawn in curves]
     hints = {drawn.hint() for drawn in curves} - {None}
     show(
-        "\n".join(verdicts),
+        verdicts,
         lambda: {
             "verdict": " ".join(verdicts),
             "curves": [drawn.scalars() for drawn in curves],

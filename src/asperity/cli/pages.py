@@ -54,7 +54,7 @@ def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) ->
     runs = [results.load_run(path) for path in paths]
     report.write_report(runs, out)
     show(
-        "\n".join(run.verdict() for run in runs),
+        [run.verdict() for run in runs],
         lambda: {"report": str(out), "runs": [run.summary() for run in runs]},
         written("Report", out),
         as_json=as_json,

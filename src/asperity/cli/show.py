@@ -24,14 +24,14 @@ Row = tuple[str, str]
 
 
 def show(
-    verdict: str,
+    verdict: str | Sequence[str],
     values: Callable[[], Mapping[str, Any]],
     *blocks: Block,
     as_json: bool,
     quiet: bool,
     a_line: bool = False,
 ) -> None:
-    """Print the values as the one JSON object, or the verdict and, unless quiet, each block after an empty line.
+    """Print the values as the one JSON object, or the verdict (or several) and, unless quiet, blocks after empty lines.
 
     `a_line` keeps the object on one line and hands it on at once, for a command that prints one after another. Nan or
     infinity in the object is a mistake of ours.
@@ -39,7 +39,8 @@ def show(
     if as_json:
         print(json.dumps(values(), indent=None if a_line else 2, allow_nan=False), flush=a_line)
         return
-    print(printable(with_flags(verdict)), flush=a_line)
+    for sentence in [verdict] if isinstance(verdict, str) else verdict:
+        print(printable(with_flags(sentence)), flush=a_line)
     if quiet:
         return
     for block in blocks:

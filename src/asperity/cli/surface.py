@@ -59,7 +59,7 @@ def surface_command(
         report.surface_map(described[0], out)
     if described:
         show(
-            "\n".join(description.verdict() for description in described),
+            [description.verdict() for description in described],
             lambda: {
                 "files": [description.scalars() for description in described],
                 "refused": [{"file": str(file), "reason": str(error)} for file, error in refused],
