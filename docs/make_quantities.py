@@ -27,6 +27,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "recording": "A recording",
     "axis": "Axes and parts of figures",
     "condition": "Conditions",
+    "oil": "An oil by its data sheet",
     "band": "Where a resonance is looked for",
     "table1": "The paper's Table 1",
 }

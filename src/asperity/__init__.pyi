@@ -23,6 +23,7 @@ from .lubricant import DowsonHigginson as DowsonHigginson
 from .lubricant import Incompressible as Incompressible
 from .lubricant import Lubricant as Lubricant
 from .lubricant import Newtonian as Newtonian
+from .lubricant import OilSheet as OilSheet
 from .lubricant import ReeEyring as ReeEyring
 from .lubricant import Roelands as Roelands
 from .recording import read_recording as read_recording

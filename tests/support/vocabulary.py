@@ -279,6 +279,7 @@ def bases_for_keys() -> tuple[Any, ...]:
         *(paper.with_overrides({"lubricant.friction": table}) for table in _FRICTION_TABLES),
         paper.with_overrides({"lubricant.viscosity.law": "roelands", "lubricant.rheology": _EYRING}),
         paper.with_overrides({"thermal.warmth": {"law": "roelands", "s0": 1.1}, "motion.steps": 2}),
+        paper.with_overrides({"lubricant": {"grade": "VG 100", "temperature": "70 degC"}}),
         paper.with_overrides({"study": {"sq": ["1 um"]}}),
     )
 
@@ -342,6 +343,8 @@ def case_sections() -> dict[str, Any]:
             known[f"[{name}]"] = model
         elif "contact" in fields:
             known["Top level"] = model
+        elif "grade" in fields:
+            known["An oil by its data sheet"] = model
     return known
 
 

@@ -8,7 +8,9 @@ from .beginnings import beginning as beginning
 from .case import Case as Case
 from .case import load_case as load_case
 from .laws import LubricantSection as LubricantSection
+from .laws import OilSupply as OilSupply
 from .laws import ThermalSection as ThermalSection
+from .oils import SheetSection as SheetSection
 from .refusals import Section as Section
 from .refusals import parse_section as parse_section
 from .sections import CaseFile as CaseFile

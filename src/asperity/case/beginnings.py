@@ -34,6 +34,7 @@ OIL = """
 viscosity = { law = "roelands", eta0 = "0.08 Pa s", alpha = "20 1/GPa" }  # at the oil's temperature; cSt x density
 density = { law = "dowson-higginson", rho0 = "0.87 g/cm^3" }
 rheology = { law = "ree-eyring", tau0 = "5 MPa" }
+# by its data sheet, in place of viscosity and density: grade = "VG 100", temperature = "70 degC"
 """
 GENERATED = """
 [surface]                       # of both bodies together

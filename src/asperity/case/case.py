@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.case.amounts import plain
+from asperity.case.oils import SheetSection
 from asperity.case.refusals import parse_section
 from asperity.case.sections import CaseFile, MotionSection
 from asperity.case.surfaces import FileSection, GeneratedSection, composite_roughness, moving_roughness, two_bodies
@@ -23,7 +24,7 @@ from asperity.ehl import ACCURACY, Options, auto_grid, inlet_notes, plausibility
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.limits import require_affordable
-from asperity.lubricant import Lubricant, Thermal
+from asperity.lubricant import Lubricant, OilFact, Thermal
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 
 # surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
@@ -89,6 +90,16 @@ class Case:
         return None if section is None else section.lubricant()
 
     @property
+    def _sheet(self) -> SheetSection | None:
+        section = self.contents.lubricant
+        return section if isinstance(section, SheetSection) else None
+
+    @property
+    def oil_facts(self) -> tuple[OilFact, ...]:
+        """What was given and what was estimated of an oil by its data sheet; of one by laws there is nothing to say."""
+        return () if self._sheet is None else self._sheet.facts()
+
+    @property
     def boundary_friction(self) -> float:
         """Shear stress over pressure where the bodies touch."""
         return float(self.contents.material.boundary_friction)
@@ -96,7 +107,7 @@ class Case:
     @cached_property
     def thermal(self) -> Thermal:
         """What takes up the heat of sliding."""
-        return self.contents.thermal.thermal()
+        return self.contents.thermal.thermal(None if self._sheet is None else self._sheet.supply())
 
     @cached_property
     def grid(self) -> Grid:
@@ -227,7 +238,8 @@ class Case:
     def notes(self) -> tuple[str, ...]:
         """What a reader of the results has to know about the case, a sentence each."""
         conditions, oil = self.conditions, self.lubricant
-        return (*plausibility_notes(conditions, oil), *inlet_notes(conditions, oil, self.grid))
+        of_oil = () if self._sheet is None else self._sheet.notes()
+        return (*of_oil, *plausibility_notes(conditions, oil), *inlet_notes(conditions, oil, self.grid))
 
     @property
     def text(self) -> str:

@@ -6,13 +6,14 @@ a law needs nothing here.
 
 from dataclasses import MISSING, fields
 from functools import cache, partial
-from typing import Annotated, Any, cast, get_type_hints
+from typing import Annotated, Any, NamedTuple, cast, get_type_hints
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
 from asperity.case.amounts import OPTIONAL, PAIRED, amount_in, default_amount, plain
-from asperity.case.refusals import Section, choose, validated
-from asperity.lubricant import LAWS, LawFamily, Lubricant, Solid, Thermal, make_law, make_lubricant
+from asperity.case.refusals import Section, choose
+from asperity.errors import BadInput
+from asperity.lubricant import LAWS, ExponentialWarmth, LawFamily, Lubricant, Solid, Thermal, make_law, make_lubricant
 from asperity.quantities import parameters
 
 
@@ -38,33 +39,31 @@ def _law_section(name: str, law: type) -> type[Section]:
     return create_model(name, __base__=Section, law=(str, ...), **section_fields(law))
 
 
-def _one_of(family: LawFamily) -> PlainValidator:
+def one_of(family: LawFamily) -> PlainValidator:
+    """What reads a section's field that is a law of a family."""
+
     def sections() -> dict[str, type[Section]]:
         return {name: _law_section(name, law) for name, law in LAWS[family].items()}
 
     return PlainValidator(partial(choose, "law", sections))
 
 
-def _description(section: Section) -> dict[str, Any]:
+def law_description(section: Section) -> dict[str, Any]:
+    """A law's section as `make_law` takes it."""
     return {name: plain(getattr(section, name)) for name in type(section).model_fields}
 
 
 class LubricantSection(Section):
     """[lubricant]: one law of each family."""
 
-    viscosity: Annotated[Section, _one_of("viscosity")]
-    density: Annotated[Section, _one_of("density")]
-    rheology: Annotated[Section, _one_of("rheology")]
-    friction: Annotated[Section, _one_of("friction"), Field(validate_default=True)] = cast(Section, "bair-winer")
+    viscosity: Annotated[Section, one_of("viscosity")]
+    density: Annotated[Section, one_of("density")]
+    rheology: Annotated[Section, one_of("rheology")]
+    friction: Annotated[Section, one_of("friction"), Field(validate_default=True)] = cast(Section, "bair-winer")
 
     def lubricant(self) -> Lubricant:
         """The oil."""
-        return make_lubricant({family: _description(getattr(self, family)) for family in type(self).model_fields})
-
-
-def parse_lubricant(value: object) -> LubricantSection | None:
-    """The oil's section; None for "none", a dry contact."""
-    return None if value == "none" else validated(LubricantSection, value)
+        return make_lubricant({family: law_description(getattr(self, family)) for family in type(self).model_fields})
 
 
 def _both(kind: Any, default: Any) -> Any:
@@ -81,20 +80,47 @@ _NUMBERS: dict[str, Any] = {
 _Numbers: Any = create_model("thermal", __base__=Section, **_NUMBERS)
 
 
+class OilSupply(NamedTuple):
+    """What an oil by its data sheet says to [thermal]: its temperature [K], and -d(ln ν)/dT there [1/K]."""
+
+    temperature: float
+    thinning: float
+
+
 class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those of `Thermal` and of both its `Solid`s
     """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
 
-    warmth: Annotated[Section, _one_of("warmth"), Field(validate_default=True)] = cast(Section, "exponential")
+    warmth: Annotated[Section, one_of("warmth"), Field(validate_default=True)] = cast(Section, "exponential")
     feedback: Annotated[bool, Strict()] = Thermal().feedback
 
-    def thermal(self) -> Thermal:
-        """The thermal side of the contact."""
+    @property
+    def tacit(self) -> tuple[str, ...]:
+        """Which of the keys that an oil by its data sheet can decide stand at their defaults."""
+        default = ThermalSection()
+        by_default = {"ambient": self.ambient.text == default.ambient.text, "warmth": self.warmth == default.warmth}
+        return tuple(key for key, tacit in by_default.items() if tacit)
+
+    def thermal(self, oil: OilSupply | None = None) -> Thermal:
+        """The thermal side of the contact; an oil by its data sheet decides what is left at its default.
+
+        Raises BadInput for an ambient temperature that is neither the default nor the oil's.
+        """
+        tacit = () if oil is None else self.tacit
+        ambient, warmth = plain(self.ambient), make_law("warmth", law_description(self.warmth))
+        if oil is not None:
+            if "ambient" not in tacit and ambient != oil.temperature:
+                raise BadInput(
+                    f"ambient of {ambient:g} K is not the {oil.temperature:g} K of lubricant.temperature; "
+                    "leave ambient out"
+                )
+            ambient = oil.temperature
+            warmth = ExponentialWarmth(oil.thinning) if "warmth" in tacit else warmth
         first, second = (Solid(**{name: plain(getattr(self, name))[body] for name in _SOLID}) for body in (0, 1))
         return Thermal(
-            ambient=plain(self.ambient),
+            ambient=ambient,
             bulk=plain(self.bulk),
             oil_conductivity=plain(self.oil_conductivity),
-            warmth=make_law("warmth", _description(self.warmth)),
+            warmth=warmth,
             solids=(first, second),
             feedback=self.feedback,
         )

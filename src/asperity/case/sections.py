@@ -17,7 +17,8 @@ from asperity.case.amounts import (
     default_amount,
     parse_amount,
 )
-from asperity.case.laws import LubricantSection, ThermalSection, parse_lubricant
+from asperity.case.laws import LubricantSection, ThermalSection
+from asperity.case.oils import SheetSection, parse_lubricant
 from asperity.case.refusals import LocatedError, Section, quoted
 from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.sweep import StudySection, parse_study
@@ -116,7 +117,7 @@ class CaseFile(Section):
     model: ContactModel = "mixed"
     contact: ContactSection
     material: MaterialSection
-    lubricant: Annotated[LubricantSection | None, PlainValidator(parse_lubricant)]
+    lubricant: Annotated[LubricantSection | SheetSection | None, PlainValidator(parse_lubricant)]
     surface: Annotated[SurfaceSection, PlainValidator(parse_surface)]
     grid: GridSection = GridSection()
     solver: SolverSection = SolverSection()

@@ -10,6 +10,7 @@ from typing import Any
 import tomli_w
 
 from asperity.case.amounts import Amount
+from asperity.case.oils import SheetSection
 from asperity.case.refusals import Section, quoted
 from asperity.case.sections import CaseFile
 from asperity.case.sweep import StudySection
@@ -47,6 +48,9 @@ def restated(contents: CaseFile) -> str:
     tables = _plain(contents)
     if contents.lubricant is None:
         tables["lubricant"] = "none"
+    if isinstance(contents.lubricant, SheetSection):  # which decides these, and at another temperature otherwise
+        for key in contents.thermal.tacit:
+            del tables["thermal"][key]
     return tomli_w.dumps(tables)
 
 

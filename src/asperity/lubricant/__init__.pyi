@@ -2,6 +2,13 @@ from .density import DENSITY_LAWS as DENSITY_LAWS
 from .density import DensityLaw as DensityLaw
 from .density import DowsonHigginson as DowsonHigginson
 from .density import Incompressible as Incompressible
+from .estimates import ESTIMATORS as ESTIMATORS
+from .estimates import Base as Base
+from .estimates import Estimator as Estimator
+from .estimates import KnownOil as KnownOil
+from .facts import OilFact as OilFact
+from .facts import oil_facts as oil_facts
+from .facts import oil_notes as oil_notes
 from .friction import FRICTION_LAWS as FRICTION_LAWS
 from .friction import BairWiner as BairWiner
 from .friction import EyringShear as EyringShear
@@ -13,6 +20,8 @@ from .laws import LAWS as LAWS
 from .laws import LawFamily as LawFamily
 from .laws import law_name as law_name
 from .laws import make_law as make_law
+from .measured import MeasuredOil as MeasuredOil
+from .measured import measured_oils as measured_oils
 from .model import Lubricant as Lubricant
 from .model import describe_lubricant as describe_lubricant
 from .model import make_lubricant as make_lubricant
@@ -20,6 +29,8 @@ from .rheology import RHEOLOGY_LAWS as RHEOLOGY_LAWS
 from .rheology import Newtonian as Newtonian
 from .rheology import ReeEyring as ReeEyring
 from .rheology import RheologyLaw as RheologyLaw
+from .sheet import OilSheet as OilSheet
+from .sheet import Thickening as Thickening
 from .thermal import WARMTH_LAWS as WARMTH_LAWS
 from .thermal import ExponentialWarmth as ExponentialWarmth
 from .thermal import RoelandsWarmth as RoelandsWarmth
@@ -30,3 +41,6 @@ from .viscosity import VISCOSITY_LAWS as VISCOSITY_LAWS
 from .viscosity import Barus as Barus
 from .viscosity import Roelands as Roelands
 from .viscosity import ViscosityLaw as ViscosityLaw
+from .walther import Walther as Walther
+from .walther import viscosity_100_of as viscosity_100_of
+from .walther import viscosity_index as viscosity_index

@@ -175,11 +175,18 @@ class Run:
         return self.solution.convergence.converged and self.undetermined is None
 
     def summary(self) -> dict[str, Any]:
-        """What `solve --json` prints: every number, the grid's cells, the regime card and what is to be noted."""
+        """What `solve --json` prints: every number, the grid's cells, the regime card and what is to be noted.
+
+        Of an oil by its data sheet also its numbers under `oil`, and below them the `origins` of each.
+        """
+        facts = self.case.oil_facts
+        origins = {fact.key: ": ".join(filter(None, (fact.origin, fact.how))) for fact in facts}
+        oil = {"oil": {**{fact.key: fact.value for fact in facts}, "origins": origins}} if facts else {}
         return {
             **self.scalars(),
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
+            **oil,
             "notes": list(self.remarks),
         }
 

@@ -29,6 +29,7 @@ def _conditions(run: Run) -> dict[str, str]:
         **_contact_rows(solution.conditions),
         **{f"{name[0].upper()}{name[1:]}": value for name, value in run.card.rows()[1:]},
         **_lubricant_rows(solution.lubricant),
+        **_oil_rows(run),
         **_thermal_rows(run),
         "Roughness": f"{quantity('sq_m').named(solution.surface.sq)}; case: {_roughness(run.case.text)}",
         **_numerical_rows(solution),
@@ -87,6 +88,14 @@ def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:
         "Rheology": _law("rheology", lubricant.rheology),
         "Friction of the film": _law("friction", lubricant.friction),
     }
+
+
+def _oil_rows(run: Run) -> dict[str, str]:
+    """Of an oil by its data sheet, what was given, measured, estimated and computed."""
+    rows: dict[str, list[str]] = {}
+    for fact in run.case.oil_facts:
+        rows.setdefault(f"Oil, {fact.origin}", []).append(str(fact))
+    return {name: "; ".join(texts) for name, texts in rows.items()}
 
 
 def _thermal_rows(run: Run) -> dict[str, str]:
