@@ -306,6 +306,11 @@ def is_case_key(dotted: str) -> bool:
         key = dotted.removeprefix("study.")
         return key in case_sections()["[study]"].model_fields or is_case_key(key) or is_leaf(key)
 
+    if dotted.startswith("machine."):  # in place of the contact that the bases have
+        from asperity.case.machines import MACHINES
+
+        return any(dotted.removeprefix("machine.") in section.model_fields for section, _ in MACHINES.values())
+
     if dotted.partition(".")[0] not in type(bases_for_keys()[0].contents).model_fields:
         return False
 

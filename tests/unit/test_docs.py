@@ -145,7 +145,13 @@ def case_tables() -> dict[str, dict[str, str]]:
     for line in (*CASE_FILE.prose, *STUDY.prose):
         kind = re.match(r'`(kind = ".*?"|file = )', line.text)
         heading = line.headings[-1] if line.headings else ""
-        name = kind[1] if kind else name if heading == "[surface]" and not line.text.startswith("#") else heading
+        name = (
+            kind[1]
+            if kind
+            else name
+            if heading in ("[surface]", "[machine]") and not line.text.startswith("#")
+            else heading
+        )
         table = tables.setdefault(name, {})
         if not line.text.startswith("|"):
             columns = []

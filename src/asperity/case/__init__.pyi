@@ -10,6 +10,8 @@ from .case import load_case as load_case
 from .laws import LubricantSection as LubricantSection
 from .laws import OilSupply as OilSupply
 from .laws import ThermalSection as ThermalSection
+from .machines import MachineCase as MachineCase
+from .machines import load_machine as load_machine
 from .oils import SheetSection as SheetSection
 from .refusals import Section as Section
 from .refusals import parse_section as parse_section

@@ -36,7 +36,13 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "1/K": ("an inverse temperature", "0.037 1/K"),
     "W/m/K": ("a thermal conductivity", "46 W/m/K"),
     "J/kg/K": ("a heat capacity", "460 J/kg/K"),
+    "rad/s": ("a rotational speed", "1500 r/min"),
+    "rad": ("an angle", "20 deg"),
+    "N m": ("a torque", "265 N m"),
+    "N/m": ("a stiffness", "30 N/mm"),
 }
+_TURN = Decimal("6.283185307179586476925286766559")  # 2 pi
+_PER_MINUTE = str(_TURN / 60)
 _COMMON = {  # unit -> its SI unit, and what one is worth in it: pint and its registry take longer to load than a case
     "m": ("m", "1"),
     "mm": ("m", "1e-3"),
@@ -69,12 +75,22 @@ _COMMON = {  # unit -> its SI unit, and what one is worth in it: pint and its re
     "1/K": ("1/K", "1"),
     "W/m/K": ("W/m/K", "1"),
     "J/kg/K": ("J/kg/K", "1"),
+    "N m": ("N m", "1"),
+    "N/m": ("N/m", "1"),
+    "N/mm": ("N/m", "1e3"),
+    "rad": ("rad", "1"),
+    "deg": ("rad", str(_TURN / 360)),
+    "rad/s": ("rad/s", "1"),
+    "rpm": ("rad/s", _PER_MINUTE),
 }
+_OURS = {"Nm": ("N m", "1"), "r/min": ("rad/s", _PER_MINUTE), "1/min": ("rad/s", _PER_MINUTE)}  # not pint's, or another
+_FREQUENCIES = {"Hz": "in hertz", "rad/s": "in r/min or rad/s"}  # one for the other would be a factor 2 pi off
+TINY = math.ulp(0.0)  # the least positive number
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
 
 
 class Amount(float):
-    """A positive quantity in SI that remembers how it was written, so that a case is restated in its author's units."""
+    """A quantity in SI that remembers how it was written, so that a case is restated in its author's units."""
 
     text: str
 
@@ -106,10 +122,14 @@ def _units() -> "pint.UnitRegistry[Decimal]":
     return UnitRegistry(non_int_type=Decimal)  # decimal: 5.4 mm is the float nearest to 0.0054, not a product of floats
 
 
+def _common(unit_text: str) -> tuple[str, str] | None:
+    return _COMMON.get(unit_text) or _OURS.get(unit_text)
+
+
 @lru_cache(4096)  # a case states forty quantities, and a study states most of them a thousand times over
 def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
     """A number of `unit_text` in `unit`; None is the SI unit of its kind."""
-    own, wanted = _COMMON.get(unit_text), _COMMON.get(unit_text if unit is None else unit)
+    own, wanted = _common(unit_text), _common(unit_text if unit is None else unit)
     if own is not None and wanted is not None and own[0] == wanted[0]:
         return Decimal(number) * Decimal(own[1]) / (1 if unit is None else Decimal(wanted[1]))
     import pint
@@ -134,8 +154,11 @@ def _split(value: object) -> tuple[str, str] | None:
     return None if written is None else (written[1], " ".join(written[2].split()))
 
 
-def parse_amount(unit: str, value: object) -> Amount:
-    """A positive quantity with its unit, in `unit`, an SI one; the BadInput it raises begins with what it must be."""
+def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
+    """A quantity of at least `least` in `unit`, an SI one: by default positive; 0, or minus infinity for any.
+
+    The BadInput it raises begins with what it must be.
+    """
     measure, example = _MEASURES.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
     expected = f'must be {measure} such as "{example}"'
     if isinstance(value, Amount):
@@ -148,14 +171,15 @@ def parse_amount(unit: str, value: object) -> Amount:
     number, unit_text = parts
     if not unit_text:
         raise BadInput(f"{expected}, got {quoted(value)} without a unit")
-    if unit == "Hz" and "Hz" not in unit_text:  # rpm and rad/s would slip through as inverse times, a factor 2 pi off
-        raise BadInput(f"{expected}, got {quoted(value)}, which is not in hertz")
+    if (unit == "Hz" and "Hz" not in unit_text) or (unit == "rad/s" and (_common(unit_text) or ("",))[0] != unit):
+        raise BadInput(f"{expected}, got {quoted(value)}, which is not {_FREQUENCIES[unit]}")
     try:
         si = float(_convert(number, unit_text, unit))
     except _UnusableUnit as wrong:
         raise BadInput(f"{expected}, got {quoted(value)}, {wrong}") from None
-    if not 0.0 < si < math.inf:
-        raise BadInput(f"must be positive and finite, got {quoted(value)}; correct its sign or value")
+    if not least <= si < math.inf:
+        allowed = "positive and finite" if least == TINY else "finite, and not negative"
+        raise BadInput(f"must be {allowed}, got {quoted(value)}; correct its sign or value")
     return Amount(si, f"{number} {unit_text}")
 
 
@@ -213,9 +237,9 @@ def default_amount(value: float, unit: str) -> Amount:
     return Amount(value, f"{value:g} {unit}" if float(f"{value:g}") == value else f"{value!r} {unit}")
 
 
-def amount_in(unit: str) -> PlainValidator:
-    """What reads a section's field that is a quantity in `unit`."""
-    return PlainValidator(partial(parse_amount, unit))
+def amount_in(unit: str, least: float = TINY) -> PlainValidator:
+    """What reads a section's field that is a quantity in `unit`, of at least `least`."""
+    return PlainValidator(partial(parse_amount, unit, least=least))
 
 
 def _paired(value: object) -> object:

@@ -289,4 +289,7 @@ def load_case(
     else:
         path = Path(source)
         text, name, folder = read_text(path), name or str(path), folder or path.parent
-    return Case(parse_section(CaseFile, parse_toml(text, name), name), folder, name, stored)
+    tables = parse_toml(text, name)
+    if "machine" in tables:
+        raise BadInput(f"{name}: states a [machine], which has several contacts; asperity machine solves them all")
+    return Case(parse_section(CaseFile, tables, name), folder, name, stored)

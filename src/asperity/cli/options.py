@@ -101,12 +101,19 @@ def chosen_case(
     replaced: dict[str, object] = {}
     if accuracy is not None:
         replaced = {"grid.cells": "auto", "grid.accuracy": accuracy}
+    replaced |= read_overrides(overrides)
+    return chosen.with_overrides(replaced) if replaced else chosen
+
+
+def read_overrides(overrides: list[str] | None) -> dict[str, object]:
+    """Keys and values of `--set KEY=VALUE`."""
+    replaced: dict[str, object] = {}
     for override in overrides or []:
         key, equals, value = override.partition("=")
         if not (equals and key.strip() and value.strip()):
             raise BadInput(f"--set takes KEY=VALUE such as contact.load='400 N', got {override!r}")
         replaced[key.strip()] = value.strip()
-    return chosen.with_overrides(replaced) if replaced else chosen
+    return replaced
 
 
 def case_at(path: Path | None) -> "Case | None":
@@ -125,6 +132,7 @@ _FLAGS = {  # what a message of the library asks for, and the option that gives 
     "give case or band_hz": "give --case or --band",
     "; method modes": "; --method modes",
     "such as um and mm": "such as --unit um --lateral-unit mm",
+    "ask for a dry run": "take --dry-run",
     "choose another out": "choose another --out",
 }
 

@@ -7,6 +7,8 @@ from .curves import traction_curve as traction_curve
 from .doubt import doubt_rows as doubt_rows
 from .levels import levels_verdict as levels_verdict
 from .levels import not_converged as not_converged
+from .run import BOUNDARY_FROM as BOUNDARY_FROM
+from .run import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .run import RUN_GROUPS as RUN_GROUPS
 from .run import Run as Run
 from .solve import SurfaceProgress as SurfaceProgress

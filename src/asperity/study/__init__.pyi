@@ -34,6 +34,9 @@ from .global_sensitivity import Sensitivity as Sensitivity
 from .global_sensitivity import SensitivityOutcome as SensitivityOutcome
 from .global_sensitivity import sensitivity as sensitivity
 from .indices import SensitivityMethod as SensitivityMethod
+from .machine import MachineResult as MachineResult
+from .machine import machine_conditions as machine_conditions
+from .machine import solve_machine as solve_machine
 from .overview import FailureReason as FailureReason
 from .overview import StudyOverview as StudyOverview
 from .plan import SEED_KEYS as SEED_KEYS

@@ -1,0 +1,231 @@
+"""[machine] of a case file: a machine element as a catalogue has it, in place of the [contact] that it leads to."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import PlainValidator
+
+from asperity.case.amounts import (
+    OPTIONAL,
+    PAIRED,
+    Amount,
+    Count,
+    Force,
+    Length,
+    Number,
+    amount_in,
+    default_amount,
+    plain,
+)
+from asperity.case.case import Case
+from asperity.case.refusals import Section, choose, parse_section
+from asperity.case.sections import CaseFile, MaterialSection
+from asperity.case.text import parse_toml, read_text, replaced
+from asperity.conditions import ElasticPair
+from asperity.errors import BadInput
+from asperity.machine import (
+    BallBearing,
+    CylindricalRollerBearing,
+    FlatCam,
+    Machine,
+    MachineContact,
+    RollerProfile,
+    SpurGear,
+    TwinDisc,
+)
+
+Rotation: TypeAlias = Annotated[float, amount_in("rad/s")]
+Angle: TypeAlias = Annotated[float, amount_in("rad")]
+AnyLength: TypeAlias = Annotated[float, amount_in("m", -math.inf)]
+ForceOrNone: TypeAlias = Annotated[float, amount_in("N", 0.0)]
+AngleOrNone: TypeAlias = Annotated[float, amount_in("rad", 0.0)]
+LengthPair: TypeAlias = Annotated[tuple[Length, Length], PAIRED]
+FOUND = 10  # digits of what a contact is stated with
+
+
+class SpurGearSection(Section):
+    """[machine] kind = "spur-gear"."""
+
+    kind: Literal["spur-gear"]
+    module: Length
+    teeth: tuple[Count, Count]
+    pressure_angle: Angle = Amount(math.radians(20.0), "20 deg")
+    centre_distance: Annotated[Length | None, OPTIONAL] = None
+    profile_shift: tuple[Number, Number] = (0.0, 0.0)
+    face_width: Length
+    tip_diameters: Annotated[LengthPair | None, OPTIONAL] = None
+    torque: Annotated[float, amount_in("N m")]
+    speed: Rotation
+
+
+class CylindricalRollerBearingSection(Section):
+    """[machine] kind = "cylindrical-roller-bearing"."""
+
+    kind: Literal["cylindrical-roller-bearing"]
+    rollers: Count
+    roller_diameter: Length
+    roller_length: Length
+    pitch_diameter: Length
+    clearance: AnyLength = default_amount(0.0, "um")
+    radial_load: ForceOrNone
+    speed: Rotation
+    profile: RollerProfile = "straight"
+
+
+class BallBearingSection(Section):
+    """[machine] kind = "ball-bearing"."""
+
+    kind: Literal["ball-bearing"]
+    balls: Count
+    ball_diameter: Length
+    pitch_diameter: Length
+    contact_angle: AngleOrNone = default_amount(0.0, "deg")
+    osculation: Annotated[tuple[Number, Number], PAIRED] = (0.52, 0.53)
+    clearance: AnyLength = default_amount(0.0, "um")
+    radial_load: ForceOrNone = default_amount(0.0, "N")
+    axial_load: ForceOrNone = default_amount(0.0, "N")
+    speed: Rotation
+
+
+class TwinDiscSection(Section):
+    """[machine] kind = "twin-disc"."""
+
+    kind: Literal["twin-disc"]
+    radii: LengthPair
+    speeds: tuple[Rotation, Rotation]
+    load: Force
+    length: Annotated[Length | None, OPTIONAL] = None
+    crown_radius: Annotated[Length | None, OPTIONAL] = None
+
+
+class FlatCamSection(Section):
+    """[machine] kind = "cam-flat"."""
+
+    kind: Literal["cam-flat"]
+    base_radius: Length
+    lift: Length
+    half_angle: Angle
+    width: Length
+    speed: Rotation
+    spring_load: Force
+    spring_rate: Annotated[float, amount_in("N/m", 0.0)] = default_amount(0.0, "N/m")
+    follower_mass: Annotated[float, amount_in("kg", 0.0)] = Amount(0.0, "0 kg")
+
+
+MACHINES: dict[str, tuple[type[Section], type[Machine]]] = {
+    "spur-gear": (SpurGearSection, SpurGear),
+    "cylindrical-roller-bearing": (CylindricalRollerBearingSection, CylindricalRollerBearing),
+    "ball-bearing": (BallBearingSection, BallBearing),
+    "twin-disc": (TwinDiscSection, TwinDisc),
+    "cam-flat": (FlatCamSection, FlatCam),
+}
+
+
+def _sections() -> dict[str, type[Section]]:
+    return {kind: section for kind, (section, _) in MACHINES.items()}
+
+
+class _MachineTables(Section):
+    """What a case file with a machine has of its own, and what the machine needs beside it."""
+
+    machine: Annotated[Any, PlainValidator(partial(choose, "kind", _sections))]
+    material: MaterialSection
+
+
+@dataclass(frozen=True)
+class MachineCase:
+    """A machine as its case file states it. Made by `load_machine`.
+
+    `tables` are the file's, `folder` is where a surface file is looked for, `source` what messages call the case.
+    """
+
+    tables: Mapping[str, Any]
+    machine: Machine
+    pair: ElasticPair
+    folder: Path = field(compare=False, repr=False)
+    source: str = field(compare=False)
+
+    @cached_property
+    def contacts(self) -> tuple[MachineContact, ...]:
+        """Every contact that carries load."""
+        return self.machine.contacts(self.pair)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the contacts has to know, a sentence each."""
+        return self.machine.notes(self.pair)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all is stated that a contact needs to be solved."""
+        return {"lubricant", "surface"} <= set(self.tables)
+
+    def contact_table(self, contact: MachineContact) -> dict[str, Any]:
+        """[contact] of a case file for one of the contacts; BadInput where it draws no oil in."""
+        stated = contact.conditions(self.pair)
+        first, second = stated.surface_speeds
+        radii = [_written(radius, "m") for radius in (stated.radius_along_rolling, stated.radius_across_rolling)]
+        length = {} if stated.length is None else {"length": _written(stated.length, "m")}
+        return {
+            "geometry": stated.geometry,
+            "radius": radii if stated.geometry == "elliptic" else radii[0],
+            **length,
+            "load": _written(stated.load, "N"),
+            "entrainment_speed": _written(stated.entrainment_speed, "m/s"),
+            "slip": float(f"{(first - second) / stated.entrainment_speed:.{FOUND}g}"),
+        }
+
+    def case(self, contact: MachineContact) -> Case:
+        """One of the contacts, with all else that the file states; BadInput as `load_case` raises it."""
+        tables = {key: table for key, table in self.tables.items() if key != "machine"}
+        stated = parse_section(CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source)
+        return Case(stated, self.folder, self.source)
+
+    def with_overrides(self, overrides: Mapping[str, object]) -> "MachineCase":
+        """The machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
+        return _machine_case(replaced(dict(self.tables), overrides, self.source), self.folder, self.source)
+
+
+def load_machine(path: str | Path) -> MachineCase:
+    """Read a case file that states a machine.
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is missing or no TOML.
+    BadInput
+        for a machine that cannot be, or a key, unit or value that cannot be meant; one sentence that says which.
+    """
+    path = Path(path)
+    return _machine_case(parse_toml(read_text(path), str(path)), path.parent, str(path))
+
+
+def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineCase:
+    if "machine" not in tables:
+        raise BadInput(f"{source}: has no [machine]; add one, or solve its one contact by asperity solve")
+    if "contact" in tables:
+        raise BadInput(f"{source}: states a [machine] and a [contact]; leave one of them out")
+    stated = parse_section(
+        _MachineTables, {key: tables[key] for key in ("machine", "material") if key in tables}, source
+    )
+    section, material = stated.machine, stated.material
+    given = {name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"}
+    try:
+        machine = MACHINES[section.kind][1](**given)
+        found = MachineCase(
+            tables, machine, ElasticPair(plain(material.youngs_modulus), material.poisson_ratio), folder, source
+        )
+        drawn = [contact for contact in found.contacts if not contact.stands_still]
+    except BadInput as refusal:
+        raise BadInput(f"{source}: machine: {refusal}") from None
+    if found.complete and drawn:
+        found.case(drawn[0])  # refuses what else the file states
+    return found
+
+
+def _written(value: float, unit: str) -> str:
+    return f"{value:.{FOUND}g} {unit}"

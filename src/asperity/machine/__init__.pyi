@@ -1,0 +1,10 @@
+from .ball import BallBearing as BallBearing
+from .cam import FlatCam as FlatCam
+from .discs import TwinDisc as TwinDisc
+from .element import Machine as Machine
+from .element import MachineContact as MachineContact
+from .gear import PathPoint as PathPoint
+from .gear import SpurGear as SpurGear
+from .roller import CylindricalRollerBearing as CylindricalRollerBearing
+from .roller import RollerProfile as RollerProfile
+from .rolling import RollingKinematics as RollingKinematics

@@ -1,0 +1,244 @@
+"""A ball bearing under radial and axial load: every ball's load and contact angle, deep groove or angular contact.
+
+Rings are rigid and bear no moment: the inner one tilts as the balls let it (ISO 16281). Spin of the balls and
+gyroscopic moments are not covered.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import scipy
+
+from asperity.arrays import Field
+from asperity.conditions import ElasticPair
+from asperity.errors import AsperityError, BadInput, require_positive
+from asperity.hertz import elliptic_contact
+from asperity.machine.element import MachineContact
+from asperity.machine.roller import require_carried
+from asperity.machine.rolling import STEEL_DENSITY, RollingKinematics, centrifugal_notes, grown, load_zone_notes
+
+EXPONENT = 1.5
+OSCULATION = 0.52, 0.53  # groove radius over ball diameter, of inner and outer ring: ISO 281's
+RINGS = "inner ring", "outer ring"
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallBearing:
+    """A ball bearing, its inner ring turning.
+
+    Parameters
+    ----------
+    balls : how many
+    ball_diameter, pitch_diameter : [m]
+    radial_load, axial_load : [N]
+    speed : of the inner ring [rad/s]
+    osculation : groove radius over ball diameter, of inner and outer ring
+    clearance : diametral [m]; negative: preload. It decides the free contact angle
+    contact_angle : free contact angle [rad], in place of the clearance
+
+    Raises
+    ------
+    BadInput
+        for balls that do not fit or none of which carries, grooves that the ball does not fit, or a clearance beside a
+        contact angle that it contradicts.
+    """
+
+    balls: int
+    ball_diameter: float
+    pitch_diameter: float
+    speed: float
+    radial_load: float = 0.0
+    axial_load: float = 0.0
+    osculation: tuple[float, float] = OSCULATION
+    clearance: float = 0.0
+    contact_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        for groove in self.osculation:
+            if not 0.5 < groove <= 0.6:
+                raise BadInput(f"osculation must lie above 0.5 and at most at 0.6, got {groove:g}; 0.52 is usual")
+        if not 0.0 <= self.contact_angle <= math.radians(60.0):
+            raise BadInput(
+                f"contact_angle must lie between 0 and 60 deg, got {math.degrees(self.contact_angle):g} deg; correct it"
+            )
+        if self.contact_angle > 0.0 and self.clearance != 0.0:
+            own = 2e6 * self.groove_distance * (1.0 - math.cos(self.contact_angle))
+            raise BadInput(
+                f"clearance and contact_angle say the same thing: {math.degrees(self.contact_angle):g} deg is a "
+                f"clearance of {own:.1f} um in these grooves; leave one of them out"
+            )
+        if not 0.0 <= self.axial_load < math.inf:
+            raise BadInput(f"axial_load must not be negative, got {self.axial_load:g} N; leave out its sign")
+        require_positive("ball_diameter", self.ball_diameter, "m")
+        if not 0.0 <= self.radial_load < math.inf:
+            raise BadInput(f"radial_load must not be negative, got {self.radial_load:g} N; leave out its sign")
+        if self.radial_load == self.axial_load == 0.0:
+            raise BadInput("radial_load and axial_load are both 0 N, no ball carries; give one of them")
+        require_carried(math.hypot(self.radial_load, self.axial_load), self.clearance, self.ball_diameter, "ball")
+        _ = self._kinematics(0.0)
+
+    @property
+    def groove_distance(self) -> float:
+        """Between the centres of the two grooves where the ball is just held, A = r_i + r_e - D [m]."""
+        return (sum(self.osculation) - 1.0) * self.ball_diameter
+
+    @cached_property
+    def play(self) -> float:
+        """Diametral clearance, given or that of the contact angle [m]."""
+        if self.contact_angle > 0.0:
+            return 2.0 * self.groove_distance * (1.0 - math.cos(self.contact_angle))
+        return self.clearance
+
+    @property
+    def angles(self) -> Field:
+        """Where the balls are, from the direction of the radial load [rad]."""
+        return 2.0 * np.pi * np.arange(self.balls) / self.balls
+
+    def stiffness(self, pair: ElasticPair) -> float:
+        """Load over the power 3/2 of the approach of both rings [N/m^1.5], at the nominal contact angle."""
+        approach = 0.0
+        for radii in self._radii(self.contact_angle):
+            found = elliptic_contact(1.0, radii, pair.reduced_modulus).approach
+            assert found is not None
+            approach += found
+        return float(approach**-EXPONENT)
+
+    def shifts(self, pair: ElasticPair) -> tuple[float, float, float]:
+        """Of the inner ring, where the balls carry the load: radial and axial [m], tilt [rad].
+
+        The axial one counts from the middle of the axial play. The ring tilts until it bears no moment.
+        """
+        stiffness = self.stiffness(pair)
+        elastic = (max(self.radial_load, self.axial_load) / stiffness) ** (1.0 / EXPONENT)
+        if self.axial_load == 0.0 or self.radial_load == 0.0:
+            return self._under_one_load(stiffness, elastic)
+        wanted = np.array([self.radial_load, self.axial_load, 0.0])
+        force = max(self.radial_load, self.axial_load)
+
+        def excess(shifts: Field) -> Field:
+            return np.asarray((self._forces(elastic * shifts, stiffness) - wanted) / force)
+
+        pressed = (max(self.play, 0.0) / 2.0 + elastic) / elastic
+        free = self.groove_distance * math.sqrt(1.0 - self._held_cosine**2) / elastic
+        for radial, axial in product((0.3 * pressed, pressed, 0.0), (free + 1.0, free + 0.3, free + 3.0, free + 10.0)):
+            found = scipy.optimize.root(excess, [radial, axial, 0.0], options={"xtol": 1e-13})
+            if np.max(np.abs(excess(found.x))) < 1e-9:
+                return self._moved(elastic * found.x)
+        raise AsperityError(
+            f"no balance was found under a radial load of {self.radial_load:g} N and an axial one of "
+            f"{self.axial_load:g} N; leave a small axial load out, or check ball_diameter and osculation"
+        )
+
+    def _under_one_load(self, stiffness: float, elastic: float) -> tuple[float, float, float]:
+        """Shifts under a radial or an axial load alone, where the ring goes one way only."""
+        axis, load = (0, self.radial_load) if self.axial_load == 0.0 else (1, self.axial_load)
+
+        def at(shift: float) -> Field:
+            return np.array([shift if place == axis else 0.0 for place in range(3)])
+
+        def excess(shift: float) -> float:
+            return float(self._forces(at(shift), stiffness)[axis]) - load
+
+        enough = grown(elastic + abs(self.play), lambda shift: excess(shift) > 0.0)
+        return self._moved(at(float(scipy.optimize.brentq(excess, 0.0, enough, xtol=1e-18, rtol=1e-14))))
+
+    def _moved(self, shifts: Field) -> tuple[float, float, float]:
+        return float(shifts[0]), float(shifts[1]), float(shifts[2]) / self._arm
+
+    def loads(self, pair: ElasticPair) -> tuple[Field, Field]:
+        """On every ball [N], and its contact angle [rad]."""
+        radial, axial, tilt = self.shifts(pair)
+        return self._balls(np.array([radial, axial, tilt * self._arm]), self.stiffness(pair))
+
+    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
+        """Both contacts of every loaded ball."""
+        found, (loads, contact_angles) = [], self.loads(pair)
+        for number, (place, load, angle) in enumerate(zip(self.angles, loads, contact_angles, strict=True)):
+            kinematics = self._kinematics(float(angle))
+            rings = zip(RINGS, self._radii(float(angle)), kinematics.overrolling_hz, strict=True)
+            for ring, radii, passages in rings if load > 0.0 else ():
+                contact = MachineContact(
+                    name=f"ball {number}, {ring}",
+                    bodies=(ring, "ball"),
+                    position=float(place),
+                    load=float(load),
+                    geometry="elliptic",
+                    radius=radii,
+                    length=None,
+                    surface_speeds=(kinematics.surface_speed, kinematics.surface_speed),
+                    overrolling_hz=passages,
+                )
+                found.append(contact)
+        return tuple(found)
+
+    @property
+    def frequencies(self) -> dict[str, float]:
+        """Of shaft, rings, ball and cage, at the free contact angle [Hz]."""
+        return self._kinematics(self.free_angle).frequencies
+
+    @property
+    def free_angle(self) -> float:
+        """Contact angle at which the grooves just hold the balls under thrust alone [rad]; 0 under radial load alone.
+
+        Loads change it a little; a bearing's characteristic frequencies are usually given for this one.
+        """
+        return self.contact_angle
+
+    def notes(self, pair: ElasticPair) -> tuple[str, ...]:
+        """What the model leaves out, and where it does not hold."""
+        contacts = self.contacts(pair)
+        loads, angles = self.loads(pair)
+        said = ["Rings are rigid and bear no moment; spin of the balls is not covered."]
+        largest = float(angles[np.argmax(loads)])
+        if largest > 1e-6:
+            said.append(f"The most loaded ball bears at a contact angle of {math.degrees(largest):.2f} deg.")
+        mass = STEEL_DENSITY * math.pi / 6.0 * self.ball_diameter**3
+        centrifugal = centrifugal_notes(self._kinematics(largest).centrifugal_load(mass), contacts)
+        return (*said, *load_zone_notes(loads.tolist()), *centrifugal)
+
+    def title(self) -> str:
+        """Balls and kind."""
+        kind = "Angular-contact" if self.contact_angle > 0.0 else "Deep-groove"
+        return f"{kind} ball bearing, {self.balls} balls"
+
+    @property
+    def _held_cosine(self) -> float:
+        """Of the contact angle at which the grooves just hold the balls."""
+        return min(1.0 - self.play / (2.0 * self.groove_distance), 1.0)
+
+    @property
+    def _arm(self) -> float:
+        """Radius of the circle of the inner groove's centres, on which a tilt acts [m]."""
+        inner = (self.osculation[0] - 0.5) * self.ball_diameter
+        return self.pitch_diameter / 2.0 + inner * self._held_cosine
+
+    def _balls(self, shifts: Field, stiffness: float) -> tuple[Field, Field]:
+        """Loads and contact angles where the inner ring is shifted so; the third shift is the tilt at `_arm`."""
+        across = self.groove_distance - self.play / 2.0 + shifts[0] * np.cos(self.angles)
+        along = shifts[1] + shifts[2] * np.cos(self.angles)
+        elastic = np.maximum(np.hypot(across, along) - self.groove_distance, 0.0)
+        return stiffness * elastic**EXPONENT, np.arctan2(along, across)
+
+    def _forces(self, shifts: Field, stiffness: float) -> Field:
+        """Radial and axial force, and the moment over `_arm` [N]."""
+        loads, angles = self._balls(shifts, stiffness)
+        axial, place = loads * np.sin(angles), np.cos(self.angles)
+        return np.array([(loads * np.cos(angles)) @ place, axial.sum(), axial @ place])
+
+    def _kinematics(self, angle: float) -> RollingKinematics:
+        return RollingKinematics(
+            count=self.balls,
+            diameter=self.ball_diameter,
+            pitch_diameter=self.pitch_diameter,
+            speed=self.speed,
+            contact_angle=angle,
+        )
+
+    def _radii(self, angle: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(R_x, R_y) at the inner and the outer ring [m]."""
+        inner, outer = self._kinematics(angle).radii
+        across = [1.0 / (2.0 / self.ball_diameter - 1.0 / (f * self.ball_diameter)) for f in self.osculation]
+        return (inner, across[0]), (outer, across[1])

@@ -1,0 +1,290 @@
+"""A pair of external spur gears: contacts along the line of action, load shared between pairs of teeth.
+
+Geometry, speeds and radii are exact for rigid involutes. How load is shared is ISO/TR 15144-1's unmodified profile
+(1/3 to 2/3 on two pairs, 1 on one); tip relief, tooth stiffness and dynamic loads are not covered.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+import scipy
+
+from asperity.conditions import ElasticPair
+from asperity.errors import BadInput, require_positive
+from asperity.machine.element import MachineContact, require_count, turns
+
+PathPoint = Literal["A", "AB", "B", "C", "D", "DE", "E"]
+JAMMED = 0.002  # modules by which the shifts may exceed what the centre distance leaves, for rounded catalogue values
+ADDENDUM = 1.0  # of the basic rack over the module; its straight flank ends as far below the reference line
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpurGear:
+    """A spur gear pair, the pinion driving.
+
+    Parameters
+    ----------
+    module : [m]
+    teeth : of pinion and wheel
+    pressure_angle : of the basic rack [rad]
+    profile_shift : of pinion and wheel, over the module
+    face_width : the one that bears [m]
+    torque : on the pinion [N m]
+    speed : of the pinion [rad/s]
+    centre_distance : [m]; None: without backlash
+    tip_diameters : of pinion and wheel [m]; None: one module above the shifted reference, not shortened
+
+    Raises
+    ------
+    BadInput
+        for teeth that do not mesh, jam, end in a point, or are undercut where they bear.
+    """
+
+    module: float
+    teeth: tuple[int, int]
+    pressure_angle: float
+    face_width: float
+    torque: float
+    speed: float
+    profile_shift: tuple[float, float] = (0.0, 0.0)
+    centre_distance: float | None = None
+    tip_diameters: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("module", self.module, "m"),
+            ("face_width", self.face_width, "m"),
+            ("torque", self.torque, "N m"),
+            ("speed", self.speed, "rad/s"),
+        ):
+            require_positive(name, value, unit)
+        for count in self.teeth:
+            require_count("teeth", count, 5)
+        if not 10.0 <= math.degrees(self.pressure_angle) <= 35.0:
+            degrees = math.degrees(self.pressure_angle)
+            raise BadInput(f"pressure_angle must lie between 10 and 35 deg, got {degrees:g} deg; 20 deg is usual")
+        self._require_mesh()
+        for body in (0, 1):
+            self._require_whole_teeth(body)
+
+    @cached_property
+    def base_radii(self) -> tuple[float, float]:
+        """Of pinion and wheel [m]."""
+        first, second = (0.5 * self.module * count * math.cos(self.pressure_angle) for count in self.teeth)
+        return first, second
+
+    @cached_property
+    def tip_radii(self) -> tuple[float, float]:
+        """Of pinion and wheel [m]."""
+        if self.tip_diameters is not None:
+            return self.tip_diameters[0] / 2.0, self.tip_diameters[1] / 2.0
+        first, second = (
+            0.5 * self.module * (count + 2.0 * (ADDENDUM + shift))
+            for count, shift in zip(self.teeth, self.profile_shift, strict=True)
+        )
+        return first, second
+
+    @cached_property
+    def centres(self) -> float:
+        """Distance of the axes [m]."""
+        if self.centre_distance is not None:
+            return self.centre_distance
+        shift = 2.0 * sum(self.profile_shift) * math.tan(self.pressure_angle) / sum(self.teeth)
+        wanted = _involute(self.pressure_angle) + shift
+        if wanted <= 0.0:
+            total = sum(self.profile_shift)
+            raise BadInput(f"profile_shift {total:g} in sum leaves no room between the axes; raise it")
+        angle = float(scipy.optimize.brentq(lambda trial: _involute(trial) - wanted, 1e-6, 1.5, xtol=1e-15))
+        return sum(self.base_radii) / math.cos(angle)
+
+    @cached_property
+    def working_angle(self) -> float:
+        """Pressure angle in the mesh [rad]: cos = (r_b1 + r_b2)/a."""
+        return math.acos(sum(self.base_radii) / self.centres)
+
+    @property
+    def base_pitch(self) -> float:
+        """π m cos α [m]."""
+        return math.pi * self.module * math.cos(self.pressure_angle)
+
+    @property
+    def line_of_action(self) -> float:
+        """From one base circle to the other, T = a sin αw [m]."""
+        return self.centres * math.sin(self.working_angle)
+
+    @cached_property
+    def path(self) -> dict[PathPoint, float]:
+        """Points of the path of contact by their distance from the pinion's base circle [m], in the order of contact.
+
+        A begins, E ends; one pair bears from B to D; C is the pitch point, AB and DE lie half way. C is left out where
+        the teeth do not meet there.
+        """
+        start, end = self._ends
+        points: dict[PathPoint, float] = {
+            "A": start,
+            "B": end - self.base_pitch,
+            "C": self.base_radii[0] * math.tan(self.working_angle),
+            "D": start + self.base_pitch,
+            "E": end,
+        }
+        points["AB"], points["DE"] = (points["A"] + points["B"]) / 2.0, (points["D"] + points["E"]) / 2.0
+        inside = (name for name in get_args(PathPoint) if start <= points[name] <= end)
+        return dict(sorted(((name, points[name]) for name in inside), key=lambda entry: entry[1]))
+
+    @property
+    def contact_ratio(self) -> float:
+        """Transverse contact ratio: mean number of pairs that bear."""
+        start, end = self._ends
+        return (end - start) / self.base_pitch
+
+    @property
+    def normal_force(self) -> float:
+        """Along the line of action, on all pairs together [N]."""
+        return self.torque / self.base_radii[0]
+
+    def share(self, distance: float) -> float:
+        """Share of the load on the pair that meets at this distance [m] from the pinion's base circle."""
+        start, end = self._ends
+        first, last = end - self.base_pitch, start + self.base_pitch
+        tiny = 1e-9 * self.base_pitch
+        if distance < first - tiny:
+            return 1.0 / 3.0 + (distance - start) / (first - start) / 3.0
+        if distance > last + tiny:
+            return 1.0 / 3.0 + (end - distance) / (end - last) / 3.0
+        return 1.0
+
+    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid teeth)
+        """The contacts at the points of `path`."""
+        return tuple(self.contact(name, distance) for name, distance in self.path.items())
+
+    def contact(self, name: str, distance: float) -> MachineContact:
+        """The contact at a distance [m] from the pinion's base circle: u1 = ω1 s, u2 = ω2 (T - s), R = s (T - s)/T."""
+        length, slower = self.line_of_action, self.speed * self.teeth[0] / self.teeth[1]
+        return MachineContact(
+            name=name,
+            bodies=("pinion", "wheel"),
+            position=distance,
+            load=self.share(distance) * self.normal_force,
+            geometry="line",
+            radius=distance * (length - distance) / length,
+            length=self.face_width,
+            surface_speeds=(self.speed * distance, slower * (length - distance)),
+            overrolling_hz=(turns(self.speed), turns(slower)),
+        )
+
+    @property
+    def frequencies(self) -> dict[str, float]:
+        """Mesh, both shafts, and the same two teeth meeting again [Hz]."""
+        first, second = self.teeth
+        pinion = turns(self.speed)
+        return {
+            "mesh_hz": first * pinion,
+            "pinion_hz": pinion,
+            "wheel_hz": pinion * first / second,
+            "hunting_tooth_hz": pinion * math.gcd(first, second) / second,
+        }
+
+    def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (rigid teeth)
+        """What the model leaves out, and where the pitch point is not what tables take it for."""
+        said = [
+            "Load is shared as ISO/TR 15144-1 has it for unmodified teeth; tip relief, tooth stiffness and dynamic "
+            "loads are not covered."
+        ]
+        pitch = self.path.get("C")
+        if pitch is None:
+            said.append("The teeth do not meet at the pitch point.")
+        elif self.share(pitch) < 1.0:
+            said.append(
+                "The pitch point C lies where two pairs bear: a nominal pressure for one pair is never reached there."
+            )
+        return tuple(said)
+
+    def title(self) -> str:
+        """Numbers of teeth and contact ratio."""
+        return f"Spur gear pair {self.teeth[0]}/{self.teeth[1]}, contact ratio {self.contact_ratio:.2f}"
+
+    @cached_property
+    def _ends(self) -> tuple[float, float]:
+        (tip_1, tip_2), (base_1, base_2) = self.tip_radii, self.base_radii
+        return self.line_of_action - math.sqrt(tip_2**2 - base_2**2), math.sqrt(tip_1**2 - base_1**2)
+
+    def _require_mesh(self) -> None:
+        millimetres, bases = 1e3, sum(self.base_radii)
+        if self.centres <= bases:
+            raise BadInput(
+                f"centre_distance {self.centres * millimetres:g} mm lets the base circles overlap, the teeth cannot "
+                f"mesh; it must be above {bases * millimetres:.4g} mm"
+            )
+        left = (_involute(self.working_angle) - _involute(self.pressure_angle)) * sum(self.teeth)
+        room = left / (2.0 * math.tan(self.pressure_angle))
+        if sum(self.profile_shift) > room + JAMMED:
+            raise BadInput(
+                f"profile_shift {sum(self.profile_shift):.4g} in sum jams the teeth: at this centre distance at most "
+                f"{room:.4f} leaves backlash; lower it or set the axes further apart"
+            )
+        for name, tip, base in zip(("pinion", "wheel"), self.tip_radii, self.base_radii, strict=True):
+            if tip <= base:
+                raise BadInput(f"tip_diameters: the {name}'s {2e3 * tip:g} mm lies inside its base circle; raise it")
+        start, end = self._ends
+        for name, other, beyond in (("wheel", "pinion", start <= 0.0), ("pinion", "wheel", end >= self.line_of_action)):
+            if beyond:
+                raise BadInput(
+                    f"the {name}'s tip reaches below the {other}'s base circle, the teeth cannot mesh; lower the "
+                    f"{name}'s tip diameter or raise the {other}'s profile shift"
+                )
+        if not 1.0 <= self.contact_ratio < 2.0:
+            few = self.contact_ratio < 1.0
+            remedy = "raise the tip diameters or bring the axes closer" if few else "lower the tip diameters"
+            why = "the teeth lose contact" if few else "three pairs bear, which the load sharing does not cover"
+            raise BadInput(f"the contact ratio is {self.contact_ratio:.3f}: {why}; {remedy}")
+
+    def _require_whole_teeth(self, body: int) -> None:
+        name, tip, base = ("pinion", "wheel")[body], self.tip_radii[body], self.base_radii[body]
+        count, shift = self.teeth[body], self.profile_shift[body]
+        half = (
+            math.pi / (2.0 * count)
+            + 2.0 * shift * math.tan(self.pressure_angle) / count
+            + _involute(self.pressure_angle)
+            - _involute(math.acos(base / tip))
+        )
+        if half <= 0.0:
+            raise BadInput(
+                f"the {name}'s teeth end in a point inside their tip circle of {2e3 * tip:g} mm; lower its tip "
+                "diameter or its profile shift"
+            )
+        start, end = self._ends
+        used = math.hypot(base, start if body == 0 else self.line_of_action - end)
+        cut = _undercut_radius(count, shift, self.module, self.pressure_angle)
+        if cut > used:
+            least = ADDENDUM - count * math.sin(self.pressure_angle) ** 2 / 2.0
+            raise BadInput(
+                f"the {name}'s teeth are undercut up to a radius of {1e3 * cut:.3f} mm and bear from "
+                f"{1e3 * used:.3f} mm; raise its profile shift to {least:.3f}, or its number of teeth"
+            )
+
+
+def _involute(angle: float) -> float:
+    return math.tan(angle) - angle
+
+
+def _undercut_radius(count: int, shift: float, module: float, angle: float) -> float:
+    """Radius [m] up to which the rack's corner cuts the involute away; 0 where it does not.
+
+    The corner, at a depth h below the pitch line, runs on a trochoid; what it cuts ends where that meets the involute.
+    """
+    pitch = 0.5 * module * count
+    base, depth = pitch * math.cos(angle), (ADDENDUM - shift) * module
+    if depth <= pitch * math.sin(angle) ** 2:
+        return 0.0
+    # the rack has moved by `travel` from where its flank passes the pitch point, the gear has turned by travel/pitch;
+    # a flank bounds the tooth until it touches at the base circle, at -pitch tan(angle)
+    travel = np.linspace(-2.0 * pitch, -pitch * math.tan(angle), 4000)
+    across, up = travel + depth * math.tan(angle), pitch - depth
+    radius = np.hypot(across, up)
+    corner = np.arctan2(across, up) - travel / pitch  # both as polar angles on the gear
+    at_radius = np.arccos(np.minimum(base / radius, 1.0))
+    flank = _involute(angle) - (np.tan(at_radius) - at_radius)
+    return float(np.max(radius[(radius > base) & (corner < flank)], initial=base))

@@ -1,0 +1,202 @@
+"""`asperity machine` as a user types it: conditions, solved contacts, what is kept, what is refused."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from asperity.case import load_machine
+from asperity.cli import main
+from asperity.errors import BadInput
+from asperity.study import machine_conditions
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+CONDITIONS = [  # of design.md, section 9, and the bodies' names
+    *("name", "bodies", "position", "load_n", "line_load_n_m", "radius_m", "length_m", "u1_m_s", "u2_m_s"),
+    *("entrainment_m_s", "slide_to_roll", "p_hertz_pa", "overrolling_hz"),
+]
+SOLVED = [  # of the same place, and more of what a solved contact has
+    *("h_central_m", "lambda_ratio", "clr", "car", "friction_coefficient", "flash_temperature_max_k", "crf_hz"),
+    *("h_min_m", "determined", "p_max_pa", "friction_power_w", "von_mises_core_pa", "reason"),
+]
+KEYS = ["contacts", "frequencies", "notes", "seconds", "verdict", "worst"]
+DISCS = """
+[machine]
+kind = "twin-disc"
+radii = ["20 mm", "30 mm"]
+speeds = ["1000 r/min", "500 r/min"]
+load = "500 N"
+length = "5 mm"
+[material]
+youngs_modulus = "206 GPa"
+poisson_ratio = 0.3
+[lubricant]
+viscosity = { law = "barus", eta0 = "0.05 Pa s", alpha = "15 1/GPa" }
+density = "none"
+rheology = "newtonian"
+"""
+QUICK = ("--workers", "1", "--set", "grid.cells=[48, 24]")
+
+
+@pytest.fixture
+def asp(tmp_path, monkeypatch, capsys):
+    """Run a command in a folder that holds the examples; return exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("fzg-c", "nu206", "6206"):
+        shutil.copy(EXAMPLES / f"{name}.toml", tmp_path)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main(arguments)
+        said = capsys.readouterr()
+        return end.value.code or 0, said.out, said.err
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("name", "contacts", "worst", "frequency"),
+    [
+        ("fzg-c", 7, "B", ("mesh_hz", 578.667)),
+        ("nu206", 10, "roller 0, inner ring", ("bpfi_hz", 387.903)),
+        ("6206", 10, "ball 0, inner ring", ("ftf_hz", 19.8234)),
+    ],
+)
+def test_a_dry_run_gives_the_conditions_alone(asp, name, contacts, worst, frequency):
+    code, out, _ = asp("machine", f"{name}.toml", "--dry-run", "--json")
+    said = json.loads(out)
+    assert code == 0
+    assert sorted(said) == KEYS
+    assert [sorted(row) for row in said["contacts"]] == [sorted(CONDITIONS)] * contacts
+    assert said["worst"] == worst
+    assert said["frequencies"][frequency[0]] == pytest.approx(frequency[1], rel=1e-5)
+    first = asp("machine", f"{name}.toml", "--dry-run")[1].splitlines()[0]
+    assert first == said["verdict"]
+    assert worst in first
+    assert list(Path().glob("*")) == list(Path().glob("*.toml"))
+
+
+def test_a_dry_run_needs_neither_oil_nor_roughness_and_solving_does(asp):
+    text = Path("nu206.toml").read_text("utf-8")
+    Path("bare.toml").write_text(text.partition("[lubricant]")[0], "utf-8")
+    assert asp("machine", "bare.toml", "--dry-run")[0] == 0
+    code, out, err = asp("machine", "bare.toml", "--out", "kept")
+    assert (code, out) == (2, "")
+    assert "add them, or take --dry-run" in err
+    assert not Path("kept").exists()
+
+
+def test_every_contact_is_solved_kept_and_not_solved_again(asp):
+    arguments = (
+        "machine",
+        "nu206.toml",
+        *QUICK[:2],
+        "--set",
+        "grid.cells=[128, 24]",
+        "--set",
+        "surface=flat",
+        "--out",
+        "kept",
+    )
+    code, out, _ = asp(*arguments, "--json")
+    assert code == 0
+    said = json.loads(out)
+    rows = {row["name"]: row for row in said["contacts"]}
+    assert [sorted(row) for row in rows.values()] == [sorted(CONDITIONS + SOLVED)] * 10
+    assert rows["roller 1, inner ring"]["h_min_m"] == rows["roller 12, inner ring"]["h_min_m"]  # the same contact
+    films = [rows[f"roller {number}, inner ring"]["h_min_m"] for number in (0, 1, 2)]
+    assert films == sorted(films)
+    assert rows["roller 0, outer ring"]["h_min_m"] > films[0]  # of larger radius
+    assert (said["worst"], rows["roller 0, inner ring"]["clr"]) == ("roller 0, inner ring", 0.0)
+    assert json.loads(Path("kept/machine.json").read_text("utf-8")) == said
+    parts = sorted(Path("kept/parts").glob("*.parquet"))
+    times = [part.stat().st_mtime_ns for part in parts]
+    parts[0].unlink()  # as if it had been killed before this one
+    again = json.loads(asp(*arguments, "--json")[1])
+    assert again["contacts"] == said["contacts"]
+    assert [part.stat().st_mtime_ns for part in parts][1:] == times[1:]
+    code, _, err = asp(*arguments, "--set", "machine.radial_load=3 kN")
+    assert code == 2
+    assert "holds a study of another case" in err
+
+
+def test_a_contact_is_what_solve_makes_of_it(asp):
+    """A contact of the gears, typed in as one, has the machine's numbers."""
+    changed = {"grid.cells": [48, 24], "surface": "flat"}
+    gears = load_machine("fzg-c.toml").with_overrides(changed)
+    one = next(contact for contact in gears.contacts if contact.name == "D")
+    arguments = ("machine", "fzg-c.toml", *QUICK, "--set", "surface=flat", "--json")
+    row = next(row for row in json.loads(asp(*arguments)[1])["contacts"] if row["name"] == "D")
+    Path("d.toml").write_text(gears.case(one).text, "utf-8")
+    alone = json.loads(asp("solve", "d.toml", "--json")[1])
+    for key in ("h_central_m", "h_min_m", "friction_coefficient", "flash_temperature_max_k"):
+        assert row[key] == pytest.approx(alone[key], rel=1e-9)
+    slips = [gears.case(contact).contents.contact.slip for contact in gears.contacts]
+    assert slips == pytest.approx([contact.slide_to_roll for contact in gears.contacts], abs=1e-9)
+
+
+def test_sliding_keeps_its_sign(asp):
+    rows = json.loads(asp("machine", "fzg-c.toml", "--dry-run", "--json")[1])["contacts"]
+    assert [row["slide_to_roll"] > 0.0 for row in rows] == [False, False, False, False, True, True, True]
+    for row in rows:
+        assert row["slide_to_roll"] * row["entrainment_m_s"] == pytest.approx(row["u1_m_s"] - row["u2_m_s"])
+
+
+def test_what_is_not_solved_is_loud(asp):
+    few = ("--set", "solver.max_iterations=1", "--set", "surface.correlation_length=60 um")
+    code, out, err = asp("machine", "fzg-c.toml", *QUICK, *few)
+    assert code == 1
+    assert "NOT SOLVED" in out.splitlines()[0]
+    assert "of 7 contacts were not solved; the first: A: " in err
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "words"),
+    [
+        ("fzg-c", "machine.torqe=3 N m", "machine.torqe is not a known key; did you mean torque?"),
+        ("fzg-c", "machine.kind=spur", 'did you mean "spur-gear"?'),
+        ("fzg-c", "machine.kind=", "--set takes KEY=VALUE"),
+        ("fzg-c", "machine=7", "machine must be a table with the key kind, got 7"),
+        ("fzg-c", "machine.speed=50 Hz", "not in r/min or rad/s"),
+        ("fzg-c", "machine.speed=50 1/s", "not in r/min or rad/s"),
+        ("fzg-c", "machine.teeth=[16, 24.5]", "machine.teeth[1] must"),
+        ("fzg-c", "machine.torque=-3 N m", "machine.torque must be positive and finite"),
+        ("fzg-c", "machine.centre_distance=90 mm", "jams the teeth"),
+        ("fzg-c", "material=none", "material must be a table, got"),
+        ("fzg-c", "lubricant.viscosity.eta0=3 m", "lubricant.viscosity.eta0 must be a viscosity"),
+        ("nu206", "machine.clearance=2 mm", "holds no roller in place"),
+        ("nu206", "machine.radial_load=0 N", "unloads every roller"),
+        ("nu206", "machine.radial_load=-4 kN", "must be finite, and not negative"),
+        ("6206", "machine.contact_angle=20 deg", None),
+        ("6206", "contact.load=4 N", "a [machine] and a [contact]; leave one of them out"),
+    ],
+)
+def test_bad_machines_are_one_sentence(asp, name, setting, words):
+    code, out, err = asp("machine", f"{name}.toml", "--dry-run", "--set", setting)
+    if words is None:
+        assert code == 0
+        return
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert words in err
+
+
+def test_what_states_a_machine_is_not_a_single_contact(asp):
+    for command in ("solve", "study", "run", "vibrate"):
+        code, _, err = asp(command, "nu206.toml", *(("--dry-run",) if command == "study" else ()))
+        assert code == 2
+        assert "states a [machine], which has several contacts; asperity machine solves them all" in err
+    shutil.copy(EXAMPLES / "paper.toml", "paper.toml")
+    assert "has no [machine]" in asp("machine", "paper.toml")[2]
+
+
+def test_discs_from_python(tmp_path):
+    path = tmp_path / "discs.toml"
+    path.write_text(DISCS, "utf-8")
+    (row,) = machine_conditions(load_machine(path)).rows
+    assert (row["u1_m_s"], row["u2_m_s"]) == pytest.approx((2.0943951, 1.5707963))
+    path.write_text(DISCS.replace('"1000 r/min"', '"104.71975512 rad/s"').replace("500 r/min", "500 rpm"), "utf-8")
+    assert machine_conditions(load_machine(path)).rows[0]["u1_m_s"] == pytest.approx(row["u1_m_s"], rel=1e-9)
+    with pytest.raises(BadInput, match="length"):
+        load_machine(path).with_overrides({"machine.crown_radius": "1 m"})
