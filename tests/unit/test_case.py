@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity.case import amounts, load_case
@@ -198,6 +198,7 @@ def test_a_missing_section_is_named(section):
         load_case(tables[0] + "\n[" + after[1])
 
 
+@settings(deadline=None)  # the first rare unit loads pint's registry
 @given(st.text(max_size=12))
 def test_any_text_for_a_unit_is_a_force_or_refused(text):
     paper = load_case(EXAMPLES / "paper.toml")
