@@ -84,6 +84,9 @@ Table = Annotated[
 Shaft = Annotated[
     list[float] | None, typer.Option(metavar="HZ", help="Shaft speed whose harmonics to remove; found if not given.")
 ]
+StagesFrom = Annotated[
+    str, typer.Option(metavar="INDICATOR", help="What decides stage and alarm: crf, damping or both; all are told.")
+]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

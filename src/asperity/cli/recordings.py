@@ -18,7 +18,7 @@ from asperity.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
     from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track
-    from asperity.wear import SeriesMethod
+    from asperity.wear import SeriesMethod, StageSource
 
 ALARM = 3
 IN_FULL = 4  # recordings that `check` shows with every fact
@@ -107,6 +107,7 @@ def track(
     table_file: options.Table = None,
     shaft: options.Shaft = None,
     method: options.Method = None,
+    stages_from: options.StagesFrom = "crf",
     page: options.Page = None,
     out: Annotated[
         list[Path] | None, typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat.")
@@ -132,6 +133,7 @@ def track(
             table=table_file,
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
+            stages_from=cast("StageSource", stages_from),
             workers=workers or processes.cores(),
             progress=step,
         )
@@ -171,6 +173,7 @@ def watch(
     table_file: options.Table = None,
     shaft: options.Shaft = None,
     method: options.Method = None,
+    stages_from: options.StagesFrom = "crf",
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -193,6 +196,7 @@ def watch(
             table=table_file,
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
+            stages_from=cast("StageSource", stages_from),
             once=once,
             every_s=every,
             settle_s=settle,
@@ -274,6 +278,7 @@ def _searched(tracked: "Track") -> Block:
     rows: list[Row] = [
         (quantity("band_hz").title, span("band_hz", tracked.target.band_hz)),
         ("method", tracked.method),
+        *tracked.stage_rows(),
         ("alarm", tracked.alarm.verdict),
     ]
     yield from table(rows, (*tracked.problems, *tracked.notes))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from asperity.arrays import Field
 from asperity.quantities import quantity
@@ -65,6 +66,14 @@ def draw_intervals(axes: Axes, x: Any, values: Any, reach: Any, marker: str, **s
     """Values with the lengths of their error bars; no bar where there is no interval."""
     reach = None if reach is None else np.where(np.isfinite(reach), reach, 0.0)
     axes.errorbar(x, values, reach, fmt=marker, **{"capsize": 2, "elinewidth": 0.9, **style})
+
+
+def plain_powers(axes: Axes) -> None:
+    """A logarithmic ordinate in plain numbers, 0.02; of less than a decade with those between its powers of ten."""
+    low, high = axes.get_ylim()
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    if high < 12.0 * low:
+        axes.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
 
 
 def mark_split(axes: Axes, stages: Stages | None, name: str | None = None) -> None:

@@ -3,6 +3,7 @@
 import json
 import re
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -17,7 +18,7 @@ from asperity.kept import netcdf_bytes
 from asperity.quantities import quantity
 from asperity.tracking.reading import Reading
 from asperity.tracking.target import Target
-from asperity.wear import Alarm, AlarmLevel, CleanSpectrum, Resonance, Stages
+from asperity.wear import IN_WORDS, Alarm, AlarmLevel, CleanSpectrum, Resonance, Stages, StageSource
 
 if TYPE_CHECKING:
     import pandas
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crfa", "crfa_std", "damping_ratio", "damping_std",
            "clr", "clr_low", "clr_high", "severe_probability", "duration_s", "rate_hz")  # fmt: skip
-TEXTS = ("file", "reason", "label", "started")
+TEXTS = ("file", "reason", "damping_reason", "label", "started")
 ENDINGS = (".csv", ".parquet", ".nc")
 
 
@@ -34,7 +35,8 @@ class TrackedRecording:
     """One recording of a series.
 
     `resonance` is not found, with its reason, for a recording that could not be used. `clr` and its 90 % interval are
-    the contact model's reading of the CRF, nan without one. `label` is the stage's name; `level` that of the alarm.
+    the contact model's reading of the CRF, nan without one. `damping_reason` says why the width of its line is no
+    damping ratio that can be followed; empty where it is one. `label` is the stage's name; `level` that of the alarm.
     """
 
     file: str
@@ -43,6 +45,7 @@ class TrackedRecording:
     reading: Reading
     clean: CleanSpectrum | None
     resonance: Resonance
+    damping_reason: str = ""
     load_n: float | None = None
     speed_hz: float | None = None
     clr: float = np.nan
@@ -50,6 +53,13 @@ class TrackedRecording:
     severe_probability: float = np.nan
     label: str = "none"
     level: AlarmLevel = "none"
+
+    @property
+    def damping(self) -> tuple[float, float]:
+        """Damping ratio of its line and the standard deviation of that; nan where it is not determined."""
+        if self.damping_reason:
+            return np.nan, np.nan
+        return self.resonance.damping_ratio, self.resonance.damping_ratio_std
 
     def row(self) -> dict[str, Any]:
         """Its line of the table, by the names of `asperity track --json`; None where there is nothing."""
@@ -62,8 +72,9 @@ class TrackedRecording:
             "crf_std_hz": finite_or_none(resonance.crf_std_hz),
             "crfa": finite_or_none(resonance.crfa),
             "crfa_std": finite_or_none(resonance.crfa_std),
-            "damping_ratio": finite_or_none(resonance.damping_ratio),
-            "damping_std": finite_or_none(resonance.damping_ratio_std),
+            "damping_ratio": finite_or_none(self.damping[0]),
+            "damping_std": finite_or_none(self.damping[1]),
+            "damping_reason": self.damping_reason,
             "found": resonance.found,
             "reason": resonance.reason,
             "clr": finite_or_none(self.clr),
@@ -87,8 +98,10 @@ class TrackedRecording:
 class Track:
     """A series of recordings, judged.
 
-    `recordings` in the order of `x`; `x_name` says what that is. `stages` is None where no resonance was found at all.
-    `problems` are sentences for which recordings should not be compared; `notes` say what was chosen for the user.
+    `recordings` in the order of `x`; `x_name` says what that is. `stages` is read from CRF, damping or both, as asked
+    for, and decides labels, probabilities and alarm; `stages_by` has all three. None and none where no resonance was
+    found at all. `problems` are sentences for which recordings should not be compared; `notes` say what was chosen for
+    the user.
     """
 
     recordings: tuple[TrackedRecording, ...]
@@ -96,6 +109,7 @@ class Track:
     target: Target
     method: str
     stages: Stages | None
+    stages_by: Mapping[StageSource, Stages]
     alarm: Alarm
     comparable: bool
     problems: tuple[str, ...]
@@ -125,6 +139,14 @@ class Track:
         resonances = f"contact resonance found in {self.resonance_count} of {several}"
         return f"{level}{self.stages.verdict.rstrip('.')}; {resonances}."
 
+    def stage_rows(self) -> list[tuple[str, str]]:
+        """What CRF, damping and both say of the stage, the deciding one marked."""
+        decides = None if self.stages is None else self.stages.source
+        return [
+            (f"stage by {IN_WORDS[source]}{', which decides' if source == decides else ''}", stages.verdict)
+            for source, stages in self.stages_by.items()
+        ]
+
     def scalars(self) -> dict[str, Any]:
         """Everything that `asperity track --json` prints."""
         stages = self.stages
@@ -132,6 +154,7 @@ class Track:
             "verdict": self.verdict(),
             "recordings": [recording.row() for recording in self.recordings],
             "stages": {
+                "source": None if stages is None else stages.source,
                 "kind": None if stages is None else stages.kind,
                 "split": None if stages is None else finite_or_none(stages.split),
                 "interval": list(stages.interval) if stages is not None and stages.found else None,
@@ -139,6 +162,7 @@ class Track:
                 "labels": [recording.label for recording in self.recordings],
                 "evidence": {} if stages is None else {k: finite_or_none(v) for k, v in stages.evidence.items()},
             },
+            "stages_by": {source: _in_json(stages) for source, stages in self.stages_by.items()},
             "alarm": {"level": self.alarm.level, "verdict": self.alarm.verdict},
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),
@@ -226,6 +250,19 @@ class Track:
                 encoding = {name: packed for name in ("density", "kept") if name in dataset}
                 part.write_bytes(netcdf_bytes(dataset, encoding))
         return path
+
+
+def _in_json(stages: Stages) -> dict[str, Any]:
+    """What one way to read the stage says; the damping ratios are those at the first place, the break and the last."""
+    return {
+        "kind": stages.kind,
+        "split": finite_or_none(stages.split),
+        "interval": list(stages.interval) if stages.found else None,
+        "slopes": [finite_or_none(slope) for slope in stages.slopes],
+        "damping": [finite_or_none(ratio) for ratio in stages.damping],
+        "evidence": {name: finite_or_none(value) for name, value in stages.evidence.items()},
+        "verdict": stages.verdict,
+    }
 
 
 def _without_numbers(reason: str) -> str:

@@ -8,12 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.case import Case
-from asperity.errors import BadInput
+from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
 from asperity.tracking.files import Place, Table, read_table, recordings_in
@@ -27,8 +28,11 @@ from asperity.wear import (
     RecordingFacts,
     Resonance,
     SeriesMethod,
+    Stages,
+    StageSource,
     asperity_load_share,
     comparability,
+    damping_objection,
     no_resonance,
     remove_lines,
     series_resonances,
@@ -59,6 +63,7 @@ def track_recordings(
     shaft_hz: Sequence[float] | None = None,
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
+    stages_from: StageSource = "crf",
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Track:
@@ -76,6 +81,7 @@ def track_recordings(
     method : of `series_resonances`; None takes "joint" from 6 recordings on, and of fewer says that one spectrum
         cannot tell whose resonance it shows
     detector : of `split_stages`
+    stages_from : what decides stage and alarm: "crf", "damping" or "both". The other two are told all the same
     workers : processes that read at the same time
     progress : called with each file that was read
 
@@ -94,7 +100,16 @@ def track_recordings(
     if all(reading.spectrum is None and reading.quality is None for reading in readings):
         others = f" (and so on for {len(readings) - 1} more files)" if len(readings) > 1 else ""
         raise BadInput(f"{readings[0].reason}{others}")
-    return judge(readings, target, places, x_name, shaft_hz=shaft_hz, method=method, detector=detector)
+    return judge(
+        readings,
+        target,
+        places,
+        x_name,
+        shaft_hz=shaft_hz,
+        method=method,
+        detector=detector,
+        stages_from=stages_from,
+    )
 
 
 def judge(
@@ -106,8 +121,10 @@ def judge(
     shaft_hz: Sequence[float] | None = None,
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
+    stages_from: StageSource = "crf",
 ) -> Track:
     """What recordings say together that have been read; otherwise as `track_recordings`."""
+    require_choice("source of stages", stages_from, get_args(StageSource))
     notes = [f"The band is {target.source}."] if target.assumed else []
     if places is None:
         places, x_name = _places_in_time(readings)
@@ -132,7 +149,8 @@ def judge(
     tracked = []
     for number, reading in enumerate(series):
         place = places[reading.file]
-        clean, resonance = used.get(number, (None, None))
+        clean, found = used.get(number, (None, None))
+        resonance = found or no_resonance(reading.reason, target.band_hz, chosen)
         tracked.append(
             TrackedRecording(
                 file=reading.file,
@@ -140,12 +158,13 @@ def judge(
                 x_std=place.x_std or 0.0,
                 reading=reading,
                 clean=clean,
-                resonance=resonance or no_resonance(reading.reason, target.band_hz, chosen),
+                resonance=resonance,
+                damping_reason=resonance.reason if clean is None else _damping_reason(resonance, clean),
                 load_n=place.load_n,
                 speed_hz=place.speed_hz,
             )
         )
-    return _staged(tracked, x_name, target, chosen, detector, notes)
+    return _staged(tracked, x_name, target, chosen, (detector, stages_from), notes)
 
 
 def _staged(
@@ -153,7 +172,7 @@ def _staged(
     x_name: str,
     target: Target,
     method: SeriesMethod,
-    detector: Detector,
+    staging: tuple[Detector, StageSource],
     notes: list[str],
 ) -> Track:
     used = [recording for recording in tracked if recording.clean is not None]
@@ -162,20 +181,17 @@ def _staged(
     crf = np.array([recording.resonance.crf_hz for recording in tracked])
     crf_std = np.array([recording.resonance.crf_std for recording in tracked])
     crf_std = np.where(np.isfinite(crf_std), crf_std, 0.0)
-    stages = None
+    stages_by = _stages_by(tracked, staging[0], _unit_of(x_name), comparable=comparable)
+    stages = stages_by.get(staging[1])
     severe: Field = np.full(x.size, np.nan)
     labels: tuple[str, ...] = ("none",) * x.size
-    if np.isfinite(crf).any():
-        stages = split_stages(
-            x,
-            crf,
-            np.array([recording.resonance.crfa for recording in tracked]) if comparable else None,
-            crf_std_hz=crf_std,
-            x_std=np.array([recording.x_std for recording in tracked]),
-            detector=detector,
-            unit=_unit_of(x_name),
+    if stages is not None:
+        known = (
+            [np.isfinite(recording.damping[0]) for recording in tracked]
+            if staging[1] == "damping"
+            else np.isfinite(crf)
         )
-        severe = np.where(np.isfinite(crf), stages.probability, np.nan)
+        severe = np.where(known, stages.probability, np.nan)
         labels = stages.labels
     alarm = trend_alarm(severe, alert=ALERT, danger=DANGER, in_a_row=IN_A_ROW, thing="the probability of severe wear")
     if target.full_load_crf_hz is not None:
@@ -196,6 +212,7 @@ def _staged(
         target=target,
         method=method,
         stages=stages,
+        stages_by=stages_by,
         alarm=alarm,
         comparable=comparable,
         problems=comparability(
@@ -213,8 +230,51 @@ def _staged(
                 for recording in used
             ]
         ),
-        notes=(*notes, *_copies(tracked)),
+        notes=(*notes, *_without_damping(tracked), *_copies(tracked)),
     )
+
+
+def _stages_by(
+    tracked: Sequence[TrackedRecording], detector: Detector, unit: str, *, comparable: bool
+) -> dict[StageSource, Stages]:
+    """The stage as CRF, damping and both tell it; nothing where no resonance was found."""
+    if not any(recording.resonance.found for recording in tracked):
+        return {}
+    resonances = [recording.resonance for recording in tracked]
+    damping, damping_std = np.array([recording.damping for recording in tracked]).T
+    return {
+        source: split_stages(
+            [recording.x for recording in tracked],
+            [resonance.crf_hz for resonance in resonances],
+            [resonance.crfa for resonance in resonances] if comparable else None,
+            crf_std_hz=[resonance.crf_std for resonance in resonances],
+            damping_ratio=damping,
+            damping_std=damping_std,
+            x_std=[recording.x_std for recording in tracked],
+            source=source,
+            detector=detector,
+            unit=unit,
+        )
+        for source in get_args(StageSource)
+    }
+
+
+def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
+    """Why its damping is not determined, or nothing. The joint separation knows which lines are missing."""
+    spectrum, half = clean.spectrum, resonance.damping_ratio * resonance.crf_hz
+    within = np.abs(spectrum.frequency_hz - resonance.crf_hz) <= half
+    missing = float(np.mean(~clean.kept[within])) if within.any() and resonance.method != "joint" else 0.0
+    return damping_objection(resonance, spectrum.resolution_hz, taken_out=missing) or ""
+
+
+def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
+    """A sentence on resonances whose damping is not determined."""
+    reasons = [one.damping_reason for one in tracked if one.resonance.found and one.damping_reason]
+    found = sum(one.resonance.found for one in tracked)
+    if not reasons:
+        return []
+    many = f"{len(reasons)} of {found} resonances" if found > 1 else "the resonance"
+    return [f"Damping is not determined of {many}: {reasons[0]}{', and so on' if len(reasons) > 1 else ''}."]
 
 
 def _copies(tracked: Sequence[TrackedRecording]) -> list[str]:

@@ -5,6 +5,7 @@ What was read is kept in files of its own, so that a watch can stop at any momen
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from time import sleep, time
@@ -19,7 +20,7 @@ from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, common_spacing, load_reading, read_spectra, save_reading
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
-from asperity.wear import Detector, SeriesMethod
+from asperity.wear import Detector, SeriesMethod, StageSource
 
 MEMORY = "heard"  # folder beside the results, a file a recording
 SETTINGS = "watch.json"
@@ -51,6 +52,7 @@ def watch_folder(
     shaft_hz: Sequence[float] | None = None,
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
+    stages_from: StageSource = "crf",
     once: bool = False,
     every_s: float = 5.0,
     settle_s: float = 2.0,
@@ -78,6 +80,7 @@ def watch_folder(
     target = search_target(case, band_hz)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
     memory = _Memory(out, target, options)
+    judged = partial(judge, shaft_hz=shaft_hz, method=method, detector=detector, stages_from=stages_from)
     first = True
     while True:
         present = _present(folder)
@@ -92,7 +95,7 @@ def watch_folder(
                 readings = [reading for reading in readings if Path(reading.file).name in places.places]
                 known, x_name = {reading.file: places.place(Path(reading.file)) for reading in readings}, places.x_name
             if readings:
-                track = judge(readings, target, known, x_name, shaft_hz=shaft_hz, method=method, detector=detector)
+                track = judged(readings, target, known, x_name)
             yield Update(new=new, track=track, waiting=len(unread) - len(arrived))
         if once:
             return

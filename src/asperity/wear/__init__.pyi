@@ -6,6 +6,7 @@ from .alarm import RecordingFacts as RecordingFacts
 from .alarm import asperity_load_share as asperity_load_share
 from .alarm import comparability as comparability
 from .alarm import trend_alarm as trend_alarm
+from .bends import FEWEST_PLACES as FEWEST_PLACES
 from .indicators import FEWEST_LINES as FEWEST_LINES
 from .indicators import INDICATOR_METHODS as INDICATOR_METHODS
 from .indicators import IndicatorMethod as IndicatorMethod
@@ -15,13 +16,15 @@ from .lines import Line as Line
 from .lines import remove_lines as remove_lines
 from .resonance import Resonance as Resonance
 from .resonance import SeenLine as SeenLine
+from .resonance import damping_objection as damping_objection
 from .resonance import line_shape as line_shape
 from .resonance import no_resonance as no_resonance
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
 from .series import SeriesMethod as SeriesMethod
 from .series import series_resonances as series_resonances
-from .stages import FEWEST_PLACES as FEWEST_PLACES
+from .stages import IN_WORDS as IN_WORDS
 from .stages import Detector as Detector
 from .stages import StageKind as StageKind
 from .stages import Stages as Stages
+from .stages import StageSource as StageSource
 from .stages import split_stages as split_stages

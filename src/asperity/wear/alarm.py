@@ -164,6 +164,8 @@ def trend_alarm(values: Field, *, alert: float, danger: float, in_a_row: int = 3
         levels.append(LEVELS[int(np.sum(raised))])
     state, since = int(np.sum(raised)), None
     verdict = f"No alarm: {thing} does not stand at {alert:g} or above by {in_a_row} recordings in a row."
+    if not np.isfinite(values).any():
+        verdict = f"No alarm, and none could be: {thing} is not determined of any recording."
     if state > 0:
         since = int(raised_at[state - 1])
         verdict = (

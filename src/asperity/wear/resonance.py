@@ -68,6 +68,37 @@ class Resonance:
         return curve
 
 
+NARROWEST = 4.0  # resolutions: a Hann window widens such a line by 6 %
+MOST_TAKEN_OUT = 0.1
+VAGUEST = 0.5  # standard deviation of a damping ratio over itself: more says hardly its order of magnitude
+
+
+def damping_objection(resonance: Resonance, resolution_hz: float, *, taken_out: float = 0.0) -> str | None:
+    """Why a line's width is no damping ratio that one could follow; None where it is one.
+
+    `resolution_hz` is the equivalent noise bandwidth of the spectrum [Hz], `taken_out` the share of the line's
+    half-power width that was taken for tones and is missing from the spectrum.
+    """
+    if not resonance.found:
+        return resonance.reason
+    ratio, std = resonance.damping_ratio, resonance.damping_ratio_std
+    if not np.isfinite(ratio):
+        return f"the method {resonance.method} fits no width"
+    if not np.isfinite(std):
+        return "its width was fitted without a deviation"
+    if std > VAGUEST * ratio:
+        return f"its damping ratio is not known to half of itself ({ratio:.3f} ± {std:.3f})"
+    width = 2.0 * ratio * resonance.crf_hz
+    if width < NARROWEST * resolution_hz:
+        return (
+            f"a line {width:.1f} Hz wide is less than {NARROWEST:g} times the spectrum's resolution of "
+            f"{resolution_hz:.1f} Hz; record for longer"
+        )
+    if taken_out > MOST_TAKEN_OUT:
+        return f"{100 * taken_out:.0f} % of the line was taken out as tones, which leaves too wide a rest"
+    return None
+
+
 def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float) -> Field:
     """Acceleration line of an oscillator that rides over white base acceleration, 1 at f = f0.
 

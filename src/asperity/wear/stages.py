@@ -1,50 +1,69 @@
 """Stages of wear: where along time or roughness the contact resonance changes its pace, or that it does not.
 
-A broken stick with a Bayesian break stands against smooth curves and against no change at all: on a smooth curve a
-stick alone reports a precise false knee. Knows nothing of recordings; docs/theory/indicators.md has the equations.
+Told by CRF, by the damping of its line, or by both together. A broken stick with a Bayesian break stands against
+smooth curves and against no change at all: on a smooth curve a stick alone reports a precise false knee. Knows nothing
+of recordings; docs/theory/indicators.md has the equations.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from functools import partial
+from itertools import pairwise, product
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from asperity.arrays import Field
-from asperity.errors import BadInput
+from asperity.errors import BadInput, require_choice
+from asperity.wear.bends import (
+    CONSTANT,
+    FEWEST_PLACES,
+    STICK,
+    Compared,
+    after_break,
+    common_breaks,
+    compared,
+    log_sum,
+    places_of,
+    quantiles,
+    sudden_bend,
+)
 
 Detector = Literal["bayesian"]
-StageKind = Literal["severe", "running-in", "no distinct stage", "no change", "too few"]
+StageKind = Literal["severe", "running-in", "no distinct stage", "no change", "disagree", "too few"]
+Indicator = Literal["crf", "damping"]
+StageSource = Literal["crf", "damping", "both"]
 
-FEWEST_PLACES = 7  # different x: three on either side of a break, and one to contradict
 STRONG_EVIDENCE = 6.0  # BIC difference, "strong": Kass and Raftery, J. Am. Stat. Assoc. 90 (1995)
-MOST_PLACES = 240  # recordings of a long watch are averaged in neighbouring groups down to so many
-BREAKS, SCATTERS, CURVATURES = 161, 15, 48  # grid points of break, scatter and bend of the smooth curves
 SEVERE_FROM = 0.5  # probability
+IN_WORDS: dict[str, str] = {"crf": "CRF", "damping": "damping", "both": "CRF and damping"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stages:
-    """What a series of CRFs says about stages of wear.
+    """What a series of CRFs, of damping ratios, or of both says about stages of wear.
 
     Parameters
     ----------
-    kind : "severe", CRF rises, and from `split` on at another pace: the paper's normal and severe stage. "running-in",
-        it falls and then does so at another pace. "no distinct stage", it changes, but a smooth curve explains it as
-        well. "no change". "too few" places to tell
+    source : what it was read from
+    kind : "severe", asperities take load over, CRF rising or damping falling, and from `split` on at another pace: the
+        paper's normal and severe stage. "running-in", it goes the other way, and then does so at another pace. "no
+        distinct stage", it changes, but a smooth curve explains it as well. "no change". "disagree", CRF and damping
+        change against each other: one of them, or both, is not the contact's. "too few" places to tell
     split, interval : the break, in units of x, and its 90 % interval; nan unless a stage was found
     probability : shape (recordings,), of being in the severe stage; 0 where the break belongs to running-in, nan
-        where there are too few places to tell. Weighs the broken stick against the smooth curves, so that it stays
-        below 1 where no stage is distinct
+        where it cannot be told. Weighs the broken stick against the smooth curves, so that it stays below 1 where no
+        stage is distinct
     labels : "normal", "severe" (probability 0.5 or more), "running-in", "steady" or "none", one a recording
     evidence : BIC of each model less that of the best; 0 is the best, 6 more is strong evidence against
-    slopes : of CRF before and after the break [Hz per unit of x]
-    scatter_hz : standard deviation of CRF about the best model beyond the errors given [Hz]
+    slopes : of CRF before and after the break [Hz per unit of x]; nan where CRF has none
+    scatter_hz : standard deviation of CRF about the best model beyond the errors given [Hz]; nan without CRF
+    damping : ratio at the first place, at the break and at the last, by the stick; nan where damping has none
     verdict : all of this in one sentence
     """
 
+    source: StageSource = "crf"
     kind: StageKind
     split: float = np.nan
     interval: tuple[float, float] = (np.nan, np.nan)
@@ -53,6 +72,7 @@ class Stages:
     evidence: dict[str, float]
     slopes: tuple[float, float] = (np.nan, np.nan)
     scatter_hz: float
+    damping: tuple[float, float, float] = (np.nan, np.nan, np.nan)
     verdict: str
 
     @property
@@ -67,7 +87,10 @@ def split_stages(
     crfa: ArrayLike | None = None,
     *,
     crf_std_hz: ArrayLike | None = None,
+    damping_ratio: ArrayLike | None = None,
+    damping_std: ArrayLike | None = None,
     x_std: ArrayLike | None = None,
+    source: StageSource = "crf",
     detector: Detector = "bayesian",
     unit: str = "",
 ) -> Stages:
@@ -77,32 +100,43 @@ def split_stages(
     ----------
     x : shape (recordings,), time or roughness, in any order; recordings at the same x are repeats of one test
     crf_hz : shape (recordings,) [Hz]; nan where none was found
-    crfa : shape (recordings,), a weak second channel: a sudden bend of its logarithm narrows the break, and decides
-        nothing
-    crf_std_hz, x_std : standard deviations, one for all or shape (recordings,); repeats at one x share its error.
-        Scatter beyond them is estimated
+    crfa : shape (recordings,), a weak second channel: a sudden bend of its logarithm narrows the break of CRF, and
+        decides nothing
+    damping_ratio : shape (recordings,), of the contact's line; nan where it is not determined. It falls as asperities
+        take the load over, whatever the rest of the machine damps, as long as that stays the same
+    crf_std_hz, damping_std, x_std : standard deviations, one for all or shape (recordings,); repeats at one x share
+        its error. Scatter beyond them is estimated
+    source : what the stage is read from: CRF, the damping ratio, or both with one break between them
     detector : name in STAGE_DETECTORS
     unit : of x, for the sentence
 
     Raises
     ------
     BadInput
-        for an unknown detector, shapes that differ, x that is not finite, negative deviations.
+        for an unknown detector or source, a source without its numbers, shapes that differ, x that is not finite,
+        damping ratios that are not positive, negative deviations.
     """
     if detector not in STAGE_DETECTORS:
         raise BadInput(f"stage detector must be one of {', '.join(STAGE_DETECTORS)}, got {detector!r}")
+    require_choice("source of stages", source, get_args(StageSource))
     x, crf_hz = np.asarray(x, dtype=float), np.asarray(crf_hz, dtype=float)
-    lengths = [np.shape(values) for values in (x, crf_hz, crfa) if values is not None]
+    damping = None if damping_ratio is None else np.asarray(damping_ratio, dtype=float)
+    lengths = [np.shape(values) for values in (x, crf_hz, crfa, damping) if values is not None]
     if x.ndim != 1 or len(set(lengths)) > 1:
-        raise BadInput(f"x, CRF and CRFA must be rows of one length, got shapes {', '.join(map(str, lengths))}")
+        raise BadInput(
+            f"x, CRF, CRFA and damping must be rows of one length, got shapes {', '.join(map(str, lengths))}"
+        )
     if x.size == 0:
         raise BadInput("stages need recordings, got none")
     if not np.isfinite(x).all():
         raise BadInput("x must be finite for every recording, got some that is not; leave those recordings out")
     crf_std = _deviations("CRF deviation", crf_std_hz, x.size)
     x_error = _deviations("x deviation", x_std, x.size)
-    second = None if crfa is None else np.asarray(crfa, dtype=float)
-    return STAGE_DETECTORS[detector](x, crf_hz, second, crf_std, x_error, unit)
+    series = [] if source == "damping" else [_Series("crf", crf_hz, crf_std)]
+    if source != "crf":
+        series.append(_narrowing(damping, _deviations("damping deviation", damping_std, x.size), source))
+    second = None if crfa is None or source == "damping" else np.asarray(crfa, dtype=float)
+    return STAGE_DETECTORS[detector](x, x_error, series, second, unit)
 
 
 def _deviations(name: str, value: ArrayLike | None, recordings: int) -> Field:
@@ -115,132 +149,243 @@ def _deviations(name: str, value: ArrayLike | None, recordings: int) -> Field:
     return np.where(np.isfinite(deviations), deviations, 0.0)
 
 
-class _Places(NamedTuple):
-    """Means over the repeats at each place, ordered; shape (places,)."""
+class _Series(NamedTuple):
+    """What a stage is read from, (recordings,): rises as asperities take the load over; nan where it is not known."""
 
-    x: Field
-    x_std: Field
-    y: Field
-    variance: Field  # of y, from the errors given and the scatter of repeats
-
-
-class _Candidate(NamedTuple):
-    """A model with its one bend parameter k (break, or length of saturation) on a grid, linear in all else.
-
-    `model(k, places)` gives the expected columns at the places, errors in x included, (grid, places, linear
-    parameters), and their derivatives by x.
-    """
-
-    name: str
-    bends: Field
-    model: Callable[[Field, _Places], tuple[Field, Field]]
-    parameters: int
+    indicator: Indicator
+    values: Field
+    std: Field
 
 
-class _Fitted(NamedTuple):
-    """Over the grid of bends and scatters: log likelihood, the same with linear parameters integrated out, those."""
+def _narrowing(ratio: Field | None, std: Field, source: StageSource) -> _Series:
+    """Damping ratios as -ln ζ, whose errors are the relative ones."""
+    if ratio is None:
+        raise BadInput(f"source {source} needs damping ratios, got none; give damping_ratio, or take source crf")
+    if np.any(ratio <= 0.0):
+        raise BadInput(f"damping ratios must be positive, got {np.nanmin(ratio):g}; leave those recordings out")
+    return _Series("damping", -np.log(ratio), std / ratio)
 
-    best: float  # greatest log likelihood
-    marginal: Field  # (grid, scatters)
-    linear: Field  # (grid, scatters, linear parameters)
+
+class _Outcome(NamedTuple):
+    """The series compared, the posterior of their break, and how the ways to explain them stand."""
+
+    each: list[Compared]
+    density: Field  # of the break, (breaks,)
+    sticks: tuple[bool, ...]  # which series break, by the best of the models with a break
+    share: float  # probability of the models with a break
+    evidence: dict[str, float]
+    broken: float  # BIC above the best: of models with a break ...
+    smooth: float  # ... without one
+    constant: float  # ... in which nothing changes
+    apart: float  # ... in which each series breaks at a place of its own; of one series alone infinite
 
 
-def _bayesian(x: Field, crf: Field, crfa: Field | None, crf_std: Field, x_std: Field, unit: str) -> Stages:
+def _bayesian(x: Field, x_std: Field, series: Sequence[_Series], crfa: Field | None, unit: str) -> Stages:
     """Broken stick against saturating curves, a straight line and a constant, by BIC."""
+    source: StageSource = "both" if len(series) > 1 else series[0].indicator
     start, reach = float(np.min(x)), max(float(np.ptp(x)), np.finfo(float).tiny)
     x, x_std = (x - start) / reach, x_std / reach  # so that no unit of x is too small for the algebra
-    known = np.isfinite(crf)
-    places = _places(x[known], crf[known], crf_std[known], x_std[known])
-    if places.x.size < FEWEST_PLACES:
-        verdict = f"Too few to tell: a stage needs CRFs at {FEWEST_PLACES} different places, got {places.x.size}."
-        return _without_stage("too few", verdict, {}, np.full(x.size, np.nan), np.nan)
-    compared = _compared(places)
-    evidence, stick = compared.evidence, compared.fits["broken stick"]
-    log_break = _log_sum(stick.marginal)
-    if crfa is not None:
-        log_break = log_break + _sudden_bend(x, crfa, x_std, compared.breaks)
-    density = np.exp(log_break - np.max(log_break))
-    density /= np.sum(density)
-    after = _after(x, x_std, compared.breaks, density)
-    low, split, high = _quantiles(compared.breaks, density, (0.05, 0.5, 0.95))
-    nearest = int(np.argmin(np.abs(compared.breaks - split)))
-    _, before_slope, change = stick.linear[nearest, int(np.argmax(stick.marginal[nearest]))]
-    slopes = (float(before_slope), float(before_slope + change))
-    rising = slopes[0] * (split - places.x[0]) + slopes[1] * (places.x[-1] - split) > 0.0
-
-    smooth = min(value for name, value in evidence.items() if name not in ("broken stick", "no change"))
-    over = f"{start + reach * places.x[0]:.4g} to {start + reach * places.x[-1]:.4g} {unit}".rstrip()
-    severe = after * compared.share if rising else np.zeros(x.size)
-    if evidence["no change"] - min(smooth, evidence["broken stick"]) < STRONG_EVIDENCE:
-        mean, error = float(np.mean(places.y)), float(np.std(places.y, ddof=1))
-        verdict = f"No change: CRF holds at {mean:.0f} ± {error:.0f} Hz over {over}."
-        return _without_stage("no change", verdict, evidence, severe, compared.scatter)
-    if smooth - evidence["broken stick"] < STRONG_EVIDENCE:
-        verdict = (
-            f"No distinct stage: CRF changes over {over}, but a smooth curve explains it "
-            f"{'better' if smooth < evidence['broken stick'] else 'as well'} (BIC of a break "
-            f"{evidence['broken stick'] - smooth:+.1f} against it, {-STRONG_EVIDENCE:.0f} needed)."
+    without = partial(_without_stage, source)
+    unknown = np.full(x.size, np.nan)
+    all_places = []
+    for one in series:
+        known = np.isfinite(one.values)
+        places = places_of(x[known], one.values[known], one.std[known], x_std[known])
+        if places.x.size < FEWEST_PLACES:
+            return without("too few", _too_few(one.indicator, places.x.size), {}, unknown, np.nan)
+        all_places.append(places)
+    breaks = common_breaks(all_places)
+    if not breaks[0] < breaks[-1]:
+        return without("too few", "Not determined: CRF and damping are known at different places.", {}, unknown, np.nan)
+    outcome = _outcome([compared(places, breaks) for places in all_places], crfa, x, x_std)
+    scatter = outcome.each[0].scatter if source != "damping" else np.nan
+    after = after_break(x, x_std, breaks, outcome.density)
+    low, split, high = quantiles(breaks, outcome.density, (0.05, 0.5, 0.95))
+    courses = [
+        _course(one, outcome.each[number], split, outcome.sticks[number], (start, reach), unit)
+        for number, one in enumerate(series)
+    ]
+    signs = {course.sign for course in courses} - {0}
+    severe = after * outcome.share if 1 in signs else np.zeros(x.size)
+    first, last = (start + reach * float(places.x[end]) for places, end in ((all_places[0], 0), (all_places[0], -1)))
+    over = f"{first:.4g} to {last:.4g} {unit}".rstrip()
+    thing = IN_WORDS[source]
+    if outcome.constant - min(outcome.smooth, outcome.broken) < STRONG_EVIDENCE:
+        means = " and ".join(course.mean for course in courses)
+        return without("no change", f"No change: {means} over {over}.", outcome.evidence, severe, scatter)
+    if len(signs) > 1:
+        sentence = f"CRF and damping disagree: {courses[0].way} and {courses[1].way} over {over}"
+        reason = "asperities that take load over raise CRF and let damping fall: one of them is not the contact's."
+        return without("disagree", f"{sentence}; {reason}", outcome.evidence, unknown, scatter)
+    if outcome.broken - outcome.apart >= STRONG_EVIDENCE:
+        own = " and ".join(
+            f"{IN_WORDS[one.indicator]} at {start + reach * _own_break(found):.3g}"
+            for one, found in zip(series, outcome.each, strict=True)
         )
-        return _without_stage("no distinct stage", verdict, evidence, severe, compared.scatter)
+        sentence = f"No common stage over {over}: {own} change their pace, and one break does not explain both"
+        verdict = f"{sentence} (BIC {outcome.broken - outcome.apart:+.1f} against it)."
+        return without("no distinct stage", verdict, outcome.evidence, unknown, scatter)
+    if outcome.smooth - outcome.broken < STRONG_EVIDENCE:
+        verdict = (
+            f"No distinct stage: {thing} {'change' if source == 'both' else 'changes'} over {over}, but a smooth curve "
+            f"explains it {'better' if outcome.smooth < outcome.broken else 'as well'} (BIC of a break "
+            f"{outcome.broken - outcome.smooth:+.1f} against it, {-STRONG_EVIDENCE:.0f} needed)."
+        )
+        return without("no distinct stage", verdict, outcome.evidence, severe, scatter)
+    rising = signs == {1}
     names = ("normal", "severe") if rising else ("running-in", "steady")
-    per = f" Hz per {unit}" if unit else " Hz per unit of x"
-    before, behind = (f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope) / reach:.3g}" for slope in slopes)
     low, split, high = (start + reach * place for place in (low, split, high))
     where = f"{split:.4g} ({low:.4g} to {high:.4g}, 90 %)" + (f" {unit}" if unit else "")
     return Stages(
+        source=source,
         kind="severe" if rising else "running-in",
         split=split,
         interval=(low, high),
         probability=severe,
         labels=tuple(names[int(p >= SEVERE_FROM)] for p in after),
-        evidence=evidence,
-        slopes=(slopes[0] / reach, slopes[1] / reach),
-        scatter_hz=compared.scatter,
-        verdict=f"{'Severe wear from' if rising else 'Running-in until'} {where}: "
-        f"CRF {before}{per} before and {behind} after.",
+        evidence=outcome.evidence,
+        slopes=courses[0].slopes if source != "damping" else (np.nan, np.nan),
+        scatter_hz=scatter,
+        damping=courses[-1].levels if source != "crf" else (np.nan, np.nan, np.nan),
+        verdict=f"{'Severe wear from' if rising else 'Running-in until'} {where}{_by(source, outcome.sticks)}: "
+        f"{', '.join(course.words for course in courses)}.",
     )
 
 
-class _Compared(NamedTuple):
-    """Candidates fitted to the places; `share` of the broken stick among them, `scatter` [Hz] of the best."""
-
-    breaks: Field
-    fits: dict[str, _Fitted]
-    evidence: dict[str, float]
-    share: float
-    scatter: float
+def _too_few(indicator: Indicator, places: int) -> str:
+    if indicator == "crf":
+        return f"Too few to tell: a stage needs CRFs at {FEWEST_PLACES} different places, got {places}."
+    return f"Not determined: a stage by damping needs it at {FEWEST_PLACES} different places, got {places}."
 
 
-def _compared(places: _Places) -> _Compared:
-    candidates = _candidates(places)
-    scatters = _scatters(places)
-    fits = {candidate.name: _fit(candidate, places, scatters) for candidate in candidates}
-    bic = {
-        candidate.name: -2.0 * fits[candidate.name].best + (candidate.parameters + 1) * float(np.log(places.x.size))
-        for candidate in candidates
-    }
-    least = min(bic.values())
-    evidence = {name: value - least for name, value in bic.items()}
-    weights = {name: float(np.exp(-0.5 * value)) for name, value in evidence.items()}
-    best = fits[min(evidence, key=lambda name: evidence[name])]
-    return _Compared(
-        breaks=candidates[0].bends,
-        fits=fits,
-        evidence=evidence,
-        share=weights["broken stick"] / sum(weights.values()),
-        scatter=float(scatters[int(np.argmax(np.max(best.marginal, axis=0)))]),
+def _by(source: StageSource, sticks: tuple[bool, ...]) -> str:
+    """What the stage is read from, where that is not CRF alone."""
+    if source == "both" and not all(sticks):
+        return f" by CRF and damping, in the {'damping' if sticks[1] else 'CRF'} alone"
+    return "" if source == "crf" else f" by {IN_WORDS[source]}"
+
+
+def _outcome(each: list[Compared], crfa: Field | None, x: Field, x_std: Field) -> _Outcome:
+    """Every way to explain the series, some of them broken at one place and each other one by a model of its own."""
+    breaks, count = each[0].breaks, len(each)
+    others = [{name: value for name, value in one.bic.items() if name != STICK} for one in each]
+    unbroken = {names: sum(bic[name] for bic, name in zip(others, names, strict=True)) for names in product(*others)}
+    ways = [way for way in product((True, False), repeat=count) if any(way)]
+    broken = {way: _bic_of_break(each, others, way) for way in ways}
+    constant = unbroken[(CONSTANT,) * count]
+    smooth = min(bic for names, bic in unbroken.items() if set(names) != {CONSTANT})
+    least = min(constant, smooth, *broken.values())
+    weights = {way: float(np.exp(-0.5 * (value - least))) for way, value in broken.items()}
+    rest = float(np.sum(np.exp(-0.5 * (np.array([*unbroken.values()]) - least))))
+    extra = np.zeros(breaks.size) if crfa is None else sudden_bend(x, crfa, x_std, breaks)
+    density = np.zeros(breaks.size)
+    for way, weight in weights.items():
+        log_break = extra + sum(
+            log_sum(one.fits[STICK].marginal) for one, stick in zip(each, way, strict=True) if stick
+        )
+        own = np.exp(log_break - np.max(log_break))
+        density += weight * own / np.sum(own)
+    apart, evidence = np.inf, {name: value - least for name, value in each[0].bic.items()}
+    if count > 1:
+        named = zip(("break in both", "break in the CRF alone", "break in the damping alone"), ways, strict=True)
+        evidence = {name: broken[way] - least for name, way in named}
+        apart = sum(one.bic[STICK] for one in each) - least
+        evidence |= {"breaks apart": apart, "smooth curves": smooth - least, CONSTANT: constant - least}
+    return _Outcome(
+        each=each,
+        density=density / np.sum(density),
+        sticks=min(ways, key=lambda way: broken[way]),
+        share=sum(weights.values()) / (sum(weights.values()) + rest),
+        evidence={name: value - min(evidence.values()) for name, value in evidence.items()},
+        broken=min(broken.values()) - least,
+        smooth=smooth - least,
+        constant=constant - least,
+        apart=apart,
     )
 
 
-STAGE_DETECTORS: dict[Detector, Callable[[Field, Field, Field | None, Field, Field, str], Stages]] = {
+def _bic_of_break(each: list[Compared], others: list[dict[str, float]], way: tuple[bool, ...]) -> float:
+    """Of a break in the series that `way` marks, at one place; of the rest the best model without one."""
+    if not all(way):
+        return sum(
+            one.bic[STICK] if stick else min(bic.values()) for one, bic, stick in zip(each, others, way, strict=True)
+        )
+    alone = sum(one.bic[STICK] + 2.0 * float(np.max(one.fits[STICK].best)) for one in each)  # what parameters cost
+    shared = (len(each) - 1) * float(np.log(max(one.places.x.size for one in each)))  # there is one break
+    return alone - shared - 2.0 * float(np.max(sum(one.fits[STICK].best for one in each)))
+
+
+def _own_break(one: Compared) -> float:
+    """Where a series' own stick breaks most likely."""
+    return float(one.breaks[int(np.argmax(one.fits[STICK].best))])
+
+
+class _Course(NamedTuple):
+    """How a series goes: 1 where asperities take load over, -1 where they hand it back, 0 where nothing changes."""
+
+    sign: int
+    mean: str
+    way: str
+    words: str
+    slopes: tuple[float, float]
+    levels: tuple[float, float, float]
+
+
+def _course(one: _Series, found: Compared, split: float, stick: bool, scale: tuple[float, float], unit: str) -> _Course:
+    """A series by its stick at the break, in words; `scale` is the start and the reach of x."""
+    places, reach = found.places, scale[1]
+    nearest = int(np.argmin(np.abs(found.breaks - split)))
+    fit = found.fits[STICK]
+    base, before, change = fit.linear[nearest, int(np.argmax(fit.marginal[nearest]))]
+    slopes = (float(before), float(before + change))
+    ends = (split - places.x[0], places.x[-1] - split)
+    rise = slopes[0] * ends[0] + slopes[1] * ends[1]
+    changes = stick or found.bic[CONSTANT] - min(found.bic.values()) >= STRONG_EVIDENCE
+    sign = (1 if rise > 0.0 else -1) if changes else 0
+    mean, error = float(np.mean(places.y)), float(np.std(places.y, ddof=1))
+    if one.indicator == "crf":
+        per = f" Hz per {unit}" if unit else " Hz per unit of x"
+        first, behind = (f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope) / reach:.3g}" for slope in slopes)
+        return _Course(
+            sign=sign,
+            mean=f"CRF holds at {mean:.0f} ± {error:.0f} Hz",
+            way=f"CRF {'rises' if sign > 0 else 'falls'}",
+            words=f"CRF {first}{per} before and {behind} after" if changes else "CRF does not change",
+            slopes=(slopes[0] / reach, slopes[1] / reach),
+            levels=(np.nan, np.nan, np.nan),
+        )
+    at = (base, base + slopes[0] * ends[0], base + rise)
+    levels = tuple(float(np.exp(-value)) for value in at)
+    ratios = [f"{level:.3g}" for level in levels]
+    goes = ["falls" if b < a else "rises" for a, b in pairwise(levels)]
+    on = "" if goes[0] == goes[1] else f"{goes[1]} "
+    return _Course(
+        sign=sign,
+        mean=f"damping holds at {np.exp(-mean):.3g} ± {error * np.exp(-mean):.2g}",
+        way=f"damping {'falls' if sign > 0 else 'rises'}",
+        words=f"damping {goes[0]} from {ratios[0]} to {ratios[1]} before and {on}to {ratios[2]} after"
+        if changes
+        else "damping does not change",
+        slopes=(np.nan, np.nan),
+        levels=(levels[0], levels[1], levels[2]),
+    )
+
+
+STAGE_DETECTORS: dict[Detector, Callable[[Field, Field, Sequence[_Series], Field | None, str], Stages]] = {
     "bayesian": _bayesian
 }
 
 
 def _without_stage(
-    kind: StageKind, verdict: str, evidence: dict[str, float], probability: Field, scatter: float
+    source: StageSource,
+    kind: StageKind,
+    verdict: str,
+    evidence: dict[str, float],
+    probability: Field,
+    scatter: float,
 ) -> Stages:
     return Stages(
+        source=source,
         kind=kind,
         probability=probability,
         labels=("none",) * probability.size,
@@ -248,135 +393,3 @@ def _without_stage(
         scatter_hz=scatter,
         verdict=verdict,
     )
-
-
-def _places(x: Field, y: Field, y_std: Field, x_std: Field) -> _Places:
-    """Repeats averaged; their own scatter, pooled, counts where it is larger than the deviations given."""
-    if x.size == 0:
-        return _Places(x, x_std, y, y)
-    at, index = np.unique(x, return_inverse=True)
-    if at.size > MOST_PLACES:  # neighbours in groups of equal number
-        index = index * MOST_PLACES // at.size
-    count = np.bincount(index).astype(float)
-
-    def mean(values: Field) -> Field:
-        return np.asarray(np.bincount(index, values) / count)
-
-    middle, centre = mean(y), mean(x)
-    given = mean(y_std**2)
-    spare = y.size - count.size
-    if spare > 0:
-        excess = float(np.sum((y - middle[index]) ** 2)) / spare - float(np.sum(given * (count - 1.0))) / spare
-        given = given + max(excess, 0.0)
-    return _Places(centre, mean(x_std), middle, given / count)
-
-
-def _scatters(places: _Places) -> Field:
-    """Grid of standard deviations, beyond the errors given, of the places about a curve [Hz]."""
-    span = max(float(np.ptp(places.y)), 1e-6 * float(np.max(np.abs(places.y))), 1e-9)
-    return np.concatenate([[span * 1e-4], span * np.geomspace(2e-3, 0.7, SCATTERS - 1)])
-
-
-def _candidates(places: _Places) -> list[_Candidate]:
-    x = places.x
-    breaks = np.linspace(x[2], x[-3], BREAKS)
-    lengths = np.ptp(x) * np.geomspace(0.05, 5.0, CURVATURES)
-    none = np.zeros(1)
-    return [
-        _Candidate("broken stick", breaks, _stick, 4),
-        _Candidate("saturating exponential", lengths, _exponential, 4),
-        _Candidate("saturating hyperbola", lengths, _hyperbola, 4),
-        _Candidate("straight line", none, _line, 2),
-        _Candidate("no change", none, _constant, 1),
-    ]
-
-
-def _beside_constant(column: Field, slope: Field) -> tuple[Field, Field]:
-    """A constant and one column, and their derivatives by x."""
-    return np.stack([np.ones_like(column), column], axis=-1), np.stack([np.zeros_like(slope), slope], axis=-1)
-
-
-def _stick(k: Field, at: _Places) -> tuple[Field, Field]:
-    """1, x and the hinge max(x - k, 0), in the mean over the error of x: (x - k) Φ(z) + s φ(z), z = (x - k)/s."""
-    ahead = at.x[None, :] - k[:, None]
-    blur = np.maximum(at.x_std, 1e-12)[None, :]
-    z = ahead / blur
-    over = scipy.special.ndtr(z)  # P(true x > k), shape (breaks, places)
-    bent = ahead * over + blur * np.exp(-0.5 * np.minimum(z**2, 1400.0)) / np.sqrt(2.0 * np.pi)
-    straight = np.broadcast_to(at.x - at.x[0], over.shape)
-    one = np.ones_like(over)
-    return np.stack([one, straight, bent], axis=-1), np.stack([np.zeros_like(over), one, over], axis=-1)
-
-
-def _exponential(k: Field, at: _Places) -> tuple[Field, Field]:
-    along = np.exp(-(at.x - at.x[0])[None, :] / k[:, None])
-    return _beside_constant(along, -along / k[:, None])
-
-
-def _hyperbola(k: Field, at: _Places) -> tuple[Field, Field]:
-    along = 1.0 / (1.0 + (at.x - at.x[0])[None, :] / k[:, None])
-    return _beside_constant(along, -(along**2) / k[:, None])
-
-
-def _line(_: Field, at: _Places) -> tuple[Field, Field]:
-    return _beside_constant((at.x - at.x[0])[None], np.ones_like(at.x)[None])
-
-
-def _constant(_: Field, at: _Places) -> tuple[Field, Field]:
-    return np.ones((1, at.x.size, 1)), np.zeros((1, at.x.size, 1))
-
-
-def _fit(candidate: _Candidate, places: _Places, scatters: Field) -> _Fitted:
-    """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
-    columns, slopes = (part[:, None] for part in candidate.model(candidate.bends, places))  # (bends, 1, places, linear)
-    own = places.variance + scatters[:, None] ** 2  # (scatters, places)
-    variance = np.broadcast_to(own, (columns.shape[0], *own.shape))
-    uncertain = bool(np.any(places.x_std > 0.0))
-    for _ in range(6 if uncertain else 1):
-        information = np.einsum("bsp,btpi,btpj->bsij", 1.0 / variance, columns, columns, optimize=True)
-        right = np.einsum("bsp,btpi->bsi", places.y / variance, columns, optimize=True)
-        ridge = 1e-12 * np.einsum("bsii->bs", information)[..., None, None] * np.eye(columns.shape[-1])
-        linear = np.linalg.solve(information + ridge, right[..., None])[..., 0]
-        steepness = np.einsum("btpi,bsi->bsp", slopes, linear, optimize=True)
-        if uncertain:
-            variance = own + (steepness * places.x_std) ** 2
-    off = places.y - np.einsum("btpi,bsi->bsp", columns, linear, optimize=True)
-    likelihood = -0.5 * np.sum(off**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
-    marginal = likelihood - 0.5 * np.linalg.slogdet(information + ridge)[1]
-    return _Fitted(float(np.max(likelihood)), marginal, linear)
-
-
-def _sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
-    """Logarithm of P(ln CRFA | break), but for a constant: a hinge over a parabola; smooth growth says nothing."""
-    known = np.isfinite(crfa) & (crfa > 0.0)
-    places = _places(x[known], np.log(crfa[known]), np.zeros(int(np.sum(known))), x_std[known])
-    if places.x.size < FEWEST_PLACES:
-        return np.zeros(breaks.size)
-
-    def model(k: Field, at: _Places) -> tuple[Field, Field]:
-        stick, sloped = _stick(k, at)
-        x = stick[..., 1:2]
-        return np.concatenate([stick, x**2], axis=-1), np.concatenate([sloped, 2.0 * x], axis=-1)
-
-    candidate = _Candidate("ln CRFA", breaks, model, 5)
-    return _log_sum(_fit(candidate, places, _scatters(places)).marginal)
-
-
-def _after(x: Field, x_std: Field, breaks: Field, density: Field) -> Field:
-    """Probability that each recording's true x lies beyond the break."""
-    blur = np.maximum(x_std, 1e-12)
-    return np.asarray(scipy.special.ndtr((x[:, None] - breaks[None, :]) / blur[:, None]) @ density)
-
-
-def _log_sum(marginal: Field) -> Field:
-    """Over the scatters, which are evenly spaced in their logarithm."""
-    top = np.max(marginal, axis=1, keepdims=True)
-    return np.asarray(np.log(np.sum(np.exp(marginal - top), axis=1)) + top[:, 0])
-
-
-def _quantiles(breaks: Field, density: Field, wanted: tuple[float, float, float]) -> tuple[float, float, float]:
-    cumulative = np.concatenate([[0.0], np.cumsum(density)])
-    step = breaks[1] - breaks[0]
-    edges = np.concatenate([breaks - step / 2.0, [breaks[-1] + step / 2.0]])
-    low, middle, high = np.interp(wanted, cumulative, edges)
-    return float(low), float(middle), float(high)

@@ -11,11 +11,20 @@ from matplotlib.figure import Figure
 from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.quantities import quantity
-from asperity.report.base import Exhibit
-from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes, neighbours, one_panel
+from asperity.report.base import Exhibit, in_print
+from asperity.report.drawing import (
+    display,
+    draw_intervals,
+    legend_below,
+    mark_split,
+    name_axes,
+    neighbours,
+    one_panel,
+    plain_powers,
+)
 from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
 from asperity.tracking import ALERT, DANGER, Track, TrackedRecording
-from asperity.wear import INTERVAL
+from asperity.wear import INTERVAL, Stages
 
 MOST_ROWS = 400  # of a waterfall; more recordings are thinned out
 SEVERITY = LinearSegmentedColormap.from_list("severity", ["#0072b2", "#e69f00", "#d55e00"])
@@ -124,25 +133,35 @@ def amplitude(track: Track) -> Exhibit:
 
 
 def damping(track: Track) -> Exhibit:
-    """Damping ratio of the fitted line over x, with 90 % intervals."""
+    """Damping ratio of the fitted line over x, with 90 % intervals and the break that it shows by itself."""
+    stages = track.stages_by.get("damping")
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
-        fitted = [one for one in track.recordings if np.isfinite(one.resonance.damping_ratio)]
-        ratio = np.array([recording.resonance.damping_ratio for recording in fitted])
-        std = np.array([recording.resonance.damping_ratio_std for recording in fitted])
-        factor = np.exp(INTERVAL * np.where(np.isfinite(std), std, 0.0) / ratio)
+        known = [one for one in track.recordings if not one.damping_reason]
+        ratio, std = (
+            display("damping_ratio", np.array(part)) for part in zip(*[one.damping for one in known], strict=True)
+        )
+        factor = np.exp(INTERVAL * std / ratio)
         ends = [ratio - ratio / factor, ratio * factor - ratio]
-        x = [recording.x for recording in fitted]
-        _draw_intervals(axes, track, x, ratio, ends, "^", GREEN, "damping ratio with 90 % interval")
+        x = [recording.x for recording in known]
+        _draw_intervals(axes, track, x, ratio, ends, "^", GREEN, "damping ratio with 90 % interval", stages)
+        unknown = [one.x for one in track.recordings if one.resonance.found and one.damping_reason]
+        if unknown:
+            axes.plot(
+                unknown, np.full(len(unknown), 0.02), "x", color=GREY, transform=axes.get_xaxis_transform(),
+                label="not determined",
+            )  # fmt: skip
         axes.set(yscale="log", ylabel=quantity("damping_ratio").axis, title="Damping of the contact resonance")
+        plain_powers(axes)
 
+    said = "" if stages is None else f" By it alone: {in_print(stages.verdict)}"
     return Exhibit(
         "damping",
         draw,
         "Half the width of the fitted line over its frequency. Where the rest of the machine damps the same "
-        "throughout, it falls as asperities take the load over from the oil.",
-        "Trend of the damping ratio.",
+        f"throughout, it falls as asperities take the load over from the oil.{said}",
+        f"Trend of the damping ratio over {x_label(track)}.{said}",
     )
 
 
@@ -169,9 +188,18 @@ def asperity_load_share(track: Track) -> Exhibit:
 
 
 def _draw_intervals(
-    axes: Axes, track: Track, x: list[float], values: Field, reach: list[Field], marker: str, colour: str, label: str
+    axes: Axes,
+    track: Track,
+    x: list[float],
+    values: Field,
+    reach: list[Field],
+    marker: str,
+    colour: str,
+    label: str,
+    stages: Stages | None = None,
 ) -> None:
-    mark_split(axes, track.stages, "break, 90 %")
+    """With the break of `stages`, or else the one that decides."""
+    mark_split(axes, stages or track.stages, "break, 90 %")
     draw_intervals(axes, x, values, reach, marker, color=colour, ecolor=GREY, markersize=4, label=label)
     axes.set_xlabel(x_label(track))
 

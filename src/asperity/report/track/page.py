@@ -10,6 +10,7 @@ from asperity.quantities import NO_VALUE, quantity
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, in_print, render, write_page
 from asperity.report.track import exhibits
 from asperity.tracking import ALERT, DANGER, IN_A_ROW, Track, TrackedRecording
+from asperity.wear import IN_WORDS
 
 METHODS = {
     "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
@@ -21,6 +22,7 @@ METHODS = {
     "peak": "The paper's: each spectrum smoothed three times by a five-point cubic, the highest point of the band "
     "taken. It is not tested against chance, and structural modes or shaft lines can be that point.",
 }
+NO_BREAK = ("saturating exponential", "saturating hyperbola", "straight line", "smooth curves", "no change")
 MOST_LINES = 20  # of those taken out, listed by name
 
 
@@ -47,10 +49,14 @@ def render_track_page(track: Track) -> str:
         heads=_heads(track),
         rows=[_row(recording, _with_clr(track)) for recording in track.recordings],
         with_clr=_with_clr(track),
+        with_damping=_with_damping(track),
         remarks=_remarks(track),
         facts=_facts(track),
         lines=_lines(track),
         evidence=_evidence(track),
+        ways=_ways(track),
+        x_label=exhibits.x_label(track),
+        decides=capitalised(IN_WORDS["crf" if track.stages is None else track.stages.source]),
         method_in_words=METHODS[track.method],
         resolution=_resolution(track),
         alert=ALERT,
@@ -62,6 +68,11 @@ def render_track_page(track: Track) -> str:
 def _with_clr(track: Track) -> bool:
     """Whether the contact model reads a load share off the CRF."""
     return track.target.full_load_crf_hz is not None
+
+
+def _with_damping(track: Track) -> bool:
+    """Whether the damping of any recording's line is determined."""
+    return not all(recording.damping_reason for recording in track.recordings)
 
 
 def _title(track: Track) -> str:
@@ -101,7 +112,7 @@ def _pictures(chosen: list[Exhibit]) -> list[Picture]:
 def _details(track: Track) -> list[Exhibit]:
     """What is shown below the trend."""
     details = [exhibits.amplitude(track)] if track.resonance_count else []
-    if any(np.isfinite(recording.resonance.damping_ratio) for recording in track.recordings):
+    if _with_damping(track):
         details.append(exhibits.damping(track))
     if track.resonance_count and _with_clr(track):
         details.append(exhibits.asperity_load_share(track))
@@ -131,9 +142,11 @@ def _heads(track: Track) -> list[str]:
 def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
     resonance, row = recording.resonance, recording.row()
     place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
-    resonant = [
-        quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa", "damping_ratio")
-    ]
+    resonant = [quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")]
+    width = (
+        "not determined" if resonance.found and recording.damping_reason else quantity("damping_ratio").number_in(row)
+    )
+    resonant.append(width)
     keys = [*(["clr"] if with_clr else []), "severe_probability"]
     cells = [place, *resonant, *(quantity(key).number(row[key]) for key in keys)]
     return _Row(
@@ -190,6 +203,31 @@ def _lines(track: Track) -> list[str]:
     strongest = sorted(clean.removed, key=lambda line: -line.mean_square)[:MOST_LINES]
     strongest.sort(key=lambda line: line.frequency_hz)
     return [f"{quantity('line_hz').text(line.frequency_hz)}: {line.source}" for line in strongest]
+
+
+class _Way(NamedTuple):
+    """What one indicator, or both, say of the stage."""
+
+    name: str
+    kind: str
+    split: str
+    margin: str
+    verdict: str
+
+
+def _ways(track: Track) -> list[_Way]:
+    """A line each for CRF, damping and both, the one that decides marked."""
+    ways = []
+    for source, stages in track.stages_by.items():
+        low, high = stages.interval
+        breaks = [value for name, value in stages.evidence.items() if "break in" in name or name == "broken stick"]
+        others = [value for name, value in stages.evidence.items() if name in NO_BREAK]
+        margin = f"{min(others) - min(breaks):+.1f}" if breaks and others else NO_VALUE
+        name = capitalised(IN_WORDS[source]) + (" (decides)" if stages is track.stages else "")
+        split = f"{stages.split:.3g} ({low:.3g} to {high:.3g})" if stages.found else NO_VALUE
+        kind = "not determined" if stages.kind == "too few" else stages.kind
+        ways.append(_Way(name, kind, split, margin, in_print(stages.verdict)))
+    return ways
 
 
 def _evidence(track: Track) -> list[tuple[str, str]]:

@@ -1,0 +1,209 @@
+"""Broken stick, smooth curves, straight line and constant fitted to one series: the likelihood of each, by Bayes.
+
+What they say of wear is left to `stages`; docs/theory/indicators.md has the equations.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from asperity.arrays import Field
+
+FEWEST_PLACES = 7  # different x: three on either side of a break, and one to contradict
+MOST_PLACES = 240  # recordings of a long watch are averaged in neighbouring groups down to so many
+BREAKS, SCATTERS, CURVATURES = 161, 15, 48  # grid points of break, scatter and bend of the smooth curves
+STICK, CONSTANT = "broken stick", "no change"
+
+
+class Places(NamedTuple):
+    """Means over the repeats at each place, ordered; shape (places,)."""
+
+    x: Field
+    x_std: Field
+    y: Field
+    variance: Field  # of y, from the errors given and the scatter of repeats
+
+
+class _Candidate(NamedTuple):
+    """A model with its one bend parameter k (break, or length of saturation) on a grid, linear in all else.
+
+    `model(k, places)` gives the expected columns at the places, errors in x included, (grid, places, linear
+    parameters), and their derivatives by x.
+    """
+
+    name: str
+    bends: Field
+    model: Callable[[Field, Places], tuple[Field, Field]]
+    parameters: int
+
+
+class Fitted(NamedTuple):
+    """Over the grid of bends and scatters: log likelihood, the same with linear parameters integrated out, those."""
+
+    best: Field  # (grid,), greatest log likelihood over the scatters
+    marginal: Field  # (grid, scatters)
+    linear: Field  # (grid, scatters, linear parameters)
+
+
+class Compared(NamedTuple):
+    """Candidates fitted to the places of one series; `bic` of each, `scatter` of the best in the series' unit."""
+
+    places: Places
+    breaks: Field
+    fits: dict[str, Fitted]
+    bic: dict[str, float]
+    scatter: float
+
+
+def common_breaks(series: Sequence[Places]) -> Field:
+    """Where a break of all series may lie: between the third and the third last place of each."""
+    low, high = max(places.x[2] for places in series), min(places.x[-3] for places in series)
+    return np.linspace(low, high, BREAKS)
+
+
+def compared(places: Places, breaks: Field) -> Compared:
+    """Every candidate fitted to the places."""
+    candidates, scatters = _candidates(places, breaks), _scatters(places)
+    fits = {candidate.name: _fit(candidate, places, scatters) for candidate in candidates}
+    bic = {
+        candidate.name: -2.0 * float(np.max(fits[candidate.name].best))
+        + (candidate.parameters + 1) * float(np.log(places.x.size))
+        for candidate in candidates
+    }
+    best = fits[min(bic, key=lambda name: bic[name])]
+    scatter = float(scatters[int(np.argmax(np.max(best.marginal, axis=0)))])
+    return Compared(places=places, breaks=breaks, fits=fits, bic=bic, scatter=scatter)
+
+
+def places_of(x: Field, y: Field, y_std: Field, x_std: Field) -> Places:
+    """Repeats averaged; their own scatter, pooled, counts where it is larger than the deviations given."""
+    if x.size == 0:
+        return Places(x, x_std, y, y)
+    at, index = np.unique(x, return_inverse=True)
+    if at.size > MOST_PLACES:  # neighbours in groups of equal number
+        index = index * MOST_PLACES // at.size
+    count = np.bincount(index).astype(float)
+
+    def mean(values: Field) -> Field:
+        return np.asarray(np.bincount(index, values) / count)
+
+    middle, centre = mean(y), mean(x)
+    given = mean(y_std**2)
+    spare = y.size - count.size
+    if spare > 0:
+        excess = float(np.sum((y - middle[index]) ** 2)) / spare - float(np.sum(given * (count - 1.0))) / spare
+        given = given + max(excess, 0.0)
+    return Places(centre, mean(x_std), middle, given / count)
+
+
+def _scatters(places: Places) -> Field:
+    """Grid of standard deviations, beyond the errors given, of the places about a curve."""
+    span = max(float(np.ptp(places.y)), 1e-6 * float(np.max(np.abs(places.y))), 1e-9)
+    return np.concatenate([[span * 1e-4], span * np.geomspace(2e-3, 0.7, SCATTERS - 1)])
+
+
+def _candidates(places: Places, breaks: Field) -> list[_Candidate]:
+    x = places.x
+    lengths = np.ptp(x) * np.geomspace(0.05, 5.0, CURVATURES)
+    none = np.zeros(1)
+    return [
+        _Candidate(STICK, breaks, _stick, 4),
+        _Candidate("saturating exponential", lengths, _exponential, 4),
+        _Candidate("saturating hyperbola", lengths, _hyperbola, 4),
+        _Candidate("straight line", none, _line, 2),
+        _Candidate(CONSTANT, none, _constant, 1),
+    ]
+
+
+def _beside_constant(column: Field, slope: Field) -> tuple[Field, Field]:
+    """A constant and one column, and their derivatives by x."""
+    return np.stack([np.ones_like(column), column], axis=-1), np.stack([np.zeros_like(slope), slope], axis=-1)
+
+
+def _stick(k: Field, at: Places) -> tuple[Field, Field]:
+    """1, x and the hinge max(x - k, 0), in the mean over the error of x: (x - k) Φ(z) + s φ(z), z = (x - k)/s."""
+    ahead = at.x[None, :] - k[:, None]
+    blur = np.maximum(at.x_std, 1e-12)[None, :]
+    z = ahead / blur
+    over = scipy.special.ndtr(z)  # P(true x > k), shape (breaks, places)
+    bent = ahead * over + blur * np.exp(-0.5 * np.minimum(z**2, 1400.0)) / np.sqrt(2.0 * np.pi)
+    straight = np.broadcast_to(at.x - at.x[0], over.shape)
+    one = np.ones_like(over)
+    return np.stack([one, straight, bent], axis=-1), np.stack([np.zeros_like(over), one, over], axis=-1)
+
+
+def _exponential(k: Field, at: Places) -> tuple[Field, Field]:
+    along = np.exp(-(at.x - at.x[0])[None, :] / k[:, None])
+    return _beside_constant(along, -along / k[:, None])
+
+
+def _hyperbola(k: Field, at: Places) -> tuple[Field, Field]:
+    along = 1.0 / (1.0 + (at.x - at.x[0])[None, :] / k[:, None])
+    return _beside_constant(along, -(along**2) / k[:, None])
+
+
+def _line(_: Field, at: Places) -> tuple[Field, Field]:
+    return _beside_constant((at.x - at.x[0])[None], np.ones_like(at.x)[None])
+
+
+def _constant(_: Field, at: Places) -> tuple[Field, Field]:
+    return np.ones((1, at.x.size, 1)), np.zeros((1, at.x.size, 1))
+
+
+def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
+    """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
+    columns, slopes = (part[:, None] for part in candidate.model(candidate.bends, places))  # (bends, 1, places, linear)
+    own = places.variance + scatters[:, None] ** 2  # (scatters, places)
+    variance = np.broadcast_to(own, (columns.shape[0], *own.shape))
+    uncertain = bool(np.any(places.x_std > 0.0))
+    for _ in range(6 if uncertain else 1):
+        information = np.einsum("bsp,btpi,btpj->bsij", 1.0 / variance, columns, columns, optimize=True)
+        right = np.einsum("bsp,btpi->bsi", places.y / variance, columns, optimize=True)
+        ridge = 1e-12 * np.einsum("bsii->bs", information)[..., None, None] * np.eye(columns.shape[-1])
+        linear = np.linalg.solve(information + ridge, right[..., None])[..., 0]
+        steepness = np.einsum("btpi,bsi->bsp", slopes, linear, optimize=True)
+        if uncertain:
+            variance = own + (steepness * places.x_std) ** 2
+    off = places.y - np.einsum("btpi,bsi->bsp", columns, linear, optimize=True)
+    likelihood = -0.5 * np.sum(off**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
+    marginal = likelihood - 0.5 * np.linalg.slogdet(information + ridge)[1]
+    return Fitted(np.max(likelihood, axis=1), marginal, linear)
+
+
+def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
+    """Logarithm of P(ln CRFA | break), but for a constant: a hinge over a parabola; smooth growth says nothing."""
+    known = np.isfinite(crfa) & (crfa > 0.0)
+    places = places_of(x[known], np.log(crfa[known]), np.zeros(int(np.sum(known))), x_std[known])
+    if places.x.size < FEWEST_PLACES:
+        return np.zeros(breaks.size)
+
+    def model(k: Field, at: Places) -> tuple[Field, Field]:
+        stick, sloped = _stick(k, at)
+        x = stick[..., 1:2]
+        return np.concatenate([stick, x**2], axis=-1), np.concatenate([sloped, 2.0 * x], axis=-1)
+
+    candidate = _Candidate("ln CRFA", breaks, model, 5)
+    return log_sum(_fit(candidate, places, _scatters(places)).marginal)
+
+
+def after_break(x: Field, x_std: Field, breaks: Field, density: Field) -> Field:
+    """Probability that each recording's true x lies beyond the break."""
+    blur = np.maximum(x_std, 1e-12)
+    return np.asarray(scipy.special.ndtr((x[:, None] - breaks[None, :]) / blur[:, None]) @ density)
+
+
+def log_sum(marginal: Field) -> Field:
+    """Over the scatters, which are evenly spaced in their logarithm."""
+    top = np.max(marginal, axis=1, keepdims=True)
+    return np.asarray(np.log(np.sum(np.exp(marginal - top), axis=1)) + top[:, 0])
+
+
+def quantiles(breaks: Field, density: Field, wanted: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Breaks below which these shares of the density lie."""
+    cumulative = np.concatenate([[0.0], np.cumsum(density)])
+    step = breaks[1] - breaks[0]
+    edges = np.concatenate([breaks - step / 2.0, [breaks[-1] + step / 2.0]])
+    low, middle, high = np.interp(wanted, cumulative, edges)
+    return float(low), float(middle), float(high)
