@@ -11,7 +11,7 @@ import pytest
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.coupling import VibrationModel
-from asperity.ehl import moving_contact, solve_contact, tangent_stiffness
+from asperity.ehl import moving_contact, own_resonance, solve_contact, tangent_stiffness
 from asperity.errors import BadInput
 from asperity.history import history_vibration, load_history, run_history
 from asperity.history.vibration import repeating, resampled, steady_response
@@ -170,6 +170,31 @@ def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration
     inside = frequency < vibration.profile.rate_hz / 6.0
     power = np.sum(lines[inside] * vibration.oscillator.gain(frequency[inside]))
     assert np.var(vibration.response.values) == pytest.approx(power, rel=0.05)
+
+
+def test_its_damping_is_that_of_its_moments_solved_apart(history, vibration):
+    chosen, rows = history.case, history.settled
+    assert vibration.damping.shape == vibration.dynamic.shape == (2,)
+    number = vibration.moments[1]
+    surface = chosen.moving_surfaces().at(float(rows["time_s"][rows["step"] == number].iloc[0]))
+    contact = solve_contact(chosen.conditions, chosen.lubricant, surface, options=chosen.options)
+    own = own_resonance(contact, chosen.vibration.mass).elastic
+    assert vibration.damping[1] == pytest.approx(own.damping_ratio, rel=1e-3)
+    assert vibration.dynamic[1] == pytest.approx(own.stiffness, rel=1e-4)
+    scalars = vibration.scalars()
+    assert scalars["history_damping_ratio"] == pytest.approx(np.mean(vibration.damping))
+    assert scalars["history_damping_std"] == pytest.approx(np.std(vibration.damping))
+    assert scalars["dynamic_stiffness_n_per_m"] == pytest.approx(np.mean(vibration.dynamic))
+    assert "its oil damps with a ratio of" in vibration.verdict()
+
+
+def test_where_the_model_cannot_be_shaken_the_damping_is_not_determined():
+    conserving = run_history(case(model="conserving"), steps=3)
+    vibration = history_vibration(conserving, moments=1)
+    assert np.isfinite(vibration.stiffness).all()
+    assert np.isnan(vibration.damping).all()
+    assert "damping is not determined (a dynamic stiffness needs the model" in vibration.verdict()
+    assert vibration.scalars()["history_damping_ratio"] is None
 
 
 def test_a_track_as_short_as_the_contact_shows_no_resonance_and_says_so(history, vibration):

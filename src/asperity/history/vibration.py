@@ -7,7 +7,7 @@ sphere's stiffness from CLR; the paper's way stands beside it, on the same histo
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -15,10 +15,10 @@ import scipy
 from asperity import coupling
 from asperity.arrays import Field
 from asperity.coupling import LINEAR_UP_TO, Tangent, Vibration, VibrationModel, band_about, contact_vibration
-from asperity.ehl import Scales, solve_contact
-from asperity.errors import BadInput, NotConverged
+from asperity.ehl import Scales, ShakenContact, solve_contact
+from asperity.errors import AsperityError, BadInput, NotConverged
 from asperity.history.history import History
-from asperity.quantities import lines, read
+from asperity.quantities import lines, quantity, read
 from asperity.signals import Signal, Spectrum, power_spectrum
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
@@ -36,7 +36,9 @@ class HistoryVibration:
     """A history as an accelerometer would record it.
 
     `oscillator` has the mean of `stiffness` [N/m], shape (moments,), the tangent stiffness of the contact as it lies at
-    the steps `moments`; steps at which a neighbouring load could not be solved are in `unsolved`. `profile` [m] is
+    the steps `moments`; steps at which a neighbouring load could not be solved are in `unsolved`. `damping` is the
+    contact's own damping ratio at the moments, where the mass resonates on its dynamic stiffness `dynamic` [N/m],
+    yielded cells elastic; nan where that is not determined, the last reason in `damping_failure`. `profile` [m] is
     one passage of the rough track, the approach of the bodies about its mean, which repeats; `response` [m/s^2] and
     `spectrum` are the steady answer to it, whose lines are `spacing_hz` apart, speed over track. `not_periodic` is what
     of the approach does not repeat, root mean square over root mean square. Without roughness, or where nothing
@@ -51,6 +53,9 @@ class HistoryVibration:
     spacing_hz: float | None
     resonance: Resonance
     coupled: Vibration
+    damping: Field
+    dynamic: Field
+    damping_failure: str = ""
     profile: Signal | None = None
     response: Signal | None = None
     spectrum: Spectrum | None = None
@@ -85,6 +90,26 @@ class HistoryVibration:
         return 0.5 * f0 * float(np.std(self.stiffness) / np.mean(self.stiffness))
 
     @property
+    def damping_ratio(self) -> float:
+        """Mean of the contact's own damping ratio over the moments that have one; nan without any."""
+        return _mean(self.damping)
+
+    @property
+    def damping_std(self) -> float:
+        """Standard deviation of the contact's own damping ratio over the moments."""
+        return _spread(self.damping)
+
+    @property
+    def dynamic_stiffness(self) -> float:
+        """Mean of the dynamic stiffness where the mass resonates on it [N/m]; nan without any."""
+        return _mean(self.dynamic)
+
+    @property
+    def dynamic_stiffness_std(self) -> float:
+        """Standard deviation of the dynamic stiffness over the moments [N/m]."""
+        return _spread(self.dynamic)
+
+    @property
     def approach_std(self) -> float | None:
         """Root mean square of the profile [m]."""
         return None if self.profile is None else float(np.std(self.profile.values))
@@ -97,6 +122,11 @@ class HistoryVibration:
             f"By its own stiffness, taken at {len(self.moments)} moments, the contact resonates at "
             f"{f0:.0f} ± {self.natural_frequency_std_hz:.0f} Hz, by the paper's coupling {by_paper}"
         )
+        ratio = quantity("history_damping_ratio")
+        if np.isfinite(self.damping_ratio):
+            sentence += f"; its oil damps with a ratio of {ratio.text(self.damping_ratio, self.damping_std)}"
+        else:
+            sentence += f"; its damping is not determined ({self.damping_failure})"
         if self.approach_std is not None and force is not None:
             sentence += (
                 f"; the approach of the bodies drives a mass on it by {1e9 * self.approach_std:.3g} nm rms, "
@@ -140,7 +170,8 @@ def history_vibration(
     if moments < 1:
         raise BadInput(f"the tangent stiffness is taken at 1 moment or more, got {moments}; {MOMENTS} is the default")
     surfaces = history.surfaces()
-    steps, stiffness, unsolved = _tangents(history, surfaces, model, moments)
+    taken = _moments(history, surfaces, model, moments)
+    stiffness = taken.stiffness
     with case.naming("vibration"):
         oscillator = coupling.damped_oscillator(float(np.mean(stiffness)), case.conditions.load, model)
         alone = model
@@ -153,8 +184,11 @@ def history_vibration(
     vibration = HistoryVibration(
         oscillator=oscillator,
         stiffness=stiffness,
-        moments=steps,
-        unsolved=unsolved,
+        moments=taken.steps,
+        unsolved=taken.unsolved,
+        damping=taken.damping,
+        dynamic=taken.dynamic,
+        damping_failure=taken.failure,
         spacing_hz=None if period is None else 1.0 / period,
         resonance=no_resonance(objection or "", band_about(f0), model.method),
         coupled=coupled,
@@ -235,24 +269,51 @@ def _period(surfaces: MovingSurfaces) -> tuple[float | None, str | None]:
     return moving[0], None
 
 
-def _tangents(
-    history: History, surfaces: MovingSurfaces, model: VibrationModel, moments: int
-) -> tuple[tuple[int, ...], Field, tuple[int, ...]]:
+class _Moments(NamedTuple):
+    """The contact as it lies at some steps; `failure` is the last reason why a damping is not determined."""
+
+    steps: tuple[int, ...]
+    stiffness: Field
+    damping: Field
+    dynamic: Field
+    unsolved: tuple[int, ...]
+    failure: str
+
+
+def _moments(history: History, surfaces: MovingSurfaces, model: VibrationModel, moments: int) -> _Moments:
     case, rows, spring = history.case, history.settled, Tangent(model.stated.get("reference_depth"))
     chosen = np.unique(np.linspace(0, len(rows) - 1, moments + 2)[1:-1].round().astype(int))
-    solved, stiffness, unsolved = [], [], []
+    solved, stiffness, shaken, unsolved, failure = [], [], [], [], ""
     for number, time in zip(rows["step"].iloc[chosen], rows["time_s"].iloc[chosen], strict=True):
         try:
             contact = solve_contact(case.conditions, case.lubricant, surfaces.at(float(time)), options=case.options)
             stiffness.append(spring.of(contact))
-            solved.append(int(number))
         except NotConverged as unfinished:
-            failure = unfinished
+            lost = unfinished
             unsolved.append(int(number))
+            continue
+        solved.append(int(number))
+        try:
+            found = ShakenContact(contact, reference_depth=spring.reference_depth).resonance(model.mass)
+            shaken.append((found.damping_ratio, found.stiffness))
+        except AsperityError as refusal:  # every other number is as good without it
+            shaken.append((math.nan, math.nan))
+            failure = str(refusal)
     if not stiffness:
-        reason = f"the tangent stiffness could be had at none of {len(unsolved)} steps: {failure}"
-        raise NotConverged(failure.solution, reason)
-    return tuple(solved), np.array(stiffness), tuple(unsolved)
+        reason = f"the tangent stiffness could be had at none of {len(unsolved)} steps: {lost}"
+        raise NotConverged(lost.solution, reason)
+    damping, dynamic = np.array(shaken).T
+    return _Moments(tuple(solved), np.array(stiffness), damping, dynamic, tuple(unsolved), failure)
+
+
+def _mean(values: Field) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if known.size else math.nan
+
+
+def _spread(values: Field) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.std(known)) if known.size else math.nan
 
 
 def _resonance(spectrum: Spectrum, f0: float, model: VibrationModel) -> Resonance:

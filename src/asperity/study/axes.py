@@ -33,6 +33,8 @@ OUTPUTS = (  # columns of a study's table that are looked at, in the order in wh
     "crf_sound_hz",
     "crf_paper_hz",
     "crf_hz",
+    "contact_damping_ratio",
+    "contact_resonance_hz",
     "crfa_sound",
     "crfa_paper",
     "crfa",

@@ -42,13 +42,13 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
     def draw(medium: Medium) -> Figure:
         figure, axes = medium.panel(0.9 * medium.single)
         for key, stroke, colour in SHARES:
-            _draw_mean(axes, curve, key, stroke, colour, quantity(key).short)
+            draw_mean(axes, curve, key, stroke, colour, quantity(key).short)
         _draw_anchors(axes, anchors, ("car", "car_domain"), "D", "CAR, printed" if printed else "CAR, given")
         _draw_anchors(axes, anchors, ("clr",), "P", "CLR from rig's CRF" if printed else "CLR, given")
         name_axes(axes, "sq_m", "share")
         axes.set_ylim(0.0, max(100.0, axes.get_ylim()[1]))
         medium.title(axes, "Load and area share of asperities")
-        _key_below(figure, axes, columns=2)
+        key_below(figure, axes, columns=2)
         return figure
 
     anchored = " Hollow marks: what should be met, with its tolerance." if anchors else ""
@@ -63,7 +63,7 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw,
         "Share of the load on asperities (CLR), and of the area: contact cells over all cells of the Hertz "
         "zone (CAR), contact area of the domain over the Hertz area (CAR of the domain). "
-        f"{_seeds(study)}{anchored}",
+        f"{surfaces_in_words(study)}{anchored}",
         f"CLR and CAR against Sq from {first_to_last('sq_m', curve.sq)}: {', '.join(ends)}.",
     )
 
@@ -73,7 +73,8 @@ def first_to_last(key: str, values: Field) -> str:
     return f"{quantity(key).number(values[0])} to {quantity(key).text(values[-1])}"
 
 
-def _seeds(study: StudyOverview) -> str:
+def surfaces_in_words(study: StudyOverview) -> str:
+    """What curves, bands and dots of a figure are."""
     surfaces = surfaces_a_point(study)
     return f"Means over {surfaces} a level with the 90 % interval of the mean; dots are single surfaces."
 
@@ -101,7 +102,7 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
         stay_near(grid[0, 0], np.concatenate([known, *(curve.by_case(f"crf_{preset}_hz")[1] for preset in presets)]))
         stay_near(grid[1, 0], np.concatenate([curve.by_case(f"crfa_{preset}")[1] for preset in presets]))
         grid[1, 0].set_ylim(bottom=0.0)
-        _key_below(figure, *grid.flat, columns=4)
+        key_below(figure, *grid.flat, columns=4)
         return figure
 
     stages = " ".join(f"Preset {name}: {in_print(stages.verdict)}" for name, stages in curve.stages.items())
@@ -110,7 +111,7 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw,
         "Contact resonance frequency (CRF) and its height in the spectrum (CRFA), by the two vibration presets "
         "on the same contacts: sound, and as the paper prints it. A shaded strip is where the split lies with "
-        f"90 %. {_seeds(study)} {stages}",
+        f"90 %. {surfaces_in_words(study)} {stages}",
         f"CRF and CRFA against Sq. {stages}",
     )
 
@@ -126,10 +127,10 @@ def _draw_preset(above: Axes, below: Axes, curve: WearCurve, anchors: Sequence[A
         for split, stroke in zip(splits, cycle(SPLIT_STROKES), strict=False):
             label = f"{'printed ' if printed else ''}{split.name}"
             axes.axvline(split.value, color="black", linestyle=stroke, linewidth=0.9, label=label)
-    _draw_mean(above, curve, f"crf_{preset}_hz", "-o", VERMILION, quantity("crf_hz").short)
+    draw_mean(above, curve, f"crf_{preset}_hz", "-o", VERMILION, quantity("crf_hz").short)
     _draw_full_load(above, curve)
     _draw_anchors(above, anchors, _CRF, "D", "CRF of the rig, printed" if printed else "CRF, given")
-    _draw_mean(below, curve, f"crfa_{preset}", "--s", BLUE, quantity("crfa").short)
+    draw_mean(below, curve, f"crfa_{preset}", "--s", BLUE, quantity("crfa").short)
     name_axes(below, "sq_m")
 
 
@@ -141,7 +142,7 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
         figure, axes = medium.panel(0.9 * medium.single)
         first, *others = list(curve.stages)
         axes.axvspan(*RIG_SPLIT_UM, color="#dfe3e8", linewidth=0, zorder=0, label="printed split")
-        _draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, f"ours, preset {first}", seeds=False)
+        draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, f"ours, preset {first}", seeds=False)
         for other in others:
             sq, label = display("sq_m", curve.sq), f"ours, preset {other}"
             axes.plot(sq, curve.mean(f"crf_{other}_hz"), "--", color=GREEN, linewidth=1.0, label=label)
@@ -156,7 +157,7 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
         name_axes(axes, "sq_m", ylabel=quantity("crf_hz").label)
         stay_near(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]]))
         medium.title(axes, "The rig's rings and our prediction")
-        _key_below(figure, axes, columns=2, seeds=False)
+        key_below(figure, axes, columns=2, seeds=False)
         return figure
 
     return Exhibit(
@@ -179,7 +180,7 @@ def _deviations(off: dict[str, float]) -> str:
     )
 
 
-def _draw_mean(
+def draw_mean(
     axes: Axes, curve: WearCurve, key: str, stroke: str, colour: str, label: str, *, seeds: bool = True
 ) -> None:
     """Mean over seeds with its interval as a band, each seed as a faint dot."""
@@ -250,7 +251,7 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
         )  # fmt: skip
 
 
-def _key_below(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -> None:
+def key_below(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -> None:
     """One key for all panels, below them; a name stands in it once, and faint dots and bands are explained."""
     keys: dict[str, Any] = {}
     for axes in panels:

@@ -15,10 +15,11 @@ from asperity.quantities import quantity
 from asperity.report.base import Exhibit, Picture, Tile, heading, render, write_exhibits, write_page
 from asperity.report.study import contacts, tables
 from asperity.report.study.curve import curve_exhibits, first_to_last
+from asperity.report.study.shaken import shaken_exhibits
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.study import SEED_KEYS, StudyOverview, StudyResult
 
-TILES = ("clr", "car", "car_domain", "crf_sound_hz")
+TILES = ("clr", "car", "car_domain", "crf_sound_hz", "contact_damping_ratio")
 
 Progress = Callable[[str], None]
 
@@ -87,7 +88,7 @@ def study_exhibits(study: StudyOverview) -> list[Exhibit]:
         return []
     if study.curve is None:
         return list(sweep_exhibits(study))
-    exhibits = list(curve_exhibits(study, study.curve))
+    exhibits = [*curve_exhibits(study, study.curve), *shaken_exhibits(study, study.curve)]
     if study.runs and not isinstance(study.runs, str):
         exhibits += [contacts.contact_maps(study.runs), contacts.surfaces(study.runs)]
     return exhibits

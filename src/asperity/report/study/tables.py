@@ -19,7 +19,16 @@ COMPUTED = {
     "shake": "contact and vibration, with the contact's own stiffness and damping",
     "vibrate": "the vibration model alone",
 }
-LEVELS = ("clr", "car", "car_domain", "crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper")
+LEVELS = (
+    "clr",
+    "car",
+    "car_domain",
+    "crf_sound_hz",
+    "crfa_sound",
+    "crf_paper_hz",
+    "crfa_paper",
+    "contact_damping_ratio",
+)
 
 
 class Cell(NamedTuple):
