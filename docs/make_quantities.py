@@ -18,6 +18,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "heat": "Temperature",
     "resonance": "Contact resonance",
     "own": "Stiffness and damping of the contact itself",
+    "dynamic": "Stiffness and damping over frequency",
     "map": "Maps in a run's file",
     "vibration": "Vibration model",
     "curve": "Friction curves",

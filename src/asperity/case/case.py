@@ -147,7 +147,7 @@ class Case:
     @cached_property
     def options(self) -> Options:
         """How hard to solve."""
-        solver = {name: plain(value) for name, value in self.contents.solver if name != "surfaces"}
+        solver = {name: plain(value) for name, value in self.contents.solver if name not in ("surfaces", "dynamic")}
         return Options(model=self.contents.model, **solver)
 
     @cached_property

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PlainValidator, Strict, model_validator
+from pydantic import Field, PlainValidator, Strict, field_validator, model_validator
 
 from asperity.case.amounts import (
     OPTIONAL,
@@ -26,6 +26,8 @@ from asperity.case.vibration import parse_vibration
 from asperity.conditions import Geometry
 from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, ContactModel, Options, Start
 from asperity.errors import BadInput
+
+MOST_FREQUENCIES = 200  # at which a contact may be shaken
 
 
 def _parse_radius(value: object) -> Amount | tuple[Amount, Amount]:
@@ -97,7 +99,15 @@ class SolverSection(Section):
     tolerance: Number = Options().tolerance
     max_iterations: Annotated[int, Strict()] = Options().max_iterations
     contact_film: Length = default_amount(Options().contact_film, "m")
+    dynamic: Annotated[int, Strict()] = 0  # frequencies at which the solved contact is shaken for k and c; 0: none
     surfaces: Count | None = None  # surfaces of one kind that a solution is the mean of; left out: as the wait allows
+
+    @field_validator("dynamic")
+    @classmethod
+    def _a_curve_or_none(cls, count: int) -> int:
+        if count and not 3 <= count <= MOST_FREQUENCIES:
+            raise BadInput(f"must be 0, for no curve over frequency, or 3 to {MOST_FREQUENCIES}, got {count}")
+        return count
 
 
 class MotionSection(Section):

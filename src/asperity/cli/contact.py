@@ -61,6 +61,9 @@ def solve(
         ),
     ] = None,
     accuracy: Accuracy = None,
+    dynamic: Annotated[
+        bool, typer.Option("--dynamic", help="Shake the solved contact: stiffness and damping over frequency, k and c.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -70,6 +73,8 @@ def solve(
     chosen = chosen_case(path, overrides, surface, accuracy)
     if surfaces is not None:
         chosen = chosen.with_overrides({"solver.surfaces": surfaces})
+    if dynamic and not chosen.contents.solver.dynamic:
+        chosen = chosen.with_overrides({"solver.dynamic": results.FREQUENCIES})
     run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None)
     if out is not None:
         run.save(out)

@@ -5,6 +5,9 @@ from .curves import SolverProgress as SolverProgress
 from .curves import stribeck_curve as stribeck_curve
 from .curves import traction_curve as traction_curve
 from .doubt import doubt_rows as doubt_rows
+from .dynamic import FREQUENCIES as FREQUENCIES
+from .dynamic import DynamicBranch as DynamicBranch
+from .dynamic import DynamicCurve as DynamicCurve
 from .levels import levels_verdict as levels_verdict
 from .levels import not_converged as not_converged
 from .run import BOUNDARY_FROM as BOUNDARY_FROM

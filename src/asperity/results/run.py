@@ -19,6 +19,7 @@ from asperity.ehl import FILMS, HOT, ContactSolution, ContactState, FlashTempera
 from asperity.errors import AsperityError, BadInput
 from asperity.quantities import lines, quantity, read
 from asperity.results.doubt import basis, in_words
+from asperity.results.dynamic import DynamicCurve, dynamic_curve
 from asperity.results.spread import Row, Scalar, half_interval, mean_row, whole_error
 from asperity.wear import Resonance
 
@@ -75,15 +76,19 @@ class Run:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """`notes`, and what a reader of friction and heat has to know."""
-        heat = self.heat
+        """`notes`, and what a reader of friction, heat and stiffness over frequency has to know."""
+        heat, curve = self.heat, self._over_frequency
+        shaken = () if isinstance(curve, str) else curve.failures
+        if isinstance(curve, str) and curve:
+            shaken = (f"no stiffness over frequency: {curve}",)
+        notes = (*self.notes, *(f"{sentence[:1].upper()}{sentence[1:]}." for sentence in shaken))
         if heat is None or self.case.thermal.feedback or heat.film_max_k < HOT or self.solution.lubricant is None:
-            return self.notes
+            return notes
         hot = (
             f"The film warms up by up to {heat.film_max_k:.4g} K, and its oil is taken as viscous as when cold: "
             "friction and temperatures are too high; set thermal.feedback=true to let it thin."
         )
-        return (*self.notes, hot)
+        return (*notes, hot)
 
     @property
     def friction_failure(self) -> str | None:
@@ -122,6 +127,25 @@ class Run:
     def own_resonance_failure(self) -> str | None:
         """Why there is no `own_resonance`; None where there is one."""
         return self._shaken if isinstance(self._shaken, str) else None
+
+    @cached_property
+    def _over_frequency(self) -> DynamicCurve | str:
+        """K and c over frequency, or why there are none; empty where the case asks for none."""
+        count = self.case.contents.solver.dynamic
+        if not count:
+            return ""
+        if not self.solution.convergence.converged:
+            return "the contact is not solved"
+        own = self.own_resonance
+        try:
+            return dynamic_curve(self.solution, count, None if own is None else own.elastic.frequency_hz)
+        except AsperityError as error:  # every other number is as good without it
+            return str(error)
+
+    @property
+    def dynamic_curve(self) -> DynamicCurve | None:
+        """Stiffness and damping over frequency of the first surface's contact, as the case's `solver.dynamic` asks."""
+        return None if isinstance(self._over_frequency, str) else self._over_frequency
 
     @property
     def damping_error(self) -> float | None:
@@ -187,6 +211,7 @@ class Run:
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
             **oil,
+            **({} if self.dynamic_curve is None else {"dynamic_curve": self.dynamic_curve.scalars()}),
             "notes": list(self.remarks),
         }
 
@@ -249,6 +274,16 @@ class Run:
         variables["von_mises"][2]["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"
         section = quantity("von_mises_section").attributes | {"comment": f"in the plane y = {stress.peak.y:g} m"}
         variables["von_mises_section"] = (("x", "depth"), stress.von_mises[:, stress.row].astype(np.float32), section)
+        curve = self.dynamic_curve
+        if curve is not None:
+            coordinates["dynamic_frequency"] = (
+                "dynamic_frequency", curve.frequency_hz, quantity("dynamic_frequency").attributes,
+            )  # fmt: skip
+            for suffix, branch in (("", curve.elastic), ("_virgin", curve.virgin)):
+                for name in ("dynamic_stiffness", "dynamic_damping"):
+                    values = getattr(branch, name.removeprefix("dynamic_"))
+                    key = f"{name}{suffix}"
+                    variables[key] = ("dynamic_frequency", values, quantity(key).attributes)
         for key, value in self.scalars().items():
             if value is not None and not isinstance(value, bool):
                 variables[key] = ((), value, quantity(key).attributes)

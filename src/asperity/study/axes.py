@@ -34,7 +34,7 @@ OUTPUTS = (  # columns of a study's table that are looked at, in the order in wh
     "crf_paper_hz",
     "crf_hz",
     "contact_damping_ratio",
-    "contact_resonance_hz",
+    "contact_stiffness_n_m",
     "crfa_sound",
     "crfa_paper",
     "crfa",

@@ -112,7 +112,7 @@ class WearCurve:
     def quantities(self) -> tuple[str, ...]:
         """The columns that the paper's Figs 7 and 8 show, and those of contacts that were shaken."""
         resonances = [key for preset in BOTH_PRESETS for key in (f"crf_{preset}_hz", f"crfa_{preset}")]
-        own = ("contact_damping_ratio", "contact_damping_ratio_virgin", "contact_resonance_hz", "contact_stiffness_n_m")
+        own = ("contact_damping_ratio", "contact_damping_ratio_virgin", "contact_stiffness_n_m")
         wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *resonances, *own)
         return tuple(name for name in wanted if name in self.table)
 

@@ -11,6 +11,7 @@ from asperity.quantities import quantity, select
 from asperity.report.base import Exhibit, Picture, Tile, render, span, tile, write_page
 from asperity.report.run import contact, rubbing, several
 from asperity.report.run.conditions import conditions_table
+from asperity.report.run.stiffness import stiffness_over_frequency
 from asperity.report.run.vibration import spectrum
 from asperity.results import RUN_GROUPS, Run, doubt_rows
 
@@ -123,6 +124,8 @@ def _exhibits(run: Run) -> Iterator[Exhibit]:
     yield rubbing.stress_over_depth(run)
     if run.vibration is not None and run.vibration.spectrum is not None:
         yield spectrum(run.vibration, run.resonance_in_words())
+    if run.dynamic_curve is not None:
+        yield stiffness_over_frequency(run)
     yield contact.convergence_history(run)
 
 

@@ -1,4 +1,4 @@
-"""Exhibits of a wear study that shook its contacts: damping and own resonance over Sq, and what tells load."""
+"""Exhibits of a wear study that shook its contacts: damping and stiffness over Sq, and what tells the load share."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +14,7 @@ from asperity.report.study.curve import draw_mean, first_to_last, key_below, sta
 from asperity.report.style import BLUE, GREEN, GREY, Medium
 from asperity.study import StudyOverview, WearCurve
 
-ELASTIC, VIRGIN, RESONANCE = "contact_damping_ratio", "contact_damping_ratio_virgin", "contact_resonance_hz"
+ELASTIC, VIRGIN, STIFFNESS = "contact_damping_ratio", "contact_damping_ratio_virgin", "contact_stiffness_n_m"
 BY_LAW = "crf_sound_hz"
 
 
@@ -26,7 +26,7 @@ def shaken_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]
 
 
 def over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
-    """Damping ratio of the contact, and the resonance of the mass on its own stiffness, over Sq."""
+    """Damping ratio and dynamic stiffness of the contact itself over Sq."""
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.single, 1.25 * medium.single), layout="constrained")
@@ -35,12 +35,12 @@ def over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
         if VIRGIN in curve.table:
             draw_mean(above, curve, VIRGIN, "--s", GREY, "yielded cells flowing")
         above.axhline(0.0, color="black", linewidth=0.6)
-        above.set_ylabel(quantity(ELASTIC).axis)
-        draw_mean(below, curve, RESONANCE, "-o", BLUE, "its own resonance, cells elastic")
-        name_axes(below, "sq_m", RESONANCE)
-        for axes, keys in ((above, [ELASTIC, VIRGIN]), (below, [RESONANCE])):
+        above.set_ylabel(f"damping ratio {quantity(ELASTIC).label}")
+        draw_mean(below, curve, STIFFNESS, "-o", BLUE, "stiffness, yielded cells elastic")
+        name_axes(below, "sq_m", ylabel=quantity(STIFFNESS).label)
+        for axes, keys in ((above, [ELASTIC, VIRGIN]), (below, [STIFFNESS])):
             stay_near(axes, np.concatenate([curve.by_case(key)[1] for key in keys if key in curve.table]))
-        medium.title(above, "Damping and resonance of the contact itself")
+        medium.title(above, "Damping and stiffness of the contact itself")
         key_below(figure, above, below, columns=2)
         return figure
 
@@ -48,16 +48,16 @@ def over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
     return Exhibit(
         "damping",
         draw,
-        "Damping ratio of the oil in the contact, and where the mass resonates on the contact's own stiffness; no law "
-        "of the paper's is in either. Elastic: tracks that come round again, what yielded once stays flat; flowing: "
-        f"virgin roughness. {surfaces_in_words(study)}",
-        f"Damping ratio of the contact against Sq, {ends}, and resonance on its own stiffness.",
+        "Damping ratio of the oil in the contact, and the contact's own stiffness k where the mass resonates on it, at "
+        "the root of k over the mass; no law of the paper's is in either. Elastic: tracks that come round again, what "
+        f"yielded once stays flat; flowing: virgin roughness. {surfaces_in_words(study)}",
+        f"Damping ratio of the contact against Sq, {ends}, and its own stiffness.",
     )
 
 
 def told_by(study: StudyOverview, curve: WearCurve) -> Exhibit:
-    """The load share of every contact over CRF by law, over its own resonance, and over its damping."""
-    keys = [key for key in (BY_LAW, RESONANCE, ELASTIC) if key in curve.table]
+    """The load share of every contact over CRF by law, over its own stiffness, and over its damping."""
+    keys = [key for key in (BY_LAW, STIFFNESS, ELASTIC) if key in curve.table]
     rows = study.used
     ranks = {key: rank_correlation(rows, key) for key in keys}
 
@@ -71,6 +71,8 @@ def told_by(study: StudyOverview, curve: WearCurve) -> Exhibit:
             sq = display("sq_m", rows["surface.sq"].to_numpy(dtype=float))[known]
             dots = axes.scatter(x[known], y[known], c=sq, vmin=sq.min(initial=0.0), **style)
             axes.set_xlabel(quantity(key).label)
+            if key == ELASTIC and np.all(x[known] > 0.0):
+                axes.set_xscale("log")
             medium.title(axes, _title(ranks[key]), f"({letter}) {_title(ranks[key])}")
         panels[0].set_ylabel(quantity("clr").label)
         figure.colorbar(dots, ax=panels, label=quantity("sq_m").label, pad=0.01)
@@ -82,8 +84,9 @@ def told_by(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw,
         "Load share of each contact over what a recording may show of it; colour is Sq. Rank correlation (±1 tells "
         f"all, 0 nothing): {in_words}. CRF follows from CLR by the paper's empirical law, so that it says nothing of "
-        "whether a contact does that; the two others are read off the solved contacts.",
-        f"Load share against CRF by law, the contact's own resonance, and its damping. Rank correlations: {in_words}.",
+        "whether a contact does that; stiffness, whose root is the frequency, and damping are read off the solved "
+        "contacts.",
+        f"Load share against CRF by law, the contact's own stiffness, and its damping. Rank correlations: {in_words}.",
     )
 
 

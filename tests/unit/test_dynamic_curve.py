@@ -1,0 +1,124 @@
+"""k and c of a solved contact over frequency, as a run states them: only where asked for, through the resonance."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray
+
+from asperity.case import load_case
+from asperity.cli import main
+from asperity.ehl import dynamic_stiffness
+from asperity.errors import AsperityError, BadInput
+from asperity.report import write_report
+from asperity.report.run.stiffness import stiffness_over_frequency
+from asperity.results import dynamic, load_run, solve_case
+
+SMALL = {"grid.cells": "[64, 32]", "surface.correlation_length": "40 um", "vibration.duration": "0.2 s"}
+COUNT = 9
+
+
+@pytest.fixture(scope="module")
+def run():
+    return solve_case(load_case("examples/paper.toml").with_overrides({**SMALL, "solver.dynamic": COUNT}))
+
+
+def test_the_curve_passes_through_the_reported_resonance(run):
+    curve, own = run.dynamic_curve, run.own_resonance.elastic
+    assert curve.frequency_hz.shape == (COUNT,)
+    at = int(np.argmin(np.abs(curve.frequency_hz - own.frequency_hz)))
+    assert curve.frequency_hz[at] == own.frequency_hz
+    assert curve.elastic.stiffness[at] == pytest.approx(own.stiffness, rel=1e-4)
+    assert curve.elastic.damping[at] == pytest.approx(own.damping, rel=1e-2)
+    assert curve.virgin.stiffness[at] == pytest.approx(run.own_resonance.virgin.stiffness, rel=1e-4)
+    assert curve.frequency_hz[0] == pytest.approx(own.frequency_hz / 10.0, rel=0.1)
+    assert curve.frequency_hz[-1] > 3.0 * own.frequency_hz
+
+
+def test_every_point_is_the_contact_shaken_at_that_frequency_alone(run):
+    curve = run.dynamic_curve
+    for place in (0, COUNT - 1):
+        for yielded, branch in (("elastic", curve.elastic), ("flowing", curve.virgin)):
+            alone = dynamic_stiffness(run.solution, float(curve.frequency_hz[place]), yielded=yielded)
+            assert branch.stiffness[place] == pytest.approx(alone.stiffness, rel=1e-3)
+            assert branch.damping[place] == pytest.approx(
+                alone.damping, rel=2e-2, abs=1e-3 * abs(curve.elastic.damping[0])
+            )
+    assert curve.elastic.slow == pytest.approx(dynamic_stiffness(run.solution, 0.0).stiffness, rel=1e-3)
+
+
+def test_it_stands_in_json_and_file_and_nothing_where_it_was_not_asked_for(run, tmp_path):
+    said = json.loads(json.dumps(run.summary()))["dynamic_curve"]
+    assert said["frequency_hz"] == run.dynamic_curve.frequency_hz.tolist()
+    assert said["stiffness_n_m"] == run.dynamic_curve.elastic.stiffness.tolist()
+    assert said["damping_ns_m"] == run.dynamic_curve.elastic.damping.tolist()
+    assert said["slow_stiffness_n_m"] == run.dynamic_curve.elastic.slow
+    assert set(said) > {"stiffness_virgin_n_m", "damping_virgin_ns_m", "slow_stiffness_virgin_n_m"}
+    with xarray.open_dataset(run.save(tmp_path / "run.nc")) as kept:
+        np.testing.assert_array_equal(kept["dynamic_frequency"], run.dynamic_curve.frequency_hz)
+        np.testing.assert_array_equal(kept["dynamic_stiffness"], run.dynamic_curve.elastic.stiffness)
+        assert kept["dynamic_damping"].attrs["units"] == "N s m-1"
+    again = load_run(tmp_path / "run.nc")
+    np.testing.assert_allclose(again.dynamic_curve.elastic.stiffness, run.dynamic_curve.elastic.stiffness, rtol=1e-6)
+    plain = replace(run, case=run.case.with_overrides({"solver.dynamic": 0}))
+    assert plain.dynamic_curve is None
+    assert "dynamic_curve" not in plain.summary()
+    assert "dynamic_stiffness" not in plain.contents().variables
+    assert "stiffness-over-frequency" not in (tmp_path / "p.html").name
+    page = write_report([plain], tmp_path / "p.html").read_text("utf-8")
+    assert "Stiffness over frequency" not in page
+
+
+def test_the_page_shows_it_with_the_resonance_marked(run, tmp_path):
+    page = write_report([run], tmp_path / "page.html").read_text("utf-8")
+    assert "Stiffness and damping of the solved contact" in page
+    above, below = stiffness_over_frequency(run).figure().axes
+    own = run.own_resonance.elastic
+    (mark,) = [line for line in above.get_lines() if line.get_label() == "where the mass resonates"]
+    assert mark.get_xydata()[0] == pytest.approx((own.frequency_hz, 1e-6 * own.stiffness))
+    assert "N s/m" in below.get_ylabel()
+
+
+def test_without_a_mass_the_curve_lies_about_the_oils_crossing(run):
+    free = replace(run, case=run.case.with_overrides({"vibration": "none"}), vibration=None)
+    conditions = run.case.conditions
+    crossing = conditions.entrainment_speed / (2.0 * np.pi * conditions.hertz.half_widths[0])
+    assert np.min(np.abs(free.dynamic_curve.frequency_hz / crossing - 1.0)) < 1e-12
+
+
+def test_frequencies_that_cannot_be_solved_are_left_out_and_said(run, monkeypatch):
+    class Stuck(dynamic.ShakenContact):
+        def at(self, frequency_hz):
+            if frequency_hz > 20e3:
+                raise AsperityError(f"not found at {frequency_hz:.0f} Hz")
+            return super().at(frequency_hz)
+
+    monkeypatch.setattr(dynamic, "ShakenContact", Stuck)
+    stuck = replace(run)
+    curve = stuck.dynamic_curve
+    assert np.isnan(curve.elastic.stiffness[-1])
+    assert np.isfinite(curve.elastic.stiffness[0])
+    assert stuck.summary()["dynamic_curve"]["stiffness_n_m"][-1] is None
+    assert any("Not found at" in note for note in stuck.remarks)
+
+
+def test_what_cannot_be_shaken_says_why(run):
+    conserving = solve_case(run.case.with_overrides({"model": "conserving", "surface": "flat"}))
+    assert conserving.dynamic_curve is None
+    assert any(
+        "No stiffness over frequency: a dynamic stiffness needs the model" in note for note in conserving.remarks
+    )
+
+
+def test_the_command_takes_an_option_and_refuses_a_senseless_number(capsys):
+    arguments = ["solve", "examples/paper.toml", "--surfaces", "1", "--json"]
+    for key, value in SMALL.items():
+        arguments += ["--set", f"{key}={value}"]
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--dynamic"])
+    assert not ended.value.code
+    said = json.loads(capsys.readouterr().out)
+    assert len(said["dynamic_curve"]["frequency_hz"]) == dynamic.FREQUENCIES
+    with pytest.raises(BadInput, match=r"solver\.dynamic"):
+        load_case("examples/paper.toml").with_overrides({"solver.dynamic": 1})
