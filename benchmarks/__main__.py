@@ -35,6 +35,7 @@ PARTS = (  # those first that the others' times are told against
     "robustness",
     "intervals",
     "damping",
+    "damping_stages",
     "motion_table",
 )
 ON_ALL = ("recordings", "study", "first_call", "prompt")  # as their users have them, on all processors
