@@ -70,6 +70,24 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     assert pandas.read_parquet("t.parquet")["file"].tolist() == [row["file"] for row in said["recordings"]]
 
 
+def test_damping_decides_where_it_is_asked_to(asp, rig):
+    folder, _ = rig
+    series = (str(folder), "--table", str(folder / "table.csv"), "--case", "case.toml")
+    by_crf, by_damping = (
+        json.loads(asp("track", *series, *more, "--json")[1]) for more in ((), ("--stages-from", "damping"))
+    )
+    assert by_crf["stages_by"] == by_damping["stages_by"]
+    assert by_crf["stages"]["source"] == "crf"
+    assert by_damping["stages"]["source"] == "damping"
+    assert (
+        by_damping["stages"]["kind"] == by_damping["stages_by"]["damping"]["kind"] == "no change"
+    )  # of the rig's sphere
+    assert by_damping["alarm"]["level"] == "none"
+    out = asp("track", *series, "--stages-from", "both")[1]
+    assert "stage by CRF and damping, which decides" in out
+    assert "damping does not change" in out
+
+
 def test_a_long_series_is_separated_in_groups(asp, rig, monkeypatch):
     folder, truth = rig
     monkeypatch.setattr("asperity.tracking.track.MOST_TOGETHER", 12)
@@ -191,6 +209,8 @@ def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
         ),
         (("track", "bare.npy", "--rate", "20000", "--band", "4000", "2000"), "band must go from low to high"),
         (("track", "bare.npy", "--rate", "20000", "--method", "guess"), "method must be one of"),
+        (("track", "bare.npy", "--rate", "20000", "--stages-from", "width"), "crf, damping, both, got 'width'"),
+        (("watch", "empty", "--once", "--stages-from", "width"), "crf, damping, both, got 'width'"),
         (("track", "bare.npy", "--rate", "20000", "--table", "t.csv"), "t.csv has no row for bare.npy"),
         (("watch", "bare.npy"), "is not a folder"),
     ],

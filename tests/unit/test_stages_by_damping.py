@@ -59,6 +59,16 @@ def test_its_break_is_where_it_was_put_and_the_interval_covers():
     assert 0.8 <= covered <= 1.0  # of 60: 90 %, two standard errors either way
 
 
+def test_deviations_of_a_ratio_count_by_its_size():
+    """Ratios near 0.04 that are off by half, and known to be: by their size, not by 0.02 of a logarithm."""
+    ratio, std = narrowing(SQ), 0.01 * narrowing(SQ)
+    ratio[:2] *= 0.5
+    std[:2] = 0.6 * ratio[:2]
+    found = split_stages(SQ, level(SQ), damping_ratio=ratio, damping_std=std, source="damping")
+    assert found.kind == "severe"
+    assert found.damping[0] == pytest.approx(0.04, rel=0.1)
+
+
 def test_damping_that_rises_is_running_in():
     found = trial(1, damping=lambda x: 0.0005 / narrowing(x))
     assert found.kind == "running-in"

@@ -1,12 +1,12 @@
 """The options that commands share, each declared once; and what is made of them before the work begins."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from asperity import case, files, results
-from asperity.errors import BadInput
+from asperity import case, files, results, wear
+from asperity.errors import BadInput, require_choice
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -18,6 +18,12 @@ def _hertz(text: str) -> float:
         return float(text)
     except ValueError:
         return case.read_amount("a frequency", "Hz", text)
+
+
+def _stage_source(text: str) -> str:
+    """What stages are read from, refused before a file is."""
+    require_choice("--stages-from", text, get_args(wear.StageSource))
+    return text
 
 
 CaseOrRun = Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a kept run.")]
@@ -85,7 +91,12 @@ Shaft = Annotated[
     list[float] | None, typer.Option(metavar="HZ", help="Shaft speed whose harmonics to remove; found if not given.")
 ]
 StagesFrom = Annotated[
-    str, typer.Option(metavar="INDICATOR", help="What decides stage and alarm: crf, damping or both; all are told.")
+    str,
+    typer.Option(
+        metavar="INDICATOR",
+        parser=_stage_source,
+        help="What decides stage and alarm: crf, damping or both; all are told.",
+    ),
 ]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 

@@ -44,12 +44,19 @@ class DynamicCurve:
 
     def scalars(self) -> dict[str, Any]:
         """What `solve --json` prints of it; None where there is no answer."""
-        values: dict[str, Any] = {"frequency_hz": self.frequency_hz.tolist()}
-        for suffix, branch in (("", self.elastic), ("_virgin", self.virgin)):
-            values[f"stiffness{suffix}_n_m"] = [finite_or_none(value) for value in branch.stiffness]
-            values[f"damping{suffix}_ns_m"] = [finite_or_none(value) for value in branch.damping]
-            values[f"slow_stiffness{suffix}_n_m"] = finite_or_none(branch.slow)
-        return values
+        return {
+            "frequency_hz": self.frequency_hz.tolist(),
+            "stiffness_n_m": _listed(self.elastic.stiffness),
+            "damping_ns_m": _listed(self.elastic.damping),
+            "slow_stiffness_n_m": finite_or_none(self.elastic.slow),
+            "stiffness_virgin_n_m": _listed(self.virgin.stiffness),
+            "damping_virgin_ns_m": _listed(self.virgin.damping),
+            "slow_stiffness_virgin_n_m": finite_or_none(self.virgin.slow),
+        }
+
+
+def _listed(values: Field) -> list[float | None]:
+    return [finite_or_none(float(value)) for value in values]
 
 
 def dynamic_curve(solution: ContactSolution, count: int, resonance_hz: float | None) -> DynamicCurve:
