@@ -2,7 +2,8 @@
 
 `python -m benchmarks.damping_stages` runs this part alone. Indicators are drawn about known courses: the paper's
 twelve rings, five tests each, CRF off by 15 Hz and damping by 10 % from test to test. Of the solved contact
-(benchmarks.damping has its library) every ring is a surface of its own, and all else damps with 0.01.
+(benchmarks.damping has its library) every ring is a surface of its own, and all else damps with 0.01. Then how well
+the joint separation knows the damping of lines that move, or hardly do.
 """
 
 import argparse
@@ -13,9 +14,23 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from asperity.arrays import Field
-from asperity.paper import SAMPLES_SQ_UM
-from asperity.wear import StageSource, split_stages
-from benchmarks.damping import REST, SEEDS, Point, between, points
+from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, Disturbance
+from asperity.paper.rig_recording import GRID_HZ, RigTest, draw_background
+from asperity.vibration import ContactOscillator
+from asperity.wear import StageSource, damping_objection, remove_lines, series_resonances, split_stages
+from benchmarks.damping import (
+    BAND_HZ,
+    DURATION_S,
+    HEAVY,
+    RATE_HZ,
+    REST,
+    SEEDS,
+    SEGMENT,
+    Point,
+    between,
+    line_of,
+    points,
+)
 
 TESTS, TRIALS = 5, 200
 CRF_STD, DAMPING_STD = 15.0, 0.1  # Hz; relative
@@ -90,6 +105,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     for law in ("by the contact's own stiffness", "by (CLR F)^(1/6)"):
         drawn = [solved(library, law, np.random.default_rng([8, number])) for number in range(trials)]
         yield from rows(f"the solved contact, CRF {law}", None, drawn)
+    yield from width_lines(fast=fast)
 
 
 def draws(truth: Truth, rng: np.random.Generator) -> tuple[Field, Field]:
@@ -134,8 +150,65 @@ def rows(name: str, knee: float | None, drawn: Sequence[tuple[Field, Field]]) ->
         yield f"| {name} | {source} | {' | '.join(f'{part:.0f} %' for part in share)} | {place} | {covers} |"
 
 
+WIDTH_SERIES, REPEATS = 6, 3
+STIFFNESS = 3.32e8  # N/m: 2900 Hz
+
+
+def width_lines(*, fast: bool = False) -> Iterator[str]:
+    """What the joint separation makes of the damping of lines that move, or hardly do."""
+    count = WIDTH_SERIES // 3 if fast else WIDTH_SERIES
+    yield f"\n## Damping by the joint separation, {count} series of {len(SAMPLES_SQ_UM) * REPEATS} recordings a row\n"
+    heads = [
+        "damping",
+        "frequency scatters by",
+        "found",
+        "of them standing",
+        "error, mean and rms",
+        "stated",
+        "covered",
+    ]
+    yield f"| {' | '.join(heads)} |"
+    yield "|---" * len(heads) + "|"
+    for name, law in (("falls from 0.04 to 0.012", width(1.8)), ("level at 0.02", level(0.02))):
+        for scatter in (0.0, 0.002, 0.005, 0.02):
+            told = [row for number in range(count) for row in judged(law, scatter, number)]
+            seen = [one for one in told if one is not None]
+            off, stated, stands = (np.array(part) for part in zip(*seen, strict=True))
+            covered = np.mean(np.abs(off) < 1.645 * stated)
+            cells = [f"{100 * part:.1f} %" for part in (np.mean(off), np.sqrt(np.mean(off**2)), np.median(stated))]
+            found = f"{100 * len(seen) / len(told):.0f} %"
+            yield (
+                f"| {name} | {100 * scatter:g} % | {found} | {100 * np.mean(stands):.0f} % | {cells[0]}, {cells[1]} | "
+                f"{cells[2]} | {100 * covered:.0f} % |"
+            )
+
+
+def judged(law: Course, scatter: float, number: int) -> Iterator[tuple[float, float, bool] | None]:
+    """Of each recording of a series: logarithm of found over true damping, its deviation, whether the line stands."""
+    rng = np.random.default_rng([11, number])
+    frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
+    disturbance = Disturbance(snr_db=10.0, modes=4)
+    background = draw_background(frequency, BAND_HZ, disturbance, rng)
+    truth, clean = [], []
+    for sample, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
+        for test in range(REPEATS):
+            ratio = float(law(np.array([sq]))[0]) * float(np.exp(0.03 * rng.standard_normal()))
+            stiffness = STIFFNESS * (1.0 + scatter * rng.standard_normal()) ** 2
+            spring = ContactOscillator(mass=HEAVY, stiffness=stiffness, damping_ratio=ratio, load=500.0)
+            about = RigTest(sample + 1, test + 1, sq * 1e-6, std * 1e-6, RATE_HZ, DURATION_S)
+            recording = background.recorded(about, line_of(spring, sq, 0.5, frequency), disturbance, rng)
+            truth.append(ratio)
+            clean.append(remove_lines(recording.spectrum(SEGMENT), shaft_hz=(60.0,)))
+    found = series_resonances([one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean])
+    for ratio, resonance, one in zip(truth, found, clean, strict=True):
+        known = damping_objection(resonance, one.spectrum.resolution_hz) is None
+        own = resonance.damping_ratio
+        stands = "keeps its place" in resonance.reason
+        yield (float(np.log(own / ratio)), resonance.damping_ratio_std / own, stands) if known else None
+
+
 def main() -> None:
-    """Print the table as Markdown."""
+    """Print the tables as Markdown."""
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.damping_stages", description=__doc__)
     arguments.add_argument("--fast", action="store_true", help="a fifth of the trials")
     with threadpool_limits(1):

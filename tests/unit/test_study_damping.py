@@ -31,6 +31,7 @@ def test_damping_and_stiffness_stand_over_sq_with_their_intervals():
     assert mean.get_ydata() == pytest.approx(curve.mean("contact_damping_ratio"))
     assert "damping ratio" in above.get_ylabel()
     assert below.get_ylabel() == "k [N/µm]"
+    assert 280.0 < below.get_ylim()[0] < below.get_ylim()[1] < 380.0
 
 
 def test_the_load_share_stands_over_each_indicator_with_its_rank_correlation():

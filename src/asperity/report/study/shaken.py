@@ -39,7 +39,7 @@ def over_roughness(study: StudyOverview, curve: WearCurve) -> Exhibit:
         draw_mean(below, curve, STIFFNESS, "-o", BLUE, "stiffness, yielded cells elastic")
         name_axes(below, "sq_m", ylabel=quantity(STIFFNESS).label)
         for axes, keys in ((above, [ELASTIC, VIRGIN]), (below, [STIFFNESS])):
-            stay_near(axes, np.concatenate([curve.by_case(key)[1] for key in keys if key in curve.table]))
+            stay_near(axes, np.concatenate([display(key, curve.by_case(key)[1]) for key in keys if key in curve.table]))
         medium.title(above, "Damping and stiffness of the contact itself")
         key_below(figure, above, below, columns=2)
         return figure
