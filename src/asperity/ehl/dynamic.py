@@ -8,7 +8,7 @@ be negative where the film is carried through just late enough (the entraining m
 import math
 from dataclasses import dataclass
 
-from asperity.ehl.oscillating import Answer, Oscillating, elastic
+from asperity.ehl.oscillating import Oscillating, elastic
 from asperity.ehl.outcome import CONSERVING
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
@@ -17,8 +17,10 @@ from asperity.ehl.stiffness import ELASTIC, FLOWING, YIELDED, Yielded, checked_d
 from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.hertz import line_stiffness
 
-TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
+TOLERANCE = 1e-4  # of the linear equations: stiffness to 1e-3, a damping ratio to 1 %
+ROUGHLY = 1e-2  # of those of a trial frequency: stiffness to 1 %
 SAME_FREQUENCY = 0.01  # a resonance is found when its own stiffness moves it by less
+NEAR = 0.05  # and looked for closely from here on
 MOST_TRIALS = 20
 
 
@@ -75,12 +77,11 @@ class ShakenContact:
         self.balance = elastic(balance) if yielded == ELASTIC else balance
         self.scales = Scales.of(conditions, solution.lubricant)
         self.oscillating = Oscillating(self.balance)
-        self.before: Answer | None = None
 
-    def at(self, frequency_hz: float) -> DynamicStiffness:
+    def at(self, frequency_hz: float, *, tolerance: float = TOLERANCE) -> DynamicStiffness:
         """Stiffness and damping at a frequency [Hz]; 0 for a change so slow that the film follows.
 
-        Near the frequency asked for before it takes a few steps only.
+        `tolerance` is the share of the linear equations that may be left.
 
         Raises
         ------
@@ -90,12 +91,11 @@ class ShakenContact:
         if not 0.0 <= frequency_hz < math.inf:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
         omega = 2.0 * math.pi * frequency_hz
-        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=TOLERANCE, start=self.before)
-        self.before = answer
-        if not answer.left < 10.0 * TOLERANCE:
+        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=tolerance)
+        if not answer.left < 10.0 * tolerance:
             raise AsperityError(
                 f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
-                f"{answer.left:.1e} of the linear equations, wanted {TOLERANCE:.0e}"
+                f"{answer.left:.1e} of the linear equations, wanted {tolerance:.0e}"
             )
         response = self._from_reference(complex(answer.total.sum()) * self._newtons_per_metre())
         return DynamicStiffness(
@@ -115,14 +115,16 @@ class ShakenContact:
     def resonance(self, mass: float) -> DynamicStiffness:
         """Where a mass [kg] on this contact resonates, k = m ω², to 1 % of its frequency; AsperityError if nowhere."""
         require_positive("mass", mass, "kg")
-        stiffness = self._bodies()
+        stiffness, tolerance = self._bodies(), ROUGHLY
         for _ in range(MOST_TRIALS):
-            found = self.at(math.sqrt(stiffness / mass) / (2.0 * math.pi))
+            found = self.at(math.sqrt(stiffness / mass) / (2.0 * math.pi), tolerance=tolerance)
             if found.stiffness <= 0.0:
                 break
             stiffness, frequency = found.stiffness, math.sqrt(found.stiffness / mass) / (2.0 * math.pi)
-            if abs(frequency - found.frequency_hz) <= SAME_FREQUENCY * frequency:
+            off = abs(frequency - found.frequency_hz) / frequency
+            if off <= SAME_FREQUENCY and tolerance == TOLERANCE:
                 return found
+            tolerance = TOLERANCE if off <= NEAR else tolerance
         raise AsperityError(f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere")
 
     def _bodies(self) -> float:

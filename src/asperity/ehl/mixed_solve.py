@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order o
 MOST_ROUGHLY = 80
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
 MOST_AT_ONCE = 40
+MOST_NEAR = 12  # steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
 BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
 LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
 SHORTEST = 0.05  # step of time, over the first one that was tried
@@ -105,6 +107,7 @@ class Lubricated(NamedTuple):
 class MixedSearch(Search):
     """The ways to the solution, all steps of them on record."""
 
+    stray = 10.0  # what begins with two pressures and misses by that much more seldom comes back
     imbalance = 0.0  # of the last step, where no oil may be lost
 
     def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
@@ -152,6 +155,31 @@ class MixedSearch(Search):
         step = self.run(problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most)
         return step if self.settled(self.options.tolerance) else self.finish(problem, unknowns)
 
+    def at_once(self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, last: bool = True) -> Step:
+        """From a coarser grid's solution: second order, or if that gains little as from afar.
+
+        What the order of the wedge makes of the figures is then told by a step back to first order.
+        """
+        tolerance, most = self._wanted(problem, coarsely=coarsely, near=True)
+        roughly, soon = max(ROUGHLY, tolerance), min(MOST_AT_ONCE, most)
+        if may_lean(problem):
+            step = self.run(problem, newton(problem, unknowns, second_order=True), roughly, min(MOST_NEAR, soon))
+            if self.settled(roughly) and not self.settled(tolerance):
+                step = self.run(problem, newton(problem, _reached(step), second_order=True), tolerance, soon)
+            if self.settled(tolerance):
+                _, back = islice(newton(problem, _reached(step), second_order=False), 2)
+                self.by_first_order = self._figures(back)
+                return step
+        return self.finish(problem, unknowns, coarsely=coarsely, last=last)
+
+    def _wanted(self, problem: Problem, *, coarsely: bool, near: bool = False) -> tuple[float, int]:
+        """Tolerance and most steps, of the whole solve or of a grid that is only the way."""
+        tolerance, most = self.options.tolerance, self.options.max_iterations
+        if not coarsely:
+            return tolerance, most
+        roughly = COARSE_TOLERANCE if problem.accurate or near else 0.5 * ROUGHLY
+        return max(roughly, tolerance), min(MOST_BESIDE, most)
+
     def finish(
         self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, length: float = 1.0, last: bool = True
     ) -> Step:
@@ -161,10 +189,7 @@ class MixedSearch(Search):
         throughout. Where time leads nowhere the `last` resort is the contact whose cavities are refilled, if oil is
         conserved, and then what stands still at once.
         """
-        tolerance, most = self.options.tolerance, self.options.max_iterations
-        if coarsely:
-            roughly = COARSE_TOLERANCE if problem.accurate else 0.5 * ROUGHLY
-            tolerance, most = max(roughly, tolerance), min(MOST_BESIDE, most)
+        tolerance, most = self._wanted(problem, coarsely=coarsely)
         if problem.conserve or not problem.accurate:
             step = self.march(problem, unknowns, length)
             if not self.settled(IN_TIME) and not last:
@@ -225,7 +250,7 @@ class MixedSearch(Search):
                 oil = interpolated(np.maximum(unknowns.oil, 0.0), problem.cells)
                 unknowns = Pressures(np.minimum(oil, total), total, unknowns.approach)
             if problem is levels[0]:
-                step = self.finish(problem, unknowns)
+                step = self.at_once(problem, unknowns) if self.figures else self.finish(problem, unknowns)
             else:
                 steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
                 step = self.run(problem, steps, max(COARSE_TOLERANCE, self.options.tolerance), MOST_COARSE_ITERATIONS)
@@ -250,7 +275,10 @@ class MixedSearch(Search):
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
             start = dry if before is None else before.granted(dry, problem.p_cap)
-            step = self.finish(problem, start, coarsely=not finest, last=before is None)
+            if before is None:
+                step = self.finish(problem, start, coarsely=not finest)
+            else:
+                step = self.at_once(problem, start, coarsely=not finest, last=False)
             if before is not None and not self.settled(FAR_OFF):  # what oil changed on the coarser grid was no start
                 step = self.finish(problem, dry, coarsely=not finest, length=2.0 * problem.spacing[0])
             if finest or self.settled(max(ROUGHLY, self.options.tolerance)):

@@ -31,12 +31,11 @@ Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 class Answer(NamedTuple):
     """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
 
-    `vector` is the model's own form of it, `left` the share of the equations that was left, `steps` those of GMRES.
+    `left` is the share of the equations that was left, `steps` those of GMRES.
     """
 
     oil: Waves
     total: Waves
-    vector: Waves
     left: float
     steps: int
 
@@ -136,17 +135,17 @@ class Oscillating:
         self.rough = self.exact if one_line else _equations(balance, np.float32)
         self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
+    def answer(self, frequency: float, *, tolerance: float) -> Answer:
         """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
 
-        `start` is the answer at a frequency near by.
+        From nothing: from the answer at a frequency near by there is so little left that the oil's lag would stay its.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
         wanted = rows + 1j * frequency * stored
         size = float(np.linalg.norm(wanted))
-        vector = np.zeros(self.exact.size, complex) if start is None else start.vector
-        left, share = self._left(wanted, vector, frequency, size)
+        vector = np.zeros(self.exact.size, complex)
+        left, share = wanted, 1.0
         for _ in range(MOST_ROUNDS):
             if share <= tolerance:
                 break
@@ -161,7 +160,7 @@ class Oscillating:
                 vector, share = vector + change, now
             else:
                 left, share = self._left(wanted, vector, frequency, size)
-        return Answer(*self.exact.pressures(vector), vector, share, steps)
+        return Answer(*self.exact.pressures(vector), share, steps)
 
     def _left(self, wanted: Waves, vector: Waves, frequency: float, size: float) -> tuple[Waves, float]:
         """What of the equations is left, and its share of all."""

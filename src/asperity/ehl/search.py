@@ -26,11 +26,14 @@ ONWARDS, BACK = 2.5, 1.5  # of the difference to the coarser grid: how far a rou
 AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
 UNRESOLVED = 2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
 BY_TWO_ORDERS = 0.75  # share of all this where both orders of the wedge are known, and tell more
+NEXT_TO_NOTHING = 1e-2  # what is left of a start, below which steps have not strayed yet by many times that
 FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 
 
 class Search:
     """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
+
+    stray = np.inf  # how often what was left at first may be left after a step: one pressure comes back from anywhere
 
     def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
         self.options, self.gap_scale, self.progress = options, gap_scale, progress
@@ -77,12 +80,15 @@ class Search:
     def run(
         self, problem: Problem, steps: Iterator[Step], tolerance: float, most: int, *, of_load: bool = True
     ) -> Step:
-        """Take steps until they meet the tolerance, `of_load` too, or there have been too many."""
+        """Take steps until they meet the tolerance, `of_load` too, have strayed, or there have been too many."""
         before = step = next(steps)
+        astray = self.stray * max(step.balance.residual_rms, NEXT_TO_NOTHING)
         while True:
             self._record(problem, step)
             self.lost = step.number > 0 and not np.isfinite(step.change)
             if self.settled(tolerance, of_load=of_load) or step.number >= most or self.lost:
+                break
+            if step.balance.residual_rms > astray:
                 break
             before, step = step, next(steps)
         self.iteration_error = self._figures(step).off(self._figures(before))
