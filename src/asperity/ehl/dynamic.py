@@ -19,7 +19,7 @@ from asperity.hertz import line_stiffness
 
 TOLERANCE = 1e-4  # of the linear equations: stiffness to 1e-3, a damping ratio to 1 %
 ROUGHLY = 1e-2  # of those of a trial frequency: stiffness to 1 %
-SAME_FREQUENCY = 0.01  # a resonance is found when its own stiffness moves it by less
+SAME_FREQUENCY = 0.005  # a resonance is found when its own stiffness moves it by less
 NEAR = 0.05  # and looked for closely from here on
 MOST_TRIALS = 20
 
@@ -113,7 +113,7 @@ class ShakenContact:
         return 2.0 * math.pi * frequency_hz * self.scales.length / speed if speed > 0.0 else 0.0
 
     def resonance(self, mass: float) -> DynamicStiffness:
-        """Where a mass [kg] on this contact resonates, k = m ω², to 1 % of its frequency; AsperityError if nowhere."""
+        """Where a mass [kg] on this contact resonates, k = m ω², to 0.5 % of its frequency; AsperityError if nowhere."""
         require_positive("mass", mass, "kg")
         stiffness, tolerance = self._bodies(), ROUGHLY
         for _ in range(MOST_TRIALS):

@@ -15,9 +15,6 @@ from asperity.ehl.problem import Problem
 PATIENCE, PROGRESS = 8, 0.9  # steps without progress, after which halves are taken, or whole ones again
 LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
 BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
-# Share of the linearised equations that a step leaves: that of the squared progress of the step before (Eisenstat and
-# Walker, SIAM J. Sci. Comput. 17 (1996) 16). Where nothing is gained, closer answers only go round the more faithfully.
-CLOSELY, ROUGHLY = 0.02, 0.1
 FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
 
 
@@ -31,13 +28,12 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change, freed = 0.0, np.inf, None
-    before, lowest, idle, share = np.inf, np.inf, 0, 1.0
+    lowest, idle, share = np.inf, 0, 1.0
     for number in count():
         balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
-        now = balance.residual_rms
-        step, before = newton_step(balance, float(np.clip((now / before) ** 2, CLOSELY, ROUGHLY))), now
+        step = newton_step(balance)
         change = float(np.mean(np.abs(step.total)) / wanted_mean)
         idle += 1
         if balance.residual_rms < PROGRESS * lowest:

@@ -22,6 +22,7 @@ from asperity.ehl.problem import Past
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
 
+LEFT = 0.1  # share to which the linearised equations are left
 MOST_KRYLOV_STEPS = 60
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
 
@@ -140,8 +141,8 @@ class MixedLinear:
         return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
 
 
-def newton_step(balance: MixedBalance, left: float) -> Pressures:
-    """Changes of all unknowns that meet every linearised equation, and the load, but for the share `left`."""
+def newton_step(balance: MixedBalance) -> Pressures:
+    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth."""
     linear, problem = MixedLinear(balance), balance.problem
     cells, real, count = linear.cells, linear.real, balance.gap.size
     zero = real(0.0)
@@ -186,7 +187,7 @@ def newton_step(balance: MixedBalance, left: float) -> Pressures:
         return joined(d_oil - d_approach * response[0], d_closed - d_approach * response[1], d_approach)
 
     wanted = joined(wet, closed, float(weight * missing))
-    solved = gmres(product, precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
+    solved = gmres(product, precondition, wanted, tolerance=LEFT, most_steps=MOST_KRYLOV_STEPS)
     d_oil, d_closed = split(solved)
     d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)
     d_total = np.where(

@@ -39,6 +39,7 @@ SHORTEST = 0.05  # step of time, over the first one that was tried
 LEAP = 10.0  # from a long step of time that was easy to the next one
 IN_TIME = 5e-2  # what a step of time is met to ...
 MOST_A_STEP, MOST_IN_TIME = 10, 60  # ... in so many of Newton's, and how many there are
+STRAY = 10.0  # times what was left at first: from there steps seldom come back
 LED_NOWHERE = 1e-2  # a smooth contact's coarse solution that misses by more
 THIN = 1.0  # film ratio below which the dry contact is the nearer start
 
@@ -107,7 +108,6 @@ class Lubricated(NamedTuple):
 class MixedSearch(Search):
     """The ways to the solution, all steps of them on record."""
 
-    stray = 10.0  # what begins with two pressures and misses by that much more seldom comes back
     imbalance = 0.0  # of the last step, where no oil may be lost
 
     def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
@@ -163,9 +163,11 @@ class MixedSearch(Search):
         tolerance, most = self._wanted(problem, coarsely=coarsely, near=True)
         roughly, soon = max(ROUGHLY, tolerance), min(MOST_AT_ONCE, most)
         if may_lean(problem):
-            step = self.run(problem, newton(problem, unknowns, second_order=True), roughly, min(MOST_NEAR, soon))
+            steps = newton(problem, unknowns, second_order=True)
+            step = self.run(problem, steps, roughly, min(MOST_NEAR, soon), stray=STRAY)
             if self.settled(roughly) and not self.settled(tolerance):
-                step = self.run(problem, newton(problem, _reached(step), second_order=True), tolerance, soon)
+                steps = newton(problem, _reached(step), second_order=True)
+                step = self.run(problem, steps, tolerance, soon, stray=STRAY)
             if self.settled(tolerance):
                 _, back = islice(newton(problem, _reached(step), second_order=False), 2)
                 self.by_first_order = self._figures(back)

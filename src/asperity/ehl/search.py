@@ -33,8 +33,6 @@ FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 class Search:
     """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
 
-    stray = np.inf  # how often what was left at first may be left after a step: one pressure comes back from anywhere
-
     def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
         self.options, self.gap_scale, self.progress = options, gap_scale, progress
         self.history: list[Iteration] = []
@@ -78,11 +76,21 @@ class Search:
         return step
 
     def run(
-        self, problem: Problem, steps: Iterator[Step], tolerance: float, most: int, *, of_load: bool = True
+        self,
+        problem: Problem,
+        steps: Iterator[Step],
+        tolerance: float,
+        most: int,
+        *,
+        of_load: bool = True,
+        stray: float = np.inf,
     ) -> Step:
-        """Take steps until they meet the tolerance, `of_load` too, have strayed, or there have been too many."""
+        """Take steps until they meet the tolerance, `of_load` too, or there have been too many.
+
+        Or until what is left is `stray` times what was left at first.
+        """
         before = step = next(steps)
-        astray = self.stray * max(step.balance.residual_rms, NEXT_TO_NOTHING)
+        astray = stray * max(step.balance.residual_rms, NEXT_TO_NOTHING)
         while True:
             self._record(problem, step)
             self.lost = step.number > 0 and not np.isfinite(step.change)
