@@ -16,7 +16,15 @@ from asperity.ehl.iterate import newton as one_pressure
 from asperity.ehl.mixed import MixedBalance, Pressures, evaluate, may_lean
 from asperity.ehl.mixed_iterate import newton
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
-from asperity.ehl.posing import contact_problem, first_guess, grid_levels, levels_in_reach, on_one_line, smooth_film
+from asperity.ehl.posing import (
+    coarser_all_along,
+    contact_problem,
+    first_guess,
+    grid_levels,
+    levels_in_reach,
+    on_one_line,
+    smooth_film,
+)
 from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import COARSE_TOLERANCE, FAR_OFF, MOST_COARSE_ITERATIONS, Progress, Search
@@ -32,6 +40,7 @@ ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order o
 MOST_ROUGHLY = 80
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
 MOST_AT_ONCE = 40
+MOST_BACK = 20  # steps from the second-order wedge's solution to the first-order one
 MOST_NEAR = 12  # steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
 BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
 LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
@@ -78,7 +87,7 @@ def solve_mixed(
         lubricant,
         seconds=time.perf_counter() - began,
         attempt=way,
-        discretisation=search.discretisation_error if start is None else start.convergence.discretisation_error,
+        start=start,
         viscosity_factor=viscosity_factor,
     )
 
@@ -158,7 +167,7 @@ class MixedSearch(Search):
     def at_once(self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, last: bool = True) -> Step:
         """From a coarser grid's solution: second order, or if that gains little as from afar.
 
-        What the order of the wedge makes of the figures is then told by a step back to first order.
+        What the order of the wedge makes of the figures is then told on the way back to first order.
         """
         tolerance, most = self._wanted(problem, coarsely=coarsely, near=True)
         roughly, soon = max(ROUGHLY, tolerance), min(MOST_AT_ONCE, most)
@@ -169,8 +178,7 @@ class MixedSearch(Search):
                 steps = newton(problem, _reached(step), second_order=True)
                 step = self.run(problem, steps, tolerance, soon, stray=STRAY)
             if self.settled(tolerance):
-                _, back = islice(newton(problem, _reached(step), second_order=False), 2)
-                self.by_first_order = self._figures(back)
+                self.by_first_order = self._figures(_back_to_first_order(problem, step))
                 return step
         return self.finish(problem, unknowns, coarsely=coarsely, last=last)
 
@@ -258,9 +266,12 @@ class MixedSearch(Search):
                 step = self.run(problem, steps, max(COARSE_TOLERANCE, self.options.tolerance), MOST_COARSE_ITERATIONS)
             if self.smooth and not self.settled(LED_NOWHERE):
                 self.figures, unknowns = [], None
-            else:
+                continue
+            if problem is not levels[0] and not self.settled(ROUGHLY):
+                self.figures = []  # a start, but no solution to compare with
+            elif coarser_all_along(problem, levels[0]):
                 self.figures.append(self._figures(step))
-                unknowns = _reached(step)
+            unknowns = _reached(step)
         if levels[0].conserve:  # on coarser grids oil was made
             self.figures = self.figures[-1:]
         return step
@@ -284,7 +295,8 @@ class MixedSearch(Search):
             if before is not None and not self.settled(FAR_OFF):  # what oil changed on the coarser grid was no start
                 step = self.finish(problem, dry, coarsely=not finest, length=2.0 * problem.spacing[0])
             if finest or self.settled(max(ROUGHLY, self.options.tolerance)):
-                self.figures.append(self._figures(step))
+                if coarser_all_along(problem, levels[0]):
+                    self.figures.append(self._figures(step))
                 before = Lubricated(dry, _reached(step))
             else:
                 self.figures, before = [], None
@@ -298,7 +310,7 @@ class MixedSearch(Search):
     def coarser(self, finest: Problem) -> None:
         """Solve the next coarser grid from dry, for what the cells' size may have done; nothing if that fails."""
         levels = grid_levels(finest)
-        if len(levels) == 1 or len(self.figures) != 1:
+        if len(levels) == 1 or len(self.figures) != 1 or not coarser_all_along(levels[1], finest):
             return
         beside = MixedSearch(replace(self.options, max_iterations=MOST_BESIDE), self.gap_scale, self.progress)
         beside.from_dry(levels[1:2])
@@ -348,6 +360,15 @@ def _kept_for(problem: Problem, length: float, content: Field) -> Past:
     """The problem's past, or none, and on top the oil that was there when it was `length` farther back."""
     past = Past(0.0, np.zeros_like(content), followed=False) if problem.past is None else problem.past
     return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
+
+
+def _back_to_first_order(problem: Problem, step: Step) -> Step:
+    """From the second-order wedge's solution to the first-order one, met roughly."""
+    back = step
+    for back in islice(newton(problem, _reached(step), second_order=False), MOST_BACK + 1):
+        if back.number > 0 and back.balance.residual_rms < ROUGHLY:
+            break
+    return back
 
 
 def _reached(step: Step) -> Pressures:

@@ -15,6 +15,7 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 FEWEST_COARSE_CELLS = 48
+FEWEST_BESIDE = 16  # along an axis that is halved together with a longer one
 FEWEST_IN_COARSE_INLET = 2.0
 
 
@@ -84,6 +85,12 @@ def grid_levels(finest: Problem) -> list[Problem]:
     return levels
 
 
+def coarser_all_along(problem: Problem, finest: Problem) -> bool:
+    """Whether a grid tells what the finest one's cells did: coarser along each axis of more than one, or itself."""
+    several = [(few, many) for few, many in zip(problem.cells, finest.cells, strict=True) if many > 1]
+    return problem.cells == finest.cells or all(few < many for few, many in several)
+
+
 def levels_in_reach(finest: Problem, conditions: ContactConditions, lubricant: Lubricant | None) -> list[Problem]:
     """The levels of a climb; those of a smooth line contact down to the coarsest that has 2 cells across the inlet.
 
@@ -97,7 +104,8 @@ def levels_in_reach(finest: Problem, conditions: ContactConditions, lubricant: L
 
 
 def _halved(cells: tuple[int, int]) -> tuple[int, int]:
-    nx, ny = ((n + 1) // 2 if n // 2 >= FEWEST_COARSE_CELLS else n for n in cells)
+    fewest = FEWEST_BESIDE if max(cells) // 2 >= FEWEST_COARSE_CELLS else FEWEST_COARSE_CELLS
+    nx, ny = ((n + 1) // 2 if n // 2 >= fewest else n for n in cells)
     return nx, ny
 
 

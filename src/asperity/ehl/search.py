@@ -8,7 +8,8 @@ import numpy as np
 from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
 from asperity.ehl.iterate import Step, newton
-from asperity.ehl.outcome import ATTEMPTS, Convergence, Figures, GridError, Iteration, Options, SolveStatus
+from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Convergence, Figures, GridError, Iteration, Options, SolveStatus
+from asperity.ehl.posing import coarser_all_along
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import CENTRE, area_share, carried_share
@@ -40,13 +41,15 @@ class Search:
         self.by_first_order: Figures | None = None  # on the finest grid, where the search passed a first-order wedge
         self.cell = 0.0  # of the finest grid along x, in half-widths
         self.iteration_error: Figures | None = None
-        self.smooth = False
+        self.smooth, self.order = False, 1 if options.model == CONSERVING else 2  # bodies, and wedge
         self.lost = False
 
     @property
     def discretisation_error(self) -> GridError | None:
         """From the last grids; see `grid_error`."""
-        return grid_error(self.figures, smooth=self.smooth, cell=self.cell, by_first_order=self.by_first_order)
+        return grid_error(
+            self.figures, smooth=self.smooth, cell=self.cell, by_first_order=self.by_first_order, order=self.order
+        )
 
     def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
         """Whether the last step met the tolerance in residual, change and, `of_load`, load."""
@@ -72,7 +75,8 @@ class Search:
                     found = self.position(problem, pressure, approach, tolerance, from_outside=True)
                     step = found if self.settled(FAR_OFF) else step
             pressure, approach = step.balance.pressure, step.approach
-            self.figures.append(self._figures(step))
+            if coarser_all_along(problem, levels[0]):
+                self.figures.append(self._figures(step))
         return step
 
     def run(
@@ -143,10 +147,18 @@ class Search:
         *,
         seconds: float,
         attempt: str = ATTEMPTS[0],
-        discretisation: GridError | None = None,
+        start: ContactSolution | None = None,
         viscosity_factor: Field | None = None,
     ) -> ContactSolution:
-        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all."""
+        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all.
+
+        A warm `start` hands on what its cells' size may have done only where it is of the same contact, but for heat.
+        """
+        discretisation = self.discretisation_error
+        if start is not None:
+            same = (start.conditions, start.lubricant, start.options) == (conditions, lubricant, self.options)
+            same = same and start.grid == surface.grid and np.array_equal(start.surface.heights, surface.heights)
+            discretisation = start.convergence.discretisation_error if same else None
         scales, balance = Scales.of(conditions, lubricant), step.balance
         stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
         lines = surface.grid.cells[1] // balance.problem.cells[1]
@@ -186,17 +198,17 @@ class Search:
 
 
 def grid_error(
-    on_grids: Sequence[Figures], *, smooth: bool, cell: float, by_first_order: Figures | None = None
+    on_grids: Sequence[Figures], *, smooth: bool, cell: float, by_first_order: Figures | None = None, order: int = 2
 ) -> GridError | None:
     """90 % intervals from the last grids; None for one grid alone.
 
-    A smooth, second-order solution gets the difference of both, Roache's grid convergence index, which is three times
-    its error. A rough one has no such order. Its figures d apart on the last two grids get 2.5 d the way that they
-    went, 1.5 d the other, and the load share 2.4 of the squared cell (`cell`, in half-widths) either way: what a
-    hundred contacts of the wide sample take (`benchmarks.intervals`). d is no less than a quarter of the difference
-    between the grids before, lest two grids agree by chance, and no less than what the second-order wedge did to the
-    first order's figures on the finest grid; where that is known, 0.75 of all this will do. Source: P. J. Roache, J.
-    Fluids Eng. 116 (1994) 405.
+    A smooth solution gets Roache's grid convergence index, three times its error: the difference of both where it is of
+    second `order`, three times that where of first. A rough one has no such order. Its figures d apart on the last two
+    grids get 2.5 d the way that they went, 1.5 d the other, and the load share 2.4 of the squared cell (`cell`, in
+    half-widths) either way: what a hundred contacts of the wide sample take to hold four times the cells
+    (`benchmarks.intervals`). d is no less than a quarter of the difference between the grids before, lest two grids
+    agree by chance, and no less than what the second-order wedge did to the first order's figures on the finest grid;
+    where that is known, 0.75 of all this will do. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
     """
     if len(on_grids) < 2:
         return None
@@ -205,7 +217,7 @@ def grid_error(
     if before:
         apart = apart.at_least(coarse.off(before[-1]).times(AGREEMENT))
     if smooth:
-        return GridError(**asdict(apart), lean=nothing)
+        return GridError(**asdict(apart if order > 1 else apart.times(3.0)), lean=nothing)
     share = 1.0
     if by_first_order is not None:
         apart, share = apart.at_least(fine.off(by_first_order)), BY_TWO_ORDERS

@@ -112,7 +112,7 @@ def solve_unified(
         lubricant,
         seconds=time.perf_counter() - began,
         attempt=attempt,
-        discretisation=search.discretisation_error if start is None else start.convergence.discretisation_error,
+        start=start,
         viscosity_factor=viscosity_factor,
     )
 
