@@ -64,6 +64,7 @@ from .stress import Peak as Peak
 from .stress import StressTensor as StressTensor
 from .stress import SubsurfaceStress as SubsurfaceStress
 from .stress import hertz_stress as hertz_stress
+from .stress import stress_below as stress_below
 from .stress import subsurface_stress as subsurface_stress
 from .thermal import HOT as HOT
 from .thermal import friction_and_heat as friction_and_heat

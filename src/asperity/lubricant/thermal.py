@@ -3,6 +3,7 @@
 Every default has its reason in docs/case-file.md.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
@@ -70,6 +71,11 @@ class Solid(Parametric):
     def diffusivity(self) -> float:
         """κ = k/(ρ c) [m^2/s]."""
         return self.conductivity / (self.density * self.heat_capacity)
+
+    @property
+    def effusivity(self) -> float:
+        """B = sqrt(k ρ c) [J/m^2/K/s^0.5]."""
+        return math.sqrt(self.conductivity * self.density * self.heat_capacity)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
