@@ -92,6 +92,8 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         ({"file": "ring.x3p", "form": "sphere"}, "surface.form"),
         ({"file": "ring.x3p", "turn": 90}, "surface.turn"),
         ({"file": "ring.x3p", "pixel": "5"}, "without a unit"),
+        ({"kind": "flat", "second": {"kind": "flat", "second": {"kind": "flat"}}}, "surface.second.second is a third"),
+        ({"kind": "flat", "second": {"kind": "grund"}}, 'did you mean "ground"'),
         ({"file": "ring.x3p", "second": {"fil": "x"}}, "surface.second.fil is not a known key; did you mean file"),
         (
             {"kind": "non-gaussian", "sq": "1 um", "correlation_length": "20 um", "skewness": -3, "kurtosis": 4},
@@ -111,3 +113,71 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
 def test_what_cannot_be_meant_is_refused(paper, surface, message):
     with pytest.raises(BadInput, match=message):
         paper.with_overrides({"surface": surface}).surface()
+
+
+# Two bodies ----------------------------------------------------------------------------------------------------------
+
+GROUND = {"kind": "ground", "sq": "0.3 um", "groove_width": "30 um", "groove_length": "80 um", "seed": 1}
+
+
+def test_two_bodies_have_each_its_own_roughness_and_lay(paper):
+    along = GROUND | {"second": GROUND | {"sq": "0.4 um", "direction_deg": 90}}
+    case = paper.with_overrides({"surface": along})
+    both = case.composite()
+    assert (both.first.sq, both.second.sq) == pytest.approx((0.3e-6, 0.4e-6), rel=1e-6)
+    assert both.speeds == case.conditions.surface_speeds
+    steep = [
+        [np.abs(np.diff(body.heights, axis=axis)).mean() / case.grid.spacing[axis] for axis in (0, 1)]
+        for body in (both.first, both.second)
+    ]
+    assert steep[0][1] > 1.5 * steep[0][0]  # grooves along rolling
+    assert steep[1][0] > 1.3 * steep[1][1]  # and across it
+    together = case.surface()
+    assert together.heights == pytest.approx(both.first.heights + both.second.heights[:, ::-1])
+    assert any("ground (moving at" in note for note in case.surface_notes)
+    assert load_case(case.text).surface().heights == pytest.approx(together.heights)
+
+
+def test_two_drawn_bodies_are_no_copies(paper):
+    """Of one kind and seed: independent, and other ones with another seed of the first."""
+    gaussian = {"kind": "gaussian", "sq": "1 um", "correlation_length": "14 um", "seed": 4}
+    case = paper.with_overrides({"surface": gaussian | {"second": gaussian}})
+    both = case.composite()
+    assert abs(np.corrcoef(both.first.heights.ravel(), both.second.heights.ravel())[0, 1]) < 0.1
+    assert case.surface().sq == pytest.approx(2.0**0.5 * 1e-6, rel=0.1)
+    other = case.with_overrides({"surface.seed": 5}).composite()
+    assert abs(np.corrcoef(both.second.heights.ravel(), other.second.heights.ravel())[0, 1]) < 0.1
+    assert case.surface_count(3) == 3
+    third = case.on_surface(2).contents.surface
+    assert (third.seed, third.second.seed) == (6, 6)
+
+
+def test_a_flat_body_beside_a_rough_one_changes_nothing(paper):
+    gaussian = {"kind": "gaussian", "sq": "1 um", "correlation_length": "14 um", "seed": 4}
+    alone = paper.with_overrides({"surface": gaussian})
+    beside = paper.with_overrides({"surface": gaussian | {"second": {"kind": "flat"}}})
+    assert np.array_equal(alone.surface().heights, beside.surface().heights)
+    assert beside.surface_count(3) == 3
+    smooth = paper.with_overrides({"surface": {"kind": "flat", "second": {"kind": "flat"}}})
+    assert smooth.surface_count(3) == 1
+    turned = paper.with_overrides({"surface": {"kind": "flat", "second": gaussian}})
+    assert turned.surface().sq == pytest.approx(1e-6, rel=1e-6)
+    assert turned.surface_count(3) == 3
+
+
+def test_a_chosen_grid_knows_both_bodies(paper):
+    """The finer of both asks for the cells."""
+    coarse = {"kind": "gaussian", "sq": "1 um", "correlation_length": "40 um"}
+    fine = {"kind": "gaussian", "sq": "0.2 um", "correlation_length": "6 um"}
+    cells = [
+        paper.with_overrides({"grid": {}, "surface": surface}).grid.cells
+        for surface in (coarse, coarse | {"second": fine})
+    ]
+    assert cells[1][0] > 1.5 * cells[0][0]
+
+
+def test_two_drawn_bodies_move_each_at_its_speed(paper):
+    gaussian = {"kind": "gaussian", "sq": "1 um", "correlation_length": "20 um", "seed": 4}
+    case = paper.with_overrides({"surface": gaussian | {"second": gaussian | {"sq": "0.5 um"}}})
+    moving = case.moving_surfaces()
+    assert (moving.first.sq, moving.second.sq) == pytest.approx((1e-6, 0.5e-6), rel=1e-3)

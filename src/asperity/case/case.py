@@ -14,7 +14,7 @@ from asperity.case.amounts import plain
 from asperity.case.oils import SheetSection
 from asperity.case.refusals import parse_section
 from asperity.case.sections import CaseFile, MotionSection
-from asperity.case.surfaces import FileSection, GeneratedSection, composite_roughness, moving_roughness, two_bodies
+from asperity.case.surfaces import FileSection, composite_roughness, moving_roughness, two_bodies
 from asperity.case.text import parse_toml, read_text, replaced, restated
 from asperity.case.texture import texture_of
 from asperity.case.vibration import vibration_model
@@ -49,7 +49,9 @@ class Case:
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
-        measured = isinstance(self.contents.surface, FileSection)  # a grid chosen by it asks for the file
+        measured = any(
+            isinstance(part, FileSection) for part in self.contents.surface.parts.values()
+        )  # a grid chosen by it asks for the file
         for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration"):
             if name == "grid" and measured and self.contents.grid.chosen:
                 continue
@@ -215,7 +217,7 @@ class Case:
                 if self.stored is None or stated:
                     raise
                 available = 1  # a run holds the surface that was solved, its measurement need not be at hand
-            if available == 1 and isinstance(self.contents.surface, GeneratedSection):
+            if available == 1 and all(part.fixed for part in self.contents.surface.parts.values()):
                 return 1
             if available is not None and stated and stated > available:
                 raise BadInput(

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, Strict, create_model
+from pydantic import Field, PlainValidator, Strict, create_model
 
 from asperity.case.amounts import OPTIONAL, PAIRED, Length, Number, Seed, plain
-from asperity.case.refusals import Section, choose, validated
+from asperity.case.refusals import LocatedError, Section, choose, validated
 from asperity.errors import BadInput
 from asperity.grid import Grid
 from asperity.surface import (
@@ -46,16 +46,63 @@ SAMPLE_DEVIATION = 0.05  # of a generated surface's correlation lengths, beyond 
 RoughBody = Literal["first", "second", "both"]
 
 
+def _parse_second(value: object) -> "SurfaceSection | None":
+    """The other body's surface; without kind a measured one."""
+    if value is None or value == "none":
+        return None
+    if isinstance(value, Mapping) and "second" in value:
+        raise LocatedError(("second",), "is a third surface where a contact has two bodies; leave it out")
+    if isinstance(value, Mapping) and "kind" not in value:
+        return validated(FileSection, value)
+    return parse_surface(value)
+
+
 class SurfaceSection(Section, ABC):
-    """[surface]."""
+    """[surface]; `second` is that of the other body, where each has its own."""
+
+    second: Annotated[Any, PlainValidator(_parse_second)] = None
+
+    @property
+    def parts(self) -> "dict[str, SurfaceSection]":
+        """Both bodies' surfaces by the key that each stands at; one where it is that of both together."""
+        return {"surface": self, **({} if self.second is None else {"surface.second": self.second})}
+
+    @property
+    @abstractmethod
+    def fixed(self) -> bool:
+        """Whether there is no other surface like it."""
 
     @abstractmethod
-    def available(self, grid: Grid, folder: Path) -> int | None:
+    def room(self, grid: Grid, folder: Path) -> int | None:
         """How many surfaces of its kind there are; None for as many as one likes."""
 
     @abstractmethod
-    def another(self, number: int) -> dict[str, object]:
+    def numbered(self, number: int) -> dict[str, object]:
         """The keys and values that make it the surface of that number; it is number 0 itself."""
+
+    @abstractmethod
+    def made(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:
+        """The surface on a grid, and what was done to get it; of another `stream` an independent one, where drawn."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Its file's, or its kind."""
+
+    def available(self, grid: Grid, folder: Path) -> int | None:
+        """How many different surfaces both bodies can have together; None for as many as one likes."""
+        varied = [part for part in self.parts.values() if not part.fixed]
+        rooms = [room for part in varied if (room := part.room(grid, folder)) is not None]
+        return min(rooms) if rooms else None if varied else 1
+
+    def another(self, number: int) -> dict[str, object]:
+        """The keys and values of the case that make both bodies' the surfaces of that number."""
+        return {
+            f"{key}.{name}": value
+            for key, part in self.parts.items()
+            if not part.fixed
+            for name, value in part.numbered(number).items()
+        }
 
 
 _LENGTH: Any = (Length, ...)
@@ -118,13 +165,28 @@ class GeneratedSection(SurfaceSection):
         rng = np.random.default_rng([seed, *stream] if stream else seed)
         return KINDS[self.kind].generator(grid, **self.arguments(), rng=rng)
 
-    def available(self, grid: Grid, folder: Path) -> int | None:  # noqa: ARG002 - it needs no room
-        """One where no seed draws it."""
-        return None if "seed" in KINDS[self.kind].fields else 1
+    @property
+    def name(self) -> str:
+        """Its kind."""
+        return self.kind
 
-    def another(self, number: int) -> dict[str, object]:
+    @property
+    def fixed(self) -> bool:
+        """Where no seed draws it."""
+        return "seed" not in KINDS[self.kind].fields
+
+    def room(self, grid: Grid, folder: Path) -> int | None:  # noqa: ARG002 - it needs none
+        """As many as there are seeds."""
+        return None
+
+    def numbered(self, number: int) -> dict[str, object]:
         """With a later seed."""
-        return {"surface.seed": getattr(self, "seed", 0) + number}
+        return {"seed": getattr(self, "seed", 0) + number}
+
+    def made(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
+        """Drawn on the grid."""
+        surface = self.make(grid, *stream)
+        return surface, self.notes(surface)
 
     def notes(self, surface: Surface) -> tuple[str, ...]:
         """How far the correlation lengths of a sample stray from those of a (non-)Gaussian section."""
@@ -166,13 +228,28 @@ class FileSection(SurfaceSection):
         """The file's map; `folder` is where the file is looked for."""
         return read_surface(folder / self.file, unit=self.unit, lateral_unit=self.lateral_unit, pixel=plain(self.pixel))
 
-    def available(self, grid: Grid, folder: Path) -> int | None:
+    @property
+    def name(self) -> str:
+        """Its file's."""
+        return self.file
+
+    @property
+    def fixed(self) -> bool:
+        """A map has other places."""
+        return False
+
+    def room(self, grid: Grid, folder: Path) -> int | None:
         """As many as the map holds side by side, from its own place on."""
         return max(1, places(self.measured(folder), grid, turn=self.turn) - (self.place or 0))
 
-    def another(self, number: int) -> dict[str, object]:
+    def numbered(self, number: int) -> dict[str, object]:
         """At the place so many places on."""
-        return {"surface.place": (self.place or 0) + number}
+        return {"place": (self.place or 0) + number}
+
+    def made(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
+        """Prepared for the grid."""
+        prepared = self.prepare(grid, folder)
+        return prepared.surface, prepared.steps
 
     def prepare(self, grid: Grid, folder: Path) -> PreparedSurface:
         """The file's map on a grid; `folder` is where the file is looked for."""
@@ -192,29 +269,12 @@ class FileSection(SurfaceSection):
         return replace(prepared, steps=(*measured.notes, *prepared.steps))
 
 
-class MeasuredSection(FileSection):
-    """[surface] file = "..."."""
-
-    second: FileSection | None = None  # on the other body; the composite of both is solved
-
-    def available(self, grid: Grid, folder: Path) -> int | None:
-        """As many as both maps hold."""
-        both = [FileSection.available(part, grid, folder) for part in (self, self.second) if part is not None]
-        return min(count for count in both if count is not None)
-
-    def another(self, number: int) -> dict[str, object]:
-        """At another place of both."""
-        if self.second is None:
-            return super().another(number)
-        return {**super().another(number), "surface.second.place": (self.second.place or 0) + number}
-
-
 def parse_surface(value: object) -> SurfaceSection:
     """The section of a generated surface by its kind, or that of a measured one."""
     if isinstance(value, Mapping) and "file" in value:
         if "kind" in value:
             raise BadInput("has both kind and file; keep kind for a generated surface or file for a measured one")
-        return validated(MeasuredSection, value)
+        return validated(FileSection, value)
     if isinstance(value, Mapping) and "kind" not in value:
         raise BadInput(f"must hold kind (one of {', '.join(GENERATED_SECTIONS)}) or file (a measured surface)")
     return choose("kind", lambda: GENERATED_SECTIONS, value)
@@ -223,32 +283,33 @@ def parse_surface(value: object) -> SurfaceSection:
 def two_bodies(
     section: SurfaceSection, grid: Grid, folder: Path, speeds: tuple[float, float]
 ) -> CompositeSurface | None:
-    """Two measured surfaces apart, each with its speed [m/s]; None where the section has no second one."""
-    if not (isinstance(section, MeasuredSection) and section.second):
+    """Both bodies' surfaces apart, each with its speed [m/s]; None where the section has no second one."""
+    if section.second is None:
         return None
-    first, second = section.prepare(grid, folder), section.second.prepare(grid, folder)
-    return CompositeSurface(first.surface, second.surface, speeds)
+    (first, _), (second, _) = _bodies(section, grid, folder)
+    return CompositeSurface(first, second, speeds)
 
 
 def composite_roughness(
     section: SurfaceSection, grid: Grid, folder: Path, speeds: tuple[float, float]
 ) -> tuple[Surface, tuple[str, ...]]:
     """The roughness of both bodies together on the grid, and what was done to get it, a sentence each."""
-    if isinstance(section, GeneratedSection):
-        surface = section.make(grid)
-        return surface, section.notes(surface)
-    assert isinstance(section, FileSection)
-    first = section.prepare(grid, folder)
-    if not (isinstance(section, MeasuredSection) and section.second):
-        return first.surface, first.steps
-    second = section.second.prepare(grid, folder)
-    combined = CompositeSurface(first.surface, second.surface, speeds).surface
+    if section.second is None:
+        return section.made(grid, folder)
+    (first, done), (second, done_to_second) = _bodies(section, grid, folder)
+    combined = CompositeSurface(first, second, speeds).surface
     return combined, (
-        *(f"{section.file}: {step}" for step in first.steps),
-        *(f"{section.second.file}: {step}" for step in second.steps),
-        f"added {section.file} (moving at {speeds[0]:.4g} m/s) and {section.second.file} ({speeds[1]:.4g} m/s), "
+        *(f"{section.name}: {step}" for step in done),
+        *(f"{section.second.name}: {step}" for step in done_to_second),
+        f"added {section.name} (moving at {speeds[0]:.4g} m/s) and {section.second.name} ({speeds[1]:.4g} m/s), "
         f"the second face down; Sq {length_text(combined.sq)} together",
     )
+
+
+def _bodies(section: SurfaceSection, grid: Grid, folder: Path) -> list[tuple[Surface, tuple[str, ...]]]:
+    """Both bodies' surfaces; a second one that is drawn depends on the first one's seed too, and is no copy of it."""
+    drawn = int(getattr(section, "seed", 0) or getattr(section, "place", 0) or 0)
+    return [section.made(grid, folder), section.second.made(grid, folder, 2, drawn)]
 
 
 def moving_roughness(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from asperity.case.amounts import plain
-from asperity.case.surfaces import FileSection, GeneratedSection, MeasuredSection, SurfaceSection
+from asperity.case.surfaces import FileSection, GeneratedSection, SurfaceSection
 from asperity.ehl import Texture
 from asperity.surface import condition_surface, correlation_lengths, read_surface
 
@@ -23,18 +23,23 @@ def texture_of(section: SurfaceSection, folder: Path) -> Texture | None:
 
     Raises UnreadableFile for a surface file that cannot be read, BadInput for one that cannot be conditioned.
     """
-    if isinstance(section, GeneratedSection):
-        return _KINDS[section.kind](section.arguments())
-    assert isinstance(section, FileSection)
-    first = _measured(section, folder)
-    if not (isinstance(section, MeasuredSection) and section.second):
-        return first
-    second = _measured(section.second, folder)
+    bodies = [texture for part in section.parts.values() if (texture := _of_body(part, folder)) is not None]
+    if len(bodies) < 2:
+        return bodies[0] if bodies else None
+    first, second = bodies
     return Texture(
         sq=math.hypot(first.sq, second.sq),
         lengths=_each(min, first.lengths, second.lengths),
+        least=_each(max, first.least, second.least),
         most=_each(min, first.most, second.most),
     )
+
+
+def _of_body(section: SurfaceSection, folder: Path) -> Texture | None:
+    if isinstance(section, GeneratedSection):
+        return _KINDS[section.kind](section.arguments())
+    assert isinstance(section, FileSection)
+    return _measured(section, folder)
 
 
 def _correlated(arguments: dict[str, Any]) -> Texture:

@@ -12,7 +12,7 @@ from decimal import Decimal
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import permutations, product
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
@@ -20,12 +20,21 @@ import scipy
 from asperity.case import Case, RangeSection, Section, Seeding, StudyKind, split_amount, to_si
 from asperity.errors import BadInput, UnreadableFile
 
+PlanKind: TypeAlias = StudyKind | Literal["surfaces"]
 SEED_KEYS = ("surface.seed", "vibration.seed")
 MOST_CASES = 10_000_000
 DIGITS = 9  # of a sampled value
 FOR_RUNS = "motion"  # the section that only `asperity run` reads
 # keys that may change which seeds a case has, and which files its surface is read from
-SHAPING = frozenset({"surface", "surface.kind", "surface.file", "surface.second", "surface.second.file", "vibration"})
+_OF_SURFACES = (
+    "surface",
+    "surface.kind",
+    "surface.file",
+    "surface.second",
+    "surface.second.kind",
+    "surface.second.file",
+)
+SHAPING = frozenset({*_OF_SURFACES, "vibration"})
 
 
 class StudyCase(NamedTuple):
@@ -48,7 +57,8 @@ class StudyPlan:
     axes : the swept keys, such as "surface.sq"
     points : replaced values by key, as a case file writes them
     realisations : surfaces (and vibration records) a point
-    kind : "solve", a contact each; "shake", its own stiffness and damping too; "vibrate", the vibration model alone
+    kind : "solve", a contact each; "shake", its own stiffness and damping too; "vibrate", the vibration model alone;
+        "surfaces", means and intervals over the surfaces that [solver] asks for
     seeding : "independent", every case has seeds of its own; "common", the k-th realisation has the same at every
         point, which lets differences between points show with fewer of them
     seeds : the surfaces' seeds in place of ones drawn for the study
@@ -59,7 +69,7 @@ class StudyPlan:
     axes: tuple[str, ...]
     points: tuple[Mapping[str, Any], ...]
     realisations: int = 1
-    kind: StudyKind = "solve"
+    kind: PlanKind = "solve"
     seeding: Seeding = "independent"
     seeds: tuple[int, ...] | None = None
     ids: tuple[str, ...] | None = field(default=None, repr=False)
@@ -153,7 +163,7 @@ def plan_points(
     *,
     axes: Sequence[str] | None = None,
     seeds: int | Sequence[int] = 1,
-    kind: StudyKind = "solve",
+    kind: PlanKind = "solve",
     seeding: Seeding = "independent",
 ) -> StudyPlan:
     """A plan of points of one's own.
