@@ -29,6 +29,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "axis": "Axes and parts of figures",
     "condition": "Conditions",
     "oil": "An oil by its data sheet",
+    "rating": "Ratings of a machine",
     "band": "Where a resonance is looked for",
     "table1": "The paper's Table 1",
 }

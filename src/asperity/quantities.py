@@ -18,6 +18,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units over their SI unit; any other display unit is the SI unit itself
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
 _FACTORS |= {"1/µm": 1e-6, "1/GPa": 1e9, "mm/s": 1e3, "N/µm": 1e-6, "N/mm": 1e-3, "mJ": 1e3, "mm²/s": 1e6, "mPa s": 1e3}
+_FACTORS |= {"°": 180.0 / math.pi, "h": 1.0 / 3600.0, "10⁶ turns": 1e-6}
 _DISPLAYS = {"Pa": "MPa", "1/Pa": "1/GPa", "kg/m^3": "kg/m³"}  # of laws' parameters, where it is not the SI unit
 
 

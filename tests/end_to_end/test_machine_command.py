@@ -19,8 +19,10 @@ CONDITIONS = [  # of design.md, section 9, and the bodies' names
 SOLVED = [  # of the same place, and more of what a solved contact has
     *("h_central_m", "lambda_ratio", "clr", "car", "friction_coefficient", "flash_temperature_max_k", "crf_hz"),
     *("h_min_m", "determined", "p_max_pa", "friction_power_w", "von_mises_core_pa", "reason"),
+    *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
 ]
-KEYS = ["contacts", "frequencies", "notes", "seconds", "verdict", "worst"]
+RATING = ["formula", "key", "reason", "standard", "validity"]
+KEYS = ["contacts", "frequencies", "notes", "ratings", "seconds", "verdict", "worst"]
 DISCS = """
 [machine]
 kind = "twin-disc"
@@ -33,7 +35,7 @@ youngs_modulus = "206 GPa"
 poisson_ratio = 0.3
 [lubricant]
 viscosity = { law = "barus", eta0 = "0.05 Pa s", alpha = "15 1/GPa" }
-density = "none"
+density = { law = "dowson-higginson", rho0 = "0.85 g/cm^3" }
 rheology = "newtonian"
 """
 QUICK = ("--workers", "1", "--set", "grid.cells=[48, 24]")
@@ -78,8 +80,8 @@ def test_a_dry_run_gives_the_conditions_alone(asp, name, contacts, worst, freque
 
 
 def test_a_dry_run_needs_neither_oil_nor_roughness_and_solving_does(asp):
-    text = Path("nu206.toml").read_text("utf-8")
-    Path("bare.toml").write_text(text.partition("[lubricant]")[0], "utf-8")
+    lines = Path("nu206.toml").read_text("utf-8").splitlines()
+    Path("bare.toml").write_text("\n".join(line for line in lines if line.startswith("machine")), "utf-8")
     assert asp("machine", "bare.toml", "--dry-run")[0] == 0
     code, out, err = asp("machine", "bare.toml", "--out", "kept")
     assert (code, out) == (2, "")
@@ -110,15 +112,36 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
     assert rows["roller 0, outer ring"]["h_min_m"] > films[0]  # of larger radius
     assert (said["worst"], rows["roller 0, inner ring"]["clr"]) == ("roller 0, inner ring", 0.0)
     assert json.loads(Path("kept/machine.json").read_text("utf-8")) == said
+    assert [sorted(rating)[:-1] for rating in said["ratings"]] == [RATING] * 5
+    page = Path("kept/machine.html").read_text("utf-8")
+    assert said["verdict"].split(",")[0] in page
+    assert 'href="worst.html"' in page
+    assert "roller 0, inner ring: the worst contact" in Path("kept/worst.html").read_text("utf-8")
+    opened = Path("kept/worst.nc").stat().st_mtime_ns
     parts = sorted(Path("kept/parts").glob("*.parquet"))
     times = [part.stat().st_mtime_ns for part in parts]
     parts[0].unlink()  # as if it had been killed before this one
     again = json.loads(asp(*arguments, "--json")[1])
     assert again["contacts"] == said["contacts"]
     assert [part.stat().st_mtime_ns for part in parts][1:] == times[1:]
+    assert Path("kept/worst.nc").stat().st_mtime_ns == opened
     code, _, err = asp(*arguments, "--set", "machine.radial_load=3 kN")
     assert code == 2
     assert "holds a study of another case" in err
+
+
+def test_a_contacts_interval_is_what_solve_gives(asp):
+    """Over several surfaces of one kind."""
+    rough = 'surface = { kind = "gaussian", sq = "0.6 um", correlation_length = "20 um", seed = 3 }\n'
+    rest = "[grid]\ncells = [96, 48]\n[solver]\nsurfaces = 3\n"
+    Path("discs.toml").write_text(rough + DISCS + rest, "utf-8")
+    (row,) = json.loads(asp("machine", "discs.toml", "--workers", "1", "--json")[1])["contacts"]
+    assert (row["surfaces"], row["clr_low"] < row["clr"] < row["clr_high"]) == (3, True)
+    discs = load_machine("discs.toml")
+    Path("one.toml").write_text(discs.case(discs.contacts[0]).text, "utf-8")
+    alone = json.loads(asp("solve", "one.toml", "--json")[1])
+    for key in ("clr", "clr_low", "clr_high", "h_central_m", "friction_coefficient"):
+        assert row[key] == pytest.approx(alone[key], rel=1e-6)
 
 
 def test_a_contact_is_what_solve_makes_of_it(asp):
@@ -164,7 +187,16 @@ def test_what_is_not_solved_is_loud(asp):
         ("fzg-c", "machine.torque=-3 N m", "machine.torque must be positive and finite"),
         ("fzg-c", "machine.centre_distance=90 mm", "jams the teeth"),
         ("fzg-c", "material=none", "material must be a table, got"),
-        ("fzg-c", "lubricant.viscosity.eta0=3 m", "lubricant.viscosity.eta0 must be a viscosity"),
+        ("fzg-c", "lubricant.grade=VG 99", "grade must be an ISO viscosity grade"),
+        ("fzg-c", "lubricant.temperature=170 degC", "temperature must lie between -20 and 150 degC"),
+        ("fzg-c", "lubricant.base=ester", "alpha is missing, which base ester has to state"),
+        ("fzg-c", "machine.profile_shift=[-0.6, 0.3]", "the teeth cannot mesh"),
+        ("fzg-c", 'machine.tip_diameters=["74 mm", "110 mm"]', "the teeth lose contact"),
+        ("fzg-c", "machine.centre_distance=80 mm", "lets the base circles overlap"),
+        ("fzg-c", "rating.contamination=0.5", "rating.contamination says nothing of a spur-gear; leave it out"),
+        ("nu206", "rating.scuffing_stage=12", "rating.scuffing_stage says nothing of a cylindrical-roller-bearing"),
+        ("6206", "rating.contamination=50", "rating.contamination must lie between 0 and 1, got 50"),
+        ("fzg-c", "rating.fatigue_limit=3 MPa", "rating.fatigue_limit is not a known key; did you mean fatigue_limits"),
         ("nu206", "machine.clearance=2 mm", "holds no roller in place"),
         ("nu206", "machine.radial_load=0 N", "unloads every roller"),
         ("nu206", "machine.radial_load=-4 kN", "must be finite, and not negative"),
@@ -189,6 +221,21 @@ def test_what_states_a_machine_is_not_a_single_contact(asp):
         assert "states a [machine], which has several contacts; asperity machine solves them all" in err
     shutil.copy(EXAMPLES / "paper.toml", "paper.toml")
     assert "has no [machine]" in asp("machine", "paper.toml")[2]
+
+
+def test_speeds_that_slip_backwards_are_said_or_refused(asp):
+    Path("discs.toml").write_text(DISCS, "utf-8")
+    for setting, words in (
+        ('machine.speeds=["1000 r/min", "-500 r/min"]', "machine.speeds[1] must be positive"),
+        ("machine.slide_to_roll=0.1", "slide_to_roll is that of both speeds"),
+        ("machine.entrainment_speed=2 m/s", "both are given; give one"),
+    ):
+        code, out, err = asp("machine", "discs.toml", "--dry-run", "--set", setting)
+        assert (code, out) == (2, "")
+        assert words in err
+    slid = DISCS.replace('speeds = ["1000 r/min", "500 r/min"]', 'entrainment_speed = "2 m/s"\nslide_to_roll = 2.2')
+    Path("discs.toml").write_text(slid, "utf-8")
+    assert "slide_to_roll must lie between -2 and 2, got 2.2" in asp("machine", "discs.toml", "--dry-run")[2]
 
 
 def test_discs_from_python(tmp_path):

@@ -311,6 +311,9 @@ def is_case_key(dotted: str) -> bool:
 
         return any(dotted.removeprefix("machine.") in section.model_fields for section, _ in MACHINES.values())
 
+    if dotted.startswith("rating."):  # beside a machine
+        return dotted.removeprefix("rating.") in case_sections()["[rating]"].model_fields
+
     if dotted.partition(".")[0] not in type(bases_for_keys()[0].contents).model_fields:
         return False
 
@@ -336,6 +339,7 @@ def case_sections() -> dict[str, Any]:
     """The tables of a case file as docs/case-file.md calls them, each as the model that reads it."""
     base = next(name for name, tree in modules() if any(_is_class(node, "Section") for node in tree.body))
     section = importlib.import_module("asperity." + base.removesuffix(".py").replace("/", ".")).Section
+    importlib.import_module("asperity.case.machines")  # which no other table needs
     paper = bases_for_keys()[0]
     known: dict[str, Any] = {}
     for model in _heirs(section):
@@ -344,7 +348,10 @@ def case_sections() -> dict[str, Any]:
             known[f'kind = "{kinds[0]}"'] = model
         elif {"file", "second"} <= set(fields):
             known["file = "] = model
-        elif (name := model.__name__.lower().removesuffix("section")) in type(paper.contents).model_fields:
+        elif (name := model.__name__.lower().removesuffix("section")) in (
+            *type(paper.contents).model_fields,
+            "rating",
+        ):
             known[f"[{name}]"] = model
         elif "contact" in fields:
             known["Top level"] = model

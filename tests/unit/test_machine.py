@@ -8,7 +8,16 @@ import scipy
 
 from asperity.conditions import ElasticPair
 from asperity.errors import BadInput
-from asperity.machine import BallBearing, CylindricalRollerBearing, FlatCam, RollingKinematics, SpurGear, TwinDisc
+from asperity.machine import (
+    BallBearing,
+    CamPoint,
+    CylindricalRollerBearing,
+    FlatCam,
+    RollerCam,
+    RollingKinematics,
+    SpurGear,
+    TwinDisc,
+)
 
 STEEL = ElasticPair((206e9, 206e9), (0.3, 0.3))
 RPM = 2.0 * math.pi / 60.0
@@ -367,6 +376,28 @@ def test_thrust_alone_meets_the_closed_form():
     assert bearing.frequencies["bpfo_hz"] > BallBearing(**BALLS, axial_load=load).frequencies["bpfo_hz"]
 
 
+def test_every_angular_contact_bearing_finds_its_balance():
+    """Under hardly any thrust too, where a ring that moves axially is hardly held."""
+    rng = np.random.default_rng(11)
+    for _ in range(60):
+        balls, diameter = int(rng.integers(7, 18)), rng.uniform(4e-3, 20e-3)
+        radial = 10.0 ** rng.uniform(1.0, 4.0)
+        axial = radial * 10.0 ** rng.uniform(-5.0, 1.0)
+        bearing = BallBearing(
+            balls=balls,
+            ball_diameter=diameter,
+            pitch_diameter=diameter * balls / math.pi * rng.uniform(1.15, 1.6),
+            speed=100.0,
+            radial_load=radial,
+            axial_load=axial,
+            contact_angle=math.radians(rng.uniform(10.0, 40.0)),
+        )
+        loads, angles = bearing.loads(STEEL)
+        places = np.cos(bearing.angles)
+        carried = [loads * np.cos(angles) @ places, loads @ np.sin(angles), loads * np.sin(angles) @ places]
+        assert carried == pytest.approx([radial, axial, 0.0], abs=1e-7 * max(radial, axial))
+
+
 def test_a_6206_under_two_kilonewtons():
     bearing = BallBearing(**BALLS_6206, radial_load=2000.0)
     assert bearing.loads(STEEL)[0][:4] == pytest.approx([974.49, 653.37, 70.52, 0.0], rel=1e-4)
@@ -471,3 +502,113 @@ def test_a_contact_that_draws_no_oil_in_is_not_solved_but_pressed():
 def test_cams_that_cannot_be_are_refused(changed, words):
     with pytest.raises(BadInput, match=words):
         FlatCam(**(CAM | changed))
+
+
+# Roller followers ----------------------------------------------------------------------------------------------------
+
+ROLLER_CAM = {
+    "base_radius": 18e-3,
+    "lift": 9e-3,
+    "half_angle": math.radians(70.0),
+    "width": 10e-3,
+    "speed": 150.0,
+    "spring_load": 600.0,
+    "roller_radius": 9e-3,
+}
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.5, 3.0])
+def test_an_eccentric_disc_under_a_roller(angle):
+    """The roller's centre stays on a circle: the cam's radius is the disc's, and so is the path that is passed."""
+    disc, off, roller = 20e-3, 6e-3, 8e-3
+
+    def reach(theta):
+        return off * math.cos(theta) + math.sqrt((disc + roller) ** 2 - (off * math.sin(theta)) ** 2)
+
+    step = 1e-4
+    slope = (reach(angle + step) - reach(angle - step)) / (2.0 * step)
+    bend = (reach(angle + step) - 2.0 * reach(angle) + reach(angle - step)) / step**2
+    point = CamPoint.of(reach(angle), slope, bend, roller)
+    assert point.cam_radius == pytest.approx(disc, rel=1e-6)
+    assert point.path == pytest.approx(disc * _swing(reach, angle, off, step), rel=1e-6)
+
+
+def _swing(reach, angle, off, step):
+    """How fast the roller's centre goes round the disc's, by differences of places."""
+
+    def direction(theta):
+        x, y = reach(theta) * math.sin(theta), reach(theta) * math.cos(theta) - off
+        return math.atan2(x, y)
+
+    return (direction(angle + step) - direction(angle - step)) / (2.0 * step)
+
+
+def test_a_roller_cam_by_its_outline():
+    """A twin: the cam as the envelope of the roller's places, its curvature and path by differences."""
+    cam = RollerCam(**ROLLER_CAM)
+    angles = np.linspace(0.02, cam.half_angle - 0.02, 4001)
+    reach = cam.base_radius + cam.roller_radius + 0.5 * cam.lift * (1.0 + np.cos(math.pi * angles / cam.half_angle))
+    centres = reach * np.exp(1j * (0.5 * math.pi - angles))
+    way = np.gradient(centres, angles, edge_order=2)
+    outline = centres + cam.roller_radius * way / np.abs(way) * -1j
+    passed = np.gradient(outline, angles, edge_order=2)
+    turned = np.gradient(np.unwrap(np.angle(passed)), angles)
+    for place in (400, 1500, 2600, 3500):
+        point = cam.at(float(angles[place]))
+        assert abs(passed[place]) == pytest.approx(point.path, rel=1e-4)
+        assert abs(passed[place]) / -turned[place] == pytest.approx(point.cam_radius, rel=1e-3)
+
+
+def test_a_roller_cams_contacts():
+    cam = RollerCam(**ROLLER_CAM, slip=0.1, spring_rate=20e3)
+    contacts = cam.contacts(STEEL)
+    nose, last = contacts[0], contacts[-1]
+    assert nose.load == pytest.approx(600.0 + 20e3 * 9e-3)  # the pressure angle is 0
+    rate = math.pi / cam.half_angle
+    sharp = 36e-3**2 / (36e-3 + 4.5e-3 * rate**2)  # ρ0 = 18 + 9 + 9 mm at the nose, ρ0'' = -(L/2)(π/β)²
+    assert nose.radius == pytest.approx(1.0 / (1.0 / (sharp - 9e-3) + 1.0 / 9e-3), rel=1e-12)
+    assert nose.entrainment_speed == pytest.approx(150.0 * 36e-3 * (1.0 - 9e-3 / sharp), rel=1e-12)
+    assert last.load == pytest.approx(600.0)
+    assert [contact.slide_to_roll for contact in contacts] == pytest.approx([0.1] * len(contacts))
+    middle = contacts[4]
+    point = cam.at(middle.position)
+    assert math.tan(point.pressure_angle) == pytest.approx(-4.5e-3 * rate / (18e-3 + 9e-3 + 4.5e-3), rel=1e-9)
+    assert middle.load == pytest.approx(cam.follower_force(middle.position) / math.cos(point.pressure_angle))
+    assert any("pressure angle" in note for note in RollerCam(**(ROLLER_CAM | {"lift": 16e-3})).notes(STEEL))
+    around = RollerCam(**ROLLER_CAM).frequencies
+    assert around["roller_hz"] / around["cam_hz"] == pytest.approx(
+        _perimeter(RollerCam(**ROLLER_CAM)) / (2.0 * math.pi * 9e-3), rel=1e-4
+    )
+
+
+def _perimeter(cam):
+    """Of the cam, summed over its outline's places."""
+    angles = np.linspace(-math.pi, math.pi, 20001)
+    near = np.minimum(np.abs(angles), cam.half_angle)
+    reach = cam.base_radius + cam.roller_radius + 0.5 * cam.lift * (1.0 + np.cos(math.pi * near / cam.half_angle))
+    centres = reach * np.exp(1j * angles)
+    way = np.gradient(centres, angles)
+    return float(np.abs(np.diff(centres + 1j * cam.roller_radius * way / np.abs(way))).sum())
+
+
+def test_bad_roller_cams_are_refused():
+    with pytest.raises(BadInput, match="undercuts it; lower roller_radius"):
+        RollerCam(**(ROLLER_CAM | {"lift": 16e-3, "half_angle": math.radians(35.0)}))
+    with pytest.raises(BadInput, match="run against each other"):
+        RollerCam(**ROLLER_CAM, slip=2.5)
+    with pytest.raises(BadInput, match="lifts off at 0 deg"):
+        RollerCam(**ROLLER_CAM, follower_mass=2.0)
+
+
+def test_discs_by_entrainment_and_slide_to_roll():
+    by_speeds = TwinDisc(radii=(20e-3, 30e-3), speeds=(105.0, 49.0), load=100.0, length=5e-3)
+    (given,) = by_speeds.contacts(STEEL)
+    stated = TwinDisc(
+        radii=(20e-3, 30e-3),
+        entrainment_speed=given.entrainment_speed,
+        slide_to_roll=given.slide_to_roll,
+        load=100.0,
+        length=5e-3,
+    )
+    assert stated.turning == pytest.approx((105.0, 49.0), rel=1e-12)
+    assert stated.contacts(STEEL)[0].surface_speeds == pytest.approx(given.surface_speeds, rel=1e-12)

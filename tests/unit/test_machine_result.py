@@ -33,8 +33,21 @@ def test_the_worst_is_where_asperities_carry_most(gears):
     assert found.worst["name"] == "D"
     assert found.verdict() == (
         "Spur gear pair 16/24, contact ratio 1.44: mixed lubrication at 3 of 7 contacts; worst is D, where asperities "
-        "carry 40.0 % of the load on a film of 0.200 µm, Λ 1.10, flash temperature 12.5 K."
+        "carry 40.0 % of the load on a film of 0.200 µm, Λ 1.10, flash temperature 12.5 K; rated λGF 0.256 at A."
     )
+
+
+def test_an_interval_is_in_the_verdict(gears):
+    found = solved(gears, D=(0.4, 1.1, 2e-7))
+    found.worst.update(clr_low=0.31, clr_high=0.52)
+    assert "asperities carry 40.0 % (31 to 52 %) of the load" in found.verdict()
+
+
+def test_a_full_film_that_may_be_none_says_so(gears):
+    found = solved(gears, A=(0.0, 0.5, 1e-7))
+    assert ": full film; worst" in found.verdict()
+    found.worst.update(clr_low=0.0, clr_high=0.05)
+    assert ": full film, or mixed lubrication at 1 of 7 contacts; worst is A" in found.verdict()
 
 
 def test_in_full_film_the_worst_has_the_least_film(gears):
@@ -55,7 +68,7 @@ def test_what_failed_is_in_the_verdict(gears):
     some = solved(gears, B=(None, None, None))
     assert [row["name"] for row in some.failures] == ["B"]
     assert some.worst["name"] != "B"
-    assert some.verdict().endswith("; 1 of 7 contacts were NOT SOLVED.")
+    assert some.verdict().endswith("; rated λGF 0.256 at A; 1 of 7 contacts were NOT SOLVED.")
     all_of_them = {row["name"]: (None, None, None) for row in some.rows}
     assert "NOT SOLVED, 7 of 7 contacts failed" in solved(gears, **all_of_them).verdict()
 
@@ -74,6 +87,12 @@ def test_a_chosen_grid_is_made_smaller_where_all_are_too_many(gears, monkeypatch
     ]
     asked = gears.with_overrides({"grid.accuracy": 0.01})
     assert max(nx * ny for nx, ny in cells(asked)) > 12_000  # what is asked for stands
+
+
+def test_a_changed_machine_leaves_the_first_as_it_was(gears):
+    gears.with_overrides({"surface.sq": "0.1 um", "machine.torque": "10 N m"})
+    assert gears.case(gears.contacts[0]).surface().sq == pytest.approx(0.5e-6, rel=1e-6)
+    assert gears.with_overrides({}).machine.torque == 265.1
 
 
 def test_both_sides_of_a_load_zone_are_one_point():

@@ -7,7 +7,21 @@ import pytest
 from asperity.quantities import NO_VALUE, Parameter, catalogue, parameters, quantity, select, with_deviation
 from asperity.surface import ProfileParameters, SurfaceParameters
 
-SCALED = ("1", "m", "Pa", "s", "Hz", "J", "N m-1", "m-1", "m s-1", "m2 s-1", "Pa s", "Pa-1")  # units shown in others
+SCALED = (
+    "1",
+    "m",
+    "Pa",
+    "s",
+    "Hz",
+    "J",
+    "N m-1",
+    "m-1",
+    "m s-1",
+    "m2 s-1",
+    "Pa s",
+    "Pa-1",
+    "rad",
+)  # units shown in others
 
 
 def test_a_key_stands_in_one_line():

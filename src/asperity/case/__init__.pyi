@@ -13,6 +13,7 @@ from .laws import ThermalSection as ThermalSection
 from .machines import MachineCase as MachineCase
 from .machines import load_machine as load_machine
 from .oils import SheetSection as SheetSection
+from .ratings import RatingSection as RatingSection
 from .refusals import Section as Section
 from .refusals import parse_section as parse_section
 from .sections import CaseFile as CaseFile

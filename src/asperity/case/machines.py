@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
+import tomli_w
 from pydantic import PlainValidator
 
 from asperity.case.amounts import (
@@ -17,11 +19,13 @@ from asperity.case.amounts import (
     Force,
     Length,
     Number,
+    Speed,
     amount_in,
     default_amount,
     plain,
 )
 from asperity.case.case import Case
+from asperity.case.ratings import RatingSection
 from asperity.case.refusals import Section, choose, parse_section
 from asperity.case.sections import CaseFile, MaterialSection
 from asperity.case.text import parse_toml, read_text, replaced
@@ -33,6 +37,7 @@ from asperity.machine import (
     FlatCam,
     Machine,
     MachineContact,
+    RollerCam,
     RollerProfile,
     SpurGear,
     TwinDisc,
@@ -44,6 +49,7 @@ AnyLength: TypeAlias = Annotated[float, amount_in("m", -math.inf)]
 ForceOrNone: TypeAlias = Annotated[float, amount_in("N", 0.0)]
 AngleOrNone: TypeAlias = Annotated[float, amount_in("rad", 0.0)]
 LengthPair: TypeAlias = Annotated[tuple[Length, Length], PAIRED]
+OWN = ("machine", "rating")  # tables that no contact has
 FOUND = 10  # digits of what a contact is stated with
 
 
@@ -96,7 +102,9 @@ class TwinDiscSection(Section):
 
     kind: Literal["twin-disc"]
     radii: LengthPair
-    speeds: tuple[Rotation, Rotation]
+    speeds: Annotated[tuple[Rotation, Rotation] | None, OPTIONAL] = None
+    entrainment_speed: Annotated[Speed | None, OPTIONAL] = None
+    slide_to_roll: Annotated[Number | None, OPTIONAL] = None
     load: Force
     length: Annotated[Length | None, OPTIONAL] = None
     crown_radius: Annotated[Length | None, OPTIONAL] = None
@@ -116,12 +124,21 @@ class FlatCamSection(Section):
     follower_mass: Annotated[float, amount_in("kg", 0.0)] = Amount(0.0, "0 kg")
 
 
+class RollerCamSection(FlatCamSection):
+    """[machine] kind = "cam-roller"."""
+
+    kind: Literal["cam-roller"]  # type: ignore[assignment]
+    roller_radius: Length
+    slip: Number = 0.0
+
+
 MACHINES: dict[str, tuple[type[Section], type[Machine]]] = {
     "spur-gear": (SpurGearSection, SpurGear),
     "cylindrical-roller-bearing": (CylindricalRollerBearingSection, CylindricalRollerBearing),
     "ball-bearing": (BallBearingSection, BallBearing),
     "twin-disc": (TwinDiscSection, TwinDisc),
     "cam-flat": (FlatCamSection, FlatCam),
+    "cam-roller": (RollerCamSection, RollerCam),
 }
 
 
@@ -129,11 +146,15 @@ def _sections() -> dict[str, type[Section]]:
     return {kind: section for kind, (section, _) in MACHINES.items()}
 
 
+STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3}  # where [material] is left out
+
+
 class _MachineTables(Section):
     """What a case file with a machine has of its own, and what the machine needs beside it."""
 
     machine: Annotated[Any, PlainValidator(partial(choose, "kind", _sections))]
     material: MaterialSection
+    rating: RatingSection = RatingSection()
 
 
 @dataclass(frozen=True)
@@ -141,11 +162,13 @@ class MachineCase:
     """A machine as its case file states it. Made by `load_machine`.
 
     `tables` are the file's, `folder` is where a surface file is looked for, `source` what messages call the case.
+    `rating` has what standards ask for besides.
     """
 
     tables: Mapping[str, Any]
     machine: Machine
     pair: ElasticPair
+    rating: RatingSection
     folder: Path = field(compare=False, repr=False)
     source: str = field(compare=False)
 
@@ -157,7 +180,13 @@ class MachineCase:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader of the contacts has to know, a sentence each."""
-        return self.machine.notes(self.pair)
+        taken = () if "material" in self.tables else ("Both bodies are taken for steel, E 206 GPa and ν 0.3.",)
+        return (*self.machine.notes(self.pair), *taken)
+
+    @property
+    def text(self) -> str:
+        """The case as TOML, as it was stated."""
+        return tomli_w.dumps(dict(self.tables))
 
     @property
     def complete(self) -> bool:
@@ -167,7 +196,6 @@ class MachineCase:
     def contact_table(self, contact: MachineContact) -> dict[str, Any]:
         """[contact] of a case file for one of the contacts; BadInput where it draws no oil in."""
         stated = contact.conditions(self.pair)
-        first, second = stated.surface_speeds
         radii = [_written(radius, "m") for radius in (stated.radius_along_rolling, stated.radius_across_rolling)]
         length = {} if stated.length is None else {"length": _written(stated.length, "m")}
         return {
@@ -176,18 +204,19 @@ class MachineCase:
             **length,
             "load": _written(stated.load, "N"),
             "entrainment_speed": _written(stated.entrainment_speed, "m/s"),
-            "slip": float(f"{(first - second) / stated.entrainment_speed:.{FOUND}g}"),
+            "slip": float(f"{contact.slide_to_roll or 0.0:.{FOUND}g}"),  # the same from either side
         }
 
     def case(self, contact: MachineContact) -> Case:
         """One of the contacts, with all else that the file states; BadInput as `load_case` raises it."""
-        tables = {key: table for key, table in self.tables.items() if key != "machine"}
+        own = {key: table for key, table in self.tables.items() if key not in OWN}
+        tables = {"material": STEEL, **own}
         stated = parse_section(CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source)
         return Case(stated, self.folder, self.source)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "MachineCase":
         """The machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
-        return _machine_case(replaced(dict(self.tables), overrides, self.source), self.folder, self.source)
+        return _machine_case(replaced(deepcopy(dict(self.tables)), overrides, self.source), self.folder, self.source)
 
 
 def load_machine(path: str | Path) -> MachineCase:
@@ -209,16 +238,15 @@ def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineC
         raise BadInput(f"{source}: has no [machine]; add one, or solve its one contact by asperity solve")
     if "contact" in tables:
         raise BadInput(f"{source}: states a [machine] and a [contact]; leave one of them out")
-    stated = parse_section(
-        _MachineTables, {key: tables[key] for key in ("machine", "material") if key in tables}, source
-    )
+    known = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
+    stated = parse_section(_MachineTables, {"material": STEEL, **known}, source)
     section, material = stated.machine, stated.material
+    pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
     given = {name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"}
     try:
         machine = MACHINES[section.kind][1](**given)
-        found = MachineCase(
-            tables, machine, ElasticPair(plain(material.youngs_modulus), material.poisson_ratio), folder, source
-        )
+        stated.rating.require_of(section.kind)
+        found = MachineCase(tables, machine, pair, stated.rating, folder, source)
         drawn = [contact for contact in found.contacts if not contact.stands_still]
     except BadInput as refusal:
         raise BadInput(f"{source}: machine: {refusal}") from None

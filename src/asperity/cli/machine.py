@@ -1,24 +1,25 @@
 """`asperity machine`: gears, bearings, discs and cams to their contacts, each solved; goes on where it was stopped."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asperity import case, files, study
+from asperity import case, files, report, study
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, OutFolder, Overrides, Quiet, Workers, read_overrides
-from asperity.cli.show import Block, Row, columns, show, table
+from asperity.cli.show import Block, Row, columns, progress, show, table
 from asperity.cli.study import study_progress
 from asperity.errors import AsperityError
 from asperity.quantities import quantity
 
 if TYPE_CHECKING:
+    from asperity.quantities import Quantity
     from asperity.study import MachineResult
 
-RESULT = "machine.json"
+RESULT, PAGE, WORST_PAGE = "machine.json", "machine.html", "worst.html"
 CONDITIONS = (  # key of a row, and of the quantity that says how it is shown
     ("load_n", "load_n"),
     ("line_load_n_m", "line_load_n_per_m"),
@@ -49,13 +50,19 @@ def machine_command(
         with study_progress(path.name, quiet=quiet) as step:
             result = study.solve_machine(chosen, out=out, workers=workers, progress=step)
         if out is not None:
-            files.write_text(out / RESULT, json.dumps(result.scalars(), indent=2, allow_nan=False))
+            _keep(result, out, quiet=quiet)
     show(
         result.verdict(),
         result.scalars,
         _contacts(result),
+        table(_ratings(result)),
         table(_frequencies(result), [*chosen.notes, *_unsolved(result)]),
-        [] if out is None or dry_run else [f"Kept in {out}; the same command goes on where it was stopped"],
+        []
+        if out is None or dry_run
+        else [
+            f"Report: {out / PAGE}",
+            f"Kept in {out}; the same command goes on where it was stopped",
+        ],
         as_json=as_json,
         quiet=quiet,
     )
@@ -66,6 +73,28 @@ def machine_command(
         )
 
 
+def _keep(result: "MachineResult", out: Path, *, quiet: bool) -> None:
+    """The machine's numbers and page, and the page of its worst contact, in their folder."""
+    files.write_text(out / RESULT, json.dumps(result.scalars(), indent=2, allow_nan=False))
+    with progress("the machine's page", quiet=quiet):
+        if result.run is not None:
+            report.write_report([result.run], out / WORST_PAGE, title=f"{result.worst['name']}: the worst contact")
+        report.write_machine_report(result, out / PAGE, opened=None if result.run is None else WORST_PAGE)
+
+
+def _ratings(result: "MachineResult") -> Iterator[Row]:
+    """Ratings of the whole machine, and of those along the path the range."""
+    for rating in result.ratings:
+        entry = quantity(rating.key)
+        known = [value for value in rating.values.values() if value is not None]
+        if rating.reason:
+            yield entry.title, f"not rated: {rating.reason}"
+        elif rating.alone is not None:
+            yield entry.title, f"{entry.text(rating.alone)}  ({rating.standard})"
+        else:
+            yield entry.title, f"{entry.number(min(known))} to {entry.text(max(known))}  ({rating.standard})"
+
+
 def _contacts(result: "MachineResult") -> Block:
     """A row a contact; those of both sides of a load zone are all there."""
     shown = [(key, quantity(name)) for key, name in CONDITIONS]
@@ -74,9 +103,14 @@ def _contacts(result: "MachineResult") -> Block:
         shown += [(key, quantity(key)) for key in kept]
     return columns(
         ["contact", *(entry.label for _, entry in shown)],
-        ([row["name"], *(entry.number(row[key]) for key, entry in shown)] for row in result.rows),
+        ([row["name"], *(_number(row, key, entry) for key, entry in shown)] for row in result.rows),
         left=1,
     )
+
+
+def _number(row: dict[str, Any], key: str, entry: "Quantity") -> str:
+    """With its interval where the row has one."""
+    return entry.number_in(row) if key == entry.key else entry.number(row[key])
 
 
 def _frequencies(result: "MachineResult") -> list[Row]:

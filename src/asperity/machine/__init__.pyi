@@ -1,5 +1,8 @@
 from .ball import BallBearing as BallBearing
+from .cam import Cam as Cam
+from .cam import CamPoint as CamPoint
 from .cam import FlatCam as FlatCam
+from .cam import RollerCam as RollerCam
 from .discs import TwinDisc as TwinDisc
 from .element import Machine as Machine
 from .element import MachineContact as MachineContact

@@ -7,7 +7,7 @@ gyroscopic moments are not covered.
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
@@ -45,6 +45,8 @@ class BallBearing:
         for balls that do not fit or none of which carries, grooves that the ball does not fit, or a clearance beside a
         contact angle that it contradicts.
     """
+
+    place: ClassVar[str] = "cycle_angle"
 
     balls: int
     ball_diameter: float
@@ -115,22 +117,52 @@ class BallBearing:
         elastic = (max(self.radial_load, self.axial_load) / stiffness) ** (1.0 / EXPONENT)
         if self.axial_load == 0.0 or self.radial_load == 0.0:
             return self._under_one_load(stiffness, elastic)
+        return self._moved(elastic * self._balanced(stiffness, elastic))
+
+    def _balanced(self, stiffness: float, elastic: float) -> Field:
+        """Shifts over `elastic` under both loads: the least of a convex energy, so that there is one balance.
+
+        Balls' approaches are distances less a constant, convex in the shifts, and so is their power 5/2.
+        """
         wanted = np.array([self.radial_load, self.axial_load, 0.0])
         force = max(self.radial_load, self.axial_load)
+
+        def energy(shifts: Field) -> float:
+            loads, _ = self._balls(elastic * shifts, stiffness)
+            approaches = (loads / stiffness) ** (1.0 / EXPONENT)
+            return float(0.4 * loads @ approaches / elastic - wanted @ shifts) / force
 
         def excess(shifts: Field) -> Field:
             return np.asarray((self._forces(elastic * shifts, stiffness) - wanted) / force)
 
         pressed = (max(self.play, 0.0) / 2.0 + elastic) / elastic
         free = self.groove_distance * math.sqrt(1.0 - self._held_cosine**2) / elastic
-        for radial, axial in product((0.3 * pressed, pressed, 0.0), (free + 1.0, free + 0.3, free + 3.0, free + 10.0)):
-            found = scipy.optimize.root(excess, [radial, axial, 0.0], options={"xtol": 1e-13})
-            if np.max(np.abs(excess(found.x))) < 1e-9:
-                return self._moved(elastic * found.x)
+        manner: Any = {
+            "jac": excess,
+            "hess": lambda shifts: self._stiffnesses(shifts, stiffness, elastic),
+            "method": "trust-exact",
+            "options": {"gtol": 1e-8, "maxiter": 2000},
+        }
+        found = scipy.optimize.minimize(energy, [pressed, free, 0.0], **manner).x
+        polished = scipy.optimize.root(excess, found, options={"xtol": 1e-13}).x
+        best = min((found, polished), key=lambda shifts: float(np.max(np.abs(excess(shifts)))))
+        if np.max(np.abs(excess(best))) < 1e-8:
+            return np.asarray(best)
         raise AsperityError(
             f"no balance was found under a radial load of {self.radial_load:g} N and an axial one of "
             f"{self.axial_load:g} N; leave a small axial load out, or check ball_diameter and osculation"
         )
+
+    def _stiffnesses(self, shifts: Field, stiffness: float, elastic: float) -> Field:
+        """Slopes of the forces by the shifts, in units of `elastic` and of the larger load, shape (3, 3)."""
+        loads, angles = self._balls(elastic * shifts, stiffness)
+        approaches = (loads / stiffness) ** (1.0 / EXPONENT)
+        place, across, along = np.cos(self.angles), np.cos(angles), np.sin(angles)
+        pressing = np.stack([across * place, along, along * place])
+        turning = np.stack([-along * place, across, across * place])
+        stiff = EXPONENT * stiffness * np.sqrt(approaches), loads / (self.groove_distance + approaches)
+        slopes = (pressing * stiff[0]) @ pressing.T + (turning * stiff[1]) @ turning.T
+        return np.asarray(slopes * elastic / max(self.radial_load, self.axial_load))
 
     def _under_one_load(self, stiffness: float, elastic: float) -> tuple[float, float, float]:
         """Shifts under a radial or an axial load alone, where the ring goes one way only."""

@@ -1,6 +1,7 @@
 """Two discs that run against each other, as on a twin-disc rig."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from asperity.conditions import ElasticPair
 from asperity.errors import BadInput, require_positive
@@ -14,7 +15,9 @@ class TwinDisc:
     Parameters
     ----------
     radii : of the discs [m]
-    speeds : of the discs [rad/s]
+    speeds : of the discs [rad/s], or else
+    entrainment_speed : mean of both surfaces' [m/s]
+    slide_to_roll : (u1 - u2) over it, with its sign
     load : [N]
     length : of the line contact [m]; None where a disc is crowned
     crown_radius : across rolling, of the pair [m]; None for cylinders
@@ -22,20 +25,23 @@ class TwinDisc:
     Raises
     ------
     BadInput
-        for a quantity that is not positive, or not exactly one of length and crown_radius.
+        for a quantity that is not positive, not exactly one of length and crown_radius, or both ways to state speeds.
     """
 
+    place: ClassVar[str] = "cycle_angle"
+
     radii: tuple[float, float]
-    speeds: tuple[float, float]
     load: float
+    speeds: tuple[float, float] | None = None
+    entrainment_speed: float | None = None
+    slide_to_roll: float | None = None
     length: float | None = None
     crown_radius: float | None = None
 
     def __post_init__(self) -> None:
         for radius in self.radii:
             require_positive("radii", radius, "m")
-        for speed in self.speeds:
-            require_positive("speeds", speed, "rad/s")
+        self._require_speeds()
         require_positive("load", self.load, "N")
         if (self.length is None) == (self.crown_radius is None):
             both = "both are" if self.length is not None else "neither is"
@@ -46,7 +52,7 @@ class TwinDisc:
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (one contact, all the load)
         """The one contact."""
-        (first, second), (slow, fast) = self.radii, self.speeds
+        (first, second), (slow, fast) = self.radii, self.turning
         radius = first * second / (first + second)
         contact = MachineContact(
             name="discs",
@@ -62,9 +68,36 @@ class TwinDisc:
         return (contact,)
 
     @property
+    def turning(self) -> tuple[float, float]:
+        """Of the discs [rad/s], as given or by entrainment and slide-to-roll ratio."""
+        if self.speeds is not None:
+            return self.speeds
+        assert self.entrainment_speed is not None
+        half = 0.5 * (self.slide_to_roll or 0.0)
+        first, second = (self.entrainment_speed * (1.0 + side * half) for side in (1.0, -1.0))
+        return first / self.radii[0], second / self.radii[1]
+
+    def _require_speeds(self) -> None:
+        if (self.speeds is None) == (self.entrainment_speed is None):
+            both = "both are" if self.speeds is not None else "neither is"
+            raise BadInput(f"discs have speeds, or entrainment_speed with slide_to_roll, {both} given; give one")
+        if self.speeds is not None:
+            if self.slide_to_roll is not None:
+                raise BadInput("slide_to_roll is that of both speeds, which are given; leave it out")
+            for speed in self.speeds:
+                require_positive("speeds", speed, "rad/s")
+            return
+        require_positive("entrainment_speed", self.entrainment_speed or 0.0, "m/s")
+        if abs(self.slide_to_roll or 0.0) >= 2.0:
+            raise BadInput(
+                f"slide_to_roll must lie between -2 and 2, got {self.slide_to_roll:g}: from there on a disc stands or "
+                "runs backwards against the other; correct it"
+            )
+
+    @property
     def frequencies(self) -> dict[str, float]:
         """Of both discs [Hz]."""
-        return {"disc_1_hz": turns(self.speeds[0]), "disc_2_hz": turns(self.speeds[1])}
+        return {"disc_1_hz": turns(self.turning[0]), "disc_2_hz": turns(self.turning[1])}
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:  # noqa: ARG002 (whatever they are made of)
         """None: the model leaves nothing out that a rig has."""

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from asperity.conditions import ContactConditions, ElasticPair, Geometry
 from asperity.errors import BadInput
 from asperity.hertz import HertzContact
 
+ROUNDING = 1e-12  # between speeds that are the same
 STILL = 1e-6  # entrainment over the faster surface, below which no oil is drawn in
 
 
@@ -56,7 +57,8 @@ class MachineContact:
         if self.stands_still:
             return None
         first, second = self.surface_speeds
-        return (first - second) / self.entrainment_speed
+        sliding = 0.0 if math.isclose(first, second, rel_tol=ROUNDING) else first - second
+        return sliding / self.entrainment_speed
 
     @property
     def stands_still(self) -> bool:
@@ -93,7 +95,9 @@ class MachineContact:
 
 
 class Machine(Protocol):
-    """What all machines can say of themselves."""
+    """What all machines can say of themselves. `place` is the quantity that positions are, by its key."""
+
+    place: ClassVar[str]
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
         """Every contact that carries load, along the machine's cycle."""

@@ -7,7 +7,7 @@ Geometry, speeds and radii are exact for rigid involutes. How load is shared is 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 import scipy
@@ -42,6 +42,8 @@ class SpurGear:
     BadInput
         for teeth that do not mesh, jam, end in a point, or are undercut where they bear.
     """
+
+    place: ClassVar[str] = "path_position_m"
 
     module: float
     teeth: tuple[int, int]

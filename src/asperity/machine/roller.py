@@ -7,7 +7,7 @@ misalignment and the edge stress of roller ends are not covered.
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 import scipy
@@ -47,6 +47,8 @@ class CylindricalRollerBearing:
     BadInput
         for rollers that do not fit, or none of which carries.
     """
+
+    place: ClassVar[str] = "cycle_angle"
 
     rollers: int
     roller_diameter: float

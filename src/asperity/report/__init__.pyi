@@ -1,3 +1,4 @@
+from .machine.page import write_machine_report as write_machine_report
 from .motion.page import write_motion_report as write_motion_report
 from .run.curves import friction_figure as friction_figure
 from .run.page import write_report as write_report

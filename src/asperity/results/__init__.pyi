@@ -11,6 +11,7 @@ from .dynamic import DynamicCurve as DynamicCurve
 from .levels import levels_verdict as levels_verdict
 from .levels import not_converged as not_converged
 from .run import BOUNDARY_FROM as BOUNDARY_FROM
+from .run import DOUBT as DOUBT
 from .run import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .run import RUN_GROUPS as RUN_GROUPS
 from .run import Run as Run
@@ -18,6 +19,7 @@ from .solve import SurfaceProgress as SurfaceProgress
 from .solve import load_run as load_run
 from .solve import solve_case as solve_case
 from .spread import Scalar as Scalar
+from .spread import mean_row as mean_row
 from .spread import one_surface as one_surface
 from .spread import whole_error as whole_error
 from .vibration import VibratedCase as VibratedCase

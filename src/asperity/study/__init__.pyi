@@ -34,9 +34,9 @@ from .global_sensitivity import Sensitivity as Sensitivity
 from .global_sensitivity import SensitivityOutcome as SensitivityOutcome
 from .global_sensitivity import sensitivity as sensitivity
 from .indices import SensitivityMethod as SensitivityMethod
-from .machine import MachineResult as MachineResult
 from .machine import machine_conditions as machine_conditions
 from .machine import solve_machine as solve_machine
+from .machine_result import MachineResult as MachineResult
 from .overview import FailureReason as FailureReason
 from .overview import StudyOverview as StudyOverview
 from .plan import SEED_KEYS as SEED_KEYS
@@ -47,6 +47,8 @@ from .plan import plan_points as plan_points
 from .plan import plan_study as plan_study
 from .ranges import ParameterRange as ParameterRange
 from .ranges import stated_value as stated_value
+from .rated import DangVan as DangVan
+from .rated import Rating as Rating
 from .summary import duration_text as duration_text
 from .summary import estimate_scalars as estimate_scalars
 from .summary import estimate_verdict as estimate_verdict

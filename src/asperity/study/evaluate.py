@@ -15,7 +15,8 @@ from asperity.arrays import Field, finite_or_none
 from asperity.case import Case
 from asperity.coupling import Vibration, contact_vibration
 from asperity.errors import AsperityError
-from asperity.results import RUN_GROUPS, Run, solve_case, vibrate_case
+from asperity.quantities import lines, read
+from asperity.results import DOUBT, RUN_GROUPS, Run, mean_row, solve_case, vibrate_case
 
 CaseStatus = Literal["done", "not converged", "failed"]
 StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
@@ -60,9 +61,7 @@ def evaluate(
 
 def _solved(case: Case, wanted: tuple[str, ...], groups: Sequence[str] = QUICK) -> tuple[Row, dict[str, Field]]:
     run = solve_case(case, strict=False)
-    convergence = run.solution.convergence
-    status, reason = (DONE, "") if convergence.converged else (NOT_CONVERGED, convergence.explain())
-    row: Row = {"status": status, "reason": reason, **run.numbers(groups)}
+    row: Row = {**_status(run), **run.numbers(groups)}
     if run.vibration is not None:
         row["full_load_crf_hz"] = run.vibration.full_load_crf_hz
         row |= _both_presets(case, run)
@@ -75,6 +74,21 @@ def _solved(case: Case, wanted: tuple[str, ...], groups: Sequence[str] = QUICK) 
     return row, {name: maps[name] for name in wanted}
 
 
+def _status(run: Run) -> Row:
+    convergence = run.solution.convergence
+    if convergence.converged:
+        return {"status": DONE, "reason": ""}
+    return {"status": NOT_CONVERGED, "reason": convergence.explain()}
+
+
+def _over_surfaces(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+    """Means over the surfaces that [solver] asks for, and intervals, as `asperity solve` gives them."""
+    run = solve_case(case, surfaces=None, strict=False)
+    first = run.numbers(QUICK)
+    others = [{key: other.get(key) for key in first} for other in run.others]
+    return {**_status(run), **mean_row((first, *others)), **read(run, lines(DOUBT))}, {}
+
+
 def _vibrated(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
     return {"status": DONE, "reason": "", **vibrate_case(case).scalars()}, {}
 
@@ -82,6 +96,7 @@ def _vibrated(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Fiel
 EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Field]]]] = {
     "solve": _solved,
     "shake": lambda case, wanted: _solved(case, wanted, RUN_GROUPS),
+    "surfaces": _over_surfaces,
     "vibrate": _vibrated,
 }
 

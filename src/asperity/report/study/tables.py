@@ -18,6 +18,7 @@ COMPUTED = {
     "solve": "contact and vibration",
     "shake": "contact and vibration, with the contact's own stiffness and damping",
     "vibrate": "the vibration model alone",
+    "surfaces": "contact and vibration, over several surfaces each",
 }
 LEVELS = (
     "clr",

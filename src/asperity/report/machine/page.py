@@ -1,0 +1,122 @@
+"""The page of a machine: what was concluded, the machine drawn, its contacts, its ratings, the worst contact opened."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from asperity.quantities import NO_VALUE, Quantity, quantity
+from asperity.report.base import Exhibit, heading, render, tile, write_page
+from asperity.report.machine.path import SHOWN, along_path, fatigue_over_depth
+from asperity.report.machine.sketch import machine_sketch
+from asperity.report.run import contact, rubbing
+from asperity.results import Run
+from asperity.study import MachineResult, Rating
+
+CONDITIONS = (
+    ("load_n", "load_n"),
+    ("line_load_n_m", "line_load_n_per_m"),
+    ("u1_m_s", "surface_speed_m_s"),
+    ("u2_m_s", "surface_speed_m_s"),
+    ("slide_to_roll", "slide_to_roll"),
+    ("p_hertz_pa", "hertz_pressure_pa"),
+)
+TILES = ("clr", "h_central_m", "lambda_ratio", "car", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
+
+
+def write_machine_report(result: MachineResult, path: str | Path, *, opened: str | None = None) -> Path:
+    """Write one self-contained HTML page about a machine, whole or not at all.
+
+    Parameters
+    ----------
+    result : from `solve_machine`, or `machine_conditions`
+    path : the file to write; its folder must exist
+    opened : what the page of the worst contact is called, beside this one; None: there is none
+
+    Returns
+    -------
+    Path
+        The file written. The same result and asperity version give the same bytes.
+
+    Raises
+    ------
+    BadInput
+        for a path that cannot be written to.
+    """
+    return write_page(path, lambda: _page(result, opened))
+
+
+def _page(result: MachineResult, opened: str | None) -> str:
+    keys = [(key, quantity(name)) for key, name in (*CONDITIONS, *SHOWN) if _known(result, key)]
+    return render(
+        "machine/page.html.j2",
+        title=result.case.machine.title(),
+        result=result,
+        failures=result.failures,
+        tiles=[tile(quantity(key), result.worst) for key in TILES if result.worst.get(key) is not None],
+        sketch=machine_sketch(result).picture(),
+        path=along_path(result).picture() if len(result.rows) > 1 else None,
+        heads=[(_head(key, entry), entry.display) for key, entry in keys],
+        rows=[(row, [_cell(row, key, entry) for key, entry in keys]) for row in result.rows],
+        ratings=[_rated(rating) for rating in result.ratings],
+        worst=[exhibit.picture() for exhibit in _worst(result)],
+        run=result.run,
+        opened=opened,
+        frequencies=[
+            (name.removesuffix("_hz").replace("_", " "), quantity("frequency_hz").text(value))
+            for name, value in result.case.machine.frequencies.items()
+        ],
+    )
+
+
+def _known(result: MachineResult, key: str) -> bool:
+    return any(row.get(key) is not None for row in result.rows)
+
+
+def _head(key: str, entry: Quantity) -> str:
+    return {"u1_m_s": "u₁", "u2_m_s": "u₂"}.get(key, entry.short)
+
+
+def _cell(row: dict[str, object], key: str, entry: Quantity) -> str:
+    """A number, with its interval where the row has one."""
+    return entry.number_in(row) if key == entry.key else entry.number(row.get(key))
+
+
+class _RatingView(NamedTuple):
+    """What the template shows of a rating."""
+
+    name: str
+    meaning: str
+    value: str
+    rating: Rating
+
+
+def _rated(rating: Rating) -> _RatingView:
+    entry = quantity(rating.key)
+    if rating.reason:
+        value = f"not rated: {rating.reason}"
+    elif rating.alone is not None:
+        value = entry.text(rating.alone)
+    else:
+        known = {name: number for name, number in rating.values.items() if number is not None}
+        value = "; ".join(f"{name} {entry.number(number)}" for name, number in known.items()) or NO_VALUE
+        value = f"{value} {entry.display}".rstrip()
+    return _RatingView(heading(entry), entry.meaning, value, rating)
+
+
+def _worst(result: MachineResult) -> Iterator[Exhibit]:
+    """The worst contact's maps, and what it does to the material below."""
+    if result.run is None:
+        return
+    yield from _maps(result.run)
+    if result.dang_van is not None:
+        yield fatigue_over_depth(result.dang_van)
+
+
+def _maps(run: Run) -> Iterator[Exhibit]:
+    yield contact.contact_map(run)
+    yield contact.film_map(run)
+    yield contact.pressure_map(run)
+    yield contact.centre_line(run)
+    if run.friction is not None and run.heat is not None and run.solution.conditions.sliding_speed != 0.0:
+        yield rubbing.temperature_map(run, run.friction, run.heat)
+    yield rubbing.stress_section(run)

@@ -1,0 +1,250 @@
+"""A machine drawn to scale: where its contacts are, and what each of them carries."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from asperity.arrays import Field
+from asperity.machine import BallBearing, Cam, CylindricalRollerBearing, FlatCam, RollerCam, SpurGear, TwinDisc
+from asperity.quantities import quantity
+from asperity.report.base import Exhibit
+from asperity.report.style import BLUE, GREY, VERMILION, Medium
+from asperity.study import MachineResult
+
+MM = 1e3
+METAL, EDGE, IDLE = "#e5e7eb", "#556070", "#ffffff"
+HEIGHT = 4.3  # inches
+Line = tuple[Field, Field]
+
+
+def machine_sketch(result: MachineResult) -> Exhibit:
+    """The machine to scale, its worst contact marked."""
+    machine = result.case.machine
+    draw: Callable[[Axes], None]
+    if isinstance(machine, SpurGear):
+        draw, caption = (
+            partial(_gears, machine, result),
+            (
+                "The pair in mesh, to scale: the pinion (below) drives. Contact runs along the line of action from A "
+                "to E; between B and D one pair of teeth bears alone. Fillets are left out."
+            ),
+        )
+    elif isinstance(machine, CylindricalRollerBearing | BallBearing):
+        draw, caption = (
+            partial(_bearing, machine, result),
+            (
+                "The bearing from its side, to scale. Shaded rolling elements bear; the bars outside are their loads, "
+                "over the largest. The load presses the inner ring down."
+            ),
+        )
+    elif isinstance(machine, TwinDisc):
+        draw, caption = partial(_discs, machine), "Both discs from their side, to scale."
+    else:
+        assert isinstance(machine, Cam)
+        draw, caption = (
+            partial(_cam, machine, result),
+            ("Cam and follower at the worst contact, to scale; the places that were solved are dots on the cam."),
+        )
+
+    def drawn(medium: Medium) -> Figure:
+        figure, axes = medium.panel(HEIGHT)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        draw(axes)
+        return figure
+
+    return Exhibit("machine", drawn, caption, f"{machine.title()}, drawn to scale. {caption}")
+
+
+def _circle(axes: Axes, x: float, y: float, radius: float, **style: Any) -> None:
+    axes.add_patch(Circle((MM * x, MM * y), MM * radius, **{"facecolor": "none", "edgecolor": EDGE, **style}))
+
+
+def _line(axes: Axes, line: Line, **style: Any) -> None:
+    axes.plot(MM * line[0], MM * line[1], **{"color": EDGE, "linewidth": 1.0, **style})
+
+
+def _frame(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
+    axes.set(xlim=(MM * x[0], MM * x[1]), ylim=(MM * y[0], MM * y[1]))
+
+
+# Bearings ------------------------------------------------------------------------------------------------------------
+
+
+def _bearing(bearing: CylindricalRollerBearing | BallBearing, result: MachineResult, axes: Axes) -> None:
+    if isinstance(bearing, BallBearing):
+        diameter, loads = bearing.ball_diameter, bearing.loads(result.case.pair)[0]
+    else:
+        diameter, loads = bearing.roller_diameter, bearing.loads
+    middle, radius = bearing.pitch_diameter / 2.0, diameter / 2.0
+    inner, outer, wall = middle - radius, middle + radius, 0.35 * diameter
+    _circle(axes, 0.0, 0.0, outer + wall, facecolor=METAL)
+    _circle(axes, 0.0, 0.0, outer, facecolor="white")
+    _circle(axes, 0.0, 0.0, inner, facecolor=METAL)
+    _circle(axes, 0.0, 0.0, inner - wall, facecolor="white")
+    largest, room = float(loads.max()), 1.1 * diameter
+    for number, (angle, load) in enumerate(zip(bearing.angles, loads, strict=True)):
+        away = np.array([math.sin(angle), -math.cos(angle)])
+        x, y = middle * away
+        share = load / largest
+        _circle(axes, x, y, radius, facecolor=BLUE if load > 0.0 else IDLE, alpha=0.25 + 0.6 * share, zorder=2)
+        axes.text(MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3)
+        if load > 0.0:
+            start, end = outer + wall, outer + wall + room * share
+            axes.plot(*(MM * np.outer(away, [start, end])), color=VERMILION, linewidth=4.0, solid_capstyle="butt")
+    most = int(np.argmax(loads))
+    place = (outer + wall + room) * np.array([math.sin(bearing.angles[most]), -math.cos(bearing.angles[most])])
+    axes.annotate(
+        quantity("load_n").text(largest), (MM * place[0], MM * place[1]), (0, -3), textcoords="offset points",
+        ha="center", va="top", color=VERMILION, fontsize="small",
+    )  # fmt: skip
+    _applied(axes, bearing, inner - wall)
+    reach = outer + wall + 0.3 * diameter
+    _frame(axes, (-reach - room, reach + room), (-reach - 1.2 * room, reach))
+
+
+def _applied(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore: float) -> None:
+    """The load on the shaft, and which way the inner ring turns."""
+    words = []
+    if bearing.radial_load > 0.0:
+        style: Any = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 2.0}
+        axes.annotate("", (0.0, -MM * 0.55 * bore), (0.0, MM * 0.3 * bore), arrowprops=style)
+        words.append(quantity("load_n").text(bearing.radial_load))
+    axial = getattr(bearing, "axial_load", 0.0)
+    if axial > 0.0:
+        words.append(f"{quantity('load_n').text(axial)} axial")
+    axes.text(0.0, MM * 0.38 * bore, "\n".join(words), ha="center", va="bottom", color=VERMILION, fontsize="small")
+    turn = np.linspace(math.radians(150.0), math.radians(30.0), 40)
+    way = 0.85 * bore * np.array([np.cos(turn), np.sin(turn)])
+    _line(axes, (way[0], way[1]), color=GREY)
+    axes.annotate("", tuple(MM * way[:, -1]), tuple(MM * way[:, -3]), arrowprops={"arrowstyle": "-|>", "color": GREY})
+
+
+# Gears ---------------------------------------------------------------------------------------------------------------
+
+
+def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
+    """The pinion's axis below, the wheel's above, both teeth meeting at the worst point."""
+    (base_1, _), centres, angle = gears.base_radii, gears.centres, gears.working_angle
+    foot = base_1 * np.array([math.sin(angle), math.cos(angle)])
+    along = np.array([-math.cos(angle), math.sin(angle)])
+    touching = foot + result.worst["position"] * along
+    pinion = _flanks(gears, 0, touching)
+    wheel = _flanks(gears, 1, np.array([0.0, centres]) - touching)  # its own axis is turned by half a turn
+    axes.fill(MM * pinion[0], MM * pinion[1], facecolor=METAL, edgecolor=EDGE, linewidth=0.9)
+    axes.fill(-MM * wheel[0], MM * (centres - wheel[1]), facecolor="#d7dde5", edgecolor=EDGE, linewidth=0.9)
+    places = np.array([foot + s * along for s in gears.path.values()])
+    _line(axes, (places[[0, -1], 0], places[[0, -1], 1]), color=VERMILION, linewidth=1.6)
+    for side, (name, (x, y)) in enumerate(zip(gears.path, places, strict=True)):
+        is_worst = name == result.worst["name"]
+        size = 6.0 if is_worst else 3.5
+        axes.plot(MM * x, MM * y, "o", color=VERMILION, markersize=size)
+        shift = (0, 8) if side % 2 else (0, -9)
+        axes.annotate(
+            name, (MM * x, MM * y), shift, textcoords="offset points", ha="center", va="center", fontsize="small",
+            fontweight="bold" if is_worst else "normal",
+        )  # fmt: skip
+    reach = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
+    middle = places.mean(axis=0)
+    _frame(axes, (middle[0] - reach, middle[0] + reach), (middle[1] - 0.8 * reach, middle[1] + 0.8 * reach))
+
+
+def _flanks(gears: SpurGear, body: int, touching: Field) -> Line:
+    """A gear's outline about its own axis, a flank through a point given from there, y towards the mesh."""
+    teeth, shift = gears.teeth[body], gears.profile_shift[body]
+    base, tip = gears.base_radii[body], gears.tip_radii[body]
+    half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _inv(gears.pressure_angle)
+    root = gears.module * (0.5 * teeth + shift - 1.25)
+    radii = np.linspace(max(base, root), tip, 25)
+    rolled = np.arccos(np.clip(base / radii, -1.0, 1.0))
+    away = half - (np.tan(rolled) - rolled)  # of a flank from the tooth's middle, at each radius
+    tooth = np.concatenate([[-half], -away, away[::-1], [half]])
+    rise = np.concatenate([[root], radii, radii[::-1], [root]])
+    met = math.acos(min(base / float(np.hypot(*touching)), 1.0))
+    first = math.atan2(touching[0], touching[1]) + half - _inv(met)
+    angles = (first + math.tau * np.arange(teeth)[:, None] / teeth + tooth).ravel()
+    radius = np.tile(rise, teeth)
+    return radius * np.sin(angles), radius * np.cos(angles)
+
+
+def _inv(angle: float) -> float:
+    return math.tan(angle) - angle
+
+
+# Discs and cams ------------------------------------------------------------------------------------------------------
+
+
+def _discs(discs: TwinDisc, axes: Axes) -> None:
+    first, second = discs.radii
+    for number, (x, radius, speed) in enumerate(zip((-first, second), discs.radii, discs.turning, strict=True), 1):
+        _circle(axes, x, 0.0, radius, facecolor=METAL)
+        turning = f"disc {number}\n{speed * 30.0 / math.pi:.4g} r/min"
+        axes.text(MM * x, 0.0, turning, ha="center", va="center", fontsize="small")
+    axes.plot(0.0, 0.0, "o", color=VERMILION, markersize=6)
+    axes.annotate(
+        quantity("load_n").text(discs.load), (0.0, 0.0), (0, 12), textcoords="offset points", ha="center",
+        color=VERMILION, fontsize="small",
+    )  # fmt: skip
+    tallest = 1.05 * max(first, second)
+    _frame(axes, (-2.1 * first, 2.1 * second), (-tallest, tallest))
+
+
+def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
+    """Turned so that the worst contact is where the follower is; the follower moves upwards."""
+    turn = result.worst["position"]
+    angles = np.linspace(-math.pi, math.pi, 721)
+    outline = np.array([_on_cam(cam, angle) for angle in angles])
+    back = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    x, y = (outline @ back.T).T
+    axes.fill(MM * x, MM * y, facecolor=METAL, edgecolor=EDGE, linewidth=1.0)
+    _circle(axes, 0.0, 0.0, cam.base_radius, linestyle=":")
+    axes.plot(0.0, 0.0, "+", color=EDGE)
+    dots = np.array([_on_cam(cam, angle) for angle in cam.angles]) @ back.T
+    axes.plot(MM * dots[:, 0], MM * dots[:, 1], "o", color=GREY, markersize=3)
+    met = back @ _on_cam(cam, turn)
+    reach = cam.base_radius + cam.lift
+    if isinstance(cam, RollerCam):
+        middle = cam.base_radius + cam.roller_radius + cam.lift_at(turn)
+        _circle(axes, 0.0, middle, cam.roller_radius, facecolor="#d7dde5")
+        axes.plot(0.0, MM * middle, "+", color=EDGE)
+        reach += 2.0 * cam.roller_radius
+    else:
+        lift = cam.base_radius + cam.lift_at(turn)
+        half = 1.1 * cam.base_radius
+        axes.fill(
+            MM * np.array([-half, half, half, -half]), MM * (lift + np.array([0.0, 0.0, 0.2, 0.2]) * cam.base_radius),
+            facecolor="#d7dde5", edgecolor=EDGE, linewidth=1.0,
+        )  # fmt: skip
+        reach += 0.4 * cam.base_radius
+    axes.plot(*(MM * met), "o", color=VERMILION, markersize=6)
+    below = 1.1 * (cam.base_radius + cam.lift)
+    _frame(axes, (-below, below), (-below, 1.05 * reach))
+
+
+def _on_cam(cam: Cam, angle: float) -> Field:
+    """Where the follower touches at an angle, seen with the nose up and the follower's way turned by it."""
+    turned = abs(angle) if abs(angle) <= cam.half_angle else cam.half_angle
+    way = np.array([math.sin(angle), math.cos(angle)])
+    across = np.array([math.cos(angle), -math.sin(angle)])
+    lift = cam.base_radius + cam.lift_at(turned)
+    slope = math.copysign(1.0, angle) * _slope(cam, turned)
+    if isinstance(cam, FlatCam):
+        return np.asarray(lift * way + slope * across)
+    assert isinstance(cam, RollerCam)
+    centre = (lift + cam.roller_radius) * way
+    normal = (lift + cam.roller_radius) * way - slope * across
+    return np.asarray(centre - cam.roller_radius * normal / float(np.hypot(*normal)))
+
+
+def _slope(cam: Cam, angle: float) -> float:
+    """S' by differences: of a drawing [m]."""
+    step = 1e-5
+    ends = (min(max(angle + side * step, 0.0), cam.half_angle) for side in (-1.0, 1.0))
+    low, high = ends
+    return (cam.lift_at(high) - cam.lift_at(low)) / (high - low)

@@ -1,0 +1,191 @@
+"""Ratings of a whole machine: that each standard gets the machine's own numbers, and says what it lacks."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.case import load_machine
+from asperity.lubricant import ESTIMATORS, OilSheet
+from asperity.quantities import catalogue
+from asperity.rating import GearOil, Mesh, MeshPoint, specific_film
+from asperity.results import solve_case
+from asperity.study import machine_conditions, rated
+from asperity.study.rating_facts import FACTS
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LIMITS = {"rating.fatigue_limits": ["350 MPa", "600 MPa"]}
+
+
+def by_key(case):
+    return {rating.key: rating for rating in rated.machine_ratings(case)}
+
+
+def test_every_rating_is_a_quantity_and_says_where_it_is_from():
+    assert set(FACTS) == {key for key, entry in catalogue().items() if entry.group == "rating"}
+    for facts in FACTS.values():
+        assert all(facts)
+
+
+def test_a_roller_bearings_viscosity_ratio_and_life():
+    case = load_machine(EXAMPLES / "nu206.toml")
+    few = by_key(case)
+    assert few["viscosity_ratio"].alone == pytest.approx(1.648, rel=1e-3)  # VG 68 of index 95 at 70 degC, 3000 r/min
+    assert few["reference_viscosity_m2_s"].alone * 1e6 == pytest.approx(12.048, rel=1e-4)
+    assert few["life_factor"].alone is None
+    assert few["life_factor"].reason == "[rating] has no dynamic_load_rating"
+    whole = {"dynamic_load_rating": "44 kN", "fatigue_load_limit": "4.5 kN", "contamination": 0.5}
+    found = by_key(case.with_overrides({"rating": whole}))
+    assert found["equivalent_load_n"].alone == pytest.approx(4000.0, rel=0.12)  # half a load zone would give 4000 N
+    factor = found["life_factor"].alone
+    turns = found["reference_life"].alone * factor
+    assert found["modified_life_s"].alone == pytest.approx(turns / 50.0, rel=1e-9)
+    assert by_key(case.with_overrides({"rating": whole | {"contamination": 0.0}}))[
+        "life_factor"
+    ].alone == pytest.approx(0.1)
+    missing = by_key(case.with_overrides({"rating": {"dynamic_load_rating": "44 kN"}}))["life_factor"]
+    assert missing.reason == "[rating] has no fatigue_load_limit and no contamination"
+    cold = by_key(case.with_overrides({"rating": whole, "machine.speed": "10 r/min"}))
+    assert "below 0.1" in cold["life_factor"].reason
+    assert cold["modified_life_s"].alone is None
+
+
+def test_a_ball_bearings_life_is_a_commercial_programs():
+    """Z 7, D 11.5 mm, d_m 43.5 mm, C 23.4 kN under 1 kN: 13 163 million turns."""
+    case = load_machine(EXAMPLES / "6206.toml").with_overrides(
+        {
+            "machine": {
+                "kind": "ball-bearing",
+                "balls": 7,
+                "ball_diameter": "11.5 mm",
+                "pitch_diameter": "43.5 mm",
+                "radial_load": "1 kN",
+                "speed": "1000 r/min",
+            },
+            "material": {"youngs_modulus": "210 GPa", "poisson_ratio": 0.3},
+            "rating": {"dynamic_load_rating": "23.4 kN"},
+        }
+    )
+    assert by_key(case)["reference_life"].alone == pytest.approx(13163.0e6, rel=2e-4)
+
+
+def test_gears_get_their_own_numbers():
+    """Against the formulas called by hand, with Ra and the bulk temperature given and by the roughness."""
+    case = load_machine(EXAMPLES / "fzg-c.toml")
+    given = case.with_overrides({"rating": {"roughness_ra": "0.5 um", "bulk_temperature": "100 degC"}})
+    found = by_key(given)
+    assert found["rated_bulk_k"].alone == 373.15
+    sheet = OilSheet(grade="VG 220")
+    oil = GearOil(
+        lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin),
+        lambda kelvin: ESTIMATORS["iso"](sheet, kelvin),
+        "mineral",
+    )
+    friction = 0.045 * (265.1 / 33.8289e-3 / 14.0 / (6.3492 * 8.3820)) ** 0.2
+    friction *= (1e3 * sheet.viscosity(363.15)) ** -0.05 * 2.2 * (0.5 / 8.3820) ** 0.25
+    assert found["mesh_friction"].alone == pytest.approx(friction, rel=1e-4)
+    effusivity = math.sqrt(46.0 * 7800.0 * 460.0)
+    mesh = Mesh(0.5e-6, case.pair.effective_modulus, (effusivity, effusivity))
+    contact = next(one for one in case.contacts if one.name == "D")
+    hertz = contact.hertz(case.pair)
+    point = MeshPoint(contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds)
+    film, rise = specific_film(point, mesh, oil, found["mesh_friction"].alone, 373.15)
+    assert found["rated_film"].values["D"] == pytest.approx(film, rel=1e-9)
+    assert found["rated_flash_k"].values["D"] == pytest.approx(rise, rel=1e-9)
+    assert found["rated_flash_k"].values["C"] == pytest.approx(0.0, abs=1e-9)
+    assert found["rated_film"].alone is None
+    smoother = by_key(case.with_overrides({"surface.sq": "0.25 um"}))["rated_film"].values["A"]
+    assert smoother > 2.0 * by_key(case)["rated_film"].values["A"]  # of Ra itself, and of a cooler mesh
+
+
+def test_ra_of_both_flanks():
+    case = load_machine(EXAMPLES / "fzg-c.toml")
+    composite = case.case(case.contacts[0])
+    assert rated._mean_ra(composite) == pytest.approx(0.5e-6 / math.sqrt(math.pi), rel=1e-6)
+    kind = {"kind": "gaussian", "correlation_length": "30 um"}
+    apart = composite.with_overrides({"surface": kind | {"sq": "0.6 um", "second": kind | {"sq": "0.2 um"}}})
+    assert rated._mean_ra(apart) == pytest.approx(math.sqrt(2.0 / math.pi) * 0.4e-6, rel=1e-6)
+
+
+def test_limits_of_gears_are_given_or_missing():
+    case = load_machine(EXAMPLES / "fzg-c.toml")
+    without = by_key(case)
+    assert without["scuffing_margin_k"].reason.startswith("[rating] has no scuffing_stage")
+    assert without["micropitting_safety"].reason.startswith("[rating] has no permissible_film")
+    found = by_key(case.with_overrides({"rating": {"scuffing_stage": 12, "permissible_film": 0.5}}))
+    films = found["rated_film"].values
+    assert found["micropitting_safety"].alone == pytest.approx(min(films.values()) / 0.5)
+    hottest = found["rated_bulk_k"].alone + max(found["rated_flash_k"].values.values())
+    assert found["scuffing_margin_k"].alone == pytest.approx(found["scuffing_limit_k"].alone - hottest)
+    assert found["scuffing_limit_k"].alone - 353.15 == pytest.approx(
+        2.25 * (1e3 * OilSheet(grade="VG 220").viscosity(363.15)) ** -0.05 * 144.0, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        (
+            {
+                "lubricant": {
+                    "viscosity": {"law": "barus", "eta0": "0.05 Pa s", "alpha": "15 1/GPa"},
+                    "density": {"law": "incompressible", "rho0": "0.85 g/cm^3"},
+                    "rheology": "newtonian",
+                }
+            },
+            "without its data sheet",
+        ),
+        ({"surface": {"kind": "flat"}}, "the flanks are smooth"),
+        (
+            {
+                "lubricant.base": "ester",
+                "lubricant.alpha": "15 1/GPa",
+                "lubricant.density_15": "0.95 g/cm^3",
+                "lubricant.viscosity_100": "20 mm^2/s",
+            },
+            "mineral or pao, got ester",
+        ),
+    ],
+)
+def test_what_cannot_be_rated_says_why(changed, reason):
+    found = rated.machine_ratings(load_machine(EXAMPLES / "fzg-c.toml").with_overrides(changed))
+    assert [rating.key for rating in found] == list(rated.GEAR_KEYS)
+    assert all(reason in rating.reason for rating in found)
+    assert all(rating.to_dict()["value"] is None for rating in found)
+
+
+def test_machines_without_a_standard_have_no_ratings():
+    case = load_machine(EXAMPLES / "fzg-c.toml")
+    discs = {"kind": "twin-disc", "radii": ["20 mm", "30 mm"], "speeds": ["900 r/min", "500 r/min"]}
+    other = case.with_overrides({"machine": discs | {"load": "500 N", "length": "5 mm"}})
+    assert rated.machine_ratings(other) == ()
+    assert machine_conditions(other).scalars()["ratings"] == []
+
+
+def test_fatigue_below_a_smooth_contact_is_hertz():
+    """The solved smooth, dry contact and Hertz' pressure agree; both are a line contact's quarter at a = 0."""
+    case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS)
+    dry = {"surface": "flat", "lubricant": "none", "grid.cells": [192, 24], "grid.x": [-3.0, 3.0]}
+    run = solve_case(case.case(case.contacts[0]).with_overrides(dry))
+    found = rated.dang_van_below(run, (350e6, 600e6))
+    core = found.depths >= found.core_depth
+    assert found.solved[core] == pytest.approx(found.smooth[core], rel=0.02)
+    assert found.slope == pytest.approx(0.25)
+    p_max = run.solution.conditions.hertz.p_max
+    assert found.smooth.max() / p_max == pytest.approx(0.182, rel=0.03)  # between 0.1935 (a 0.2) and 0.1702 (a 0.3)
+    ratings = {rating.key: rating.alone for rating in found.ratings()}
+    assert ratings["dang_van_safety"] == pytest.approx(350e6 / found.solved[core].max())
+    result = replace(machine_conditions(case), run=run)
+    assert result.dang_van is not None
+    assert "dang_van_pa" in [rating.key for rating in result.ratings]
+
+
+def test_asperities_raise_the_measure():
+    case = load_machine(EXAMPLES / "nu206.toml").with_overrides(LIMITS | {"surface.sq": "0.4 um"})
+    rough = {"grid.cells": [96, 48], "solver.surfaces": 1}
+    run = solve_case(case.case(case.contacts[0]).with_overrides(rough))
+    found = rated.dang_van_below(run, (350e6, 600e6))
+    assert found.solved.max() > 1.3 * found.smooth.max()
+    assert np.argmax(found.solved) < np.argmax(found.smooth)  # and nearer to the surface

@@ -1,0 +1,163 @@
+"""The page of a machine: what stands on it, and that what is drawn is the machine."""
+
+import math
+import re
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from asperity.case import load_machine
+from asperity.machine import RollerCam, SpurGear
+from asperity.report import write_machine_report
+from asperity.report.machine import sketch
+from asperity.report.machine.path import along_path
+from asperity.results import solve_case
+from asperity.study import MachineResult, machine_conditions
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+CAM = """
+[machine]
+kind = "cam-roller"
+base_radius = "18 mm"
+lift = "9 mm"
+half_angle = "70 deg"
+width = "10 mm"
+speed = "1500 r/min"
+spring_load = "600 N"
+roller_radius = "9 mm"
+"""
+SOLVED = {
+    "h_central_m": 2e-7,
+    "h_min_m": 1e-7,
+    "lambda_ratio": 0.4,
+    "clr": 0.08,
+    "clr_low": 0.05,
+    "clr_high": 0.13,
+    "car": 0.03,
+    "determined": True,
+    "friction_coefficient": 0.05,
+    "friction_power_w": 400.0,
+    "flash_temperature_max_k": 150.0,
+    "von_mises_core_pa": 1e9,
+    "reason": "",
+}
+
+
+def solved(case, failed=(), run=None):
+    rows = [{**row, **SOLVED} for row in machine_conditions(case).rows]
+    for row in rows:
+        if row["name"] in failed:
+            row.update(dict.fromkeys(SOLVED) | {"reason": "did not converge"})
+    return MachineResult(case, tuple(rows), True, 1.0, run=run)
+
+
+def page(result, tmp_path, **about):
+    return unescape(write_machine_report(result, tmp_path / "page.html", **about).read_text("utf-8"))
+
+
+def test_the_first_thing_on_the_page_is_what_is_concluded(tmp_path):
+    gears = load_machine(EXAMPLES / "fzg-c.toml")
+    run = solve_case(gears.case(gears.contacts[4]).with_overrides({"grid.cells": [96, 48]}), strict=False)
+    text = page(solved(gears, run=run), tmp_path, opened="worst.html")
+    body = text.split("<main>")[1]
+    assert body.index("mixed lubrication; worst is") < body.index("<h2 id=")
+    assert "asperities carry 8.0 % (5.0 to 13.0 %) of the load".replace(" %", "\N{NO-BREAK SPACE}%") in body
+    assert 'href="worst.html"' in body
+    assert body.count("<img ") == 8  # the machine, its path, and six of the worst contact, which slides
+    for words in ("ISO/TR 15144-1:2014", "not rated: [rating] has no scuffing_stage", 'kind = "spur-gear"', "mesh"):
+        assert words in text
+    assert len(re.findall(r'<tr class="worst">', text)) == 1
+    assert "8.0 (5.0 to 13.0)" in text
+
+
+def test_the_page_loads_nothing_and_runs_nothing(tmp_path):
+    text = page(machine_conditions(load_machine(EXAMPLES / "nu206.toml")), tmp_path)
+    assert "default-src 'none'; img-src data:;" in text
+    assert "script-src 'none'" in text
+    assert "<script" not in text
+    assert not re.search(r'(src|href)="(?!data:|#|https://doi)', text)
+    for alternative in re.findall(r'<img [^>]*alt="([^"]*)"', text):
+        assert len(alternative) > 20
+
+
+def test_what_was_not_solved_is_loud(tmp_path):
+    text = page(solved(load_machine(EXAMPLES / "fzg-c.toml"), failed=("B",)), tmp_path)
+    assert "⚠" in text
+    assert "1 of 7 contacts were NOT SOLVED" in text
+    assert "not solved: did not converge" in text
+
+
+def test_the_same_result_gives_the_same_bytes(tmp_path):
+    result = machine_conditions(load_machine(EXAMPLES / "6206.toml"))
+    first = write_machine_report(result, tmp_path / "one.html").read_bytes()
+    assert first == write_machine_report(result, tmp_path / "two.html").read_bytes()
+
+
+def test_both_sides_of_a_load_zone_are_drawn_in_their_order():
+    bearing = solved(load_machine(EXAMPLES / "nu206.toml"))
+    figure = along_path(bearing).figure()
+    line = figure.axes[0].get_lines()[0]
+    assert line.get_xdata() == pytest.approx(np.arange(-2, 3) * 360.0 / 13.0)
+    assert len(figure.axes[0].get_lines()) == 2  # both rings
+    shares = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("CLR"))
+    (low, high), *_ = (segment[:, 1] for segment in shares.collections[0].get_segments())
+    assert (low, high) == pytest.approx((5.0, 13.0))
+
+
+def test_a_rating_is_drawn_beside_what_was_solved():
+    figure = along_path(solved(load_machine(EXAMPLES / "fzg-c.toml"))).figure()
+    heat = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("flash"))
+    (_, rating) = heat.get_lines()
+    assert rating.get_ydata()[3] == pytest.approx(0.0, abs=1e-9)
+    assert rating.get_ydata()[0] > 50.0
+
+
+def drawn(case):
+    figure = Figure()
+    axes = figure.add_subplot()
+    result = machine_conditions(case)
+    return result, axes
+
+
+def test_the_teeth_drawn_meet_where_the_contact_is():
+    """Both outlines pass through the worst point, and there along the same flank."""
+    gears = load_machine(EXAMPLES / "fzg-c.toml")
+    pair = gears.machine
+    assert isinstance(pair, SpurGear)
+    result, axes = drawn(gears)
+    sketch._gears(pair, result, axes)
+    pinion, wheel = (patch.get_xy() for patch in axes.patches[:2])
+    met = next(
+        line for line in axes.get_lines() if (line.get_marker(), line.get_markersize()) == ("o", 6.0)
+    ).get_xydata()[0]
+    assert np.hypot(*met) == pytest.approx(1e3 * math.hypot(pair.base_radii[0], pair.path["B"]), rel=1e-6)
+    slopes = []
+    for outline in (pinion, wheel):
+        start, end = outline[:-1], outline[1:]
+        way = end - start
+        share = np.clip(((met - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0)
+        off = np.hypot(*(start + share[:, None] * way - met).T)
+        nearest = int(np.argmin(off))
+        assert off[nearest] < 0.01  # mm
+        slopes.append(math.atan2(*way[nearest][::-1]) % math.pi)
+    assert slopes[0] == pytest.approx(slopes[1], abs=0.1)
+    along = math.atan2(math.sin(pair.working_angle), -math.cos(pair.working_angle))
+    assert (slopes[0] - along) % math.pi == pytest.approx(math.pi / 2.0, abs=0.1)
+
+
+def test_the_cam_drawn_touches_its_roller(tmp_path):
+    path = tmp_path / "cam.toml"
+    path.write_text(CAM, "utf-8")
+    cam = load_machine(path).machine
+    assert isinstance(cam, RollerCam)
+    for angle in (0.0, 0.5, 1.0):
+        touched = sketch._on_cam(cam, angle)
+        reach = cam.base_radius + cam.roller_radius + cam.lift_at(angle)
+        centre = reach * np.array([math.sin(angle), math.cos(angle)])
+        assert np.hypot(*(touched - centre)) == pytest.approx(cam.roller_radius, rel=1e-9)
+        outline = np.array([sketch._on_cam(cam, turn) for turn in np.linspace(-1.2, 1.2, 2401)])
+        assert np.hypot(*(outline - centre).T).min() == pytest.approx(cam.roller_radius, rel=1e-5)
+    assert "Cam with roller follower" in page(machine_conditions(load_machine(path)), tmp_path)
