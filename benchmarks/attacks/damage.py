@@ -7,7 +7,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from asperity.errors import BadInput
+from asperity.kept import digest
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "data"
 RECORDINGS = ("vibration/mfpt-formats/*", "vibration/mfpt/*.mat", "vibration/endaq/*", "vibration/uff/*")
@@ -52,7 +55,7 @@ def make_results(folder: Path) -> None:
     solve_case(case, strict=False).save(folder / "run.nc")
     run_history(case, steps=3, every=1, out=folder / "history", strict=False)
     swept = case.with_overrides({"study": {"sq": ["1 um", "2 um"], "seeds": 2}})
-    run_study(plan_study(swept), out=folder / "study", workers=1)
+    run_study(plan_study(swept), out=folder / "study", workers=1, fields=("pressure", "gap"))
 
 
 def numbers_of(folder: Path, which: str) -> str:
@@ -67,13 +70,15 @@ def numbers_of(folder: Path, which: str) -> str:
     if which == "run.nc":
         run = load_run(folder / which)
         fields = (run.solution.pressure, run.solution.gap, run.solution.surface.heights)
-        return text([run.verdict(), run.case.text, [field.tobytes().hex()[:2000] for field in fields]])
+        return text([run.verdict(), run.case.text, [digest(field) for field in fields]])
     if which == "history":
         moved = load_history(folder / which)
         values = {key: value for key, value in moved.scalars().items() if key != "folder"}
-        return text([values, moved.table.to_dict(), moved.case.text, len(moved.frames), str(moved.memory)])
+        held = [[digest(np.asarray(part)) for part in frame] for frame in moved.frames]
+        return text([values, moved.table.to_dict(), moved.case.text, held, digest(dict(moved.memory or {}))])
     result = load_study(folder / which)
-    return text([result.table.to_dict(), result.plan.points, [case.id for case in result.plan.cases]])
+    maps = [digest(result.maps(case.id)) for case in result.plan.cases]
+    return text([result.table.to_dict(), result.plan.points, [case.id for case in result.plan.cases], maps])
 
 
 def results(folder: Path) -> Callable[[int], str | None]:

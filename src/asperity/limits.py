@@ -86,7 +86,9 @@ def reading_limit(stored: int) -> float:
 
 
 def stored_size(path: Path) -> int:
-    """Bytes that a file takes on the disk: fewer than it claims where it has holes."""
+    """Bytes that a file takes on the disk: fewer than it claims where it has holes; of a folder, all files in it."""
+    if path.is_dir():
+        return sum(stored_size(file) for file in path.rglob("*") if file.is_file())
     status = path.stat()
     return min(status.st_size, 512 * getattr(status, "st_blocks", status.st_size) or status.st_size)
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -259,6 +260,95 @@ def test_fields_are_kept_before_their_row_and_are_the_solutions(plan, executor, 
     assert (group[f"{chosen.id}/pressure"][:] == solution.pressure).all()
     assert (group[f"{chosen.id}/in_contact"][:] == solution.in_contact).all()
     assert group[f"{chosen.id}/pressure"].chunks == solution.pressure.shape
+    kept = load_study(tmp_path).maps(chosen.id)
+    assert sorted(kept) == ["in_contact", "pressure"]
+    assert (kept["pressure"] == solution.pressure).all()
+
+
+@pytest.fixture(scope="module")
+def mapped(case, executor, tmp_path_factory):
+    """Folders of two studies that keep maps, and differ in their load."""
+    folders = []
+    for load in ("500 N", "400 N"):
+        plan = plan_study(case.with_overrides({"contact.load": load, "study": {"sq": ["1 um"], "seeds": 1}}))
+        folders.append(tmp_path_factory.mktemp("mapped") / "study")
+        run_study(plan, out=folders[-1], executor=executor, fields=("pressure", "gap"))
+    return folders
+
+
+def map_files(folder):
+    result = load_study(folder)
+    case_id = str(result.table["case_id"][0])
+    group = folder / "fields.zarr" / case_id
+    return result, case_id, sorted(path for path in group.rglob("*") if path.is_file())
+
+
+def test_a_flipped_bit_in_any_file_of_a_map_is_refused_or_changes_nothing(mapped):
+    result, case_id, files = map_files(mapped[0])
+    told = result.maps(case_id)
+    assert len(files) == 5  # of the group, and of each map its description and its one chunk
+    rng = np.random.default_rng(1)
+    refused = 0
+    for path in files:
+        whole = path.read_bytes()
+        for place in rng.integers(8 * len(whole), size=12):
+            changed = bytearray(whole)
+            changed[place // 8] ^= 1 << place % 8
+            path.write_bytes(changed)
+            try:
+                again = result.maps(case_id)
+            except UnreadableFile as refusal:
+                assert len(str(refusal)) < 500
+                refused += 1
+            else:
+                assert {name: again[name].tobytes() for name in again} == {name: told[name].tobytes() for name in told}
+        path.write_bytes(whole)
+    assert refused > 40
+    result.maps(case_id)
+
+
+def test_a_map_that_is_missing_exchanged_or_anothers_is_refused(mapped, tmp_path):
+    folder = shutil.copytree(mapped[0], tmp_path / "study")
+    result, case_id, _ = map_files(folder)
+    group = folder / "fields.zarr" / case_id
+    (group / "pressure").rename(group / "other")
+    with pytest.raises(UnreadableFile, match="other content"):
+        result.maps(case_id)
+    (group / "other").rename(group / "pressure")
+    (group / "gap" / "c" / "0" / "0").unlink()  # to zarr, a chunk that was never written is zeros
+    with pytest.raises(UnreadableFile, match="other content"):
+        result.maps(case_id)
+    shutil.rmtree(group)
+    shutil.copytree(mapped[1] / "fields.zarr" / map_files(mapped[1])[1], group)
+    with pytest.raises(UnreadableFile, match="another study"):
+        result.maps(case_id)
+    shutil.rmtree(group)
+    with pytest.raises(UnreadableFile, match="keeps no maps"):
+        result.maps(case_id)
+    with pytest.raises(BadInput, match="no finished case"):
+        result.maps("../parts")
+
+
+def test_a_map_that_claims_more_than_it_stores_is_refused_before_it_is_read(mapped, tmp_path):
+    folder = shutil.copytree(mapped[0], tmp_path / "study")
+    result, case_id, _ = map_files(folder)
+    about = folder / "fields.zarr" / case_id / "gap" / "zarr.json"
+    told = json.loads(about.read_text())
+    about.write_text(json.dumps({**told, "shape": [10**6, 10**6]}))
+    with pytest.raises(UnreadableFile, match="claims to hold 8e"):
+        result.maps(case_id)
+
+
+def test_other_readers_notice_damage_of_a_map_too(mapped, tmp_path):
+    import zarr
+
+    folder = shutil.copytree(mapped[0], tmp_path / "study")
+    _, case_id, _ = map_files(folder)
+    chunk = folder / "fields.zarr" / case_id / "gap" / "c" / "0" / "0"
+    whole = chunk.read_bytes()
+    chunk.write_bytes(whole[:50] + bytes([whole[50] ^ 1]) + whole[51:])
+    with pytest.raises(Exception, match="checksum"):
+        zarr.open_array(folder / "fields.zarr" / case_id / "gap", mode="r")[...]
 
 
 def test_progress_counts_every_case_once(plan, executor):

@@ -34,7 +34,8 @@ from asperity.kept import MANIFEST
 from asperity.processes import cores, set_up_worker
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, timed_batch
 from asperity.study.plan import StudyCase, StudyPlan
-from asperity.study.store import Store, in_order, manifest_of, open_kept, open_read, open_store, require_zarr, table_of
+from asperity.study.maps import require_zarr
+from asperity.study.store import Store, in_order, manifest_of, open_kept, open_read, open_store, table_of
 
 BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose
 LARGEST_BATCH = 200
@@ -96,6 +97,22 @@ class StudyResult:
     def versions(self) -> dict[str, str]:
         """Of asperity and what it stands on, when the folder was begun; in memory, those of now."""
         return versions() if self.folder is None else dict(manifest_of(self.folder)["versions"])
+
+    def maps(self, case_id: str) -> dict[str, Field]:
+        """The maps that `fields` asked for of a case, each (nx, ny) in SI.
+
+        Raises
+        ------
+        UnreadableFile
+            where none are kept, or they are damaged.
+        BadInput
+            for a case of another study, or a study in memory.
+        """
+        if self.folder is None:
+            raise BadInput("maps are kept in a study's folder, and this study has none; give out")
+        if case_id not in self.table["case_id"].to_numpy():
+            raise BadInput(f"the study has no finished case {case_id!r}; take one of the column case_id")
+        return open_kept(self.folder).maps(case_id)
 
 
 def run_study(

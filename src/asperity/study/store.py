@@ -24,10 +24,11 @@ from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import make_folder, require_writable, versions, write_bytes
 from asperity.kept import MANIFEST, read_manifest, read_table, require_same_version, write_json, write_table
 from asperity.study.evaluate import Row
+from asperity.study.maps import read_maps, write_maps
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
 FORMAT = 2  # counts up when a reader of the format before could not read the folder
-PARTS, TABLE, MAPS = "parts", "table.parquet", "fields.zarr"
+PARTS, TABLE = "parts", "table.parquet"
 LEFT_BEHIND_S = 3600.0  # age of a temporary file that no shard elsewhere can still be writing
 _LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
 
@@ -54,19 +55,13 @@ class Store:
         """Write a finished batch: its fields first, then its rows; `AsperityError` if the system refuses to write."""
         for case_id, fields in maps.items():
             if fields:
-                self._keep_maps(case_id, fields)
+                write_maps(self.folder, self.design, case_id, fields)
         names = hashlib.sha256("".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()).hexdigest()
         self._write(self.folder / PARTS / f"{names[:20]}.parquet", table_of(rows))
 
-    def _keep_maps(self, case_id: str, fields: Mapping[str, Field]) -> None:
-        zarr, group_path = require_zarr(), self.folder / MAPS
-        try:
-            group = zarr.open_group(group_path, mode="a").require_group(case_id)
-            for name, values in fields.items():
-                group.create_array(name, data=values, chunks=values.shape, overwrite=True)
-        except OSError as error:
-            reason = error.strerror or error
-            raise AsperityError(f"{group_path} could not be written: {reason}; finished cases are kept") from error
+    def maps(self, case_id: str) -> dict[str, Field]:
+        """The maps kept of a case; UnreadableFile where there are none, or they are damaged."""
+        return read_maps(self.folder, self.design, case_id)
 
     def merge(self) -> Path:
         """Write what is finished as one table, in the order of the plan, and return its path."""
@@ -204,15 +199,6 @@ def _require_same(plan: StudyPlan, folder: Path) -> None:
     if manifest.get("design") != plan.design:
         remedy = "choose another folder, or the case as it was"
         raise BadInput(f"{folder} holds a study of another case than {plan.case.source}; {remedy}")
-
-
-def require_zarr() -> Any:
-    """The zarr library; BadInput where it is not installed."""
-    try:
-        import zarr
-    except ModuleNotFoundError:
-        raise BadInput("keeping fields needs zarr; pip install 'asperity[study]'") from None
-    return zarr
 
 
 # Tables --------------------------------------------------------------------------------------------------------------
