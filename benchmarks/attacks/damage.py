@@ -2,18 +2,20 @@
 
 import json
 import random
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.errors import BadInput
 from asperity.kept import digest
 
+if TYPE_CHECKING:
+    from asperity.recording import OpenRecording
+
 SHARED = Path(__file__).parents[2].parent / "shared" / "data"
-RECORDINGS = ("vibration/mfpt-formats/*", "vibration/mfpt/*.mat", "vibration/endaq/*", "vibration/uff/*")
+RECORDINGS = ("mfpt-formats/*", "mfpt/*.mat", "endaq/*", "uff/*", "ims/*")
 SURFACES = ("surfaces/*",)
 LARGEST = 3_000_000  # bytes of an original; larger ones take too long a thousand times
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um"}
@@ -123,7 +125,7 @@ def originals(folder: Path) -> list[Path]:
     """Measured files of every format, as far as they are at hand; else such as can be made."""
     found = [
         path
-        for pattern in (*RECORDINGS, *SURFACES)
+        for pattern in (*(f"vibration/{recordings}" for recordings in RECORDINGS), *SURFACES)
         for path in sorted(SHARED.glob(pattern))
         if path.is_file() and path.stat().st_size < LARGEST
     ]
@@ -154,7 +156,6 @@ def _made(folder: Path) -> list[Path]:
 
 def measured(folder: Path) -> Callable[[int], str | None]:
     """An attack by number on a recording or a surface: what is wrong with it is said, or it is read."""
-    from asperity.recording import open_channels
     from asperity.surface import read_surface
 
     files = originals(folder)
@@ -170,7 +171,7 @@ def measured(folder: Path) -> Callable[[int], str | None]:
             if surface:
                 read_surface(copy)
             else:
-                for opened in open_channels(copy, rate_hz=None)[:2]:
+                for opened in channels(copy)[:2]:
                     opened.read()
         except BadInput as refusal:
             return too_long(refusal)
@@ -181,6 +182,13 @@ def measured(folder: Path) -> Callable[[int], str | None]:
     return attack
 
 
-def copied(folder: Path, source: Path) -> Path:
-    """A copy of a folder of results."""
-    return Path(shutil.copytree(source, folder))
+def channels(path: Path) -> "list[OpenRecording]":
+    """All channels of a recording, with a rate stated where the file states none."""
+    from asperity.recording import open_channels
+
+    try:
+        return open_channels(path)
+    except BadInput as refusal:
+        if "states no sampling rate" not in str(refusal):
+            raise
+        return open_channels(path, rate_hz=2e4)

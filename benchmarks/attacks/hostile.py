@@ -175,6 +175,24 @@ def hdf5_outside(folder: Path) -> tuple[str, ...]:
     return ("check", str(folder / "outside.h5"))
 
 
+def hdf5_text(mark: bytes, behind: int, value: int) -> Attack:
+    """Samples beside text, one byte of which is not what the library expects."""
+
+    def make(folder: Path) -> tuple[str, ...]:
+        import h5py
+
+        path = folder / "text.h5"
+        with h5py.File(path, "w") as file:
+            file["text"] = [b"abc", b"d"]
+            file.create_dataset("x", data=np.zeros(5000)).attrs["fs"] = 2e4
+        content = bytearray(path.read_bytes())
+        content[content.index(mark) + behind] = value
+        path.write_bytes(content)
+        return ("check", str(path))
+
+    return make
+
+
 def hdf5_groups(folder: Path) -> tuple[str, ...]:
     import h5py
 
@@ -326,6 +344,8 @@ HOSTILE: dict[str, Attack] = {
     "HDF5 whose groups hold themselves": hdf5_cycle,
     "HDF5 whose samples are /dev/zero": hdf5_outside,
     "HDF5 with 20000 groups": hdf5_groups,
+    "HDF5 whose heap leads to itself": hdf5_text(b"GCOL", 24, 0),
+    "HDF5 whose text is of no kind": hdf5_text(b"\x19\x01", 1, 0x66),
     "HDF5 map that claims 1e6 x 1e6": lambda folder: (
         hdf5("m.h5", shape=(10**6, 10**6), dtype="f8", chunks=(100, 100))(folder),
         _surface(folder / "m.h5"),

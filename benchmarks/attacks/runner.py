@@ -63,6 +63,18 @@ def _family(pid: int) -> list[int]:
     return pids
 
 
+def processor_s(pid: int) -> float:
+    """Seconds of a processor that a process, all below it and what ended below it have taken."""
+    total = 0.0
+    for member in _family(pid):
+        try:
+            numbers = Path(f"/proc/{member}/stat").read_text().rpartition(")")[2].split()
+            total += sum(map(int, numbers[11:15])) / os.sysconf("SC_CLK_TCK")
+        except (OSError, IndexError):
+            continue
+    return total
+
+
 def _resident(pid: int) -> float:
     """Megabytes of memory of a process and all below it."""
     total = 0.0

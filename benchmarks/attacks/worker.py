@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from asperity.errors import BadInput
-from benchmarks.attacks import damage, inputs, names
+from benchmarks.attacks import damage, inputs, names, runner
 
 KINDS = {
     "case files": inputs.cases,
@@ -32,7 +32,7 @@ def main(kind: str, first: int, last: int) -> None:
         attack = KINDS[kind](Path(folder))
         for number in range(first, last):
             tell(begun=number)
-            begun = time.perf_counter()
+            begun, spent = time.perf_counter(), runner.processor_s(os.getpid())
             try:
                 fault = attack(number)
             except BadInput as refusal:
@@ -40,7 +40,9 @@ def main(kind: str, first: int, last: int) -> None:
             except Exception as error:  # noqa: BLE001 - a traceback is what is looked for
                 fault = f"traceback: {type(error).__name__}: {error}"[:200]
             megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-            tell(done=number, fault=fault, seconds=time.perf_counter() - begun, megabytes=megabytes)
+            processor = runner.processor_s(os.getpid()) - spent
+            seconds = time.perf_counter() - begun
+            tell(done=number, fault=fault, seconds=seconds, processor_s=processor, megabytes=megabytes)
 
 
 if __name__ == "__main__":

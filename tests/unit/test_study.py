@@ -297,8 +297,7 @@ def test_a_flipped_bit_in_any_file_of_a_map_is_refused_or_changes_nothing(mapped
             path.write_bytes(changed)
             try:
                 again = result.maps(case_id)
-            except UnreadableFile as refusal:
-                assert len(str(refusal)) < 500
+            except UnreadableFile:
                 refused += 1
             else:
                 assert {name: again[name].tobytes() for name in again} == {name: told[name].tobytes() for name in told}

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from asperity.apart import read_apart
-from asperity.recording.common import REMEDY, columns, facts_in, numeric, refused_as
+from asperity.recording.common import columns, facts_in, numeric, refused_as
 from asperity.recording.model import Contents
 
 _DEEPEST = 8
@@ -27,22 +26,17 @@ def is_matlab(head: bytes) -> bool:
 
 
 def read(path: Path) -> Contents:
-    """Channels named by variable and field: bearing.gs; scipy, which does not survive every file, reads them apart."""
+    """Channels named by variable and field: bearing.gs."""
     notes: list[str] = []
-    rows = read_apart(path.absolute(), "asperity.recording.matlab:rows", remedy=REMEDY, library="scipy.io")
+    with refused_as(path, "no readable MATLAB file"):
+        held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+        held = {key: value for key, value in held.items() if not key.startswith("__")}
+        rows = list(_rows(path.name, held, "", {}))
     channels = [channel for name, values, facts in rows for channel in columns(name, values, notes, **facts)]
     return Contents(format="mat v5", channels=channels, notes=notes)
 
 
 Row = tuple[str, Any, dict[str, Any]]  # name, array, and what the file states of it
-
-
-def rows(path: Path) -> list[Row]:
-    """All arrays of numbers in a file."""
-    with refused_as(path, "no readable MATLAB file"):
-        held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
-        held = {key: value for key, value in held.items() if not key.startswith("__")}
-        return list(_rows(path.name, held, "", {}))
 
 
 def _rows(file: str, held: dict[str, Any], name: str, above: dict[str, Any]) -> Iterator[Row]:

@@ -14,7 +14,7 @@ from asperity.errors import BadInput, UnreadableFile, require_positive
 from asperity.files import require_file
 from asperity.limits import require_unpacked
 from asperity.quiet import first_line, quietly
-from asperity.recording import hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
+from asperity.recording import foreign, hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
 from asperity.recording.common import MOST_CHANNELS, REMEDY, parse_time
 from asperity.recording.model import (
     ACCELERATION,
@@ -36,25 +36,34 @@ _HEAD = 4096
 
 @dataclass(frozen=True, slots=True)
 class _Format:
-    """How a format is known, by its first bytes; which names promise it; who reads it."""
+    """How a format is known, by its first bytes; which names promise it; who reads it.
+
+    `library` is somebody else's that reads it, in a process of its own; `package` is where that comes from.
+    """
 
     known: Callable[[bytes], bool]
     suffixes: tuple[str, ...]
     read: Callable[[Path], Contents]
     library: str | None = None
+    package: str | None = None
+
+    def contents(self, path: Path) -> Contents:
+        """All channels of a file, by its own reader."""
+        return self.read(path) if self.library is None else foreign.contents(path, self.read.__module__, self.library)
 
 
 FORMATS = (  # in the order in which they are tried; text comes after all of them
-    _Format(wav.is_wav, ("wav", "rf64", "flac"), wav.read, "soundfile"),
-    _Format(matlab.is_matlab, ("mat",), matlab.read),
-    _Format(hdf5.is_hdf5, ("h5", "hdf5", "hdf", "mat", "nc"), hdf5.read),
-    _Format(tdms.is_tdms, ("tdms",), tdms.read, "npTDMS"),
-    _Format(parquet.is_parquet, ("parquet", "pq"), parquet.read, "pyarrow"),
-    _Format(ide.is_ide, ("ide",), ide.read, "idelib"),
+    _Format(wav.is_wav, ("wav", "rf64", "flac"), wav.read, "soundfile", "soundfile"),
+    _Format(matlab.is_matlab, ("mat",), matlab.read, "scipy.io", "scipy"),
+    _Format(hdf5.is_hdf5, ("h5", "hdf5", "hdf", "mat", "nc"), hdf5.read, "h5py", "h5py"),
+    _Format(tdms.is_tdms, ("tdms",), tdms.read, "nptdms", "npTDMS"),
+    _Format(parquet.is_parquet, ("parquet", "pq"), parquet.read, "pyarrow.parquet", "pyarrow"),
+    _Format(ide.is_ide, ("ide",), ide.read, "idelib", "idelib"),
     _Format(numpys.is_npy, ("npy",), numpys.read_npy),
     _Format(numpys.is_npz, ("npz",), numpys.read_npz),
-    _Format(uff.is_uff, ("uff", "unv", "u58", "bunv"), uff.read, "pyuff"),
+    _Format(uff.is_uff, ("uff", "unv", "u58", "bunv"), uff.read, "pyuff", "pyuff"),
 )
+_TEXT = _Format(text.looks_like_text, tuple(text.SUFFIXES), text.read)
 SUFFIXES = {suffix for form in FORMATS for suffix in form.suffixes} | text.SUFFIXES
 
 
@@ -132,13 +141,15 @@ def read_contents(path: Path) -> Contents:
             raise UnreadableFile(
                 f"{path.name} is in no format of recordings that asperity knows; export it as wav or csv"
             )
-    reader, library = (text.read, None) if chosen is None else (chosen.read, chosen.library)
+    chosen = chosen or _TEXT
     try:
-        contents = reader(path)
+        contents = chosen.contents(path)
     except BadInput:
         raise
     except ImportError:
-        raise UnreadableFile(f"{path.name} needs {library} to be read; pip install 'asperity[recordings]'") from None
+        raise UnreadableFile(
+            f"{path.name} needs {chosen.package} to be read; pip install 'asperity[recordings]'"
+        ) from None
     except MemoryError:
         raise UnreadableFile(f"{path.name} claims more data than fits into memory; {REMEDY}") from None
     except Exception as error:

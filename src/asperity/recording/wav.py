@@ -8,6 +8,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import UnreadableFile
+from asperity.quiet import first_line
 from asperity.recording.common import REMEDY, refused_as
 from asperity.recording.model import Channel, Contents
 
@@ -31,9 +32,16 @@ def read(path: Path) -> Contents:
         notes.append(f"cut short: {frames} of {whole} samples are there")
 
     def blocks(number: int, size: int) -> Iterator[Field]:
-        with soundfile.SoundFile(path) as sound:
-            while (block := sound.read(size, dtype="float64", always_2d=True)).size:
-                yield np.ascontiguousarray(block[:, number])
+        done = 0
+        try:
+            with soundfile.SoundFile(path) as sound:
+                while (block := sound.read(size, dtype="float64", always_2d=True)).size:
+                    done += block.shape[0]
+                    yield np.ascontiguousarray(block[:, number])
+        except soundfile.LibsndfileError as error:
+            if done == 0:
+                raise UnreadableFile(f"{path.name} cannot be read ({first_line(error)}); {REMEDY}") from error
+            notes.append(f"damaged after sample {done} of {frames}; what comes before was read")
 
     channels = [
         Channel(

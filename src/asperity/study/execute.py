@@ -33,8 +33,8 @@ from asperity.files import versions
 from asperity.kept import MANIFEST
 from asperity.processes import cores, set_up_worker
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, timed_batch
-from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.maps import require_zarr
+from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.store import Store, in_order, manifest_of, open_kept, open_read, open_store, table_of
 
 BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose

@@ -40,7 +40,9 @@ def write_maps(folder: Path, study: str, case_id: str, maps: Mapping[str, Field]
             group.create_array(name, data=values, chunks=values.shape, compressors=codecs)
         group.attrs.update({_STUDY: study, _SEAL: _sealed(study, case_id, maps)})
     except OSError as error:
-        raise AsperityError(f"{path} could not be written: {error.strerror or error}; finished cases are kept") from error
+        raise AsperityError(
+            f"{path} could not be written: {error.strerror or error}; finished cases are kept"
+        ) from error
 
 
 def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
