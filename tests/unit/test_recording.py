@@ -207,6 +207,24 @@ def test_large_text_is_read_piece_by_piece(tmp_path, monkeypatch):
     assert "another block" in recording.notes[0]
 
 
+@pytest.mark.parametrize("end", ["", "sep", "sep "])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_large_text_is_parsed_by_pandas_and_not_line_by_line(tmp_path, monkeypatch, separator, end):
+    def never(chunk, *_):
+        assert chunk == b""
+        return np.empty((0, 2)), None
+
+    monkeypatch.setattr("asperity.recording.text._WORTH_PANDAS", 10_000)
+    monkeypatch.setattr("asperity.recording.text._line_by_line", never)
+    behind = end.replace("sep", separator)
+    rows = "".join(f"{i / RATE:.4f}{separator}{v:.6f}{behind}\n" for i, v in enumerate(VALUES))
+    (tmp_path / "a.csv").write_text(f"time_s{separator}acc_g\n{rows}", "utf-8")
+    recording = read_recording(tmp_path / "a.csv")
+    assert recording.rate_hz == RATE
+    assert recording.notes == ()
+    assert np.allclose(recording.values / G, VALUES, atol=1e-6)
+
+
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' data are not on this machine")
 def test_six_copies_of_a_measured_second_are_one_signal():
     folder = SHARED / "vibration" / "mfpt-formats"

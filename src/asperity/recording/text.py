@@ -218,13 +218,15 @@ def _parsed(chunk: bytes, table: _Table, column: int | None = None) -> Field | N
     if not chunk.strip():
         return np.empty((0, table.columns if column is None else 1))
     wanted: Any = range(table.columns) if column is None else [column]
+    first = chunk.lstrip(b"\r\n").split(b"\n", 1)[0].rstrip(b" \r")
+    ended = table.dialect.separator is not None and first.endswith(table.dialect.separator.encode())
     try:
         frame = pandas.read_csv(
             BytesIO(chunk),
             sep=table.dialect.separator or r"\s+",
             decimal="," if table.dialect.comma else ".",
             header=None,
-            names=range(table.columns + (table.dialect.separator is not None)),  # one for a separator at the end
+            names=range(table.columns + ended),  # one for what is behind a separator at the end
             usecols=wanted,
             dtype=np.float64,
             na_values=sorted(MISSING),
