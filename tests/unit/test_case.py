@@ -1,3 +1,4 @@
+import copy
 import math
 import pickle
 import re
@@ -91,10 +92,24 @@ def test_the_text_of_a_case_loads_to_an_equal_case(paper, overrides):
     )
 
 
-def test_a_case_travels_to_another_process(paper):
-    again = pickle.loads(pickle.dumps(paper))
-    assert again == paper
-    assert again.text == paper.text
+COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_a_case_and_its_contents_can_be_copied_and_sent_to_another_process(how):
+    copied = 0
+    for path in sorted(EXAMPLES.glob("*.toml")):
+        if "[machine]" in path.read_text("utf-8"):
+            continue
+        case, copied = load_case(path), copied + 1
+        again, contents = COPIES[how](case), COPIES[how](case.contents)
+        assert again == case
+        assert again.text == case.text
+        assert again.folder == case.folder
+        assert contents == case.contents
+        assert contents.contact.load.text == case.contents.contact.load.text
+        assert contents.material is case.contents.material or how != "copy"
+    assert copied > 3
 
 
 @given(st.floats(1e-3, 1e6), st.sampled_from([("mm", 1e-3), ("um", 1e-6), ("m", 1.0), ("nm", 1e-9)]))

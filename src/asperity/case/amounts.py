@@ -100,6 +100,9 @@ class Amount(float):
         amount.text = text
         return amount
 
+    def __getnewargs__(self) -> tuple[float, str]:  # or it could not be copied
+        return float(self), self.text
+
 
 def plain(value: Any) -> Any:
     """Numbers in SI without the text that they were written in, of a pair both; anything else as it stands."""

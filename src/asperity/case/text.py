@@ -1,8 +1,9 @@
 """A case as TOML text: read, restated with every default, and with values replaced."""
 
+import copyreg
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import tomli_w
 
 from asperity.case.amounts import Amount
 from asperity.case.oils import SheetSection
-from asperity.case.refusals import Section, quoted
+from asperity.case.refusals import Section, parse_section, quoted
 from asperity.case.sections import CaseFile
 from asperity.case.sweep import StudySection
 from asperity.case.vibration import preset_keys
@@ -52,6 +53,17 @@ def restated(contents: CaseFile) -> str:
         for key in contents.thermal.tacit:
             del tables["thermal"][key]
     return tomli_w.dumps(tables)
+
+
+def _reread(text: str) -> CaseFile:
+    return parse_section(CaseFile, tomllib.loads(text), "a case")
+
+
+def _as_text(contents: CaseFile) -> tuple[Callable[[str], CaseFile], tuple[str]]:
+    return _reread, (restated(contents),)
+
+
+copyreg.pickle(CaseFile, _as_text)  # the sections of laws are made at run time, which pickle cannot follow
 
 
 def replaced(tables: dict[str, Any], overrides: Mapping[str, object], source: str) -> dict[str, Any]:
