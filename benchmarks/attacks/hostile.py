@@ -254,6 +254,20 @@ def uff_claim() -> bytes:
     return ("\n".join([*lines, "    -1", ""])).encode()
 
 
+def ide_formula(folder: Path) -> tuple[str, ...]:
+    """A recorder's file whose clock is a formula, which its library evaluates: a number of 370 million digits."""
+    from ebmlite import loadSchema
+
+    schema = loadSchema("mide_ide.xml")
+    head = {"EBMLVersion": 1, "EBMLReadVersion": 1, "EBMLMaxIDLength": 4, "EBMLMaxSizeLength": 8, "DocType": "mide"}
+    clock = {"TimeCodeScale": "9**9**9", "TimeCodeModulus": 16777216, "ChannelFormat": "<H"}
+    channel = {"ChannelID": 8, "ChannelName": "x", **clock, "SubChannel": [{"SubChannelID": 0, "SubChannelName": "x"}]}
+    about = {"RecorderInfo": {"RecorderTypeUID": 18}, "ChannelList": {"Channel": [channel]}}
+    content = schema.encodes({"EBML": head | {"DocTypeVersion": 2, "DocTypeReadVersion": 1}})
+    (folder / "x.ide").write_bytes(content + schema.encodes({"RecordingProperties": about}))
+    return ("check", str(folder / "x.ide"))
+
+
 def wrong_byte_xyz() -> bytes:
     n = 400
     lines = [f"{i:.4f} {j:.4f} {(i * j) % 7 * 0.1:.6f}" for i in range(n) for j in range(n)]
@@ -372,6 +386,7 @@ HOSTILE: dict[str, Attack] = {
     "tdms that claims 1e12 samples": content("x.tdms", tdms_claim, _check),
     "uff that claims 1e9 points": content("x.uff", uff_claim, _stated),
     "IDE of nonsense": content("x.ide", lambda: b"\x1a\x45\xdf\xa3" + b"\x08" * 3 + b"\xff" * 9999, _check),
+    "IDE whose text is evaluated": ide_formula,
     "opd that claims 30000 x 30000": content("x.opd", lambda: b"\x01\x00Directory\x00".ljust(6000, b"\x7f"), _surface),
     "sdf that claims 1e9 x 1e9": content(
         "x.sdf", lambda: b"aBCR-1.0" + bytes(34) + struct.pack("<HH", 65535, 65535) + bytes(60), _surface
