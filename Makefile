@@ -28,6 +28,7 @@ installed: $(READY)
 
 attacks: $(READY)
 	$(BIN)/python -m benchmarks.attacks --share 0.02
+	$(BIN)/python -m benchmarks.crashes 2
 
 docs: $(READY)
 	$(BIN)/python docs/make_quantities.py

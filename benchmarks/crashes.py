@@ -1,5 +1,6 @@
 """Studies that are killed: `python -m benchmarks.crashes [MOMENTS]` kills a worker or the parent at random moments,
-goes on each time, and compares with the study that nothing interrupted, number by number."""
+goes on each time, and compares with the study that nothing interrupted, number by number; exit code 1
+if one differs."""
 
 import os
 import random
@@ -81,7 +82,7 @@ def main(moments: int) -> None:
         length = time.perf_counter() - begun
         whole = pandas.read_parquet(folder / "whole" / "table.parquet").drop(columns=TIMES)
         rng = random.Random(1)
-        same = twice = 0
+        same = twice = behind = 0
         print(f"{len(whole)} cases take {length:.0f} s; then killed at {moments} moments and resumed")
         for number in range(moments):
             out = folder / f"killed-{number}"
@@ -93,9 +94,11 @@ def main(moments: int) -> None:
             same += again.equals(whole)
             twice += computed_twice(out)
             left = len(list(out.rglob("*.part")))
+            behind += left
             print(f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left over: {left}")
             shutil.rmtree(out)
-        print(f"{same} of {moments} the same to the last bit; {twice} cases computed twice")
+        print(f"{same} of {moments} the same to the last bit; {twice} cases computed twice, {behind} files left over")
+        sys.exit(same < moments or twice > 0 or behind > 0)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

@@ -1,6 +1,7 @@
 """`asperity surface` and `solve --surface` as a user types them, on files of several kinds."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -35,12 +36,41 @@ def test_surface_names_what_it_did_and_found(asp):
 def test_a_profile_has_profile_parameters_and_a_figure(asp):
     code, out, _ = asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--out", "line.png")
     assert code == 0
-    assert out.startswith("line.csv: profile, Rq 0.7")
-    assert "arithmetic mean height, Ra " in out
-    assert "mean profile element spacing, Rsm " in out
+    assert out.startswith("line.csv: profile, Pq 0.7")
+    assert "arithmetic mean height, Pa " in out
+    assert "mean profile element spacing, Psm " in out
+    assert ", Pmr2 " in out
     assert Path("line.png").read_bytes().startswith(b"\x89PNG")
     found = json.loads(asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--json")[1])["files"][0]
     assert found["profile"]["rsm_m"] == pytest.approx(2.0 * np.pi * 9 * 0.1e-6, rel=0.01)
+    assert found["profile_letter"] == "P"
+
+
+def test_a_profile_is_called_r_where_a_filter_has_removed_its_waviness(asp):
+    given = ("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--l-filter", "8 um")
+    code, out, _ = asp(*given)
+    assert code == 0
+    assert "arithmetic mean height, Ra " in out
+    assert ": profile, Rq " in out
+    assert json.loads(asp(*given, "--json")[1])["files"][0]["profile_letter"] == "R"
+    shorter = ("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--s-filter", "1 um")
+    assert "arithmetic mean height, Pa " in asp(*shorter)[1]  # which a primary profile may have been through
+
+
+def test_a_profiles_figure_says_what_its_text_says(asp, monkeypatch):
+    written = []
+    monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *given, **_: written.append(given[3]))
+    steps = np.cumsum(np.random.default_rng(3).standard_normal(901)) * 1e-2  # not a sine: its flattest secant is one
+    Path("rough.csv").write_text("\n".join(f"{0.1e-3 * k:.6f},{z:.6f}" for k, z in enumerate(steps)))
+    code, out, _ = asp("surface", "rough.csv", "--unit", "um", "--lateral-unit", "mm", "--out", "rough.png")
+    assert code == 0
+    drawn = dict(re.findall(r"(P\w*k) ([\d.]+)", written[0]))
+    assert sorted(drawn) == ["Pk", "Ppk", "Pvk"]
+    for name, value in drawn.items():
+        assert re.search(rf", {name} +{re.escape(value)} µm", out), (name, value, out)
+    found = json.loads(asp("surface", "rough.csv", "--unit", "um", "--lateral-unit", "mm", "--json")[1])["files"][0]
+    assert found["sk_m"] == pytest.approx(found["profile"]["rk_m"], rel=1e-12)
+    assert found["svk_m"] == pytest.approx(found["profile"]["rvk_m"], rel=1e-12)
 
 
 def test_good_surfaces_are_shown_beside_a_bad_one(asp):

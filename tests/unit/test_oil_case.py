@@ -106,7 +106,7 @@ def test_a_measured_oil_by_name():
             {"lubricant": {"oil": "spindle low-VI", "base": "pao", "temperature": "40 degC"}},
             "lubricant: has both oil and base",
         ),
-        ({"thermal.ambient": "40 degC"}, "thermal: ambient of 313.15 K is not the 343.15 K of lubricant.temperature"),
+        ({"thermal.ambient": "40 degC"}, "thermal: ambient of 40 degC is not the 70 degC of lubricant.temperature"),
         ({"lubricant": "nun"}, "lubricant must be a table"),
     ],
 )

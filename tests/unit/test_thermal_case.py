@@ -49,7 +49,16 @@ def test_what_is_said_arrives_in_si_and_comes_back():
     ("key", "value", "says"),
     [
         ("thermal.ambient", 60, 'must be a temperature such as "40 degC", got the bare number 60'),
-        ("thermal.ambient", "1000 degC", "temperature must lie between 213.15 and 773.15 K, got 1273.15 K"),
+        ("thermal.ambient", "1000 degC", "temperature must lie between -60 and 500 degC, .* got 1000 degC, 1273.15 K"),
+        ("thermal.ambient", "40 C", 'got "40 C", which is something else; degrees Celsius are written degC or °C'),
+        (
+            "thermal.ambient",
+            "40 cSt",
+            'must be a temperature such as "40 degC", got "40 cSt", which is something else$',
+        ),
+        ("surface.sq", "5 %", 'surface.sq must be a length such as "5.4 mm", got "5 %"$'),
+        ("contact.slip", "20 %", 'got "20 %"; write a share, 0.05 for 5 %'),
+        ("lubricant.viscosity.eta0", "100 cSt", "something else; a kinematic viscosity times the density is one"),
         ("thermal.warmth", "exponentiel", 'did you mean "exponential"'),
         ("thermal.feedbck", True, "did you mean feedback"),
         ("thermal.conductivity", "46 W", "a thermal conductivity"),
@@ -60,6 +69,13 @@ def test_what_is_said_arrives_in_si_and_comes_back():
 def test_a_mistake_is_one_sentence(key, value, says):
     with pytest.raises(BadInput, match=says):
         CASE.with_overrides({key: value})
+
+
+@pytest.mark.parametrize("text", ["60 °C", "60°C", "60 degC"])
+def test_degrees_celsius_are_read_as_people_write_them(text):
+    case = CASE.with_overrides({"thermal.ambient": text})
+    assert case.thermal.ambient == 333.15
+    assert load_case(case.text) == case
 
 
 def test_a_run_with_feedback_is_warmer_oil_and_comes_back_from_disk(tmp_path):

@@ -100,7 +100,7 @@ class Amount(float):
         amount.text = text
         return amount
 
-    def __getnewargs__(self) -> tuple[float, str]:  # or it could not be copied
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]  # or it could not be copied
         return float(self), self.text
 
 
@@ -111,7 +111,7 @@ def plain(value: Any) -> Any:
     return float(value) if isinstance(value, float) else value
 
 
-_KINEMATIC = "; a kinematic viscosity times the density is one: 100 cSt of 0.88 g/cm^3 are 88 mPa s"
+_KINEMATIC = "a kinematic viscosity times the density is one: 100 cSt of 0.88 g/cm^3 are 88 mPa s"
 
 
 class _UnusableUnit(ValueError):
@@ -144,16 +144,16 @@ def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
         raise _UnusableUnit("whose unit is not known; capitals matter") from None
     except pint.DimensionalityError:
         kinematic = unit == "Pa s" and re.search(r"St\b|stokes|m(m)?(\^|\*\*)?2/s|m²/s", unit_text)
-        raise _UnusableUnit(
-            f"which is something else; {_KINEMATIC}" if kinematic else "which is something else"
-        ) from None
+        celsius = unit == "K" and unit_text in ("C", "c", "degF", "F")
+        remedy = f"; {_KINEMATIC}" if kinematic else "; degrees Celsius are written degC or °C" if celsius else ""
+        raise _UnusableUnit(f"which is something else{remedy}") from None
     except (pint.PintError, ValueError, TypeError, AssertionError, ArithmeticError, SyntaxError, TokenError):
         raise _UnusableUnit("whose unit cannot be read") from None
 
 
 def _split(value: object) -> tuple[str, str] | None:
     """Number and unit of a text, the unit "" where there is none; None for what is no quantity."""
-    written = _WRITTEN.fullmatch(value) if isinstance(value, str) else None
+    written = _WRITTEN.fullmatch(value.replace("°C", "degC")) if isinstance(value, str) else None
     return None if written is None else (written[1], " ".join(written[2].split()))
 
 
@@ -170,7 +170,7 @@ def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
         raise BadInput(f"{expected}, got the bare number {value}; give it its unit")
     parts = _split(value)
     if parts is None:
-        raise BadInput(f"{expected}, got {quoted(value)}{remedy_for(value)}")
+        raise BadInput(f"{expected}, got {quoted(value)}{remedy_for(value, but='%')}")
     number, unit_text = parts
     if not unit_text:
         raise BadInput(f"{expected}, got {quoted(value)} without a unit")

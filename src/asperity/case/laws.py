@@ -13,7 +13,17 @@ from pydantic import Field, PlainValidator, Strict, create_model
 from asperity.case.amounts import OPTIONAL, PAIRED, amount_in, default_amount, plain
 from asperity.case.refusals import Section, choose
 from asperity.errors import BadInput
-from asperity.lubricant import LAWS, ExponentialWarmth, LawFamily, Lubricant, Solid, Thermal, make_law, make_lubricant
+from asperity.lubricant import (
+    FREEZING,
+    LAWS,
+    ExponentialWarmth,
+    LawFamily,
+    Lubricant,
+    Solid,
+    Thermal,
+    make_law,
+    make_lubricant,
+)
 from asperity.quantities import parameters
 
 
@@ -110,8 +120,8 @@ class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those o
         if oil is not None:
             if "ambient" not in tacit and ambient != oil.temperature:
                 raise BadInput(
-                    f"ambient of {ambient:g} K is not the {oil.temperature:g} K of lubricant.temperature; "
-                    "leave ambient out"
+                    f"ambient of {self.ambient.text} is not the {oil.temperature - FREEZING:.6g} degC of "
+                    "lubricant.temperature; leave ambient out"
                 )
             ambient = oil.temperature
             warmth = ExponentialWarmth(oil.thinning) if "warmth" in tacit else warmth

@@ -37,10 +37,13 @@ def quoted(value: object) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} characters)"
 
 
-def remedy_for(value: object) -> str:
-    """What to write instead of a sign that is none of ours, as the end of a sentence; nothing for most values."""
+def remedy_for(value: object, but: str = "") -> str:
+    """What to write instead of a sign that is none of ours, as the end of a sentence; nothing for most values.
+
+    `but` is a sign that is none of the mistake's.
+    """
     text = value if isinstance(value, str) else ""
-    return next((f"; {remedy}" for sign, remedy in SIGNS.items() if sign in text), "")
+    return next((f"; {remedy}" for sign, remedy in SIGNS.items() if sign in text and sign != but), "")
 
 
 def none_from_word(value: object) -> object:

@@ -10,6 +10,7 @@ from asperity.cli.app import app
 from asperity.cli.options import AsJson, OutPicture, Quiet, Unit, require_output
 from asperity.cli.show import Block, Row, known, show, table, written
 from asperity.errors import BadInput
+from asperity.quantities import select
 
 if TYPE_CHECKING:
     from asperity.surface import SurfaceDescription
@@ -80,7 +81,12 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
     values, measured, of_map = description.scalars(), description.measured, description.profile is None
     size = surface.area_text(measured.grid.extent) if of_map else surface.length_text(measured.grid.extent[0])
     rows: list[Row] = [("format", measured.format), ("size", size)]
-    rows += known(values, "film", "surface") if of_map else known(values["profile"], "profile")
+    profile = () if of_map else map(description.symbol, select("profile"))
+    rows += (
+        known(values, "film", "surface")
+        if of_map
+        else [(entry.title, entry.text_in(values["profile"])) for entry in profile]
+    )
     bound = "Str is an upper bound: the lay outlasts half the map"
     bounded = [bound] if of_map and description.parameters.str_bounded else []
     yield from table(rows, (*bounded, *description.steps, *measured.notes))

@@ -164,9 +164,8 @@ def _check_factor(factor: Field, surface: Surface) -> None:
 def _check_grid(conditions: ContactConditions, surface: Surface) -> None:
     grid, line = surface.grid, conditions.geometry == "line"
     if grid.periodic != (False, line):
-        raise BadInput(
-            f"a {conditions.geometry} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}"
-        )
+        which = "an elliptic" if conditions.geometry == "elliptic" else f"a {conditions.geometry}"
+        raise BadInput(f"{which} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}")
     a, b = conditions.hertz.half_widths
     for axis, index, half in [("x", 0, a)] if line else [("x", 0, a), ("y", 1, b)]:
         low, high, spacing = grid.lower[index], grid.upper[index], grid.spacing[index]

@@ -9,6 +9,7 @@ from .estimates import KnownOil as KnownOil
 from .facts import OilFact as OilFact
 from .facts import oil_facts as oil_facts
 from .facts import oil_notes as oil_notes
+from .friction import FREEZING as FREEZING
 from .friction import FRICTION_LAWS as FRICTION_LAWS
 from .friction import BairWiner as BairWiner
 from .friction import EyringShear as EyringShear

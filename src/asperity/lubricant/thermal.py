@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
+from asperity.lubricant.friction import FREEZING
 from asperity.quantities import Parameter, Parametric
 
 AMBIENT = 313.15  # 40 °C [K]
@@ -109,5 +110,6 @@ class Thermal(Parametric):
         for temperature in (self.ambient, *(self.bulk or ())):
             if not 213.15 <= temperature <= 773.15:
                 raise BadInput(
-                    f"temperature must lie between 213.15 and 773.15 K, got {temperature:g} K; 313.15 K is 40 °C"
+                    "temperature must lie between -60 and 500 degC, 213.15 and 773.15 K, "
+                    f"got {temperature - FREEZING:g} degC, {temperature:g} K; correct it"
                 )

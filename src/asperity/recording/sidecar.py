@@ -45,7 +45,7 @@ def _checked(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         raise BadInput(f"{path.name} cannot be read as {path.suffix[1:]} ({error}); correct it") from None
     if not isinstance(stated, dict):
-        raise BadInput(f"{path.name} must hold keys such as rate_hz, got a {type(stated).__name__}")
+        raise BadInput(f"{path.name} must hold keys such as rate_hz, got {type(stated).__name__}")
     for key, value in stated.items():
         if key not in KEYS:
             near = get_close_matches(key, KEYS, 1)

@@ -8,11 +8,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from asperity.errors import BadInput
 from asperity.files import whole_file
@@ -25,6 +28,9 @@ GAP_COLOUR = "#e5e7eb"  # of a dry contact
 SPLIT_COLOUR, SPLIT_STRIP, BAND_COLOUR = "#8a5a00", "#f2e3c6", "#e8eef4"
 DASHED: Any = (0, (4, 3))
 FORMATS = (".png", ".pdf")
+_SMALLEST_TITLE = 8.0  # points
+_SURELY = 0.6  # of the width of its column, that any title may have
+_MARGIN = 0.01  # of the figure's width, beside a title: readers' type may be wider than ours
 
 STYLE: Any = {
     "svg.hashsalt": "asperity",  # the same run gives the same bytes
@@ -102,10 +108,62 @@ ON_PAPER = Medium(
 )
 
 
+def fit_titles(figure: Figure) -> None:
+    """Move titles that leave their figure, or run into the next panel, to the left; print smaller what is too long.
+
+    What is still too long is broken into lines.
+    """
+    if all(_short(axes, title) for axes in figure.axes for title in _titles(axes)):
+        return  # to lay a figure out takes as long as to draw it
+    figure.draw_without_rendering()
+    boxes = {axes: axes.get_tightbbox(for_layout_only=True) for axes in figure.axes}
+    margin = _MARGIN * figure.bbox.width
+    for axes in figure.axes:
+        for title in _titles(axes):
+            own = title.get_window_extent()
+            beside = [box for other, box in boxes.items() if other is not axes and box and _level(box, own)]
+            left = max([box.x1 for box in beside if box.x1 <= own.x0], default=0.0)
+            right = min([box.x0 for box in beside if box.x0 > own.x0], default=figure.bbox.width)
+            _fit_title(axes, title, left + margin, right - margin)
+
+
+def _titles(axes: Axes) -> list[Text]:
+    both: tuple[Text, ...] = (axes.title, axes._left_title)  # type: ignore[attr-defined]
+    return [title for title in both if title.get_text()]
+
+
+def _short(axes: Axes, title: Text) -> bool:
+    """Whether a title has room wherever in its column it begins, but far to the right."""
+    place = axes.get_subplotspec()
+    column = axes.figure.bbox.width / (place.get_gridspec().ncols if place is not None else 1)
+    return bool(title.get_window_extent().width < _SURELY * column)
+
+
+def _level(box: Bbox, title: Bbox) -> bool:
+    """Whether a panel lies beside a title, and not below or above it."""
+    return bool(box.y0 < title.y1 + title.height and title.y0 - title.height < box.y1)
+
+
+def _fit_title(axes: Axes, title: Text, left: float, right: float) -> None:
+    words, size = title.get_text(), float(title.get_fontsize())
+    while title.get_window_extent().width > right - left and size > _SMALLEST_TITLE:
+        size -= 0.5
+        title.set_fontsize(size)
+    for across in range(len(words), 8, -1):
+        if title.get_window_extent().width <= right - left:
+            break
+        title.set_text("\n".join(wrap(words, across)))
+    over = title.get_window_extent().x1 - right
+    if over > 0.0:
+        x, y = map(float, title.get_position())
+        title.set_position((x - over / axes.get_window_extent().width, y))
+
+
 def svg(figure: Figure) -> str:
     """The figure as SVG text, the same bytes for the same figure."""
     text = StringIO()
     with ON_PAGE.drawing():
+        fit_titles(figure)
         figure.savefig(text, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
     return text.getvalue()
 
@@ -117,5 +175,6 @@ def write_figure(figure: Figure, path: Path, *, medium: Medium = ON_PAGE, dpi: i
     kind = path.suffix.lower()[1:]
     about: dict[str, Any] = {"Software": None} if kind == "png" else {"CreationDate": None}
     with whole_file(path) as part, medium.drawing():
+        fit_titles(figure)
         figure.savefig(part, format=kind, dpi=dpi, metadata=about)
     return path

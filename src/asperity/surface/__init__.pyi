@@ -21,6 +21,7 @@ from .parameters import SurfaceDescription as SurfaceDescription
 from .parameters import SurfaceParameters as SurfaceParameters
 from .parameters import correlation_lengths as correlation_lengths
 from .parameters import describe_surface as describe_surface
+from .parameters import known_once as known_once
 from .parameters import surface_parameters as surface_parameters
 from .prepare import CompositeSurface as CompositeSurface
 from .prepare import Fit as Fit

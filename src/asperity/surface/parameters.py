@@ -1,15 +1,15 @@
 """ISO 25178-2 parameters of a rough surface, and the description of a measured file that the command line prints."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy
 
 from asperity.arrays import Field
 from asperity.grid import Grid
-from asperity.quantities import catalogue
+from asperity.quantities import Quantity, catalogue
 from asperity.surface.bearing import bearing_curve, core_heights
 from asperity.surface.condition import Form, Outliers, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface
@@ -57,7 +57,8 @@ class SurfaceParameters:
 class SurfaceDescription:
     """A measured file: as read, levelled (the map to draw), its parameters after levelling, and what was done.
 
-    `profile` are the parameters of ISO 21920-2, of a file that holds a profile only.
+    `profile` are the parameters of ISO 21920-2, of a file that holds a profile only; `profile_letter` is what that
+    standard calls them by: "R" of what a filter has left of the waviness, "P" of a primary profile.
     """
 
     path: Path
@@ -66,13 +67,19 @@ class SurfaceDescription:
     parameters: SurfaceParameters
     steps: tuple[str, ...]
     profile: ProfileParameters | None = None
+    profile_letter: Literal["P", "R"] = "P"
+
+    def symbol(self, quantity: Quantity) -> Quantity:
+        """A parameter of a profile, with the symbol that it has here: Pq in place of Rq."""
+        return replace(quantity, symbol=self.profile_letter + quantity.symbol.removeprefix("R"))
 
     def verdict(self) -> str:
         """One sentence: roughness, cells and what is missing."""
         measured, (nx, ny), (dx, dy) = self.measured, self.measured.grid.cells, self.measured.grid.spacing
         what = f"Sq {1e6 * self.parameters.sq:.3g} um, {nx} x {ny} cells of {1e6 * dx:.4g} x {1e6 * dy:.4g} um"
         if measured.uniform is not None:
-            what = f"profile, Rq {1e6 * self.parameters.sq:.3g} um, {nx} points every {1e6 * dx:.4g} um"
+            rms = f"{self.profile_letter}q {1e6 * self.parameters.sq:.3g} um"
+            what = f"profile, {rms}, {nx} points every {1e6 * dx:.4g} um"
         return f"{self.path}: {what}, {100 * measured.missing:.2g} % missing."
 
     def scalars(self) -> dict[str, Any]:
@@ -86,6 +93,7 @@ class SurfaceDescription:
             "missing": self.measured.missing,
             **_plain(self.parameters),
             "profile": None if self.profile is None else _plain(self.profile),
+            "profile_letter": None if self.profile is None else self.profile_letter,
             "steps": list(self.steps),
             "notes": list(self.measured.notes),
         }
@@ -131,7 +139,8 @@ def describe_surface(
     profile = None
     if levelled.uniform is not None:
         profile = profile_parameters(levelled.profile, levelled.grid.spacing[1 - levelled.uniform])
-    return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps, profile)
+    letter: Literal["P", "R"] = "P" if l_filter is None else "R"
+    return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps, profile, letter)
 
 
 def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
@@ -143,7 +152,7 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
         return SurfaceParameters(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0, 0.0, 0.0, nan, nan, False, 0.0, 0.0, 0.0, 0.0, 1.0)
     sal, texture, bounded = _texture(heights, surface.grid)
     sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
-    core = core_heights(bearing_curve(heights))
+    core = core_heights(bearing_curve(known_once(surface)))
     return SurfaceParameters(
         sa=float(np.nanmean(np.abs(heights))),
         sq=sq,
@@ -163,6 +172,11 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
         smr1=core.upper,
         smr2=core.lower,
     )
+
+
+def known_once(surface: Surface | MeasuredSurface) -> Field:
+    """The heights, of a profile those of one of its equal rows: the bearing curve is that of its own points."""
+    return surface.profile if isinstance(surface, MeasuredSurface) and surface.uniform is not None else surface.heights
 
 
 def correlation_lengths(surface: Surface | MeasuredSurface, direction: float = 0.0) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Any
 from asperity.conditions import ContactConditions
 from asperity.coupling import VibrationModel
 from asperity.ehl import ContactSolution
-from asperity.lubricant import LawFamily, Lubricant, Solid, law_name
+from asperity.lubricant import FREEZING, LawFamily, Lubricant, Solid, law_name
 from asperity.quantities import NO_VALUE, parameters, quantity, with_deviation
 from asperity.report.base import heading
 from asperity.results import Run
@@ -99,7 +99,7 @@ def _oil_rows(run: Run) -> dict[str, str]:
 
 
 def _thermal_rows(run: Run) -> dict[str, str]:
-    thermal, temperature = run.case.thermal, quantity("temperature_k")
+    thermal = run.case.thermal
     solids = [
         f"{name.replace('_', ' ')} {_both([mark.text(getattr(solid, name)) for solid in thermal.solids])}"
         for name, mark in parameters(Solid).items()
@@ -108,14 +108,19 @@ def _thermal_rows(run: Run) -> dict[str, str]:
     rows = {heading(boundary): boundary.text(run.case.boundary_friction), "Bodies": ", ".join(solids)}
     if run.solution.lubricant is None:
         return rows
-    bulk = "" if thermal.bulk is None else f", bodies at {_both([temperature.text(each) for each in thermal.bulk])}"
+    bulk = "" if thermal.bulk is None else f", bodies at {_both([_temperature(each) for each in thermal.bulk])}"
     feedback = "the film's heat thins the oil" if thermal.feedback else "heat does not act back on the oil"
     return {
         **rows,
-        "Temperature": f"{temperature.text(thermal.ambient)} ambient{bulk}; {feedback}",
+        "Temperature": f"{_temperature(thermal.ambient)} ambient{bulk}; {feedback}",
         "Oil and heat": f"conductivity {quantity('oil_conductivity_w_m_k').text(thermal.oil_conductivity)}, viscosity "
         f"falls by the law {_law('warmth', thermal.warmth)}",
     }
+
+
+def _temperature(kelvin: float) -> str:
+    """In degrees Celsius, as cases mostly have it, and in kelvin."""
+    return f"{with_deviation(kelvin - FREEZING, None)} °C ({quantity('oil_temperature_k').text(kelvin)})"
 
 
 def _numerical_rows(solution: ContactSolution) -> dict[str, str]:

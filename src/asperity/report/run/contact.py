@@ -151,8 +151,8 @@ def height_distribution(run: Run) -> Exhibit:
     )
 
 
-def draw_height_distribution(axes: Axes, heights: Field) -> None:
-    """The same of any heights [m]; what was not measured is left out."""
+def draw_height_distribution(axes: Axes, heights: Field, rms: str = "Sq") -> None:
+    """The same of any heights [m], whose deviation is called `rms`; what was not measured is left out."""
     deviations = heights[np.isfinite(heights)] - np.nanmean(heights)
     values = display("height_m", deviations)
     sq = float(values.std())
@@ -163,7 +163,9 @@ def draw_height_distribution(axes: Axes, heights: Field) -> None:
     axes.hist(values, bins=80, range=(-4.5 * sq, 4.5 * sq), density=True, color="#9ec5dd", label="surface")
     grid = np.linspace(-4.5 * sq, 4.5 * sq, 181)
     gauss = np.exp(-0.5 * (grid / sq) ** 2) / (sq * np.sqrt(2.0 * np.pi))
-    axes.plot(grid, gauss, "--", color="black", label=f"Gaussian, {quantity('sq_m').named(float(deviations.std()))}")
+    axes.plot(
+        grid, gauss, "--", color="black", label=f"Gaussian, {rms} {quantity('sq_m').text(float(deviations.std()))}"
+    )
     axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the key
     axes.legend(loc="upper right")
 

@@ -12,7 +12,14 @@ from asperity.quantities import quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.run.contact import draw_height_distribution
 from asperity.report.style import BLUE, DASHED, GREEN, GREY, ON_PAGE, VERMILION, write_figure
-from asperity.surface import MeasuredSurface, SurfaceDescription, SurfaceSpectrum, bearing_curve, surface_spectrum
+from asperity.surface import (
+    MeasuredSurface,
+    SurfaceDescription,
+    SurfaceSpectrum,
+    bearing_curve,
+    known_once,
+    surface_spectrum,
+)
 
 
 def surface_map(description: SurfaceDescription, path: Path) -> Path:
@@ -43,8 +50,9 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
         size = f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
     else:
         _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
-        draw_height_distribution(figure.add_subplot(places[1, 0]), levelled.profile)
-        size = f"profile, Rq {sq}, {levelled.profile.size} points every {pixel.text(min(dx, dy))}"
+        rms = f"{description.profile_letter}q"
+        draw_height_distribution(figure.add_subplot(places[1, 0]), levelled.profile, rms)
+        size = f"profile, {rms} {sq}, {levelled.profile.size} points every {pixel.text(min(dx, dy))}"
     _draw_bearing_curve(figure.add_subplot(places[1, 1]), description)
     _draw_radial_spectrum(figure.add_subplot(places[1, 2]), spectrum, levelled.uniform is not None)
     figure.suptitle(f"{description.path.name}: {size}", x=0.01, ha="left", parse_math=False)
@@ -75,8 +83,8 @@ def _draw_profile(axes: Axes, levelled: MeasuredSurface, title: str) -> None:
 
 
 def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
-    curve, parameters, sq = bearing_curve(description.levelled.heights), description.parameters, quantity("sq_m")
-    prefix = "S" if description.profile is None else "R"
+    curve, parameters, sq = bearing_curve(known_once(description.levelled)), description.parameters, quantity("sk_m")
+    prefix = "S" if description.profile is None else description.profile_letter
     axes.plot(display("material_ratio", curve.share), display("height_m", curve.height), color=BLUE)
     top, bottom = (display("height_m", curve.height_at(share)) for share in (parameters.smr1, parameters.smr2))
     axes.axhspan(bottom, top, color="#e5e7eb", linewidth=0)
