@@ -12,10 +12,10 @@ import pytest
 from asperity import load_case
 from asperity.cli import main
 from asperity.errors import AsperityError, BadInput
-from asperity.study import ParameterRange, sensitivity
+from asperity.study import ParameterRange, global_sensitivity, sensitivity
 from asperity.study.global_sensitivity import knee
 from asperity.study.indices import indices, sample_design
-from asperity.study.ranges import OPEN_RANGES, open_ranges, overrides_at, parse_range
+from asperity.study.ranges import LENGTH_KEY, OPEN_RANGES, open_ranges, overrides_at, parse_range
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 SMALL = {"surface.correlation_length": "60 um", "vibration.duration": "1 s"}
@@ -154,6 +154,46 @@ def test_only_what_the_case_has_is_varied_and_lengths_fit_its_grid(paper):
             small.with_overrides(
                 {"surface.correlation_length": lengths.written(share), "grid.x": [inlet, 1.9]}
             ).surface()
+
+
+@pytest.mark.parametrize("cells", [[32, 32], [40, 40], [52, 44], [64, 64]])
+def test_no_length_of_a_carried_range_is_refused_for_its_rounding(cells):
+    case = load_case(PAPER.with_name("ball-on-disc.toml")).with_overrides({"grid.cells": cells})
+    ranges = open_ranges(case)
+    for share in (0.0, 1.0):
+        for inlet in np.linspace(0.0, 1.0, 7):
+            shares = [{LENGTH_KEY: share, "grid.x[0]": inlet}.get(entry.key, 0.5) for entry in ranges]
+            case.with_overrides(overrides_at(case, ranges, shares)).surface()
+
+
+def test_an_end_of_a_domain_that_the_case_leaves_to_be_chosen_is_not_varied():
+    case = load_case(PAPER.with_name("data-sheet-oil.toml"))
+    assert "grid.x[0]" not in [entry.key for entry in open_ranges(case)]
+
+
+def test_ranges_of_which_nothing_would_be_left_are_refused_before_anything_is_solved(paper, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("solved")
+
+    monkeypatch.setattr("asperity.study.global_sensitivity.run_study", never)
+    lengths = ParameterRange("surface.correlation_length", 1.0, 1.5, "um")  # on cells of 6 um
+    with pytest.raises(BadInput, match=r"correlation length along x must be at least 2 cells.*; narrow the ranges"):
+        sensitivity(paper, vary=[lengths], sq=[1e-6], levels=0, cells=64)
+
+
+def test_why_contacts_failed_is_said_where_too_many_did(paper, threads, monkeypatch):
+    kept = global_sensitivity.run_study
+
+    def failing(plan, **options):
+        result = kept(plan, **options)
+        result.table.loc[1:, ["status", "reason"]] = "failed", "the roller is square"
+        return result
+
+    monkeypatch.setattr(global_sensitivity, "run_study", failing)
+    hardness = ParameterRange("material.hardness", 1.0, 2.0, "GPa")
+    case = paper.with_overrides({**SMALL, "lubricant": "none"})
+    with pytest.raises(AsperityError, match="curves; the first: the roller is square; narrow the ranges"):
+        sensitivity(case, vary=[hardness], sq=[1e-6], levels=0, cells=32, size=2, executor=threads)
 
 
 def test_the_cutoff_moves_crfa_by_its_cube_and_nothing_else(paper, threads, tmp_path):

@@ -22,7 +22,7 @@ from asperity.quantities import quantity
 from asperity.study.calibration_result import as_json
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
-from asperity.study.indices import SIZES, SampleDesign, SensitivityMethod, indices, sample_design
+from asperity.study.indices import FEWEST_BLOCKS, SIZES, SampleDesign, SensitivityMethod, indices, sample_design
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 from asperity.study.ranges import (
     ParameterRange,
@@ -220,6 +220,7 @@ def sensitivity(
     factors = (*(entry.key for entry in ranges), *([SEED_FACTOR] if seeded else []))
     design = sample_design(method, len(factors), size or SIZES[method], sample_seed)
     study = _Design(case, ranges, tuple(seeded), design, curve, seeds, sample_seed)
+    study.require_solvable()
     result = run_study(study.plan(), out=out, executor=executor, workers=workers, progress=progress)
     return _analysed(study, factors, result, sq)
 
@@ -259,6 +260,23 @@ class _Design(NamedTuple):
                 points.append({**chosen, "surface.sq": f"{1e6 * level:g} um", **drawn})
         return plan_points(self.case, points)
 
+    def require_solvable(self) -> None:
+        """Refuse, before anything is solved, ranges of which the case refuses so many points that nothing is left."""
+        refused: dict[int, str] = {}
+        for number, shares in enumerate(self.sample.shares):
+            if number // self.sample.block not in refused:
+                try:
+                    chosen = overrides_at(self.case, self.ranges, shares[: len(self.ranges)])
+                    self.case.with_overrides(chosen).surface()
+                except BadInput as refusal:
+                    refused[number // self.sample.block] = str(refusal)
+        if len(self.sample.shares) // self.sample.block - len(refused) < FEWEST_BLOCKS:
+            ranges = ", ".join(map(str, self.ranges))
+            raise BadInput(
+                f"{len(refused)} blocks of the sample hold contacts that cannot be solved, the first: "
+                f"{next(iter(refused.values()))}; narrow the ranges ({ranges[:200]})"
+            )
+
     def _drawn(self, number: int, share: float, surface: int) -> dict[str, int]:
         """The realisation that a share of the seed's range stands for.
 
@@ -278,18 +296,21 @@ def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq:
     outcomes, columns = _outcomes(curves, sq, curve)
     names = [*factors, *(outcome.name for outcome in outcomes)]
     values = pandas.DataFrame(dict(zip(names, [*design.shares.T, *columns], strict=True)))
+    whole = np.isfinite(columns).reshape(len(columns), -1, design.block).all(axis=2)
+    if whole.sum(axis=1).min() < FEWEST_BLOCKS:
+        first = f"; the first: {result.failures['reason'].iloc[0]}" if result.failed else ""
+        raise AsperityError(f"too many contacts failed to say what moves the curves{first}; narrow the ranges")
     effects = []
     for outcome, column in zip(outcomes, columns, strict=True):
         measures = indices(design, column)
         ranked = np.maximum(measures[RANKED_BY[design.method]], 0.0)
-        whole = float(np.sum(ranked))
+        total = float(np.sum(ranked))
         about = dict(zip(ABOUT, outcome, strict=True))
         for i, factor in enumerate(factors):
             each = {name: float(measure[i]) for name, measure in measures.items()}
             effects.append(
-                {**about, "factor": factor, **each, "share": float(ranked[i]) / whole if whole > 0.0 else 0.0}
+                {**about, "factor": factor, **each, "share": float(ranked[i]) / total if total > 0.0 else 0.0}
             )
-    lost = np.isnan(np.asarray(columns)).any(axis=0).reshape(-1, design.block).any(axis=1)
     return Sensitivity(
         case=study.case,
         method=design.method,
@@ -298,7 +319,7 @@ def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq:
         outcomes=tuple(outcomes),
         effects=pandas.DataFrame(effects),
         values=values,
-        left_out=int(np.count_nonzero(lost)) * design.block,
+        left_out=int(np.count_nonzero(~whole.all(axis=0))) * design.block,
         distinct=_distinct(curves, curve),
         silent=silent_share,
         result=result,

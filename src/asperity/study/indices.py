@@ -17,6 +17,7 @@ MEASURES: dict[SensitivityMethod, dict[str, str]] = {  # and what SALib calls th
 LEVELS = 4  # places a factor of Morris' design can take
 CONFIDENCE = 0.95  # of SALib's intervals
 RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
+FEWEST_BLOCKS = 2  # of the sample, that effects can be told from
 ROUNDING = 1e-9  # relative difference that nothing has made
 
 
@@ -60,7 +61,7 @@ def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
     `AsperityError` if fewer than two blocks are left.
     """
     whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
-    if np.count_nonzero(whole) < 2:
+    if np.count_nonzero(whole) < FEWEST_BLOCKS:
         raise AsperityError("too many contacts failed to say what moves the curves; narrow the ranges")
     kept = np.repeat(whole, design.block)
     values, shares = outcome[kept], design.shares[kept]

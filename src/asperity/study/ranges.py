@@ -115,6 +115,7 @@ def _number_or_text(text: str) -> object:
 def open_ranges(case: Case, wanted: Sequence[ParameterRange] = OPEN_RANGES) -> tuple[ParameterRange, ...]:
     """Those of `wanted` that the case has a key for; lengths of roughness kept to what its grid can carry."""
     ranges = [entry for entry in wanted if _has(case, entry.key)]
+    ranges = [entry for entry in ranges if entry_of(entry.key)[1] is None or stated_value(case, entry.key) is not None]
     return tuple(_carried(case, entry, ranges) if entry.key == LENGTH_KEY else entry for entry in ranges)
 
 
@@ -133,13 +134,21 @@ def _carried(case: Case, lengths: ParameterRange, others: Sequence[ParameterRang
     grid = case.grid
     a, upper = case.conditions.hertz.half_widths[0], grid.upper[0]
     along = [upper - inlet * a for inlet in inlets] or [grid.extent[0]]
-    coarsest = 1e6 * max(max(along) / grid.cells[0], grid.spacing[1])  # um, as the length's range
+    fewest = grid.cells[0] * min(along) / max(along)  # cells go along, to a whole even number: one may be missing
+    widened = fewest / (fewest - 1.0) if inlets else 1.0
+    coarsest = 1e6 * max(widened * max(along) / grid.cells[0], grid.spacing[1])  # um, as the length's range
     shortest = 1e6 * min(*along, grid.extent[1])
     low, high = max(lengths.low, 2.0 * coarsest), min(lengths.high, 0.49 * shortest)
     if low >= high:
         reason = f"the grid carries no correlation length from {lengths.low:g} to {lengths.high:g} um"
         raise BadInput(f"{case.source}: {reason}; use more cells or a larger domain")
-    return replace(lengths, low=float(f"{low:.3g}"), high=float(f"{high:.3g}"))
+    step = 10.0 ** (math.floor(math.log10(low)) - 2)  # three digits, which the grid still carries
+    return replace(lengths, low=float(f"{math.ceil(low / step) * step:.6g}"), high=float(f"{_down(high):.6g}"))
+
+
+def _down(value: float) -> float:
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return math.floor(value / step) * step
 
 
 def entry_of(key: str) -> tuple[str, int | None]:
