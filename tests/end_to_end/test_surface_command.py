@@ -43,7 +43,7 @@ def test_a_profile_has_profile_parameters_and_a_figure(asp):
     assert Path("line.png").read_bytes().startswith(b"\x89PNG")
     found = json.loads(asp("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--json")[1])["files"][0]
     assert found["profile"]["rsm_m"] == pytest.approx(2.0 * np.pi * 9 * 0.1e-6, rel=0.01)
-    assert found["profile_letter"] == "P"
+    assert found["profile"]["letter"] == "P"
 
 
 def test_a_profile_is_called_r_where_a_filter_has_removed_its_waviness(asp):
@@ -52,7 +52,7 @@ def test_a_profile_is_called_r_where_a_filter_has_removed_its_waviness(asp):
     assert code == 0
     assert "arithmetic mean height, Ra " in out
     assert ": profile, Rq " in out
-    assert json.loads(asp(*given, "--json")[1])["files"][0]["profile_letter"] == "R"
+    assert json.loads(asp(*given, "--json")[1])["files"][0]["profile"]["letter"] == "R"
     shorter = ("surface", "line.csv", "--unit", "um", "--lateral-unit", "mm", "--s-filter", "1 um")
     assert "arithmetic mean height, Pa " in asp(*shorter)[1]  # which a primary profile may have been through
 

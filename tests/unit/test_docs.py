@@ -58,6 +58,7 @@ OF_JSON = {  # what golden numbers do not show of `--json`
     "pass": "of a history with flattening, and longer than the golden one",
     "ra_m": "of a profile",
     "rq_m": "of a profile",
+    "letter": "of a profile",
     "stribeck": "the section is about two commands",
     "traction": "the section is about two commands",
 }

@@ -92,8 +92,7 @@ class SurfaceDescription:
             "size_m": list(self.measured.grid.extent),
             "missing": self.measured.missing,
             **_plain(self.parameters),
-            "profile": None if self.profile is None else _plain(self.profile),
-            "profile_letter": None if self.profile is None else self.profile_letter,
+            "profile": None if self.profile is None else {"letter": self.profile_letter, **_plain(self.profile)},
             "steps": list(self.steps),
             "notes": list(self.measured.notes),
         }
