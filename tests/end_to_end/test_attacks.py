@@ -9,7 +9,7 @@ QUICK = (
     "mat 4 of 1e9 x 1e9", "HDF5 whose groups hold themselves", "csv of 200 000 columns",
     "tdms that claims 1e12 samples", "pipe as recording", "pipe as case", "pipe as manifest", "/dev/zero as surface",
     "run of 40 GB, sparse", "case with 3000 brackets", "case with an integer of 5000 digits",
-    "manifest with 100 000 brackets",
+    "manifest with 100 000 brackets", "HDF5 whose text is of no kind",
 )  # fmt: skip
 
 
