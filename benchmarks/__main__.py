@@ -33,6 +33,8 @@ PARTS = (  # those first that the others' times are told against
     "recordings",
     "study",
     "robustness",
+    "bounded",
+    "rollers",
     "intervals",
     "damping",
     "damping_stages",

@@ -15,6 +15,7 @@ Made by `make docs` from `src/asperity/quantities.csv`, the one place where any 
 TITLES = {  # of groups, where the group's own name does not do
     "load": "Load and contact area",
     "sharing": "Load by film",
+    "ends": "A roller along its length",
     "heat": "Temperature",
     "resonance": "Contact resonance",
     "own": "Stiffness and damping of the contact itself",

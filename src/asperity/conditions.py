@@ -6,8 +6,9 @@ from typing import Literal, get_args
 
 from asperity.errors import BadInput, articled, require_positive
 from asperity.hertz import HertzContact, elliptic_contact, line_contact, point_contact
+from asperity.rollers import RollerShape, SlicedLoad, sliced_load
 
-Geometry = Literal["line", "point", "elliptic"]
+Geometry = Literal["line", "point", "elliptic", "roller"]
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,13 @@ class ContactConditions:
     Parameters
     ----------
     pair : elasticity of the two bodies
-    geometry : "line" (needs `length`), "point" or "elliptic" (`radius` is then (Rx, Ry))
+    geometry : "line" (needs `length`), "point", "elliptic" (`radius` is then (Rx, Ry)), or "roller" (needs `length`, at
+        whose ends it ends; a line goes on)
     radius : effective radius of curvature along rolling, 1/R = 1/R1 + 1/R2 [m]
     load : normal load on the whole contact [N]
     surface_speeds : speeds of the two surfaces along x [m/s]
-    length : length of a line contact [m]
+    length : length of a line contact or a roller [m]
+    shape : of a roller along its length; None for a straight one
     hardness : pressure that no point of the contact can exceed [Pa]; None for a purely elastic contact
 
     Raises
@@ -62,6 +65,7 @@ class ContactConditions:
     surface_speeds: tuple[float, float]
     length: float | None = None
     hardness: float | None = None
+    shape: RollerShape | None = None
 
     def __post_init__(self) -> None:
         if self.geometry not in get_args(Geometry):
@@ -75,18 +79,38 @@ class ContactConditions:
         for radius in self.radius if isinstance(self.radius, tuple) else (self.radius,):
             require_positive("radius", radius, "m")
         require_positive("load", self.load, "N")
-        if self.geometry == "line":
-            if self.length is None:
-                raise BadInput("a line contact needs its length; give length in metres")
-            require_positive("length", self.length, "m")
-        elif self.length is not None:
-            raise BadInput(
-                f"length belongs to a line contact, got {self.length:g} m for {articled(self.geometry)} contact; "
-                "leave it out"
-            )
+        self._check_length()
         if self.hardness is not None:
             require_positive("hardness", self.hardness, "Pa")
         require_positive("entrainment speed", self.entrainment_speed, "m/s")
+
+    def _check_length(self) -> None:
+        named = f"{articled(self.geometry)} contact"
+        if self.long:
+            if self.length is None:
+                raise BadInput(f"{named} needs its length; give length in metres")
+            require_positive("length", self.length, "m")
+        elif self.length is not None:
+            raise BadInput(f"length belongs to a line contact, got {self.length:g} m for {named}; leave it out")
+        if self.geometry == "roller" and self.length is not None:
+            self.roller.between_chamfers(self.length)
+        elif self.shape is not None:
+            raise BadInput(f"shape belongs to a roller contact, got one for {named}; leave it out")
+
+    @property
+    def long(self) -> bool:
+        """Whether the bodies touch along a line, with or without ends: forms for line contacts hold."""
+        return self.geometry in ("line", "roller")
+
+    @property
+    def endless(self) -> bool:
+        """Whether the contact is a piece of one that goes on across rolling: a line contact."""
+        return self.geometry == "line"
+
+    @property
+    def roller(self) -> RollerShape:
+        """The shape along a roller; a straight one unless stated."""
+        return self.shape or RollerShape()
 
     @property
     def entrainment_speed(self) -> float:
@@ -110,17 +134,37 @@ class ContactConditions:
 
     @property
     def radius_across_rolling(self) -> float:
-        """Ry [m]; infinite for a line contact."""
+        """Ry [m]; infinite for a line contact and a roller, whose crown is its shape's."""
         if isinstance(self.radius, tuple):
             return self.radius[1]
-        return float("inf") if self.geometry == "line" else self.radius
+        return float("inf") if self.long else self.radius
 
     @property
     def line_load(self) -> float:
-        """Load per length of a line contact [N/m]."""
+        """Load per length of a line contact, or of a roller between its chamfers, in the mean [N/m]."""
+        return self.load / self.line_length
+
+    @property
+    def line_length(self) -> float:
+        """Length of a line contact, or of a roller between its chamfers [m]."""
         if self.length is None:
             raise BadInput(f"{articled(self.geometry)} contact has no load per length; use load")
-        return self.load / self.length
+        return self.roller.between_chamfers(self.length)
+
+    @property
+    def end(self) -> float:
+        """Where a roller ends to both sides of its middle [m]; infinite for a line contact, which does not."""
+        if self.geometry != "roller" or self.length is None:
+            return float("inf")
+        return self.roller.ends(self.length)
+
+    @property
+    def sliced_load(self) -> SlicedLoad:
+        """The load along a roller by slices."""
+        if self.length is None:
+            raise BadInput(f"{articled(self.geometry)} contact has no slices; use a roller")
+        radius, modulus = self.radius_along_rolling, self.pair.reduced_modulus
+        return sliced_load(self.roller, self.length, self.load, radius, modulus)
 
     @cached_property
     def hertz(self) -> HertzContact:
@@ -129,5 +173,5 @@ class ContactConditions:
         if isinstance(self.radius, tuple):
             return elliptic_contact(self.load, self.radius, modulus)
         if self.length is not None:
-            return line_contact(self.load, self.length, self.radius, modulus)
+            return line_contact(self.load, self.line_length, self.radius, modulus)
         return point_contact(self.load, self.radius, modulus)

@@ -357,6 +357,8 @@ def case_sections() -> dict[str, Any]:
             known["Top level"] = model
         elif "grade" in fields:
             known["An oil by its data sheet"] = model
+        elif "design_load" in fields:
+            known["The shape of a roller"] = model
     return known
 
 

@@ -6,7 +6,7 @@ from asperity.case import KINDS, beginning, load_case
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_case_to_start_from_is_a_case(kind):
     case = load_case(beginning(kind), name=kind)
-    assert case.conditions.geometry == (kind if kind in ("point", "elliptic") else "line")
+    assert case.conditions.geometry == (kind if kind in ("point", "elliptic", "roller") else "line")
     assert (case.lubricant is None) == (kind == "dry")
     assert (case.contents.study is not None) == (kind == "study")
     assert (case.contents.motion is not None) == (kind == "motion")

@@ -50,7 +50,7 @@ def test_each_geometry_meets_its_own_hertz():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"geometry": "plane"}, "line, point, elliptic, got 'plane'"),
+        ({"geometry": "plane"}, "line, point, elliptic, roller, got 'plane'"),
         ({"radius": -5.4e-3}, "radius must be positive and finite, got -0.0054 m"),
         ({"radius": (1e-3, 2e-3)}, "one number"),
         ({"geometry": "elliptic", "length": None}, r"a pair \(Rx, Ry\)"),

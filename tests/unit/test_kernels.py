@@ -59,11 +59,27 @@ SCHEMES = [
 ]
 
 
-def faces_of(film, wedge=(0.0, 0.5), logarithmic=False):
+def faces_of(film, wedge=(0.0, 0.5), logarithmic=False, ends=()):
     cells = film.mobility.shape
     faces = Faces(*np.empty((6, *cells)), np.empty(cells[1]), np.array(wedge))
-    reynolds.face_mobilities(film, np.log(film.mobility), logarithmic, faces)
+    across_ends = np.isin(np.arange(cells[1]), ends)
+    reynolds.face_mobilities(film, np.log(film.mobility), logarithmic, across_ends, faces)
     return faces
+
+
+def test_across_a_rollers_end_the_mobility_is_the_logarithmic_mean(film):
+    """Exact for a viscosity that grows exponentially: of ∫ ε dP over the difference of ln ε."""
+    plain, ended = faces_of(film), faces_of(film, ends=(0, 6))
+    own, following = film.mobility, np.roll(film.mobility, -1, 1)
+    logarithmic = (own - following) / np.log(own / following)
+    at = np.isin(np.arange(CELLS[1]), (0, 6))
+    assert ended.north[:, at] == pytest.approx(logarithmic[:, at], rel=1e-4)
+    assert np.array_equal(ended.north[:, ~at], plain.north[:, ~at])
+    assert np.array_equal(ended.east, plain.east)
+    step = 1e-6
+    grown = film._replace(mobility=film.mobility * np.exp(step * (np.arange(CELLS[1]) == 0)))
+    slope = (faces_of(grown, ends=(0, 6)).north - ended.north)[:, 0] / step
+    assert ended.north_by_own[:, 0] == pytest.approx(slope, rel=1e-3)
 
 
 def outflow(pressure, film, inlet, **scheme):

@@ -22,6 +22,7 @@ from .sections import GridSection as GridSection
 from .sections import MaterialSection as MaterialSection
 from .sections import MotionSection as MotionSection
 from .sections import SolverSection as SolverSection
+from .shapes import ShapeSection as ShapeSection
 from .surfaces import SurfaceSection as SurfaceSection
 from .sweep import RangeSection as RangeSection
 from .sweep import Seeding as Seeding

@@ -79,6 +79,7 @@ _COMMON = {  # unit -> its SI unit, and what one is worth in it: pint and its re
     "N/m": ("N/m", "1"),
     "N/mm": ("N/m", "1e3"),
     "rad": ("rad", "1"),
+    "mrad": ("rad", "1e-3"),
     "deg": ("rad", str(_TURN / 360)),
     "rad/s": ("rad/s", "1"),
     "rpm": ("rad/s", _PER_MINUTE),

@@ -17,6 +17,14 @@ geometry = "elliptic"           # two crowned bodies
 radius = ["10 mm", "25 mm"]     # along rolling, and across it; 1/R = 1/R1 + 1/R2 of both bodies for each
 load = "40 N"
 """,
+    "roller": """\
+geometry = "roller"             # a roller that ends: what presses on its edges, where its load lies
+radius = "3.63 mm"              # 1/R = 1/R1 + 1/R2 of both bodies
+length = "5 mm"                 # of the roller, its chamfers included
+load = "1000 N"                 # on all of that length
+shape = { design_load = "1500 N", chamfer = "0.2 mm", tilt = "0 mrad" }  # how it falls back along its length
+# in place of design_load: iso_diameter = "9 mm", or amplitude and end_drop; also crown_radius and flat
+""",
 }
 MOVES = """\
 entrainment_speed = "2 m/s"     # mean of both surfaces' speeds
@@ -69,13 +77,17 @@ sq = { from = "0.2 um", to = "1 um", step = "0.2 um" }
 seeds = 3                       # surfaces a point
 """
 HEAD = "# A case to start from: change what is yours. `asperity solve` says which value it cannot take, and why.\n\n"
-KINDS = ("line", "point", "elliptic", "dry", "measured", "motion", "study")
+SMOOTH = """
+[surface]                       # of both bodies together
+kind = "flat"                   # smooth; or gaussian, ground, run-in, sandblasted, self-affine, non-gaussian
+"""
+KINDS = ("line", "point", "elliptic", "roller", "dry", "measured", "motion", "study")
 
 
 def beginning(kind: str) -> str:
     """The text of a case file to start from, of one of `KINDS`."""
     contact = f"[contact]\n{CONTACTS.get(kind, CONTACTS['line'])}{MOVES}"
     parts = [HEAD, 'lubricant = "none"\n\n' if kind == "dry" else "", contact, BODIES, "" if kind == "dry" else OIL]
-    parts += [MEASURED if kind == "measured" else GENERATED, GRID, SOUND]
+    parts += [{"measured": MEASURED, "roller": SMOOTH}.get(kind, GENERATED), GRID, SOUND]
     parts += [{"motion": MOTION, "study": STUDY}.get(kind, "")]
     return "".join(parts)

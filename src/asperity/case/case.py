@@ -75,11 +75,17 @@ class Case:
         """Bodies, load and motion."""
         contact, material = self.contents.contact, self.contents.material
         speed = plain(contact.entrainment_speed)
+        pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
+        shape = None
+        if contact.shape is not None and contact.length is not None:
+            radius = contact.radius[0] if isinstance(contact.radius, tuple) else contact.radius
+            shape = contact.shape.shape(plain(contact.length), plain(radius), pair)
         return ContactConditions(
-            pair=ElasticPair(plain(material.youngs_modulus), material.poisson_ratio),
+            pair=pair,
             geometry=contact.geometry,
             radius=plain(contact.radius),
             length=plain(contact.length),
+            shape=shape,
             load=plain(contact.load),
             surface_speeds=(speed * (1.0 + contact.slip / 2.0), speed * (1.0 - contact.slip / 2.0)),
             hardness=plain(material.hardness),
@@ -118,7 +124,7 @@ class Case:
         What the case leaves out of it is chosen (`auto_grid`); roughness kept in a run brings its own.
         """
         section, conditions = self.contents.grid, self.conditions
-        line, (a, b) = conditions.geometry == "line", conditions.hertz.half_widths
+        line, (a, b) = conditions.endless, conditions.hertz.half_widths
         if section.chosen and self.stored is not None:
             return self.stored.grid
         x, y = (

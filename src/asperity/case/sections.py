@@ -20,6 +20,7 @@ from asperity.case.amounts import (
 from asperity.case.laws import LubricantSection, ThermalSection
 from asperity.case.oils import SheetSection, parse_lubricant
 from asperity.case.refusals import LocatedError, Section, quoted
+from asperity.case.shapes import ShapeSection
 from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.sweep import StudySection, parse_study
 from asperity.case.vibration import parse_vibration
@@ -44,7 +45,8 @@ class ContactSection(Section):
 
     geometry: Geometry
     radius: Annotated[float | tuple[float, float], PlainValidator(_parse_radius)]
-    length: Annotated[Length | None, OPTIONAL] = None  # of a line contact
+    length: Annotated[Length | None, OPTIONAL] = None  # of a line contact or a roller
+    shape: Annotated[ShapeSection | None, OPTIONAL] = None  # of a roller along its length
     load: Force
     entrainment_speed: Speed
     slip: Number = 0.0  # slide-to-roll ratio (u1 - u2)/entrainment speed

@@ -12,7 +12,9 @@ from asperity.errors import BadInput, require_choice
 
 @app.command()
 def new(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="line, point, elliptic, dry, measured, motion or study.")],
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="line, point, elliptic, roller, dry, measured, motion or study.")
+    ],
     out: Annotated[Path | None, typer.Option(metavar="CASE.toml", help="File to write; default: KIND.toml.")] = None,
 ) -> None:
     """Write a commented case to start from."""

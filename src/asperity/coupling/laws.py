@@ -90,13 +90,13 @@ class HertzLine(_LineApproach, StiffnessLaw):
     def __call__(self, contact: LoadedContact) -> float:
         """S [N/m]; raises BadInput for a contact that is no line."""
         conditions = contact.conditions
-        if conditions.length is None:
+        if not conditions.long:
             raise BadInput(
                 f"stiffness law hertz-line needs a line contact, got {articled(conditions.geometry)} contact"
             )
         return line_stiffness(
             contact.asperity_load,
-            conditions.length,
+            conditions.line_length,
             conditions.radius_along_rolling,
             conditions.pair.reduced_modulus,
             self.reference_depth or ehl.roller_depth(conditions),
@@ -142,7 +142,7 @@ class Tangent(_LineApproach, StiffnessLaw):
 
     def at_full_load(self, conditions: ContactConditions) -> StiffnessLaw:
         """That of the smooth, dry contact: a tangent belongs to its own load share."""
-        return HertzLine(self.reference_depth) if conditions.geometry == "line" else HertzPoint()
+        return HertzLine(self.reference_depth) if conditions.long else HertzPoint()
 
 
 STIFFNESS_LAWS: dict[str, type[StiffnessLaw]] = {

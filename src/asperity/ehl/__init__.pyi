@@ -5,6 +5,8 @@ from .dynamic import OwnResonance as OwnResonance
 from .dynamic import ShakenContact as ShakenContact
 from .dynamic import dynamic_stiffness as dynamic_stiffness
 from .dynamic import own_resonance as own_resonance
+from .ends import AlongRoller as AlongRoller
+from .ends import along_roller as along_roller
 from .films import FilmFit as FilmFit
 from .films import FilmNumbers as FilmNumbers
 from .films import Regime as Regime

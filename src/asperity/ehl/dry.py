@@ -17,9 +17,7 @@ MOST_SHARINGS = 40  # rounds in which what the bounds cut off is put on other ce
 def dry_contact(problem: Problem, pressure: Field, *, most_steps: int = MOST_STEPS) -> tuple[Field, float, bool]:
     """Pressure (nx, ny) and approach of the dry contact from a first guess, and whether they met the tolerance."""
     deflection, cap = problem.deflection, problem.p_cap
-    inside = np.ones(problem.cells, dtype=bool)
-    if not problem.form.periodic:
-        inside[:, [0, -1]] = False
+    inside = np.broadcast_to(~problem.rim, problem.cells)
     stiffness = 1.0 / problem.softness
     pressure = _carrying(problem, np.where(inside, np.clip(pressure, 0.0, cap), 0.0), inside)
     direction, size, keep = np.zeros_like(pressure), 1.0, 0.0

@@ -70,9 +70,8 @@ class ShakenContact:
         if yielded not in YIELDED:
             raise BadInput(f"yielded must be one of {', '.join(YIELDED)}, got {yielded!r}")
         conditions = solution.conditions
-        line = conditions.geometry == "line"
         self.yielded, self.conditions = yielded, conditions
-        self.depth = checked_depth(conditions, reference_depth) if line else None
+        self.depth = checked_depth(conditions, reference_depth) if conditions.endless else None
         if solution.options.model == CONSERVING:
             raise BadInput("a dynamic stiffness needs the model unified or mixed, got conserving; solve by one of them")
         balance = balance_of(solution, whole=False)
@@ -137,19 +136,24 @@ class ShakenContact:
     def _bodies(self) -> float:
         """Stiffness of the smooth dry bodies under the whole load [N/m], near any contact's that has been loaded."""
         conditions = self.conditions
-        if conditions.length is None or self.depth is None:
+        if not conditions.long:
             approach = conditions.hertz.approach
             assert approach is not None  # a line's alone depends on the depth
             return 1.5 * conditions.load / approach
-        radius, modulus = conditions.radius_along_rolling, conditions.pair.reduced_modulus
-        return line_stiffness(conditions.load, conditions.length, radius, modulus, self.depth)
+        radius, modulus, length = (
+            conditions.radius_along_rolling,
+            conditions.pair.reduced_modulus,
+            conditions.line_length,
+        )
+        depth = length if self.depth is None else self.depth  # of a roller its length counts as one
+        return line_stiffness(conditions.load, length, radius, modulus, depth)
 
     def _newtons_per_metre(self) -> float:
         """What one dimensionless cell's pressure per gap is worth, over the whole length of a line contact."""
         problem, scales, conditions = self.balance.problem, self.scales, self.conditions
         dx, dy = problem.spacing
         cell = scales.pressure * scales.length**2 / scales.gap * dx * dy
-        if conditions.length is None:
+        if not conditions.endless or conditions.length is None:
             return cell
         return cell * conditions.length / (problem.cells[1] * dy * scales.length)
 

@@ -34,9 +34,7 @@ class _Lines(NamedTuple):
 
     @classmethod
     def all_of(cls, problem: Problem) -> "_Lines":
-        inside = np.ones(problem.cells, dtype=bool)
-        if not problem.form.periodic:
-            inside[:, [0, -1]] = False
+        inside = np.broadcast_to(~problem.rim, problem.cells)
         dx, dy = problem.spacing
         load, stiffness = problem.load / (dx * dy), 1.0 / problem.softness
         return cls(problem.deflection, problem.undeformed, inside, stiffness, load, inside.size)

@@ -54,7 +54,7 @@ class _Asymptotes(NamedTuple):
 def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNumbers:
     """The numbers that fits of the film are made of."""
     radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
-    line = conditions.geometry == "line"
+    line = conditions.long
     material = float(lubricant.viscosity.log_slope(np.zeros(1))[0]) * modulus
     speed = lubricant.viscosity.eta0 * conditions.entrainment_speed / (modulus * radius)
     load = conditions.line_load / (modulus * radius) if line else conditions.load / (modulus * radius**2)
@@ -89,7 +89,7 @@ def central_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
     """
     numbers = film_numbers(conditions, lubricant)
     films = _asymptotes(conditions, numbers)
-    blend = _moes if conditions.geometry == "line" else _nijenbanning
+    blend = _moes if conditions.long else _nijenbanning
     unit = conditions.radius_along_rolling * (2.0 * numbers.speed) ** 0.5
     return float(blend(films, _ratio(conditions)) * unit)
 
@@ -103,7 +103,7 @@ def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Reg
     """The fit of the least film in each regime."""
     numbers, radius = film_numbers(conditions, lubricant), conditions.radius_along_rolling
     u, w, g = numbers.speed, numbers.load, numbers.material
-    if conditions.geometry == "line":
+    if conditions.long:
         return {
             "isoviscous-rigid": FilmFit("Martin (1916)", "least", 4.898 * u / w * radius),
             "isoviscous-elastic": FilmFit("Herrebrugh (1968)", "least", 3.10 * u**0.6 * w**-0.2 * radius),
@@ -132,7 +132,7 @@ def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[Film
     if _ratio(conditions) > 1.0:
         return ()
     regime, numbers = lubrication_regime(conditions, lubricant), film_numbers(conditions, lubricant)
-    line, radius = conditions.geometry == "line", conditions.radius_along_rolling
+    line, radius = conditions.long, conditions.radius_along_rolling
     spanning = "Moes" if line else "Nijenbanning, Venner and Moes (1994)"
     fits = [
         FilmFit(spanning, "central", central_film(conditions, lubricant), incompressible=True),
@@ -162,7 +162,7 @@ def _axes(conditions: ContactConditions) -> float:
 
 def _asymptotes(conditions: ContactConditions, numbers: FilmNumbers) -> _Asymptotes:
     m, l = numbers.moes_load, numbers.moes_oil  # noqa: E741
-    if conditions.geometry == "line":
+    if conditions.long:
         return _Asymptotes(3.0 / m, 2.621 * m**-0.2, 1.287 * l ** (2.0 / 3.0), 1.311 * m**-0.125 * l**0.75)
     ratio = _ratio(conditions)
     shape = 1.0 + 0.006 * np.log(ratio) + 0.63 * ratio ** (4.0 / 7.0)

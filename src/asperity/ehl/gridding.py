@@ -34,6 +34,10 @@ CORRELATION_LENGTHS = 10.0  # along a line contact's piece
 DRY_FILM_RATIO = 0.05  # below it no film carries a load that matters, and its inlet need not be resolved
 LEAST_FILM_RATIO = 0.3  # Sq that count as film in rough contacts: asperities hold the inlet open as far as that
 MOST_CELLS = 130_000  # of a rough contact at ACCURACY
+END_CELL = 0.22  # half-widths along a roller's axis, as long as that takes no more than the most lines of cells
+LINES_ALONG = 128, 504
+MOST_ACROSS = 512.0  # cells along x of a smooth roller
+SPARE_ALONG = 0.05  # of a roller's loaded length: slices tell it that well
 WIDEST_BAR = 0.15  # of CLR: beyond it mixed cannot be told from boundary lubrication
 
 
@@ -87,13 +91,14 @@ def auto_grid(
     """
     if not 1e-4 <= accuracy <= 0.2:
         raise BadInput(f"accuracy must lie between 0.0001 and 0.2, got {accuracy:g}; 0.01 is the default")
-    line = conditions.geometry == "line"
     texture = texture if texture is not None and texture.sq > 0.0 else None
-    x = x or _along(conditions, lubricant, texture, accuracy)
+    x, given = x or _along(conditions, lubricant, texture, accuracy), y
     y = y or _across(conditions, lubricant, texture, accuracy)
     if cells is None:
         cells = _cells(conditions, lubricant, texture, accuracy, (x[1] - x[0], y[1] - y[0]))
-    return Grid(cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, line))
+    if given is None and conditions.geometry == "roller":
+        y = _past_the_ends(conditions, y, cells[1])
+    return Grid(cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, conditions.endless))
 
 
 def inlet_length(conditions: ContactConditions, lubricant: Lubricant, sq: float = 0.0) -> float:
@@ -165,7 +170,7 @@ def _built_up(film: float) -> tuple[Field, Field]:
 def _along(
     conditions: ContactConditions, lubricant: Lubricant | None, texture: Texture | None, accuracy: float
 ) -> tuple[float, float]:
-    a = conditions.hertz.half_widths[0]
+    a = conditions.hertz.half_widths[0] * _widest(conditions)
     touching = _touching(conditions, texture, a**2 / conditions.radius_along_rolling)
     inlet, outlet = max(1.4, touching), max(1.3, touching)
     if lubricant is not None:
@@ -179,9 +184,11 @@ def _across(
     conditions: ContactConditions, lubricant: Lubricant | None, texture: Texture | None, accuracy: float
 ) -> tuple[float, float]:
     a, b = conditions.hertz.half_widths
-    if conditions.geometry == "line":
+    if conditions.endless:
         length = 2.0 * a if texture is None else max(2.0 * a, CORRELATION_LENGTHS * _finite(texture.lengths[1], a))
         return _held(-length / 2.0, length / 2.0, texture, 1)
+    if conditions.geometry == "roller":
+        return _along_roller(conditions, lubricant, texture, accuracy)
     radius = conditions.radius_across_rolling
     reach = max(1.3, _touching(conditions, texture, b**2 / radius))
     if lubricant is not None:
@@ -189,6 +196,27 @@ def _across(
         sides = min(1.0, 0.7 + 0.3 * film)  # thin films end sooner at the sides than before the contact
         reach = max(reach, 1.0 + sides * (_flooded(film, _missing(texture, accuracy)) - 1.0))
     return _held(-reach * b, reach * b, texture, 1)
+
+
+def _widest(conditions: ContactConditions) -> float:
+    """The widest place of a dry roller by slices, in half-widths."""
+    return math.sqrt(conditions.sliced_load.peak) if conditions.geometry == "roller" else 1.0
+
+
+def _along_roller(
+    conditions: ContactConditions, lubricant: Lubricant | None, texture: Texture | None, accuracy: float
+) -> tuple[float, float]:
+    """From one end to the other; less where a crown keeps the ends far off the load."""
+    (low, high), end = conditions.sliced_load.ends, conditions.end
+    spare = SPARE_ALONG * (high - low) - _along(conditions, lubricant, texture, accuracy)[0]
+    return max(low - spare, -end), min(high + spare, end)
+
+
+def _past_the_ends(conditions: ContactConditions, y: tuple[float, float], lines: int) -> tuple[float, float]:
+    """The same with one of the lines of cells past each end of the roller that it comes to."""
+    before, after = y[0] <= -conditions.end, y[1] >= conditions.end
+    cell = (y[1] - y[0]) / (lines - before - after)
+    return y[0] - before * cell, y[1] + after * cell
 
 
 def _missing(texture: Texture | None, accuracy: float) -> float:
@@ -216,7 +244,7 @@ def _spacing(
     conditions: ContactConditions, lubricant: Lubricant | None, texture: Texture | None, finer: float
 ) -> tuple[float, float]:
     """Cells [m], `finer` times as fine as at `ACCURACY`; the coarsest that will do for 0."""
-    (a, b), line = conditions.hertz.half_widths, conditions.geometry == "line"
+    (a, b), line = conditions.hertz.half_widths, conditions.endless
     dx = dy = 2.0 / max(CELLS_IN_CONTACT * finer, FEWEST_IN_CONTACT)
     if lubricant is not None:
         inlet = inlet_length(conditions, lubricant, 0.0 if texture is None else texture.sq) / a
@@ -225,10 +253,19 @@ def _spacing(
         dx = min(dx, inlet / across)
         dy = min(dy, inlet / across / SIDES)
     dx, dy = dx * a, math.inf if line else dy * b  # along a line nothing varies but the roughness
+    if conditions.geometry == "roller":
+        dy = _between_lines(conditions, finer)
     if texture is not None:
         along = max(CELLS_IN_CORRELATION * finer, SPARE * FEWEST_IN_CORRELATION)
         dx, dy = min(dx, texture.lengths[0] / along), min(dy, texture.lengths[1] / along)
     return dx, dy
+
+
+def _between_lines(conditions: ContactConditions, finer: float) -> float:
+    """Distance of lines of cells along a roller [m]: a share of the half-width, by which its ends' pressures change."""
+    (low, high), a = conditions.sliced_load.ends, conditions.hertz.half_widths[0]
+    fewest, most = (count * max(finer, 0.5) for count in LINES_ALONG)
+    return min(max(END_CELL * a / max(finer, 0.5), (high - low) / most), (high - low) / fewest)
 
 
 def _cells(
@@ -241,6 +278,8 @@ def _cells(
     """As many as are wanted; where those are too many, down to the fewest that will do, and then fewer."""
     finer = math.sqrt(ACCURACY / accuracy)
     wanted = _counts(_spacing(conditions, lubricant, texture, finer), extent)
+    if conditions.geometry == "roller" and texture is None:  # under a light load the film is wider than Hertz's zone
+        wanted = min(wanted[0], MOST_ACROSS * max(finer, 0.5)), wanted[1]
     most = MOST_CELLS * max(1.0, ACCURACY / accuracy)
     if texture is not None and wanted[0] * wanted[1] > most:
         fewest = _counts(_spacing(conditions, lubricant, texture, 0.0), extent)

@@ -64,7 +64,7 @@ class Linear:
         if self.film is None or self.faces is None:
             touching = self.rows.state == reynolds.TOUCHING
             return np.where(touching, d_gap * self.dtype(self.rows.contact_scale), d_pressure)
-        out = np.empty(self.cells, self.dtype)
+        out, d_gap = np.empty(self.cells, self.dtype), problem.filmed(d_gap)
         reynolds.jacobian_product(
             self.rows, self.film, self.faces, self.pressure, d_pressure, d_gap, problem.spacing, self.storing, out
         )

@@ -71,10 +71,7 @@ class MixedBalance:
         """Cells in which Reynolds' equation decides: where oil is conserved, all but the rim's."""
         if self.surplus is None:
             return np.asarray(self.rows.state == LUBRICATED)
-        inside = np.ones(self.gap.shape, dtype=bool)
-        if not self.problem.form.periodic:
-            inside[:, [0, -1]] = False
-        return inside
+        return np.broadcast_to(~self.problem.rim, self.gap.shape)
 
     @property
     def content(self) -> Field:
@@ -214,10 +211,9 @@ def _evaluate(
     if problem.conserve:
         stiff = pressed & (film.log_mobility_by_gap == 0.0)
         film = film._replace(log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap))
-    if not problem.form.periodic:
-        for rim in (0, -1):
-            state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
-            solid[:, rim], solid_residual[:, rim] = FREE, borne[:, rim]
+    rim = problem.rim
+    state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
+    solid[:, rim], solid_residual[:, rim] = FREE, borne[:, rim]
     rows, left = Rows(state, scale, contact_scale), (oil_residual, solid_residual)
     balance = MixedBalance(problem, unknowns, gap, *left, rows, solid, film, faces, lean, outflow, shut)
     return replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil) if problem.conserve else balance

@@ -108,7 +108,7 @@ class MixedLinear:
         """The same, of a change of the oil's unknown and that of the gap."""
         problem = self.balance.problem
         wet = np.empty(self.cells, self.real)
-        spacing, d_pressure, d_height = problem.spacing, self.pressure_of(d_oil), d_gap
+        spacing, d_pressure, d_height = problem.spacing, self.pressure_of(d_oil), problem.filmed(d_gap)
         if self.conserves:
             d_height = np.where(self.balance.shut, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
         reynolds.jacobian_product(self.rows, self.film, self.faces, self.oil, d_pressure, d_height, spacing, 0.0, wet)

@@ -35,6 +35,7 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 CLIMB, STURDY = ATTEMPTS[:2]
+MOST_BETWEEN_ENDS = 60  # accurate steps on a roller's finest grid: sharp ends take the sturdier way
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
@@ -78,6 +79,8 @@ def solve_mixed(
             levels = levels_in_reach(posed, conditions, lubricant)
             step = search.along(way, levels, lambda on: first_guess(on, conditions, lubricant, scales))
             if search.settled(options.tolerance):
+                if way == STURDY and finest.form.along is not None:
+                    way, step = search.refined(finest, step)
                 search.coarser(finest)
                 break
     return search.solution(
@@ -142,7 +145,10 @@ class MixedSearch(Search):
         if way == FROM_DRY:
             return self.from_dry(levels)
         step = self.climb_from(levels, guess)
-        if self.smooth and not self.settled(self.options.tolerance):  # one pressure is all that smooth bodies have
+        ends = levels[0].form.along is not None and way == CLIMB  # sharp ones go on the sturdier way
+        if (
+            self.smooth and not ends and not self.settled(self.options.tolerance)
+        ):  # one pressure is all that smooth bodies have
             step = self.from_one(levels, guess)
         return step
 
@@ -190,6 +196,18 @@ class MixedSearch(Search):
         roughly = COARSE_TOLERANCE if problem.accurate or near else 0.5 * ROUGHLY
         return max(roughly, tolerance), min(MOST_BESIDE, most)
 
+    def refined(self, problem: Problem, step: Step) -> tuple[str, Step]:
+        """A sturdy solution of smooth bodies led on to the accurate wedge and its way; or as it is, if that fails."""
+        history, figures, error = list(self.history), list(self.figures), self.iteration_error
+        better = self.run(
+            problem, newton(problem, _reached(step), second_order=False), self.options.tolerance, MOST_AT_ONCE
+        )
+        if self.settled(self.options.tolerance):
+            self.figures[-1] = self._figures(better)
+            return CLIMB, better
+        self.history, self.figures, self.iteration_error = history, figures, error
+        return STURDY, step
+
     def finish(
         self, problem: Problem, unknowns: Pressures, *, coarsely: bool = False, length: float = 1.0, last: bool = True
     ) -> Step:
@@ -207,6 +225,8 @@ class MixedSearch(Search):
             if not self.settled(IN_TIME) and problem.conserve:
                 step = self.refilled(problem, unknowns, length)
             unknowns = _reached(step) if self.settled(IN_TIME) else unknowns
+        if problem.accurate and problem.form.along is not None:
+            most = min(most, MOST_BETWEEN_ENDS)
         if not may_lean(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
         roughly = max(ROUGHLY, tolerance)
@@ -321,9 +341,8 @@ class MixedSearch(Search):
 
 def _dry(problem: Problem) -> tuple[Field, float]:
     """Pressure and approach without oil: by conjugate gradients, and by Newton's steps where the cap is too busy."""
-    across = problem.y / problem.form.aspect
-    pressure = np.sqrt(np.maximum(1.0 - (problem.x**2)[:, None] - across**2, 0.0))
     dry = replace(problem, lubricant=None, contact_gap=0.0)
+    pressure = problem.form.hertz(problem.x, problem.y)
     pressure, approach, met = dry_contact(dry, pressure, most_steps=MOST_GRADIENTS)
     if not met:
         for step in one_pressure(dry, pressure, approach):

@@ -140,7 +140,7 @@ class _Contact:
         self.scales = Scales.of(conditions, lubricant)
         self.seconds = step_seconds(conditions, surfaces, time_step)
         self.length = self.seconds * conditions.entrainment_speed / self.scales.length
-        self.one_line = surfaces.uniform and conditions.geometry == "line"
+        self.one_line = surfaces.uniform and conditions.endless
         rough = any(surfaces.rough)
         self.shares = [float(one) / max(sum(surfaces.rough), 1) for one in surfaces.rough]  # of what is flattened
         self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # on smooth bodies, the accurate wedge

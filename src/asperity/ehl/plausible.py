@@ -18,6 +18,8 @@ from asperity.grid import Grid
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.quantities import quantity
 
+LOADED_END = 0.5  # load per length on a roller's end by slices, over the mean, from which the end is said to be sharp
+UNEVEN = 1.5  # largest over mean load per length along a roller, from which it is said
 OILS = 5e-9, 40e-9  # pressure-viscosity coefficients [1/Pa]
 SOFT = 1e9  # Young's modulus below which a body is rubber or a slip of the unit [Pa]
 COMPRESSIBLE = 0.4  # Poisson's ratio below which it is not rubber
@@ -30,7 +32,8 @@ FILM_BY_PRESSURE = 0.75  # relative loss of film over the share of the inlet's p
 
 def plausibility_notes(conditions: ContactConditions, lubricant: Lubricant | None) -> tuple[str, ...]:
     """What a reader of the results should doubt about the bodies, the load and the oil."""
-    return (*_solids(conditions), *(() if lubricant is None else _oil(conditions, lubricant)))
+    solids, oil = _solids(conditions), () if lubricant is None else _oil(conditions, lubricant)
+    return (*solids, *(_roller(conditions) if conditions.geometry == "roller" else ()), *oil)
 
 
 def inlet_notes(conditions: ContactConditions, lubricant: Lubricant | None, grid: Grid) -> tuple[str, ...]:
@@ -96,6 +99,22 @@ def _solids(conditions: ContactConditions) -> Iterator[str]:
         )
 
 
+def _roller(conditions: ContactConditions) -> Iterator[str]:
+    load = conditions.sliced_load
+    if max(load.line_load[0], load.line_load[-1]) > LOADED_END * load.line_load.mean():
+        yield (
+            "The roller's shape falls back too little for its ends: on elastic half-spaces their pressure is singular "
+            "and grows with the number of cells, and a real roller's free end is softer; take the edge pressure as a "
+            "sign, not as a number."
+        )
+    if load.peak > UNEVEN:
+        low, high = load.ends
+        yield (
+            f"By slices the load lies on {100.0 * (high - low) / conditions.line_length:.0f} % of the roller, and is "
+            f"{load.peak:.2g} times its mean there: Hertz's values and fitted films are those of an even load."
+        )
+
+
 def _oil(conditions: ContactConditions, lubricant: Lubricant) -> Iterator[str]:
     law, p_h = lubricant.viscosity, conditions.hertz.p_max
     alpha = getattr(law, "alpha", None)
@@ -133,6 +152,7 @@ def _reached_edges(solution: ContactSolution) -> str:
     """Which edges the contact has come to, within two cells."""
     touching = solution.in_contact
     found = [name for name, rows in (("inlet edge", touching[:2]), ("outlet edge", touching[-2:])) if rows.any()]
-    if not solution.grid.periodic[1] and (touching[:, :2].any() or touching[:, -2:].any()):
+    ends = max(abs(end) for end in (solution.grid.y[0], solution.grid.y[-1])) >= solution.conditions.end
+    if not solution.grid.periodic[1] and not ends and (touching[:, :2].any() or touching[:, -2:].any()):
         found.append("sides")
     return " and ".join(found)

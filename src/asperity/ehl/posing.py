@@ -6,6 +6,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
+from asperity.ehl.along import Along
 from asperity.ehl.films import least_films
 from asperity.ehl.gridding import inlet_length
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
@@ -30,16 +31,17 @@ def contact_problem(
 ) -> Problem:
     """The dimensionless problem on the surface's own grid, as the attempt poses it."""
     scales = Scales.of(conditions, lubricant)
-    grid, line = surface.grid, conditions.geometry == "line"
+    grid, line = surface.grid, conditions.endless
     (dx, dy), (left, front) = grid.spacing, grid.lower
     load = conditions.line_load * grid.extent[1] if line else conditions.load
     radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
     return Problem(
         form=Form(
-            flatness=0.0 if line else radius / conditions.radius_across_rolling,
+            flatness=radius / conditions.radius_across_rolling,
             compliance=2.0 * scales.pressure * radius / (np.pi * modulus * scales.length),
             aspect=np.inf if line else conditions.hertz.half_widths[1] / scales.length,
             periodic=line,
+            along=Along(conditions, scales.length, scales.gap) if conditions.geometry == "roller" else None,
         ),
         roughness=surface.heights / scales.gap,
         lower=(left / scales.length, front / scales.length),
@@ -61,9 +63,7 @@ def first_guess(
     problem: Problem, conditions: ContactConditions, lubricant: Lubricant | None, scales: Scales
 ) -> tuple[Field, float]:
     """Hertz pressure, with the bodies as far apart as the film of a smooth contact holds them."""
-    across = problem.y / problem.form.aspect
-    pressure = np.sqrt(np.maximum(1.0 - (problem.x**2)[:, None] - across**2, 0.0))
-    pressure = np.minimum(pressure, problem.p_cap)
+    pressure = np.minimum(problem.form.hertz(problem.x, problem.y), problem.p_cap)
     film = smooth_film(conditions, lubricant) / scales.gap if lubricant else 0.0
     smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))

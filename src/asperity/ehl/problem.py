@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from asperity.arrays import Field, Mask
+from asperity.ehl.along import Along
 from asperity.ehl.deflection import Deflection, deflection
 from asperity.ehl.shares import within_ellipse
 from asperity.ehl.transfer import averaged
@@ -27,19 +28,29 @@ THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
 class Form:
     """Shape and compliance of the smooth bodies.
 
-    The gap grows as X^2/2 + `flatness` Y^2/2; `compliance` scales the half-space's deflection, V = compliance times the
-    integral of P/distance; `aspect` is the Hertz contact's half-width across over along rolling (infinite for a line);
-    `periodic` tells whether the contact repeats in y.
+    The gap grows as X^2/2 + `flatness` Y^2/2, or on a roller by its drop `along` it; `compliance` scales the
+    half-space's deflection, V = compliance times the integral of P/distance; `aspect` is the Hertz contact's half-width
+    across over along rolling (infinite for a line); `periodic` tells whether the contact repeats in y.
     """
 
     flatness: float
     compliance: float
     aspect: float
     periodic: bool
+    along: Along | None = None
 
     def gap(self, x: Field, y: Field) -> Field:
         """Gap at H0 = 0, shape (x, y)."""
-        return np.asarray((x**2 / 2.0)[:, None] + self.flatness * (y**2 / 2.0))
+        across = self.flatness * (y**2 / 2.0) if self.along is None else self.along.drop(y)
+        return np.asarray((x**2 / 2.0)[:, None] + across)
+
+    def hertz(self, x: Field, y: Field) -> Field:
+        """Pressure of the smooth, dry contact, that of a roller by slices, shape (x, y)."""
+        if self.along is None:
+            across = y / self.aspect
+            return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
+        load = np.where(self.along.beyond(y), 0.0, self.along.load(y))
+        return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +84,10 @@ class Problem:
     `form` is the bodies' own shape and `roughness` what stands out of it, shape (nx, ny); `load` the wanted sum of
     P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the speed number. For the oil's laws
     `p_scale` [Pa] turns P into pascals and `sliding`/H is the shear rate [1/s]; `viscosity_factor` is what warmth
-    leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by
-    lines of cells at ambient pressure. `accurate` takes the third-order wedge and logarithmic mean mobilities.
-    `conserve` lets no oil appear or vanish. `past` is None where nothing moves but the oil.
+    leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by lines
+    of cells at ambient pressure, a roller by all beyond its ends. `accurate` takes the third-order wedge and
+    logarithmic mean mobilities. `conserve` lets no oil appear or vanish. `past` is None where nothing moves but the
+    oil.
     """
 
     form: Form
@@ -115,6 +127,34 @@ class Problem:
         """Gap of the rough bodies before they deform, at H0 = 0, shape (nx, ny)."""
         return np.asarray(self.form.gap(self.x, self.y) - self.roughness)
 
+    @cached_property
+    def rim(self) -> Mask:
+        """Lines of cells along x that are held at ambient pressure, shape (ny,)."""
+        held = np.zeros(self.cells[1], dtype=bool)
+        if not self.form.periodic:
+            held[[0, -1]] = True
+        if self.form.along is not None:
+            held |= self.form.along.beyond(self.y)
+        return held
+
+    @cached_property
+    def _nearest(self) -> np.ndarray | None:
+        """Of each line of cells the nearest one on the roller; None where there are no ends."""
+        if self.form.along is None:
+            return None
+        inside = np.flatnonzero(~self.rim)
+        return np.asarray(inside[np.abs(np.arange(self.cells[1])[:, None] - inside).argmin(axis=1)])
+
+    @cached_property
+    def _ends(self) -> Mask:
+        """Lines of cells behind which, towards larger y, a roller ends or begins, shape (ny,)."""
+        changes = self.rim != np.roll(self.rim, -1)
+        return np.asarray(changes & (self.form.along is not None))
+
+    def filmed(self, gap: Field) -> Field:
+        """A gap, or its change, as the oil has it: beyond a roller's ends that at the ends, where it flows out."""
+        return gap if self._nearest is None else gap[:, self._nearest]
+
     @property
     def deflection(self) -> Deflection:
         """The elastic half-space on this grid."""
@@ -145,6 +185,8 @@ class Problem:
 
     def zone(self, share: float = 1.0) -> Mask:
         """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
+        if self.form.along is not None:
+            return self.form.along.zone(self.x, self.y, share, self.spacing)
         return within_ellipse(self.x, self.y, (share, share * self.form.aspect), self.spacing)
 
     def load_error(self, pressure: Field) -> float:
@@ -175,9 +217,8 @@ class Problem:
         capped = pressure - self.p_cap > residual
         residual[capped] = pressure[capped] - self.p_cap
         state[capped] = CAPPED
-        if not self.form.periodic:
-            for rim in (0, -1):
-                residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
+        rim = self.rim
+        residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
         if film is not None:  # pressing overlapping bodies together moves no film
             film = film.held_where((touching <= 0.0) & (state != LUBRICATED))
         return Balance(self, pressure, gap, residual, Rows(state, fluid_scale, contact_scale), film, faces, outflow)
@@ -187,6 +228,7 @@ class Problem:
     ) -> tuple[Film, Faces, Field, Field]:
         """Film, faces, net outflow of each cell and the inverse of its derivative, of an oil pressure and a gap."""
         pascals = pressure * self.p_scale
+        gap = self.filmed(gap)
         height = np.maximum(gap, self.contact_gap)
         density = oil.density(pascals) / oil.density.rho0
         density_slope = oil.density.slope(pascals) * (self.p_scale / oil.density.rho0)
@@ -225,7 +267,7 @@ class Problem:
         )
         mobility = film.mobility
         log_mobility = np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
-        reynolds.face_mobilities(film, log_mobility, self.accurate, faces)
+        reynolds.face_mobilities(film, log_mobility, self.accurate, self._ends, faces)
         dx, dy = self.spacing
         outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
         entering = self.entering(gap)

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from asperity.ehl.films import FilmNumbers, Place, Regime, film_fits, film_numbers, least_film, lubrication_regime
 from asperity.ehl.gridding import FEWEST_IN_INLET, flooded_inlet, inlet_length
-from asperity.ehl.shares import CENTRE, within_ellipse
+from asperity.ehl.shares import CENTRE, hertz_zone
 from asperity.ehl.solution import ContactSolution
 from asperity.quantities import quantity
 
@@ -110,7 +108,7 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
     solved = {"central": central, "least": float(solution.gap.min())}
     return RegimeCard(
         half_width=a,
-        half_width_across=None if conditions.geometry == "line" else b,
+        half_width_across=None if conditions.long else b,
         hertz_pressure=hertz.p_max,
         effective_modulus=conditions.pair.effective_modulus,
         numbers=None if lubricant is None else film_numbers(conditions, lubricant),
@@ -155,9 +153,7 @@ def _central(solution: ContactSolution, *, at_the_peak: bool) -> tuple[float, fl
     Mean over the middle tenth of the Hertz zone; between bodies that stay rigid the film under the highest pressure,
     which is what fits call central there.
     """
-    a, b = solution.conditions.hertz.half_widths
-    halves = CENTRE * a, np.inf if solution.conditions.geometry == "line" else CENTRE * b
-    middle = within_ellipse(solution.grid.x, solution.grid.y, halves, solution.grid.spacing)
+    middle = hertz_zone(solution.conditions, solution.grid, CENTRE)
     if at_the_peak:
         middle = solution.pressure == solution.pressure.max()
     film, oil = float(solution.gap[middle].mean()), solution.lubricant

@@ -4,6 +4,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
+from asperity.ehl.along import Along
 from asperity.grid import Grid
 
 CENTRE = 0.1  # half-widths each side of x = 0 that count as the centre of the contact
@@ -16,10 +17,13 @@ def within_ellipse(x: Field, y: Field, half_widths: tuple[float, float], spacing
     return np.asarray((along**2)[:, None] + across**2 <= 1.0)
 
 
-def hertz_zone(conditions: ContactConditions, grid: Grid) -> Mask:
-    """Cells within the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
-    a, b = conditions.hertz.half_widths
-    return within_ellipse(grid.x, grid.y, (a, np.inf if conditions.geometry == "line" else b), grid.spacing)
+def hertz_zone(conditions: ContactConditions, grid: Grid, share: float = 1.0) -> Mask:
+    """Cells within a share of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
+    (a, b), (dx, dy) = conditions.hertz.half_widths, grid.spacing
+    if conditions.geometry == "roller":
+        along = Along(conditions, a, a**2 / conditions.radius_along_rolling)
+        return along.zone(grid.x / a, grid.y / a, share, (dx / a, dy / a))
+    return within_ellipse(grid.x, grid.y, (share * a, np.inf if conditions.endless else share * b), grid.spacing)
 
 
 def area_share(cells: Mask, zone: Mask) -> float:

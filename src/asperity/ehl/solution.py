@@ -200,9 +200,13 @@ class ContactSolution:
         }
 
     def _described(self) -> dict[str, Any]:
-        convergence = self.convergence
+        convergence, conditions = self.convergence, asdict(self.conditions)
+        if conditions["shape"] is None:
+            del conditions[
+                "shape"
+            ]  # which most contacts cannot have, and readers before there were rollers do not know
         return {
-            "conditions": asdict(self.conditions),
+            "conditions": conditions,
             "lubricant": None if self.lubricant is None else describe_lubricant(self.lubricant),
             "options": asdict(self.options),
             "grid": asdict(self.grid),

@@ -19,6 +19,7 @@ from asperity.ehl.search import COARSE_TOLERANCE, Progress, Search
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
+from asperity.grid import Grid
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
@@ -162,12 +163,14 @@ def _check_factor(factor: Field, surface: Surface) -> None:
 
 
 def _check_grid(conditions: ContactConditions, surface: Surface) -> None:
-    grid, line = surface.grid, conditions.geometry == "line"
+    grid, line = surface.grid, conditions.endless
     if grid.periodic != (False, line):
         which = "an elliptic" if conditions.geometry == "elliptic" else f"a {conditions.geometry}"
         raise BadInput(f"{which} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}")
     a, b = conditions.hertz.half_widths
-    for axis, index, half in [("x", 0, a)] if line else [("x", 0, a), ("y", 1, b)]:
+    if conditions.geometry == "roller":
+        _check_ends(conditions, grid)
+    for axis, index, half in [("x", 0, a)] if conditions.long else [("x", 0, a), ("y", 1, b)]:
         low, high, spacing = grid.lower[index], grid.upper[index], grid.spacing[index]
         if low > -1.2 * half or high < 1.2 * half:
             raise BadInput(
@@ -179,3 +182,20 @@ def _check_grid(conditions: ContactConditions, surface: Surface) -> None:
                 f"cells of {spacing * 1e6:.3g} um along {axis} leave fewer than 8 across the contact of "
                 f"{2.0 * half * 1e6:.3g} um; use more cells"
             )
+
+
+def _check_ends(conditions: ContactConditions, grid: Grid) -> None:
+    """A roller's grid has to hold what is loaded of its length, or all of it and a line of cells beyond."""
+    half, (low, high) = conditions.end, conditions.sliced_load.ends
+    middle, reach = 0.5 * (low + high), 0.55 * (high - low)
+    wanted = max(middle - reach, -half), min(middle + reach, half)
+    if grid.y[0] > wanted[0] or grid.y[-1] < wanted[1]:
+        raise BadInput(
+            f"the outermost cells along y lie at {grid.y[0] * 1e3:.4g} and {grid.y[-1] * 1e3:.4g} mm, and the roller's "
+            f"load reaches from {wanted[0] * 1e3:.4g} to {wanted[1] * 1e3:.4g} mm; widen the grid"
+        )
+    if grid.spacing[1] > (high - low) / 16.0:
+        raise BadInput(
+            f"cells of {grid.spacing[1] * 1e6:.3g} um along y leave fewer than 16 on the loaded length of "
+            f"{(high - low) * 1e3:.3g} mm; use more cells"
+        )

@@ -106,6 +106,6 @@ def _contact_slope(solution: ContactSolution) -> float | None:
 
 def _hertz_areas(conditions: ContactConditions, grid: Grid) -> float:
     """Area of the grid in Hertz contact areas."""
-    if conditions.geometry == "line":
+    if conditions.endless:
         return grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
     return grid.extent[0] * grid.extent[1] / conditions.hertz.area

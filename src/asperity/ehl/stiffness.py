@@ -80,7 +80,7 @@ def tangent_stiffness(
         raise BadInput(f"load step must lie between 0.001 and 0.2 of the load, got {step:g}; {LOAD_STEP:g} is usual")
     if yielded not in YIELDED:
         raise BadInput(f"yielded must be one of {', '.join(YIELDED)}, got {yielded!r}")
-    depth = checked_depth(solution.conditions, reference_depth) if solution.conditions.geometry == "line" else None
+    depth = checked_depth(solution.conditions, reference_depth) if solution.conditions.endless else None
     if yielded == ELASTIC and solution.p_cap is not None:
         solution = _shaken_down(solution)
     coarse, fine = (_central_difference(solution, depth, share) for share in (step, step / 2.0))

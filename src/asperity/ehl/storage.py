@@ -11,6 +11,7 @@ from asperity.errors import UnreadableFile
 from asperity.grid import Grid
 from asperity.kept import read_netcdf
 from asperity.lubricant import make_lubricant
+from asperity.rollers import RollerShape
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
     described = {name: json.loads(dataset.attrs[name]) for name in DESCRIBED}
     conditions, lubricant, grid = described["conditions"], described["lubricant"], described["grid"]
     pair = ElasticPair(**{name: tuple(value) for name, value in conditions.pop("pair").items()})
+    if conditions.get("shape"):
+        conditions["shape"] = RollerShape(**conditions["shape"])
     conditions = {name: tuple(value) if isinstance(value, list) else value for name, value in conditions.items()}
     steps = [dataset[name].values.tolist() for name in STEPS]
     history = tuple(

@@ -158,7 +158,7 @@ def subsurface_stress(
 
 def hertz_stress(conditions: ContactConditions, depths: Field, *, body: int = 1) -> SubsurfaceStress:
     """Stresses below the smooth, dry, frictionless contact of the same conditions, on a grid of its own."""
-    line = conditions.geometry == "line"
+    line = conditions.long
     (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS
     reach = (1.25 * a, a if line else 1.25 * b)
     grid = Grid((cells, FEWEST_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line))
@@ -171,7 +171,7 @@ def hertz_stress(conditions: ContactConditions, depths: Field, *, body: int = 1)
 
 def _half_width(conditions: ContactConditions) -> float:
     widths = conditions.hertz.half_widths
-    return widths[0] if conditions.geometry == "line" else min(widths)
+    return widths[0] if conditions.long else min(widths)
 
 
 def default_depths(conditions: ContactConditions, grid: Grid) -> Field:

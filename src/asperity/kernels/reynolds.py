@@ -104,10 +104,11 @@ def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, fl
 
 
 @njit(cache=True)
-def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, faces: Faces) -> None:
+def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces) -> None:
     """Fill `faces` in; `log_mobility` is the natural logarithm of the film's mobility.
 
-    Arithmetic means unless `logarithmic`.
+    Arithmetic means unless `logarithmic`; across `ends`, which tell of each line whether its north face is one, always
+    logarithmic ones.
     """
     nx, ny = log_mobility.shape
     eps = film.mobility
@@ -123,6 +124,8 @@ def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, faces: F
             faces.east[i, j], faces.east_by_own[i, j], faces.east_by_next[i, j] = mean, own, following
             jn = j + 1 if j < ny - 1 else 0
             ratio = log_mobility[i, j] - log_mobility[i, jn] if logarithmic else 0.0
+            if ends[j] and not logarithmic and eps[i, j] > 0.0 and eps[i, jn] > 0.0:
+                ratio = np.log(eps[i, j]) - np.log(eps[i, jn])
             mean, own, following = _log_mean(eps[i, j], eps[i, jn], ratio)
             faces.north[i, j], faces.north_by_own[i, j], faces.north_by_next[i, j] = mean, own, following
 

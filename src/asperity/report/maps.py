@@ -35,11 +35,15 @@ def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any)
     """Draw values of shape (nx, ny) or colours of shape (nx, ny, 3) over the contact, oil coming from the left."""
     (x0, y0), (x1, y1) = solution.grid.lower, solution.grid.upper
     corners = (*display("x_m", np.array([x0, x1])), *display("y_m", np.array([y0, y1])))
+    roller = solution.conditions.geometry == "roller"
+    aspect: Any = "auto" if roller else "equal"  # a roller is too long to scale
     image = axes.imshow(
-        np.swapaxes(values, 0, 1), origin="lower", extent=corners, interpolation="none", aspect="equal", **style
+        np.swapaxes(values, 0, 1), origin="lower", extent=corners, interpolation="none", aspect=aspect, **style
     )
     name_axes(axes, "x_m", "y_m")
     axes.spines[:].set_visible(False)
+    if roller:
+        axes.tick_params(axis="y", labelrotation=90)  # thousands of micrometres leave no room beside them
     return image
 
 
@@ -71,9 +75,15 @@ def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
     """The outline of the smooth, dry contact, dashed."""
     a, b = (display("x_m", half_width) for half_width in solution.conditions.hertz.half_widths)
     style: dict[str, Any] = {"color": colour, "linestyle": DASHED, "linewidth": 1.0}
-    if solution.conditions.geometry == "line":
+    if solution.conditions.endless:
         for side in (-a, a):
             axes.axvline(side, **style)
+    elif solution.conditions.long:
+        sliced = solution.conditions.sliced_load
+        loaded = sliced.line_load > 0.0
+        places = display("y_m", sliced.y[loaded])
+        side = a * np.sqrt(sliced.line_load[loaded] / sliced.line_load.mean())
+        axes.plot(np.concatenate([side, -side[::-1]]), np.concatenate([places, places[::-1]]), **style)
     else:
         turn = np.linspace(0.0, 2.0 * np.pi, 200)
         axes.plot(a * np.cos(turn), b * np.sin(turn), **style)

@@ -12,6 +12,7 @@ from .levels import levels_verdict as levels_verdict
 from .levels import not_converged as not_converged
 from .run import BOUNDARY_FROM as BOUNDARY_FROM
 from .run import DOUBT as DOUBT
+from .run import ENDS as ENDS
 from .run import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .run import RUN_GROUPS as RUN_GROUPS
 from .run import Run as Run

@@ -31,6 +31,7 @@ BOUNDARY_FROM = 0.9
 
 RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "own", "solver")
 DOUBT = "uncertainty"  # group of the catalogue: of all surfaces together
+ENDS = "ends"  # group of the catalogue: of rollers
 DAMPING = "contact_damping_ratio"
 CRUCIAL = ("clr", "clr_error", "car", "crf_hz", "crf_std_hz")
 MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2", "film_temperature")
@@ -176,8 +177,13 @@ class Run:
         return self.numbers(RUN_GROUPS)
 
     def numbers(self, groups: Sequence[str]) -> dict[str, Scalar]:
-        """`own_scalars` of some groups of the catalogue."""
-        return read(self, lines(*groups))
+        """`own_scalars` of some groups of the catalogue; a roller's along its length go with them."""
+        return read(self, lines(*groups, *([] if self.along is None else [ENDS])))
+
+    @cached_property
+    def along(self) -> ehl.AlongRoller | None:
+        """A roller along its length; None for a contact of another geometry."""
+        return ehl.along_roller(self.solution)
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its key, SI: means over its surfaces, and intervals; of the first how it went."""
@@ -236,7 +242,15 @@ class Run:
             sentence = f"Grid too coarse, CLR not determined ({self.undetermined}): on this grid {shared}"
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
-        return f"{sentence}; {self.resonance_in_words()}; {basis(error)}."
+        return f"{sentence}; {self._ends_in_words()}{self.resonance_in_words()}; {basis(error)}."
+
+    def _ends_in_words(self) -> str:
+        """What presses on a roller's ends, and on how much of it the load lies; nothing for other contacts."""
+        if self.along is None:
+            return ""
+        edge, loaded = (quantity(key).named(self.numbers([])[key]) for key in ("edge_pressure_pa", "loaded_share"))
+        hertz = self.along.edge_pressure / self.solution.conditions.hertz.p_max
+        return f"{edge}, {hertz:.2f} times an even load's, {loaded}; "
 
     @property
     def crucial(self) -> Row:

@@ -84,7 +84,7 @@ def _map(history: History, kind: exhibits.Kind, reach: exhibits.Ranges) -> Movin
     box = figure.axes[0].get_position()
     left, top, width, height = (100.0 * share for share in (box.x0, 1.0 - box.y1, box.width, box.height))
     grid, a = history.case.grid, history.case.conditions.hertz.half_widths[0]
-    sides = (-a, a) if history.case.conditions.geometry == "line" else ()
+    sides = (-a, a) if history.case.conditions.endless else ()
     zone = tuple(left + width * (side - grid.lower[0]) / grid.extent[0] for side in sides)
     return MovingMap(exhibit.picture_of(figure), left, top, width, height, zone)
 

@@ -1,5 +1,6 @@
 """The table of conditions of a run: what was given, in words and display units."""
 
+import math
 import tomllib
 from collections.abc import Sequence
 from typing import Any
@@ -59,11 +60,13 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         contact += f", length {quantity('length_m').text(conditions.length)}"
         load += f" ({quantity('line_load_n_per_m').text(conditions.line_load)})"
     half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
-    across = "" if conditions.geometry == "line" else f", across rolling b = {half_widths[1]}"
+    across = "" if conditions.long else f", across rolling b = {half_widths[1]}"
     speeds = " and ".join(map(quantity("surface_speed_m_s").text, conditions.surface_speeds))
     mean, slip, modulus = map(quantity, ("entrainment_speed_m_s", "slide_to_roll", "reduced_modulus_pa"))
+    shape = {"Shape along the roller": _shape(conditions)} if conditions.geometry == "roller" else {}
     return {
         "Contact": contact,
+        **shape,
         "Load": load,
         "Speeds": f"{speeds}: {mean.name} {mean.text(conditions.entrainment_speed)}, "
         f"{slip.name} {slip.text(conditions.slide_to_roll)}",
@@ -77,6 +80,24 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
         "Hertz (smooth, dry)": f"half-width a = {half_widths[0]}{across}, largest pressure "
         f"{quantity('hertz_pressure_pa').text(hertz.p_max)}",
     }
+
+
+def _shape(conditions: ContactConditions) -> str:
+    """What a roller is along its length."""
+    shape, drop, length = conditions.roller, quantity("height_m"), quantity("length_m")
+    parts = []
+    if shape.amplitude > 0.0:
+        ends = "unbounded at the ends" if shape.end_drop is None else f"{drop.text(shape.end_drop)} at the ends"
+        parts.append(f"logarithmic drop of amplitude {drop.text(shape.amplitude)}, {ends}")
+    if shape.crown_radius is not None:
+        parts.append(f"circular crown of radius {length.text(shape.crown_radius)}")
+    if shape.flat > 0.0:
+        parts.append(f"straight middle of {length.text(shape.flat)}")
+    if shape.chamfer > 0.0:
+        parts.append(f"chamfers of {length.text(shape.chamfer)} at {math.degrees(shape.chamfer_angle):.3g} degrees")
+    if shape.tilt != 0.0:
+        parts.append(f"tilted by {1e3 * shape.tilt:.3g} mrad")
+    return ", ".join(parts) or "straight"
 
 
 def _lubricant_rows(lubricant: Lubricant | None) -> dict[str, str]:

@@ -9,11 +9,11 @@ from asperity.errors import BadInput
 from asperity.lubricant import Newtonian
 from asperity.quantities import quantity, select
 from asperity.report.base import Exhibit, Picture, Tile, render, span, tile, write_page
-from asperity.report.run import contact, rubbing, several
+from asperity.report.run import contact, roller, rubbing, several
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.stiffness import stiffness_over_frequency
 from asperity.report.run.vibration import spectrum
-from asperity.results import RUN_GROUPS, Run, doubt_rows
+from asperity.results import ENDS, RUN_GROUPS, Run, doubt_rows
 
 TILES = (
     "clr",
@@ -55,19 +55,22 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
 def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     """The page as HTML text."""
     oils = [run.solution.lubricant for run in runs]
+    ends = any(run.along is not None for run in runs)
+    groups = [name for group in RUN_GROUPS for name in ([group, ENDS] if ends and group == "pressure" else [group])]
     return render(
         "run/page.html.j2",
         title=title or _title(runs),
         runs=[_view(run, number, len(runs) > 1) for number, run in enumerate(runs, 1)],
         overview=[exhibit.picture() for exhibit in _overview(runs)] if len({run.state.sq for run in runs}) > 1 else [],
-        numbers=[entry for group in RUN_GROUPS for entry in select(group)],
+        numbers=[entry for group in groups for entry in select(group)],
         conditions=conditions_table(runs),
         lubricated=any(oil is not None for oil in oils),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
         alone=any(run.error.surfaces == 1 and run.state.sq > 0.0 for run in runs),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
         sphere=any(run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs),
-        line=any(run.solution.conditions.geometry == "line" for run in runs),
+        line=any(run.solution.conditions.long for run in runs),
+        ends=ends,
         imbalance=span(quantity("mass_flux_imbalance"), [run.state.mass_flux_imbalance for run in runs]),
     )
 
@@ -112,6 +115,8 @@ def _exhibits(run: Run) -> Iterator[Exhibit]:
     yield contact.film_map(run)
     yield contact.pressure_map(run)
     yield contact.centre_line(run)
+    if run.along is not None:
+        yield roller.along_length(run, run.along)
     yield contact.roughness_map(run)
     yield contact.height_distribution(run)
     friction, heat = run.friction, run.heat

@@ -1,0 +1,203 @@
+"""A roller's shape along its length: closed forms, refusals, slices, and the way through a case and a file."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.case import load_case
+from asperity.ehl import along_roller, auto_grid, hertz_zone, plausibility_notes, solution_notes
+from asperity.hertz import line_contact
+from asperity.rollers import RollerShape, sliced_load
+
+STEEL = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
+RADIUS, LENGTH, LOAD = 3.629e-3, 10e-3, 2000.0
+ISO = RollerShape.iso(9e-3, LENGTH)
+
+
+def roller(shape: RollerShape | None = None, load: float = LOAD, **given) -> asp.ContactConditions:
+    return asp.ContactConditions(
+        pair=STEEL,
+        geometry="roller",
+        **{"radius": RADIUS, "length": LENGTH, "load": load, "surface_speeds": (3.5, 3.5), "shape": shape, **given},
+    )
+
+
+def case_text(**changes: str) -> str:
+    contact = {
+        "geometry": '"roller"',
+        "radius": '"3.629 mm"',
+        "length": '"10 mm"',
+        "load": '"2000 N"',
+        "entrainment_speed": '"3.5 m/s"',
+        **changes,
+    }
+    lines = [f"{key} = {value}" for key, value in contact.items() if value]
+    return "\n".join([
+        'lubricant = "none"', 'surface = "flat"', "[contact]", *lines,
+        "[material]", 'youngs_modulus = "206 GPa"', "poisson_ratio = 0.3",
+        "[grid]", "cells = [32, 66]", "",
+    ])  # fmt: skip
+
+
+def test_johns_and_gohars_drop_is_that_of_the_reference():
+    """w'/(pi E*) 0.56245 um, end drop 2.9284 um at 2000 N on 10 mm."""
+    shape = RollerShape.johns_gohar(LOAD, LENGTH, RADIUS, STEEL.reduced_modulus)
+    assert shape.amplitude == pytest.approx(0.56245e-6, rel=1e-5)
+    assert shape.end_drop == pytest.approx(2.9284e-6, rel=2e-5)
+    ends = shape.drop(np.array([-0.5, 0.0, 0.5]) * LENGTH, LENGTH)
+    assert ends == pytest.approx([shape.end_drop, 0.0, shape.end_drop], abs=1e-15)
+    assert math.exp(-0.5) / 2.0 == pytest.approx(0.3033, abs=5e-5)
+
+
+def test_isos_profile_is_the_printed_one():
+    y = np.array([0.0, 1e-3, -3e-3, 4.5e-3])
+    assert ISO.drop(y, LENGTH) == pytest.approx(0.00035 * 9e-3 * np.log(1.0 / (1.0 - (2.0 * y / LENGTH) ** 2)))
+    long = RollerShape.iso(3e-3, LENGTH)
+    beyond = np.maximum(2.0 * np.abs(y) - (LENGTH - 7.5e-3), 0.0) / 7.5e-3
+    assert long.drop(y, LENGTH) == pytest.approx(0.0005 * 3e-3 * np.log(1.0 / (1.0 - beyond**2)))
+
+
+def test_crown_flat_chamfer_and_tilt_add_up():
+    shape = RollerShape(crown_radius=2.0, flat=2e-3, chamfer=0.5e-3, chamfer_angle=0.1, tilt=1e-3)
+    y = np.array([0.0, 0.9e-3, 3e-3, -4.8e-3])
+    crown = np.array([0.0, 0.0, (2e-3) ** 2 / 4.0, (3.5e-3) ** 2 / 4.0])
+    bevel = np.array([0.0, 0.0, 0.0, 0.3e-3 * math.tan(0.1)])
+    assert shape.drop(y, LENGTH) == pytest.approx(crown + bevel + 1e-3 * y)
+    assert roller(replace(shape, chamfer_angle=0.8)).end == pytest.approx(4.5e-3)
+    assert roller(replace(shape, chamfer_angle=0.05)).end == pytest.approx(5e-3)
+    assert roller(shape).line_load == pytest.approx(LOAD / 9e-3)
+    hertz = line_contact(LOAD, 9e-3, RADIUS, STEEL.reduced_modulus)
+    assert roller(shape).hertz.p_max == pytest.approx(hertz.p_max)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"amplitude": -1e-6}, "amplitude must be 0 m or more"),
+        ({"end_drop": 1e-6}, "belongs to a logarithm"),
+        ({"crown_radius": 0.0}, "crown_radius must be positive"),
+        ({"tilt": 0.1}, "tilt must lie between -0.05 and 0.05 rad, got 0.1"),
+        ({"chamfer": 1e-3, "chamfer_angle": 2.0}, "chamfer_angle must lie between 0 and 90 degrees"),
+    ],
+)
+def test_a_shape_that_cannot_be_is_refused(given, said):
+    with pytest.raises(asp.BadInput, match=said):
+        RollerShape(**given)
+
+
+def test_conditions_that_do_not_fit_are_refused():
+    with pytest.raises(asp.BadInput, match="a roller contact needs its length"):
+        roller(length=None)
+    with pytest.raises(asp.BadInput, match="no room for chamfers"):
+        roller(RollerShape(chamfer=6e-3))
+    with pytest.raises(asp.BadInput, match="shape belongs to a roller contact, got one for a line contact"):
+        replace(roller(ISO), geometry="line")
+
+
+def test_slices_share_the_load_about_as_iso_does():
+    """w'max/w'mean 1.3318 on 0.955 of the length by ISO's slices; a half-space's differ by a few per cent."""
+    load = sliced_load(ISO, LENGTH, LOAD, RADIUS, STEEL.reduced_modulus)
+    assert load.line_load.mean() * LENGTH == pytest.approx(LOAD)
+    assert load.peak == pytest.approx(1.3318, rel=0.03)
+    assert (load.ends[1] - load.ends[0]) / LENGTH == pytest.approx(0.955, abs=0.02)
+    tilted = sliced_load(ISO.tilted(1e-3), LENGTH, LOAD, RADIUS, STEEL.reduced_modulus)
+    assert (tilted.line_load * tilted.y).sum() < 0.0  # the gap opens towards +y
+    straight = sliced_load(RollerShape(), LENGTH, LOAD, RADIUS, STEEL.reduced_modulus)
+    assert straight.peak == pytest.approx(1.0)
+
+
+def test_the_chosen_grid_ends_a_cell_past_the_roller_or_where_no_load_is():
+    whole = auto_grid(roller(ISO), None)
+    assert whole.y[[1, -2]] == pytest.approx(np.array([-0.5, 0.5]) * (LENGTH - whole.spacing[1]))
+    assert whole.periodic == (False, False)
+    crowned = roller(RollerShape(crown_radius=0.1), load=50.0)
+    part = auto_grid(crowned, None)
+    assert part.upper[1] < 0.4 * LENGTH
+    assert part.upper[1] > crowned.sliced_load.ends[1]
+    tilted = auto_grid(roller(ISO.tilted(5e-3)), None)
+    assert tilted.upper[1] < 0.3 * LENGTH
+    assert tilted.y[0] < -0.5 * LENGTH < tilted.y[1]
+
+
+def test_a_grid_that_cuts_the_load_off_is_refused():
+    surface = asp.flat_surface(asp.Grid((32, 64), (-2e-4, -4e-3), (2e-4, 4e-3), (False, False)))
+    with pytest.raises(asp.BadInput, match=r"outermost cells along y lie at -3.938 and 3.938 mm, .* widen the grid"):
+        asp.solve_contact(roller(ISO), None, surface)
+
+
+def test_a_case_states_a_roller_and_a_run_keeps_it(tmp_path):
+    shape = '{ design_load = "2000 N", tilt = "-0.2 mrad" }'
+    case = load_case(case_text(shape=shape), name="case")
+    wanted = RollerShape.johns_gohar(LOAD, LENGTH, RADIUS, STEEL.reduced_modulus).tilted(-0.2e-3)
+    assert case.conditions == roller(wanted)
+    assert load_case(case.text, name="restated").conditions == case.conditions
+    assert case.with_overrides({"contact.shape.tilt": "0 mrad"}).conditions.roller.tilt == 0.0
+    run = asp.solve_case(case)
+    kept = asp.load_run(run.save(tmp_path / "run.nc"))
+    assert kept.summary() == run.summary()
+    said = json.loads(json.dumps(run.summary()))
+    assert said["load_centre_m"] > 0.1e-3
+    assert said["tilting_moment_n_m"] == pytest.approx(said["load_centre_m"] * LOAD, rel=1e-6)
+    assert "; edge pressure " in run.verdict()
+    assert "times an even load's, loaded length " in run.verdict()
+
+
+def test_other_contacts_say_nothing_of_ends():
+    case = load_case(case_text(geometry='"line"'), name="case").with_overrides({"grid": {"cells": [32, 8]}})
+    run = asp.solve_case(case)
+    assert "edge_pressure_pa" not in run.summary()
+    assert "edge pressure" not in run.verdict()
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        ('{ design_load = "1 N", amplitude = "1 um" }', "contact.shape has design_load and amplitude, which both make"),
+        ('{ end_drop = "1 um" }', "contact.shape has an end_drop without an amplitude"),
+        ('{ iso_diameter = "3 mm", flat = "1 mm" }', "contact.shape has a flat and an iso_diameter"),
+        ('{ tilt = "1 um" }', 'contact.shape.tilt must be an angle such as "20 deg"'),
+        ('{ chamfers = "1 mm" }', "contact.shape.chamfers is not a known key; did you mean chamfer"),
+        ('{ tilt = "6 deg" }', "contact and material: tilt must lie between -0.05 and 0.05 rad"),
+    ],
+)
+def test_a_shape_that_a_case_cannot_mean_is_refused(shape, said):
+    with pytest.raises(asp.BadInput, match=said):
+        load_case(case_text(shape=shape), name="case")
+
+
+def test_sharp_ends_and_an_uneven_load_are_noted():
+    def notes(shape: RollerShape) -> str:
+        return " ".join(plausibility_notes(roller(shape), None))
+
+    assert "take the edge pressure as a sign" in notes(RollerShape())
+    assert "falls back too little" not in notes(ISO)
+    assert "By slices the load lies on" in notes(ISO.tilted(1e-3))
+    assert "By slices" not in notes(ISO)
+
+
+def test_readings_are_those_of_a_known_pressure():
+    """Pressure that falls to one end as (1 + y/L): its centre, moment and edge by hand."""
+    conditions = roller(RollerShape(chamfer=0.5e-3))
+    grid = asp.Grid((32, 92), (-2e-4, -4.6e-3), (2e-4, 4.6e-3), (False, False))
+    solution = asp.solve_contact(conditions, None, asp.flat_surface(grid))
+    on = np.abs(grid.y) < 4.5e-3
+    made = np.where(on, 1.0 + grid.y / 9e-3, 0.0) * np.ones((32, 1)) * 1e9
+    along = along_roller(replace(solution, pressure=made))
+    assert along.y.size == 90
+    assert along.load_centre == pytest.approx(9e-3 / 12.0, rel=1e-3)
+    assert along.moment == pytest.approx(1e9 * 4e-4 * (9e-3) ** 2 / 12.0, rel=1e-3)
+    assert along.largest_line_load == pytest.approx(1.5e9 * 4e-4, rel=0.01)
+    assert along.edge_pressure == pytest.approx(1.5e9, rel=0.01)
+    assert along.loaded_share == pytest.approx(1.0)
+    short = along_roller(replace(solution, pressure=np.where(np.abs(grid.y) < 0.44 * 9e-3, made, 0.0)))
+    assert (short.edge_pressure, short.loaded_share) == (0.0, pytest.approx(0.88, abs=0.01))
+    longer = along_roller(replace(solution, pressure=np.where(np.abs(grid.y) < 0.47 * 9e-3, made, 0.0)))
+    assert longer.edge_pressure > 1.4e9
+    assert along_roller(replace(solution, conditions=replace(conditions, geometry="line", shape=None))) is None
+    assert not any("sides" in note for note in solution_notes(solution))
+    assert hertz_zone(conditions, grid)[:, on].any(axis=0).all()
+    assert not hertz_zone(conditions, grid)[:, ~on].any()

@@ -1,0 +1,246 @@
+"""Rollers that end: dry against reference solutions, the moment against the energy, the middle against a line contact,
+a strong crown against a point contact, and the ends of the range.
+
+Reference pressures: an own half-space solver and tamaas, not periodic, which agree to 2e-8 of Hertz's pressure; 48 x
+1024 cells over 3.2 half-widths and the length, values at cell centres.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.ehl import along_roller, auto_grid, dynamic_stiffness, tangent_stiffness
+from asperity.ehl.posing import contact_problem
+from asperity.rollers import RollerShape
+from asperity.surface import gaussian_surface
+
+STEEL = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
+RADIUS, LENGTH, LOAD = 3.629e-3, 10e-3, 2000.0
+OIL = asp.Lubricant(viscosity=asp.Roelands(0.04, 20e-9), density=asp.DowsonHigginson(870.0), rheology=asp.Newtonian())
+ISO = RollerShape.iso(9e-3, LENGTH)
+
+
+def lundberg(load: float) -> RollerShape:
+    return RollerShape.johns_gohar(load, LENGTH, RADIUS, STEEL.reduced_modulus)
+
+
+def roller(shape: RollerShape | None = None, load: float = LOAD, **given) -> asp.ContactConditions:
+    stated = {"radius": RADIUS, "length": LENGTH, "surface_speeds": (3.5, 3.5), "pair": STEEL, **given}
+    return asp.ContactConditions(geometry="roller", load=load, shape=shape, **stated)
+
+
+def solved(conditions, oil=None, *, cells, reach=1.6, **options):
+    """On cells of which one line lies past each end."""
+    nx, ny = cells
+    a, end = conditions.hertz.half_widths[0], 0.5 * conditions.length * (1.0 + 2.0 / ny)
+    x = (-reach * a, reach * a) if oil is None else (-4.5 * a, 1.5 * a)
+    surface = asp.flat_surface(asp.Grid((nx, ny + 2), (x[0], -end), (x[1], end), (False, False)))
+    return asp.solve_contact(conditions, oil, surface, options=asp.Options(**options))
+
+
+@pytest.mark.parametrize(
+    ("shape", "load", "largest", "at", "middle", "line_load"),
+    [
+        (lundberg(LOAD), LOAD, 1.131, 0.4985, 0.9994, 1.022),
+        (lundberg(LOAD), 1000.0, 1.0371, 0.0, 1.0371, None),
+        (ISO, LOAD, 1.1528, 0.0, 1.1528, 1.3288),
+        (ISO.tilted(0.5e-3), LOAD, 1.2000, -0.222, 1.1444, 1.4399),
+        (ISO.tilted(1e-3), LOAD, 1.3032, -0.331, 1.1177, 1.6961),
+        (ISO, 500.0, 1.3760, 0.0, 1.3760, None),
+        (ISO, 1000.0, 1.2524, 0.0, 1.2524, None),
+        (ISO, 4000.0, 1.0771, 0.0, 1.0771, None),
+    ],
+)
+def test_a_dry_roller_has_the_reference_pressure(shape, load, largest, at, middle, line_load):
+    conditions = roller(shape, load)
+    solution = solved(conditions, cells=(48, 1024))
+    pressure, y = solution.pressure / conditions.hertz.p_max, solution.grid.y
+    assert pressure.max() == pytest.approx(largest, rel=5e-4)
+    place = y[np.argmax(pressure.max(axis=0))] / LENGTH
+    assert (abs(place) if at >= 0.0 else place) == pytest.approx(at, abs=2e-3)
+    assert np.interp(0.0, y, pressure.max(axis=0)) == pytest.approx(middle, rel=1e-3)
+    if line_load is not None:
+        along = along_roller(solution)
+        assert along.largest_line_load * LENGTH / load == pytest.approx(line_load, rel=5e-4)
+
+
+def test_lundbergs_shape_is_even_but_for_the_ends_and_loaded_throughout():
+    solution = solved(roller(lundberg(LOAD)), cells=(48, 1024))
+    along = along_roller(solution)
+    at = np.interp(0.45 * LENGTH, along.y, along.pressure) / solution.conditions.hertz.p_max
+    assert at == pytest.approx(1.0029, abs=1e-3)
+    assert along.loaded_share == pytest.approx(1.0)
+    assert along.edge_pressure == pytest.approx(1.131 * solution.conditions.hertz.p_max, rel=5e-4)
+    iso = along_roller(solved(roller(ISO), cells=(48, 1024)))
+    assert iso.loaded_share == pytest.approx(0.918, abs=0.004)
+
+
+@pytest.mark.parametrize("oil", [None, OIL])
+def test_what_lies_past_the_ends_changes_nothing(oil):
+    """Three more lines of cells past each end: no pressure there, and the same on the roller."""
+    conditions = roller(lundberg(1.2 * LOAD))
+    narrow = solved(conditions, oil, cells=(64, 64))
+    (x0, y0), (x1, y1), (_, dy) = narrow.grid.lower, narrow.grid.upper, narrow.grid.spacing
+    wider = asp.Grid((64, 72), (x0, y0 - 3.0 * dy), (x1, y1 + 3.0 * dy), (False, False))
+    wide = asp.solve_contact(conditions, oil, asp.flat_surface(wider))
+    assert wide.pressure[:, :4].max() == wide.pressure[:, -4:].max() == 0.0
+    assert wide.pressure[:, 4:-4] == pytest.approx(narrow.pressure[:, 1:-1], abs=2e-3 * narrow.pressure.max())
+    assert along_roller(wide).end_film == pytest.approx(along_roller(narrow).end_film, rel=2e-3, abs=1e-12)
+
+
+def test_an_untilted_roller_is_symmetric_to_rounding():
+    solution = solved(roller(ISO), cells=(48, 128), tolerance=1e-8)
+    pressure = solution.pressure
+    assert np.abs(pressure - pressure[:, ::-1]).max() < 1e-9 * pressure.max()
+    assert abs(along_roller(solution).load_centre) < 1e-9 * LENGTH
+    here, there = (solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-8) for tilt in (3e-4, -3e-4))
+    assert np.abs(here.pressure - there.pressure[:, ::-1]).max() < 1e-8 * pressure.max()
+
+
+def test_the_moment_is_what_the_energy_asks_for():
+    """Of p V/2 + p (x²/2R + drop + tilt y), in sum the least there is at a load, the tilt's slope is the moment."""
+
+    def energy(tilt: float) -> float:
+        solution = solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7)
+        problem = contact_problem(solution.conditions, None, solution.surface, solution.options)
+        a, p_max = solution.conditions.hertz.half_widths[0], solution.conditions.hertz.p_max
+        apart = np.where(problem.rim, 0.0, problem.form.gap(problem.x, problem.y))
+        work = solution.pressure * (0.5 * problem.deflection(solution.pressure / p_max) + apart) * a**2 / RADIUS
+        dx, dy = solution.grid.spacing
+        return float(work.sum()) * dx * dy
+
+    tilt, step = 0.5e-3, 2e-5
+    along = along_roller(solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7))
+    assert along.moment == pytest.approx((energy(tilt + step) - energy(tilt - step)) / (2.0 * step), rel=1e-3)
+    assert along.moment < -1.0  # away from where the gap opens
+    assert along.load == pytest.approx(LOAD, rel=1e-6)
+
+
+def test_the_flattest_pressure_is_near_lundbergs_drop():
+    def largest(share: float, tilt: float = 0.0) -> float:
+        solution = solved(roller(lundberg(share * LOAD).tilted(tilt)), cells=(48, 256))
+        return float(solution.pressure.max() / solution.conditions.hertz.p_max)
+
+    level = {share: largest(share) for share in (0.5, 1.2, 4.0)}
+    assert level[1.2] == pytest.approx(1.008, abs=0.005)
+    assert level[0.5] > 1.5
+    assert level[4.0] > 1.08
+    tilted = {share: largest(share, 0.5e-3) for share in (1.2, 3.0, 8.0)}
+    assert min(tilted, key=tilted.get) == 3.0  # a tilt asks for more
+
+
+@pytest.mark.parametrize("oil", [None, OIL])
+def test_the_middle_of_a_long_roller_is_a_line_contact(oil):
+    conditions = roller(lundberg(1.2 * LOAD))
+    solution = solved(conditions, oil, cells=(192, 96))
+    (nx, ny), grid = solution.grid.cells, solution.grid
+    middle = slice(ny // 2 - 1, ny // 2 + 1)
+    carried = solution.pressure[:, middle].sum(axis=0).mean() * grid.spacing[0]
+    assert carried == pytest.approx(LOAD / LENGTH, rel=0.02)
+    line = replace(conditions, geometry="line", shape=None, load=carried * LENGTH)
+    lower, upper = (grid.lower[0], -1e-4), (grid.upper[0], 1e-4)
+    even = asp.solve_contact(line, oil, asp.flat_surface(asp.Grid((nx, 8), lower, upper)))
+    within = np.abs(grid.x) < 0.7 * conditions.hertz.half_widths[0]  # before the spike
+    pressure, gap = solution.pressure[within, middle].mean(axis=1), solution.gap[within, middle].mean(axis=1)
+    assert np.abs(pressure - even.pressure[within, 0]).max() < 5e-3 * even.pressure[within].max()
+    if oil is not None:
+        assert gap == pytest.approx(even.gap[within, 0], rel=5e-3)
+        assert solution.gap[:, middle].min() == pytest.approx(even.gap.min(), rel=5e-3)
+
+
+def test_a_straight_rollers_middle_is_the_line_contact_of_its_own_load():
+    solution = solved(roller(), cells=(64, 256))
+    along = along_roller(solution)
+    middle = along.y.size // 2
+    line = replace(roller(), geometry="line", load=along.line_load[middle] * LENGTH)
+    assert along.pressure[middle] == pytest.approx(line.hertz.p_max, rel=5e-3)
+    finer = along_roller(solved(roller(), cells=(64, 512)))
+    assert finer.edge_pressure > 1.2 * along.edge_pressure  # singular
+
+
+@pytest.mark.parametrize("oil", [None, OIL])
+def test_a_roller_with_a_strong_crown_is_a_point_contact(oil):
+    speeds = (3.85, 3.15)
+    ball = asp.ContactConditions(pair=STEEL, geometry="point", radius=RADIUS, load=20.0, surface_speeds=speeds)
+    a = ball.hertz.half_widths[0]
+    grid = asp.Grid((96, 96), (-4.5 * a, -2.5 * a), (1.5 * a, 2.5 * a), (False, False))
+    crowned = roller(RollerShape(crown_radius=RADIUS), 20.0, length=2e-3, surface_speeds=speeds)
+    one, other = (asp.solve_contact(each, oil, asp.flat_surface(grid)) for each in (crowned, ball))
+    assert one.pressure == pytest.approx(other.pressure, abs=1e-3 * other.pressure.max())
+    assert one.gap.min() == pytest.approx(other.gap.min(), rel=1e-3, abs=1e-12)
+    if oil is None:
+        assert one.pressure.max() == pytest.approx(ball.hertz.p_max, rel=0.01)
+
+
+def test_oil_leaves_at_the_ends_and_the_film_there_is_thin():
+    solution = solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(96, 128))
+    state, along = asp.contact_state(solution), along_roller(solution)
+    assert solution.pressure[:, [0, -1]].max() == 0.0
+    assert along.end_film == state.h_min
+    assert 0.3 * state.h_central < along.end_film < 0.9 * state.h_central
+    assert abs(along.load_centre) < 1e-4 * LENGTH
+
+
+def test_a_film_ends_alike_between_smooth_bodies_and_all_but_smooth_ones():
+    """Which have another wedge and other means of mobilities, but across the ends the same."""
+    smooth = solved(roller(lundberg(LOAD)), OIL, cells=(96, 96))
+    heights = 1e-11 * np.random.default_rng(2).standard_normal(smooth.grid.cells)
+    rough = asp.solve_contact(smooth.conditions, OIL, asp.Surface(heights - heights.mean(), smooth.grid))
+    ends = [along_roller(solution).end_film for solution in (smooth, rough)]
+    assert ends[1] == pytest.approx(ends[0], rel=0.1)
+
+
+def test_a_roller_is_as_stiff_as_a_strip_of_its_length():
+    """π E* L/(2 ln(2L/a)): the middle of a strip on a half-space; the shaken contact without haste is the tangent."""
+    conditions = roller(lundberg(1.2 * LOAD))
+    solution = solved(conditions, OIL, cells=(64, 64))
+    a, modulus = conditions.hertz.half_widths[0], STEEL.reduced_modulus
+    strip = np.pi * modulus * LENGTH / (2.0 * np.log(2.0 * LENGTH / a))
+    tangent = tangent_stiffness(solution).total
+    assert tangent == pytest.approx(strip, rel=0.1)
+    assert dynamic_stiffness(solution, 0.0).stiffness == pytest.approx(tangent, rel=0.01)
+
+
+def test_models_agree_where_the_film_is_full():
+    """One pressure or two; where no oil may be lost the wedge is of first order, and films some per cent thicker."""
+    conditions = roller(ISO.tilted(0.3e-3))
+    mixed, paper, conserving = (
+        asp.contact_state(solved(conditions, OIL, cells=(96, 96), model=model))
+        for model in ("mixed", "paper", "conserving")
+    )
+    assert paper.h_central == pytest.approx(mixed.h_central, rel=1e-3)
+    assert paper.p_max == pytest.approx(mixed.p_max, rel=1e-3)
+    assert mixed.h_central < conserving.h_central < 1.1 * mixed.h_central
+    assert mixed.clr == paper.clr == conserving.clr == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "load"),
+    [
+        ({"pair": asp.ElasticPair((1e12, 1e12), (0.2, 0.2))}, LOAD),
+        ({"surface_speeds": (30.0, 30.0)}, LOAD),
+        ({}, 100.0),
+        ({"length": 1e-3}, 200.0),
+        ({"length": 50e-3}, 5000.0),
+    ],
+)
+def test_the_ends_of_the_range_are_solved(given, load):
+    conditions = roller(None, load, **given)
+    shape = RollerShape.johns_gohar(1.3 * load, conditions.length, RADIUS, conditions.pair.reduced_modulus)
+    conditions = replace(conditions, shape=shape)
+    grid = auto_grid(conditions, OIL, accuracy=0.1)
+    solution = asp.solve_contact(conditions, OIL, asp.flat_surface(grid))
+    state = asp.contact_state(solution)
+    assert abs(state.load_error) < 1e-4
+    assert 0.0 < state.h_min < state.h_central
+
+
+def test_without_speed_a_rough_roller_is_dry():
+    conditions = roller(lundberg(1.5 * LOAD), surface_speeds=(1e-4, 1e-4), hardness=4e9)
+    grid = auto_grid(conditions, OIL, cells=(64, 128))
+    rough = gaussian_surface(grid, sq=0.5e-6, correlation_length=(40e-6, 400e-6), rng=np.random.default_rng(1))
+    slow, dry = (asp.solve_contact(conditions, oil, rough) for oil in (OIL, None))
+    assert asp.contact_state(slow).clr > 0.999
+    assert slow.pressure == pytest.approx(dry.pressure, abs=0.02 * dry.pressure.max())
