@@ -197,6 +197,12 @@ def test_how_many_surfaces_are_solved(overrides, count):
     assert case(**overrides).surface_count(1) == 1
 
 
+@pytest.mark.parametrize("count", [1001, 0x7FFF])
+def test_more_surfaces_than_tell_anything_are_refused(count):
+    with pytest.raises(BadInput, match=f"surfaces must be 1 to 1000, got {count}"):
+        case(**{"solver.surfaces": count}).surface_count()
+
+
 def measured_case(folder, columns, rows, **overrides):
     """A case of a map of 2 um pixels, on a contact of 358 um x 179 um."""
     heights = 1e6 * gaussian(columns, rows)

@@ -29,6 +29,7 @@ from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_gr
 
 # surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
 MANY_SURFACES, FEW_SURFACES = 5, 3
+MOST_SURFACES = 1000  # an interval of one further surface hardly narrows beyond a few dozen
 FINE_GRID = 256 * 256  # cells above which there are few
 CELL_BYTES, CELL_S = 800.0, 1e-4  # what a cell takes of memory and time while a contact is solved
 
@@ -213,8 +214,8 @@ class Case:
         with self.naming("surface"):
             stated = self.contents.solver.surfaces if asked is None else asked
             wanted = stated or (MANY_SURFACES if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID else FEW_SURFACES)
-            if wanted < 1:
-                raise BadInput(f"surfaces must be at least 1, got {wanted}")
+            if not 1 <= wanted <= MOST_SURFACES:
+                raise BadInput(f"surfaces must be 1 to {MOST_SURFACES}, got {wanted}; asperity study takes more")
             if wanted == 1 or self.surface().sq == 0.0:
                 return 1
             try:
