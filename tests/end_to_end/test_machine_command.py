@@ -123,7 +123,7 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
     parts[0].unlink()  # as if it had been killed before this one
     again = json.loads(asp(*arguments, "--json")[1])
     assert again["contacts"] == said["contacts"]
-    assert [part.stat().st_mtime_ns for part in parts][1:] == times[1:]
+    assert [part.stat().st_mtime_ns for part in parts[1:]] == times[1:]  # the first may be told in other batches now
     assert Path("kept/worst.nc").stat().st_mtime_ns == opened
     code, _, err = asp(*arguments, "--set", "machine.radial_load=3 kN")
     assert code == 2

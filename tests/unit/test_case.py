@@ -2,6 +2,7 @@ import copy
 import math
 import pickle
 import re
+import tomllib
 from contextlib import suppress
 from decimal import Decimal
 from pathlib import Path
@@ -99,7 +100,7 @@ COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda thing: 
 def test_a_case_and_its_contents_can_be_copied_and_sent_to_another_process(how):
     copied = 0
     for path in sorted(EXAMPLES.glob("*.toml")):
-        if "[machine]" in path.read_text("utf-8"):
+        if "machine" in tomllib.loads(path.read_text("utf-8")):
             continue
         case, copied = load_case(path), copied + 1
         again, contents = COPIES[how](case), COPIES[how](case.contents)

@@ -156,7 +156,8 @@ class Search:
         """
         discretisation = self.discretisation_error
         if start is not None:
-            same = (start.conditions, start.lubricant, start.options) == (conditions, lubricant, self.options)
+            alike = replace(start.options, max_iterations=self.options.max_iterations)
+            same = (start.conditions, start.lubricant, alike) == (conditions, lubricant, self.options)
             same = same and start.grid == surface.grid and np.array_equal(start.surface.heights, surface.heights)
             discretisation = start.convergence.discretisation_error if same else None
         scales, balance = Scales.of(conditions, lubricant), step.balance
