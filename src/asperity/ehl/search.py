@@ -26,7 +26,7 @@ MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
 ONWARDS, BACK = 2.5, 1.5  # of the difference to the coarser grid: how far a rough contact's figures may yet go
 AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
 UNRESOLVED = 2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
-BY_TWO_ORDERS = 0.75  # share of all this where both orders of the wedge are known, and tell more
+BY_TWO_ORDERS = 0.8  # share of all this where both orders of the wedge are known, and tell more
 NEXT_TO_NOTHING = 1e-2  # what is left of a start, below which steps have not strayed yet by many times that
 FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 
@@ -209,7 +209,7 @@ def grid_error(
     half-widths) either way: what a hundred contacts of the wide sample take to hold four times the cells
     (`benchmarks.intervals`). d is no less than a quarter of the difference between the grids before, lest two grids
     agree by chance, and no less than what the second-order wedge did to the first order's figures on the finest grid;
-    where that is known, 0.75 of all this will do. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
+    where that is known, 0.8 of all this will do. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
     """
     if len(on_grids) < 2:
         return None
