@@ -16,6 +16,7 @@ from asperity.ehl.mixed_solve import MixedSearch
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import carried_share
+from asperity.ehl.state import balance_of
 from asperity.grid import Grid
 from asperity.kernels.reynolds import LUBRICATED, TOUCHING
 from asperity.lubricant import Roelands
@@ -184,3 +185,17 @@ def test_a_dry_contact_is_the_same_in_every_model():
         for model in ("mixed", "paper")
     )
     np.testing.assert_array_equal(mixed.pressure, paper.pressure)
+
+
+def test_the_oil_that_lubricated_cells_lose_is_counted():
+    """Slow, sharp and elastic: all that any cell of the Hertz zone is left with, of the oil that is carried there."""
+    slow, surface = contact(hardness=None, speed=0.05), rough(grid((96, 32)), 2.5e-6, correlation_length=30e-6)
+    solution = solve_contact(slow, barus(), surface, options=MIXED)
+    balance = balance_of(solution)
+    zone, (dx, dy) = balance.problem.zone(), balance.problem.spacing
+    of_all, of_wet = (
+        np.abs(balance.outflow[cells]).sum() * dx * dy for cells in (zone, zone & (balance.rows.state == LUBRICATED))
+    )
+    carried = balance.content[zone].mean() * solution.grid.cells[1] * dy
+    assert of_wet > 1e-4 * carried
+    assert contact_state(solution).mass_flux_imbalance == pytest.approx(of_all / carried)

@@ -189,9 +189,10 @@ class ContactState:
     over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the smooth contact's least
     film, by the fit of its regime, over Sq (`least_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
     `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
-    relative; `mass_flux_imbalance` oil that vanishes or appears in those cells of the Hertz zone where Reynolds'
-    equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times mean film (0 when
-    dry). The cavity behind the contact is left out: the model refills it, which changes nothing upstream;
+    relative; `mass_flux_imbalance` oil that vanishes or appears in the cells of the Hertz zone, of one pressure in
+    those where Reynolds' equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times
+    mean film (0 when dry). The cavity behind the contact is left out: the model refills it, which changes nothing
+    upstream;
     `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch);
     `error` how far load share and resonance may be off, and why (None for a mean over the steps of a history).
     """

@@ -54,7 +54,7 @@ def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> Cont
     lost = balance.rows.state != LUBRICATED
     if isinstance(balance, MixedBalance):
         capped, carried = balance.yielded, balance.content[zone].mean()
-        lost |= balance.surplus is not None  # what is left of any cell's equation
+        lost[:] = True  # what is left of any cell's equation: at low speed it is as much as what is refilled
     else:
         capped = balance.rows.state == CAPPED
         carried = balance.film.content[zone].mean() if balance.film else np.inf
