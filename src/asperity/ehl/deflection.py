@@ -43,7 +43,7 @@ class Deflection:
         """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
         (nx, ny), (long, wide) = self.cells, self.padded
         waves = scipy.fft.fft(scipy.fft.rfft(displacement, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
-        waves /= np.abs(self.spectrum[0])  # the mean of a line contact has a sign of its own
+        waves /= np.abs(self.spectrum[displacement.dtype == np.float32])  # a line contact's mean has a sign of its own
         return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
 
     def among(self, lines: int) -> "Deflection":
