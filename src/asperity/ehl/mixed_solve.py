@@ -146,9 +146,8 @@ class MixedSearch(Search):
             return self.from_dry(levels)
         step = self.climb_from(levels, guess)
         ends = levels[0].form.along is not None and way == CLIMB  # sharp ones go on the sturdier way
-        if (
-            self.smooth and not ends and not self.settled(self.options.tolerance)
-        ):  # one pressure is all that smooth bodies have
+        one_is_all = self.smooth and not ends  # that bodies without roughness have: oil and asperities never share
+        if one_is_all and not self.settled(self.options.tolerance):
             step = self.from_one(levels, guess)
         return step
 
