@@ -229,7 +229,8 @@ class MixedSearch(Search):
         if not may_lean(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
         roughly = max(ROUGHLY, tolerance)
-        step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
+        steps = newton(problem, unknowns, second_order=False)
+        step = self.run(problem, steps, roughly, min(most, MOST_ROUGHLY), stray=STRAY)
         if not self.settled(roughly):  # too much was left to the last: closer now
             unknowns = _reached(self.march(problem, unknowns, length, met=ROUGHLY))
             step = self.run(problem, newton(problem, unknowns, second_order=False), roughly, min(most, MOST_ROUGHLY))
@@ -248,7 +249,7 @@ class MixedSearch(Search):
         most = min(MOST_A_STEP, self.options.max_iterations)
         for _ in range(MOST_IN_TIME):
             led = replace(problem, past=_kept_for(problem, length, content))
-            step = self.run(led, newton(led, unknowns, second_order=False), met, most)
+            step = self.run(led, newton(led, unknowns, second_order=False), met, most, stray=STRAY)
             if self.settled(met):
                 unknowns, content = _reached(step), step.balance.content
                 if length >= LAST_LENGTH:
