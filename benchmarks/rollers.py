@@ -41,8 +41,8 @@ def lundberg(share: float) -> RollerShape:
 
 
 def between(contact: ContactConditions, cells: tuple[int, int], x: tuple[float, float]) -> Grid:
-    """A grid from x to x, in half-widths, and a line of cells past each end."""
-    a, end = contact.hertz.half_widths[0], 0.5 * LENGTH * cells[1] / (cells[1] - 2)
+    """A grid from x to x, in half-widths, and four lines of cells past each end, so that coarser ones have it too."""
+    a, end = contact.hertz.half_widths[0], 0.5 * LENGTH * cells[1] / (cells[1] - 8)
     return Grid(cells, (x[0] * a, -end), (x[1] * a, end), periodic=(False, False))
 
 
@@ -88,8 +88,13 @@ def _timed(name: str, contact: ContactConditions, cells: tuple[int, int]) -> str
     seconds = time.process_time() - began
     along, state = along_roller(solution), contact_state(solution)
     assert along is not None
-    end = "-" if along.end_film is None else f"{1e6 * along.end_film:.3f}"
+    edge, end = (
+        f"{factor * found.on_grid:.3f}"
+        + (" (not determined)" if found.value is None else f" ± {factor * (found.bar or 0.0):.3f}")
+        for factor, found in ((1e-9, along.edge_pressure), (1e6, along.end_film))
+        if found is not None
+    )
     return (
         f"| {name} | {cells[0]} x {cells[1]} | {solution.convergence.iterations} | {seconds:.1f} | "
-        f"{1e6 * state.h_central:.4f} | {end} | {1e-9 * along.edge_pressure:.3f} |"
+        f"{1e6 * state.h_central:.4f} | {end} | {edge} |"
     )

@@ -6,6 +6,7 @@ from .dynamic import ShakenContact as ShakenContact
 from .dynamic import dynamic_stiffness as dynamic_stiffness
 from .dynamic import own_resonance as own_resonance
 from .ends import AlongRoller as AlongRoller
+from .ends import AtEnd as AtEnd
 from .ends import along_roller as along_roller
 from .films import FilmFit as FilmFit
 from .films import FilmNumbers as FilmNumbers

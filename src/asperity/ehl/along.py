@@ -12,6 +12,7 @@ from asperity.arrays import Field, Mask
 from asperity.conditions import ContactConditions
 
 FAR_APART = 30.0  # a²/R from where the dry roller still touches: as far as before an inlet of 7.7 half-widths
+END = 0.05  # share of the length, at either end, that counts as the end
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,23 @@ class Along:
 
     def beyond(self, y: Field) -> Mask:
         """Places past the roller, shape (ny,)."""
-        conditions = self.conditions
-        past = np.abs(y) * self.length >= conditions.end * (1.0 - 1e-9)
-        return np.asarray(past | (self._drop(y) > self._touching + FAR_APART))
+        return np.asarray(~self.on(y) | (self._drop(y) > self._touching + FAR_APART))
+
+    @staticmethod
+    def dome(x: Field, pressure: Field, dx: float) -> Field:
+        """Largest pressure of every line of cells up to its middle, before oil's spike at the outlet, shape (ny,)."""
+        return np.asarray(pressure[x <= 0.5 * dx].max(axis=0))
+
+    def at_ends(self, y: Field, values: Field) -> Field:
+        """Values of lines on the outer twentieth of the length at either end, and where it begins."""
+        begins, on = (0.5 - END) * self.conditions.line_length / self.length, self.on(y)
+        y, values = y[on], values[on]
+        borders = [np.interp(place, y, values) for place in (-begins, begins) if y[0] <= place <= y[-1]]
+        return np.concatenate([values[np.abs(y) >= begins], borders])
+
+    def on(self, y: Field) -> Mask:
+        """Places between the ends of the roller, shape (ny,)."""
+        return np.asarray(np.abs(y) * self.length < self.conditions.end * (1.0 - 1e-9))
 
     @property
     def _touching(self) -> float:

@@ -1,7 +1,7 @@
 """A solved roller read along its length: what presses on its ends, where the load lies, how thin the film is there.
 
 Both bodies are elastic half-spaces: that a real roller's end is a free surface, which softens a flush edge, is left
-out. The pressure on an end without relief is singular there, and grows with the number of cells.
+out. The pressure on an end without relief is singular there, and grows with the number of cells: none is given then.
 """
 
 from dataclasses import dataclass
@@ -9,35 +9,75 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.arrays import Field
+from asperity.conditions import ContactConditions
+from asperity.ehl.along import Along
+from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
+from asperity.quantities import quantity
 
-END = 0.05  # share of the length, at either end, that counts as the end
 LOADED = 0.01  # of the mean load per length, from which a place counts as loaded
+SHARP = 0.8  # load per length on an end by slices, over the mean, from which its pressure has no limit
+BEARING = 0.2  # the same, from which the end bears, and needs lines of cells close together
+CLOSE = {"edge_pressure": 0.5, "end_film": 0.25}  # half-widths that those may lie apart there
+WIDEST = 0.5  # bar of a figure, over the figure, that still tells something
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AtEnd:
+    """A figure of a roller's ends as it is on the grid, and how far it may be off; None where nothing tells.
+
+    `why` says why it is not determined; empty where it is.
+    """
+
+    on_grid: float
+    error: float | None
+    why: str
+
+    @property
+    def value(self) -> float | None:
+        """The figure where it is determined."""
+        return None if self.why else self.on_grid
+
+    @property
+    def bar(self) -> float | None:
+        """Its error bar."""
+        return None if self.why else self.error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlongRoller:
-    """Load per length [N/m], largest pressure [Pa] and least gap [m] of every line of cells on the roller, at y [m].
+    """Load per length [N/m], pressures [Pa] and least gap [m] of every line of cells on the roller, at y [m].
 
-    `length` [m] is that between the chamfers, `load` [N] what all lines carry.
+    `pressure` is the largest of a line, `dome` the largest up to the middle, before the spike that oil has at the
+    outlet: the spike grows with the cells along x wherever it is, and is no matter of the ends. `length` [m] is that
+    between the chamfers, `load` [N] what all lines carry. `edge_pressure` [Pa] is the largest dome and `end_film` [m]
+    the least gap on the outer twentieth of the length, of either end; None where that is off the grid.
     """
 
     y: Field
     line_load: Field
     pressure: Field
+    dome: Field
     gap: Field
     length: float
     load: float
+    edge_pressure: AtEnd | None
+    end_film: AtEnd | None
 
     @property
-    def edge_pressure(self) -> float:
-        """Largest pressure on the outer twentieth of the length, of either end [Pa]; 0 where that is off the grid."""
-        return float(self.pressure[self._outer].max(initial=0.0))
+    def middle_pressure(self) -> float:
+        """The dome at the middle of the length [Pa]; 0 where that is off the grid."""
+        return float(np.interp(0.0, self.y, self.dome, left=0.0, right=0.0))
 
     @property
-    def end_film(self) -> float | None:
-        """Least gap on the same [m]; None where that is off the grid."""
-        return float(self.gap[self._outer].min()) if self._outer.any() else None
+    def undetermined(self) -> tuple[str, ...]:
+        """Which figures of the ends this solution cannot tell, and why, a sentence each."""
+        figures = {"edge_pressure_pa": self.edge_pressure, "end_film_m": self.end_film}
+        return tuple(
+            f"The {quantity(key).name} is not determined: {figure.why}."
+            for key, figure in figures.items()
+            if figure is not None and figure.why
+        )
 
     @property
     def largest_line_load(self) -> float:
@@ -60,23 +100,65 @@ class AlongRoller:
         """What the load's place has to be held against [N m]: load times its distance from the middle."""
         return self.load * self.load_centre
 
-    @property
-    def _outer(self) -> Field:
-        return np.asarray(np.abs(self.y) >= (0.5 - END) * self.length)
-
 
 def along_roller(solution: ContactSolution) -> AlongRoller | None:
     """A solved roller along its length; None for a contact of another geometry."""
     conditions, grid = solution.conditions, solution.grid
     if conditions.geometry != "roller":
         return None
-    on = np.abs(grid.y) < conditions.end
-    pressure = solution.pressure[:, on]
+    scales = Scales.of(conditions, solution.lubricant)
+    along, y = Along(conditions, scales.length, scales.gap), grid.y / scales.length
+    dome, gap = along.dome(grid.x, solution.pressure, grid.spacing[0]), solution.gap.min(axis=0)
+    on, pressures, films = along.on(y), along.at_ends(y, dome), along.at_ends(y, gap)
+    found = {"edge_pressure": float(pressures.max()), "end_film": float(films.min())} if films.size else {}
+    at_ends = {name: _at_end(solution, name, value) for name, value in found.items()}
     return AlongRoller(
         y=grid.y[on],
-        line_load=pressure.sum(axis=0) * grid.spacing[0],
-        pressure=pressure.max(axis=0),
-        gap=solution.gap[:, on].min(axis=0),
+        line_load=solution.pressure[:, on].sum(axis=0) * grid.spacing[0],
+        pressure=solution.pressure[:, on].max(axis=0),
+        dome=dome[on],
+        gap=gap[on],
         length=conditions.line_length,
-        load=float(pressure.sum()) * grid.spacing[0] * grid.spacing[1],
+        load=float(solution.pressure[:, on].sum()) * grid.spacing[0] * grid.spacing[1],
+        edge_pressure=at_ends.get("edge_pressure"),
+        end_film=at_ends.get("end_film"),
+    )
+
+
+def end_load(conditions: ContactConditions) -> float:
+    """Load per length that slices put on the more loaded end of a roller, over the mean of its length."""
+    load = conditions.sliced_load
+    return float(max(load.line_load[0], load.line_load[-1]) / load.line_load.mean())
+
+
+def _at_end(solution: ContactSolution, name: str, value: float) -> AtEnd:
+    error = solution.convergence.error
+    bar = None if error is None else getattr(error, name)
+    return AtEnd(on_grid=value, error=bar, why=_why_not(solution, name, value, bar))
+
+
+def _why_not(solution: ContactSolution, name: str, value: float, bar: float | None) -> str:
+    """Why a figure of the ends is not determined; empty where it is."""
+    conditions, pressed = solution.conditions, end_load(solution.conditions)
+    apart = solution.grid.spacing[1] / conditions.hertz.half_widths[0]
+    if name == "edge_pressure" and pressed > SHARP:
+        return (
+            "the roller's shape falls back too little for its ends, where the pressure of elastic half-spaces has no "
+            "limit and grows with the number of cells"
+        )
+    if solution.lubricant is None and name == "end_film":
+        return ""
+    if pressed > BEARING and apart > CLOSE[name] * (1.0 + 1e-9):
+        wanted = int(np.ceil(solution.grid.cells[1] * apart / CLOSE[name]))
+        return (
+            f"its lines of cells lie {apart:.2g} half-widths apart, where loaded ends need {CLOSE[name]:g}; take "
+            f"{wanted} cells along the roller"
+        )
+    least = conditions.hertz.p_max if name == "edge_pressure" else solution.options.contact_film
+    if bar is None or bar <= WIDEST * max(value, least):
+        return ""
+    entry = quantity({"edge_pressure": "edge_pressure_pa", "end_film": "end_film_m"}[name])
+    return (
+        f"on this grid it is {entry.text(value)}, too far from what coarser and coarser grids lead to; take "
+        f"{2 * solution.grid.cells[1]} cells along the roller"
     )

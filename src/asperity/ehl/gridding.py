@@ -36,6 +36,7 @@ LEAST_FILM_RATIO = 0.3  # Sq that count as film in rough contacts: asperities ho
 MOST_CELLS = 130_000  # of a rough contact at ACCURACY
 END_CELL = 0.22  # half-widths along a roller's axis, as long as that takes no more than the most lines of cells
 LINES_ALONG = 128, 504
+PAST_END, FEWEST_COARSE = 4, 24  # lines of cells past a roller's end, if the grid has so many times as many
 MOST_ACROSS = 512.0  # cells along x of a smooth roller
 SPARE_ALONG = 0.05  # of a roller's loaded length: slices tell it that well
 WIDEST_BAR = 0.15  # of CLR: beyond it mixed cannot be told from boundary lubrication
@@ -213,8 +214,13 @@ def _along_roller(
 
 
 def _past_the_ends(conditions: ContactConditions, y: tuple[float, float], lines: int) -> tuple[float, float]:
-    """The same with one of the lines of cells past each end of the roller that it comes to."""
-    before, after = y[0] <= -conditions.end, y[1] >= conditions.end
+    """The same with some of the lines of cells past each end of the roller that it comes to.
+
+    So many that its end lies on a border of cells twice as large too, and of those again: the error bar of what presses
+    on it is told by them.
+    """
+    past = PAST_END if lines >= FEWEST_COARSE * PAST_END else 1
+    before, after = (past * reached for reached in (y[0] <= -conditions.end, y[1] >= conditions.end))
     cell = (y[1] - y[0]) / (lines - before - after)
     return y[0] - before * cell, y[1] + after * cell
 

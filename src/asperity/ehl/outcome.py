@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Literal, get_args
 
@@ -78,12 +78,17 @@ class Iteration:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors."""
+    """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors.
+
+    Of a roller also the largest pressure [Pa] and the least gap [m] at its ends; None of other contacts.
+    """
 
     car: float
     clr: float
     h_min: float
     h_central: float
+    edge_pressure: float | None = None
+    end_film: float | None = None
 
     def off(self, other: "Figures") -> "Figures":
         """Absolute differences."""
@@ -110,8 +115,11 @@ class Figures:
         return self._each(self, lambda mine, _: factor * mine)
 
     def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
-        names = ("car", "clr", "h_min", "h_central")
-        return Figures(**{name: merge(getattr(self, name), getattr(other, name)) for name in names})
+        pairs = ((name, getattr(self, name), getattr(other, name)) for name in FIGURES)
+        return Figures(**{name: merge(mine, its) for name, mine, its in pairs if None not in (mine, its)})
+
+
+FIGURES = tuple(field.name for field in fields(Figures))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from asperity.conditions import ContactConditions
+from asperity.ehl.ends import BEARING, SHARP, along_roller, end_load
 from asperity.ehl.gridding import (
     CELLS_IN_INLET,
     WIDEST_BAR,
@@ -18,7 +19,6 @@ from asperity.grid import Grid
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.quantities import quantity
 
-LOADED_END = 0.5  # load per length on a roller's end by slices, over the mean, from which the end is said to be sharp
 UNEVEN = 1.5  # largest over mean load per length along a roller, from which it is said
 OILS = 5e-9, 40e-9  # pressure-viscosity coefficients [1/Pa]
 SOFT = 1e9  # Young's modulus below which a body is rubber or a slip of the unit [Pa]
@@ -100,12 +100,16 @@ def _solids(conditions: ContactConditions) -> Iterator[str]:
 
 
 def _roller(conditions: ContactConditions) -> Iterator[str]:
-    load = conditions.sliced_load
-    if max(load.line_load[0], load.line_load[-1]) > LOADED_END * load.line_load.mean():
+    load, pressed = conditions.sliced_load, end_load(conditions)
+    if pressed > SHARP:
         yield (
-            "The roller's shape falls back too little for its ends: on elastic half-spaces their pressure is singular "
-            "and grows with the number of cells, and a real roller's free end is softer; take the edge pressure as a "
-            "sign, not as a number."
+            "The roller's shape falls back too little for its ends: the pressure of elastic half-spaces has no limit "
+            "there. Take more crown, or read load per length and pressure at mid-length."
+        )
+    if pressed > BEARING:
+        yield (
+            "The roller's ends bear load as ends of half-spaces do; that a real roller ends in a free surface, which "
+            "is softer, is not modelled."
         )
     if load.peak > UNEVEN:
         low, high = load.ends
@@ -144,6 +148,8 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
         yield f"Contact runs into the {edges} of the grid, and what lies beyond it is missing: widen the grid."
     if shortfalls := grid_shortfalls(conditions, lubricant, solution.surface):
         yield f"The grid of {grid.cells[0]} x {grid.cells[1]} cells has {'; '.join(shortfalls)}."
+    if (along := along_roller(solution)) is not None:
+        yield from along.undetermined
     if (far := far_from_fits(solution)) is not None:
         yield far
 

@@ -27,6 +27,9 @@ ONWARDS, BACK = 2.5, 1.5  # of the difference to the coarser grid: how far a rou
 AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
 UNRESOLVED = 2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
 BY_TWO_ORDERS = 0.8  # share of all this where both orders of the wedge are known, and tell more
+OF_ENDS = 3.0  # of the same, of what is read off a roller's ends: their error falls with the cell, not its square
+NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
+SCATTER = 0.03  # of a figure of the ends, below which differences say nothing of where they go
 NEXT_TO_NOTHING = 1e-2  # what is left of a start, below which steps have not strayed yet by many times that
 FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 
@@ -203,32 +206,58 @@ def grid_error(
 ) -> GridError | None:
     """90 % intervals from the last grids; None for one grid alone.
 
-    A smooth solution gets Roache's grid convergence index, three times its error: the difference of both where it is of
-    second `order`, three times that where of first. A rough one has no such order. Its figures d apart on the last two
-    grids get 2.5 d the way that they went, 1.5 d the other, and the load share 2.4 of the squared cell (`cell`, in
-    half-widths) either way: what a hundred contacts of the wide sample take to hold four times the cells
-    (`benchmarks.intervals`). d is no less than a quarter of the difference between the grids before, lest two grids
-    agree by chance, and no less than what the second-order wedge did to the first order's figures on the finest grid;
-    where that is known, 0.8 of all this will do. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
+    A smooth solution gets Roache's grid convergence index, three times its error: the difference of both where it
+    is of second `order`, three times that where of first. A rough one has no such order. Its figures d apart on the
+    last two grids get 2.5 d the way that they went, 1.5 d the other, and the load share 2.4 of the squared cell
+    (`cell`, in half-widths) either way: what a hundred contacts of the wide sample take to hold four times the
+    cells (`benchmarks.intervals`). A roller's edge pressure and end film get 3 d, and up to ten times that where d
+    does not shrink as grids get finer. d is no less than a quarter of the difference between the grids before, lest
+    two grids agree by chance, and no less than what the second-order wedge did to the first order's figures on the
+    finest grid; where that is known, 0.8 of all this will do. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
     """
     if len(on_grids) < 2:
         return None
     *before, coarse, fine = on_grids
     nothing, apart = fine.off(fine), fine.off(coarse)
+    figures_of_ends = ((name, [getattr(each, name) for each in on_grids]) for name in ("edge_pressure", "end_film"))
+    ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
     if before:
         apart = apart.at_least(coarse.off(before[-1]).times(AGREEMENT))
     if smooth:
-        return GridError(**asdict(apart if order > 1 else apart.times(3.0)), lean=nothing)
+        return GridError(**asdict(replace(apart if order > 1 else apart.times(3.0), **ends)), lean=nothing)
     share = 1.0
     if by_first_order is not None:
         apart, share = apart.at_least(fine.off(by_first_order)), BY_TWO_ORDERS
     half = apart.times(0.5 * share * (ONWARDS + BACK)).plus(replace(nothing, clr=share * UNRESOLVED * cell**2))
-    return GridError(**asdict(half), lean=apart.times(0.5 * share * (ONWARDS - BACK)).signed(fine.minus(coarse)))
+    lean = apart.times(0.5 * share * (ONWARDS - BACK)).signed(fine.minus(coarse))
+    return GridError(**asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0)))
+
+
+def ends_error(on_grids: Sequence[float]) -> float:
+    """Half the 90 % interval of a figure of a roller's ends, on finer and finer grids; see `grid_error`."""
+    *before, coarse, fine = on_grids
+    apart, factor = abs(fine - coarse), OF_ENDS
+    if before:
+        earlier = abs(coarse - before[-1])
+        if apart > SCATTER * abs(fine):
+            shrinks = min(apart / earlier, 1.0) if earlier > 0.0 else 1.0
+            factor *= min(max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0), NO_LIMIT)
+        apart = max(apart, AGREEMENT * earlier)
+    return factor * apart
 
 
 def figures(problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float) -> Figures:
     """The first figures of dimensionless fields; lengths in the unit of `gap_scale`."""
+    along, ends = problem.form.along, {}
+    if along is not None:
+        dome, film = (
+            along.at_ends(problem.y, of)
+            for of in (along.dome(problem.x, pressure, problem.spacing[0]), gap.min(axis=0))
+        )
+        if dome.size:
+            ends = {"edge_pressure": float(dome.max()) * problem.p_scale, "end_film": float(film.min()) * gap_scale}
     return Figures(
+        **ends,
         car=area_share(touching, problem.zone()),
         clr=carried_share(pressure, touching),
         h_min=float(gap.min()) * gap_scale,

@@ -248,9 +248,16 @@ class Run:
         """What presses on a roller's ends, and on how much of it the load lies; nothing for other contacts."""
         if self.along is None:
             return ""
-        edge, loaded = (quantity(key).named(self.numbers([])[key]) for key in ("edge_pressure_pa", "loaded_share"))
-        hertz = self.along.edge_pressure / self.solution.conditions.hertz.p_max
-        return f"{edge}, {hertz:.2f} times an even load's, {loaded}; "
+        numbers, edge = self.numbers([]), quantity("edge_pressure_pa")
+        pressure, middle = self.along.edge_pressure, quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"])
+        if pressure is None:
+            said = f"no {edge.name}, the grid ends before"
+        elif pressure.value is None:
+            said = f"{edge.name} not determined, {middle}"
+        else:
+            hertz = pressure.value / self.solution.conditions.hertz.p_max
+            said = f"{edge.short} {edge.text_in(numbers)}, {hertz:.2f} times an even load's"
+        return f"{said}, {quantity('loaded_share').named(numbers['loaded_share'])}; "
 
     @property
     def crucial(self) -> Row:
