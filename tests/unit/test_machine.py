@@ -567,7 +567,7 @@ def test_a_roller_cams_contacts():
     rate = math.pi / cam.half_angle
     sharp = 36e-3**2 / (36e-3 + 4.5e-3 * rate**2)  # ρ0 = 18 + 9 + 9 mm at the nose, ρ0'' = -(L/2)(π/β)²
     assert nose.radius == pytest.approx(1.0 / (1.0 / (sharp - 9e-3) + 1.0 / 9e-3), rel=1e-12)
-    assert nose.entrainment_speed == pytest.approx(150.0 * 36e-3 * (1.0 - 9e-3 / sharp), rel=1e-12)
+    assert nose.surface_speeds[0] == pytest.approx(150.0 * 36e-3 * (1.0 - 9e-3 / sharp), rel=1e-12)  # slip or none
     assert last.load == pytest.approx(600.0)
     assert [contact.slide_to_roll for contact in contacts] == pytest.approx([0.1] * len(contacts))
     middle = contacts[4]
@@ -579,6 +579,20 @@ def test_a_roller_cams_contacts():
     assert around["roller_hz"] / around["cam_hz"] == pytest.approx(
         _perimeter(RollerCam(**ROLLER_CAM)) / (2.0 * math.pi * 9e-3), rel=1e-4
     )
+
+
+@pytest.mark.parametrize("slip", [-0.5, 0.0, 0.2, 1.5])
+def test_a_roller_that_slips_changes_its_own_speed_and_not_the_cams(slip):
+    """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over all of the cam's outline."""
+    cam = RollerCam(**ROLLER_CAM, slip=slip)
+    contacts = cam.contacts(STEEL)
+    cams, rollers = (np.array([contact.surface_speeds[body] for contact in contacts]) for body in (0, 1))
+    assert cams == pytest.approx([cam.speed * cam.at(angle).path for angle in cam.angles])
+    assert [contact.slide_to_roll for contact in contacts] == pytest.approx([slip] * len(contacts))
+    ratios = rollers / cams
+    assert ratios == pytest.approx([ratios[0]] * len(ratios))
+    turned = ratios[0] * _perimeter(cam) / (2.0 * math.pi * cam.roller_radius)
+    assert turned == pytest.approx(cam.frequencies["roller_hz"] / cam.frequencies["cam_hz"], rel=1e-4)
 
 
 def _perimeter(cam):

@@ -219,7 +219,10 @@ class RollerCam(Cam):
         return CamPoint.of(reach, self._lift_slope(angle), self._lift_bend(angle), self.roller_radius)
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
-        """From the nose to where the lift begins. 1/R = 1/ρ + 1/r, F = follower's force/cos φ, u = ω times the path."""
+        """From the nose to where the lift begins. 1/R = 1/ρ + 1/r, F = follower's force/cos φ, u1 = ω times the path.
+
+        The cam's way past the contact is a matter of its shape alone: a roller that slips is the slower for it.
+        """
         found = []
         for angle in self.angles:
             point = self.at(angle)
@@ -233,7 +236,7 @@ class RollerCam(Cam):
                 geometry="line",
                 radius=1.0 / curvature,
                 length=self.width,
-                surface_speeds=(speed * (1.0 + self.slip / 2.0), speed * (1.0 - self.slip / 2.0)),
+                surface_speeds=(speed, self._rolled * speed),
                 overrolling_hz=(turns(self.speed), self.frequencies["roller_hz"]),
             )
             found.append(contact)
@@ -244,11 +247,15 @@ class RollerCam(Cam):
         """Of the cam, and of the roller in the mean of a turn of it [Hz]."""
         way = 2.0 * float(scipy.integrate.quad(lambda angle: self.at(angle).path, 0.0, self.half_angle)[0])
         way += 2.0 * (math.pi - self.half_angle) * self.base_radius
-        rolled = (1.0 - self.slip / 2.0) / (1.0 + self.slip / 2.0)
         return {
             "cam_hz": turns(self.speed),
-            "roller_hz": turns(self.speed) * rolled * way / math.tau / self.roller_radius,
+            "roller_hz": turns(self.speed) * self._rolled * way / math.tau / self.roller_radius,
         }
+
+    @property
+    def _rolled(self) -> float:
+        """The roller's surface speed over the cam's."""
+        return (2.0 - self.slip) / (2.0 + self.slip)
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """What the model leaves out, and a guide that is pressed hard aside."""
