@@ -21,7 +21,7 @@ SOLVED = [  # of the same place, and more of what a solved contact has
     *("h_min_m", "determined", "p_max_pa", "friction_power_w", "von_mises_core_pa", "reason"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
 ]
-RATING = ["formula", "key", "reason", "standard", "validity"]
+RATING = ["beyond", "formula", "key", "reason", "standard", "validity"]
 KEYS = ["contacts", "frequencies", "notes", "ratings", "seconds", "verdict", "worst"]
 DISCS = """
 [machine]
@@ -200,7 +200,14 @@ def test_what_is_not_solved_is_loud(asp):
         ("nu206", "machine.clearance=2 mm", "holds no roller in place"),
         ("nu206", "machine.radial_load=0 N", "unloads every roller"),
         ("nu206", "machine.radial_load=-4 kN", "must be finite, and not negative"),
-        ("6206", "machine.contact_angle=20 deg", None),
+        (
+            "6206",
+            "machine.contact_angle=20 deg",
+            "an angular-contact bearing comes apart under a radial_load of 2000 N",
+        ),
+        ("6206", "machine.tilt=level", 'machine.tilt must be an angle such as "20 deg"'),
+        ("6206", "machine.tilt=free", None),
+        ("nu206", "machine.tilt=free", "machine.tilt is not a known key"),
         ("6206", "contact.load=4 N", "a [machine] and a [contact]; leave one of them out"),
     ],
 )
@@ -223,10 +230,25 @@ def test_what_states_a_machine_is_not_a_single_contact(asp):
     assert "has no [machine]" in asp("machine", "paper.toml")[2]
 
 
+def test_a_setting_mends_a_file_that_is_refused(asp):
+    Path("discs.toml").write_text(DISCS.replace('"500 N"', '"-500 N"'), "utf-8")
+    assert asp("machine", "discs.toml", "--dry-run")[0] == 2
+    assert asp("machine", "discs.toml", "--dry-run", "--set", "machine.load=500 N")[0] == 0
+
+
+def test_a_disc_may_stand(asp):
+    Path("discs.toml").write_text(DISCS, "utf-8")
+    out = asp("machine", "discs.toml", "--dry-run", "--json", "--set", 'machine.speeds=["1000 r/min", "0 r/min"]')[1]
+    (contact,) = json.loads(out)["contacts"]
+    assert (contact["slide_to_roll"], contact["u2_m_s"], contact["overrolling_hz"][1]) == (2.0, 0.0, 0.0)
+    for speeds in ('["0 r/min", "0 r/min"]', '["-1 r/min", "3 r/min"]'):
+        assert asp("machine", "discs.toml", "--dry-run", "--set", f"machine.speeds={speeds}")[0] == 2
+
+
 def test_speeds_that_slip_backwards_are_said_or_refused(asp):
     Path("discs.toml").write_text(DISCS, "utf-8")
     for setting, words in (
-        ('machine.speeds=["1000 r/min", "-500 r/min"]', "machine.speeds[1] must be positive"),
+        ('machine.speeds=["1000 r/min", "-500 r/min"]', "machine.speeds[1] must be finite, and not negative"),
         ("machine.slide_to_roll=0.1", "slide_to_roll is that of both speeds"),
         ("machine.entrainment_speed=2 m/s", "both are given; give one"),
     ):

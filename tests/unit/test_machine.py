@@ -18,6 +18,7 @@ from asperity.machine import (
     SpurGear,
     TwinDisc,
 )
+from asperity.rating import BallRaceway, ball_life
 
 STEEL = ElasticPair((206e9, 206e9), (0.3, 0.3))
 RPM = 2.0 * math.pi / 60.0
@@ -50,6 +51,13 @@ NU206 = {
 }
 BALLS = {"balls": 7, "ball_diameter": 11.5e-3, "pitch_diameter": 43.5e-3, "speed": 100.0}
 BALLS_6206 = {"balls": 9, "ball_diameter": 9.525e-3, "pitch_diameter": 46e-3, "speed": 3000.0 * RPM}
+BALLS_7205 = {
+    "balls": 12,
+    "ball_diameter": 7.938e-3,
+    "pitch_diameter": 38.5e-3,
+    "speed": 100.0,
+    "contact_angle": math.radians(40.0),
+}
 CAM = {
     "base_radius": 15e-3,
     "lift": 10e-3,
@@ -354,7 +362,7 @@ def test_a_profiled_roller_is_solved_for_its_heaviest_slice():
 )
 def test_ball_bearings_move_as_iso_16281_has_it(radial, axial, clearance, shifts):
     pair = ElasticPair((210e9, 210e9), (0.3, 0.3))
-    bearing = BallBearing(**BALLS, radial_load=radial, axial_load=axial, clearance=clearance)
+    bearing = BallBearing(**BALLS, radial_load=radial, axial_load=axial, clearance=clearance, tilt=None)
     assert bearing.stiffness(pair) * 1e-3**1.5 == pytest.approx(333592.0, rel=1e-4)
     assert [1e6 * shift for shift in bearing.shifts(pair)[:2]] == pytest.approx(shifts, rel=1e-4)
     loads, angles = bearing.loads(pair)
@@ -376,26 +384,104 @@ def test_thrust_alone_meets_the_closed_form():
     assert bearing.frequencies["bpfo_hz"] > BallBearing(**BALLS, axial_load=load).frequencies["bpfo_hz"]
 
 
-def test_every_angular_contact_bearing_finds_its_balance():
+def random_bearing(rng, *, tilt, thrusts):
+    balls, diameter = int(rng.integers(7, 18)), rng.uniform(4e-3, 20e-3)
+    radial = 10.0 ** rng.uniform(1.0, 4.0)
+    return BallBearing(
+        balls=balls,
+        ball_diameter=diameter,
+        pitch_diameter=diameter * balls / math.pi * rng.uniform(1.15, 1.6),
+        speed=100.0,
+        radial_load=radial,
+        axial_load=radial * 10.0 ** rng.uniform(*thrusts),
+        contact_angle=math.radians(rng.uniform(10.0, 40.0)),
+        tilt=tilt,
+    )
+
+
+def carried(bearing):
+    """Radial and axial force on all balls, and the moment over the radius of their grooves' centres [N]."""
+    radial, axial, tilt = bearing.shifts(STEEL)
+    return bearing._forces(np.array([radial, axial, tilt * bearing._arm]), bearing.stiffness(STEEL))
+
+
+@pytest.mark.parametrize("tilt", [None, 0.0, 1e-3])
+def test_every_angular_contact_bearing_finds_its_balance(tilt):
     """Under hardly any thrust too, where a ring that moves axially is hardly held."""
     rng = np.random.default_rng(11)
     for _ in range(60):
-        balls, diameter = int(rng.integers(7, 18)), rng.uniform(4e-3, 20e-3)
-        radial = 10.0 ** rng.uniform(1.0, 4.0)
-        axial = radial * 10.0 ** rng.uniform(-5.0, 1.0)
-        bearing = BallBearing(
-            balls=balls,
-            ball_diameter=diameter,
-            pitch_diameter=diameter * balls / math.pi * rng.uniform(1.15, 1.6),
-            speed=100.0,
-            radial_load=radial,
-            axial_load=axial,
-            contact_angle=math.radians(rng.uniform(10.0, 40.0)),
-        )
-        loads, angles = bearing.loads(STEEL)
-        places = np.cos(bearing.angles)
-        carried = [loads * np.cos(angles) @ places, loads @ np.sin(angles), loads * np.sin(angles) @ places]
-        assert carried == pytest.approx([radial, axial, 0.0], abs=1e-7 * max(radial, axial))
+        bearing = random_bearing(rng, tilt=tilt, thrusts=(-5.0, 1.0))
+        force = max(bearing.radial_load, bearing.axial_load)
+        found = carried(bearing)
+        assert found[:2] == pytest.approx([bearing.radial_load, bearing.axial_load], abs=1e-7 * force)
+        if tilt is None:
+            assert found[2] == pytest.approx(0.0, abs=1e-7 * force)
+        if bearing.axial_load > bearing.radial_load * math.tan(bearing.contact_angle):
+            loads, angles = bearing.loads(STEEL)
+            assert angles[loads > 0.0].min() > 0.0
+
+
+def test_an_angular_contact_bearing_that_comes_apart_says_so():
+    loose = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=5.0, tilt=None)
+    with pytest.raises(BadInput, match=r"comes apart under a thrust of 5 N beside 1000 N.* from about 1.02e.03 N"):
+        loose.loads(STEEL)
+
+
+def test_an_angular_contact_bearing_bears_as_its_catalogue_supposes():
+    """7205 B, 1 kN across and 1.14 kN along, e of ISO 281: half of the balls, at 40 degrees, for (C/P)³ million turns.
+
+    C 15.6 kN, P the radial load. Free to tilt it would bear at 20 degrees, on balls opposite the load too.
+    """
+    upright, free = (
+        BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=1140.0, tilt=tilt) for tilt in (0.0, None)
+    )
+    loads, angles = upright.loads(STEEL)
+    assert np.count_nonzero(loads) == 7
+    assert loads.max() == pytest.approx(430.0, rel=2e-3)
+    assert math.degrees(angles[0]) == pytest.approx(40.0, abs=3.0)
+    ratio = upright.ball_diameter * math.cos(upright.contact_angle) / upright.pitch_diameter
+    raceway = BallRaceway(ratio, upright.osculation, upright.contact_angle)
+    assert ball_life(loads, 15.6e3, raceway) == pytest.approx(15.6**3 * 1e6, rel=0.25)
+    tilting, aslant = free.loads(STEEL)
+    assert tilting.max() > 1.5 * loads.max()
+    assert math.degrees(aslant[0]) < 25.0
+    assert any("tilts by -5.22 mrad" in note for note in free.notes(STEEL))
+    assert any("with a moment of 16.1 N m" in note for note in upright.notes(STEEL))
+    few = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=600.0)
+    assert any("The thrust holds 3 of 12 balls" in note for note in few.notes(STEEL))
+
+
+def test_the_moment_of_a_held_ring_is_what_the_energy_asks_for():
+    """A tilt's slope of the elastic energy less the loads' work, least at the other shifts."""
+
+    def energy(tilt):
+        bearing = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=900.0, tilt=tilt)
+        radial, axial, _ = bearing.shifts(STEEL)
+        loads, _ = bearing.loads(STEEL)
+        elastic = (loads / bearing.stiffness(STEEL)) ** (2.0 / 3.0)
+        return 0.4 * float(loads @ elastic) - 1000.0 * radial - 900.0 * axial
+
+    held = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=900.0, tilt=-1e-3)
+    step = 1e-5
+    assert held.moment(STEEL) == pytest.approx((energy(-1e-3 + step) - energy(-1e-3 - step)) / (2.0 * step), rel=1e-5)
+
+
+def test_preload_alone_bears_on_every_ball():
+    bearing = BallBearing(**BALLS_6206, clearance=-10e-6)
+    loads, angles = bearing.loads(STEEL)
+    assert loads == pytest.approx([bearing.stiffness(STEEL) * 5e-6**1.5] * 9)
+    assert angles == pytest.approx([0.0] * 9)
+    assert len(bearing.contacts(STEEL)) == 18
+
+
+def test_a_clearance_sets_the_angle_that_frequencies_are_for():
+    """6206, 20 um: arccos(1 - s/(2 A)) is 11.76 deg; without thrust the balls bear upright."""
+    thrust, across = (
+        BallBearing(**BALLS_6206, clearance=20e-6, **load) for load in ({"axial_load": 500.0}, {"radial_load": 500.0})
+    )
+    assert math.degrees(thrust.free_angle) == pytest.approx(11.76, abs=0.01)
+    assert across.free_angle == 0.0
+    assert thrust.frequencies["bpfi_hz"] < across.frequencies["bpfi_hz"]
 
 
 def test_a_6206_under_two_kilonewtons():
@@ -418,7 +504,12 @@ def test_a_6206_under_two_kilonewtons():
         (CylindricalRollerBearing, NU206 | {"slices": 10}, "at least 30"),
         (CylindricalRollerBearing, NU206 | {"radial_load": -5.0}, "negative"),
         (BallBearing, BALLS, "no ball carries"),
-        (BallBearing, BALLS | {"radial_load": 10.0, "clearance": 1e-3}, "holds no ball in place"),
+        (BallBearing, BALLS | {"radial_load": 10.0, "clearance": -1e-3}, "holds no ball in place"),
+        (BallBearing, BALLS | {"radial_load": 10.0, "clearance": 6e-4}, "bear at more than 60 deg; it must be at most"),
+        (BallBearing, BALLS_6206 | {"axial_load": 500.0, "osculation": (0.505, 0.505), "clearance": 4e-4}, "60 deg"),
+        (BallBearing, BALLS_6206 | {"axial_load": 500.0, "osculation": (0.51, 0.51), "clearance": 4e-4}, "60 deg"),
+        (BallBearing, BALLS | {"radial_load": 10.0, "tilt": 0.05}, "between -20 and 20 mrad"),
+        (BallBearing, BALLS_7205 | {"radial_load": 1000.0}, "comes apart under a radial_load of 1000 N alone"),
         (BallBearing, BALLS | {"radial_load": 10.0, "osculation": (0.49, 0.53)}, "osculation"),
         (
             BallBearing,
@@ -438,7 +529,7 @@ def test_what_is_left_out_of_a_bearing_is_said():
     assert any("centrifugal load of 82" in note for note in fast.notes(STEEL))  # 1.85 N at 3000 r/min, by its square
     assert not any("centrifugal" in note for note in CylindricalRollerBearing(**NU206).notes(STEEL))
     loose = CylindricalRollerBearing(**(NU206 | {"clearance": 200e-6, "radial_load": 100.0}))
-    assert any("One rolling element alone" in note for note in loose.notes(STEEL))
+    assert any("One roller alone" in note for note in loose.notes(STEEL))
     brass = ElasticPair((100e9, 206e9), (0.3, 0.3))
     assert any("steel rollers" in note for note in fast.notes(brass))
 
@@ -583,7 +674,7 @@ def test_a_roller_cams_contacts():
 
 @pytest.mark.parametrize("slip", [-0.5, 0.0, 0.2, 1.5])
 def test_a_roller_that_slips_changes_its_own_speed_and_not_the_cams(slip):
-    """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over all of the cam's outline."""
+    """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over the cam's outline."""
     cam = RollerCam(**ROLLER_CAM, slip=slip)
     contacts = cam.contacts(STEEL)
     cams, rollers = (np.array([contact.surface_speeds[body] for contact in contacts]) for body in (0, 1))

@@ -10,7 +10,7 @@ import pytest
 from asperity.case import load_machine
 from asperity.lubricant import ESTIMATORS, OilSheet
 from asperity.quantities import catalogue
-from asperity.rating import GearOil, Mesh, MeshPoint, specific_film
+from asperity.rating import GearOil, Mesh, MeshPoint, life_factor, specific_film
 from asperity.results import solve_case
 from asperity.study import machine_conditions, rated
 from asperity.study.rating_facts import FACTS
@@ -154,6 +154,89 @@ def test_what_cannot_be_rated_says_why(changed, reason):
     assert [rating.key for rating in found] == list(rated.GEAR_KEYS)
     assert all(reason in rating.reason for rating in found)
     assert all(rating.to_dict()["value"] is None for rating in found)
+
+
+@pytest.mark.parametrize("grade", ["VG 32", "VG 46", "VG 68"])
+def test_gears_in_thin_oil_are_rated(grade):
+    """The standard's alpha is one of the oil at 38 °C: how thin a flash makes it is no matter."""
+    case = load_machine(EXAMPLES / "fzg-c.toml", {"lubricant.grade": grade})
+    found = by_key(case)
+    assert not any(found[key].reason for key in rated.GEAR_KEYS)
+    films = found["rated_film"].values
+    assert min(films, key=films.get) == "A"
+    assert 0.02 < films["A"] < 0.25  # of VG 220: 0.256
+    assert machine_conditions(case).scalars()["ratings"]
+
+
+def test_a_flash_beyond_the_oils_alpha_is_said():
+    hot = {"machine.torque": "900 N m", "machine.speed": "12000 r/min", "surface.sq": "2 um"}
+    found = by_key(load_machine(EXAMPLES / "fzg-c.toml", hot | {"rating.permissible_film": 0.2}))
+    assert found["rated_flash_k"].values["A"] > 300.0
+    assert found["rated_film"].values["A"] is None
+    assert "where the estimate of α ends" in found["rated_film"].reason
+    assert "not known all along the path" in found["micropitting_safety"].reason
+
+
+@pytest.mark.parametrize(
+    ("changed", "beyond"),
+    [
+        ({}, ""),
+        (
+            {"machine.speed": "500 r/min"},
+            "a pitch-line speed of 1.92 m/s, for 2 to 80; a Peclet number of 0.83, for 1 and more",
+        ),
+        (
+            {"machine.speed": "1 r/min"},
+            "a pitch-line speed of 0.00383 m/s, for 2 to 80; a Peclet number of 0.0017, for 1 and more",
+        ),
+    ],
+)
+def test_what_lies_outside_a_standards_range_is_said(changed, beyond):
+    case = load_machine(EXAMPLES / "fzg-c.toml", changed)
+    found = by_key(case)
+    assert found["rated_flash_k"].beyond == beyond
+    assert found["mesh_friction"].beyond == beyond.partition("; ")[0]
+    assert ("rated λGF" in machine_conditions(case)._rated()) == (beyond == "")
+
+
+def test_the_life_factor_of_rollers_is_of_the_bearings_load_at_least():
+    """NJ 208 under 10 kN: slices and clearance make the equivalent load less than the load, no stress less."""
+    case = load_machine(EXAMPLES / "nu206.toml").with_overrides(
+        {
+            "machine": {
+                "kind": "cylindrical-roller-bearing",
+                "rollers": 14,
+                "roller_diameter": "11 mm",
+                "roller_length": "10.2 mm",
+                "pitch_diameter": "60 mm",
+                "clearance": "35 um",
+                "profile": "iso",
+                "radial_load": "10 kN",
+                "speed": "1500 r/min",
+            },
+            "rating": {"dynamic_load_rating": "62 kN", "fatigue_load_limit": "6.7 kN", "contamination": 0.5},
+        }
+    )
+    found = by_key(case)
+    assert found["equivalent_load_n"].alone == pytest.approx(7590.0, rel=1e-3)
+    whole = life_factor("roller", found["viscosity_ratio"].alone, 0.5 * 6.7 / 10.0)
+    assert found["life_factor"].alone == pytest.approx(whole)
+
+
+def test_teeth_that_are_warmer_than_their_oil_are_said():
+    """fzg-c: 390 K against 363 K, where VG 220 of index 95 has 0.47 of its viscosity."""
+    case = load_machine(EXAMPLES / "fzg-c.toml")
+    (said,) = [note for note in machine_conditions(case).notes if "bulk temperature" in note]
+    assert "oil of 90 degC, as it is supplied" in said
+    assert "of 117 degC it has 0.47 of that viscosity" in said
+    same = load_machine(EXAMPLES / "fzg-c.toml", {"rating.bulk_temperature": "90 degC"})
+    assert not any("bulk temperature" in note for note in machine_conditions(same).notes)
+
+
+def test_a_pressure_that_no_bearing_bears_is_said():
+    case = load_machine(EXAMPLES / "6206.toml", {"machine.clearance": "-450 um"})
+    assert any("above 4.2000 GPa, the static limit" in note for note in machine_conditions(case).notes)
+    assert not any("static limit" in note for note in machine_conditions(load_machine(EXAMPLES / "6206.toml")).notes)
 
 
 def test_machines_without_a_standard_have_no_ratings():

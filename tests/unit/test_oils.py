@@ -283,7 +283,7 @@ def test_what_is_doubtful_is_noted(oil, celsius, says):
         ({"grade": "VG 100", "density_15": float("nan")}, "density_15 must be positive"),
         ({"grade": "VG 100", "viscosity_100": 11e-6, "viscosity_index": 150.0}, "index of 150 is not that of .* is 94"),
         ({"grade": "VG 100", "viscosity_index": 9999.0}, "viscosity_index of 9999 belongs to no oil of 100 mm"),
-        ({"grade": "VG 3"}, "viscosity_index of 95 belongs to no oil of 3.2 mm"),
+        ({"grade": "VG 3", "viscosity_index": 95.0}, "viscosity_index of 95 belongs to no oil of 3.2 mm"),
         ({"grade": "VG 100", "alpha": 2e-8, "alpha_estimate": "gold"}, "alpha and alpha_estimate are both given"),
         ({"grade": "VG 100", "alpha_estimate": "silver"}, "alpha_estimate must be one of roelands, so-klaus, wooster"),
         ({"grade": "VG 100", "base": "pao"}, "alpha is missing, which base pao has to state"),
@@ -314,6 +314,29 @@ def test_a_sheet_that_cannot_be_is_refused(given, says):
 def test_an_oil_out_of_range_is_refused(oil, celsius, says):
     with pytest.raises(BadInput, match=says):
         oil.lubricant(celsius + ZERO)
+
+
+@pytest.mark.parametrize("name", sorted(ESTIMATORS))
+@pytest.mark.parametrize("grade", [32, 320, 1000])
+def test_alpha_rises_as_oil_cools_or_none_is_given(name, grade):
+    """So and Klaus' turns down in thick oil and ends below 0."""
+    oil, last, refused = OilSheet(grade=f"VG {grade}", alpha_estimate=name), 0.0, []
+    for celsius in range(100, -20, -5):
+        try:
+            alpha = oil.pressure_viscosity(celsius + ZERO)
+        except BadInput as refusal:
+            refused.append((celsius, str(refusal)))
+            continue
+        assert alpha > last
+        assert not refused  # once it falls it stays refused
+        last = alpha
+    assert bool(refused) == (name == "so-klaus" and grade > 32)
+    assert all("So and Klaus (1980) falls off again in oil as cold and thick as" in said for _, said in refused)
+
+
+def test_a_thin_grade_says_what_is_missing():
+    with pytest.raises(BadInput, match=r"viscosity_100 is missing; give it: the index of 95 .* 2.2 mm.2/s at 40 degC"):
+        OilSheet(grade="VG 2")
 
 
 def test_a_given_alpha_serves_a_thin_oil():

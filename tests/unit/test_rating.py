@@ -117,6 +117,7 @@ def test_lives_of_a_ball_bearing_by_a_commercial_program(radial, axial, clearanc
     pair = ElasticPair((210e9, 210e9), (0.3, 0.3))
     bearing = BallBearing(
         balls=7, ball_diameter=11.5e-3, pitch_diameter=43.5e-3, speed=1.0, radial_load=radial, axial_load=axial,
+        tilt=None,
         clearance=clearance,
     )  # fmt: skip
     raceway = BallRaceway(11.5 / 43.5, bearing.osculation, 0.0)

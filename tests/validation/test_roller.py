@@ -204,6 +204,12 @@ def test_a_pressure_that_still_grows_is_no_edge_pressure():
     assert "lie 0.92 half-widths apart, where loaded ends need 0.5; take 237 cells" in along.undetermined[0]
 
 
+def test_an_end_at_the_pressure_cap_has_that_edge_pressure():
+    along = along_roller(solved(roller(hardness=2e9), cells=(48, 248), past=4))
+    assert along.edge_pressure.value == pytest.approx(2e9)
+    assert along_roller(solved(roller(hardness=20e9), cells=(48, 248), past=4)).edge_pressure.value is None
+
+
 def test_the_film_at_loaded_ends_asks_for_close_lines():
     few, many, finest = (
         along_roller(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4)) for ny in (256, 1024, 1536)

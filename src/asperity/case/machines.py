@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import tomli_w
-from pydantic import PlainValidator
+from pydantic import BeforeValidator, PlainValidator
 
 from asperity.case.amounts import (
     OPTIONAL,
@@ -44,11 +44,16 @@ from asperity.machine import (
 )
 
 Rotation: TypeAlias = Annotated[float, amount_in("rad/s")]
+RotationOrNone: TypeAlias = Annotated[float, amount_in("rad/s", 0.0)]
 Angle: TypeAlias = Annotated[float, amount_in("rad")]
 AnyLength: TypeAlias = Annotated[float, amount_in("m", -math.inf)]
 ForceOrNone: TypeAlias = Annotated[float, amount_in("N", 0.0)]
 AngleOrNone: TypeAlias = Annotated[float, amount_in("rad", 0.0)]
 LengthPair: TypeAlias = Annotated[tuple[Length, Length], PAIRED]
+Tilt: TypeAlias = Annotated[
+    Annotated[float, amount_in("rad", -math.inf)] | None,
+    BeforeValidator(lambda value: None if value == "free" else value),
+]
 OWN = ("machine", "rating")  # tables that no contact has
 FOUND = 10  # digits of what a contact is stated with
 
@@ -94,6 +99,7 @@ class BallBearingSection(Section):
     clearance: AnyLength = default_amount(0.0, "um")
     radial_load: ForceOrNone = default_amount(0.0, "N")
     axial_load: ForceOrNone = default_amount(0.0, "N")
+    tilt: Tilt = default_amount(0.0, "mrad")
     speed: Rotation
 
 
@@ -102,7 +108,7 @@ class TwinDiscSection(Section):
 
     kind: Literal["twin-disc"]
     radii: LengthPair
-    speeds: Annotated[tuple[Rotation, Rotation] | None, OPTIONAL] = None
+    speeds: Annotated[tuple[RotationOrNone, RotationOrNone] | None, OPTIONAL] = None
     entrainment_speed: Annotated[Speed | None, OPTIONAL] = None
     slide_to_roll: Annotated[Number | None, OPTIONAL] = None
     load: Force
@@ -219,8 +225,8 @@ class MachineCase:
         return _machine_case(replaced(deepcopy(dict(self.tables)), overrides, self.source), self.folder, self.source)
 
 
-def load_machine(path: str | Path) -> MachineCase:
-    """Read a case file that states a machine.
+def load_machine(path: str | Path, overrides: Mapping[str, object] | None = None) -> MachineCase:
+    """Read a case file that states a machine, with values replaced, such as `{"machine.torque": "300 N m"}`.
 
     Raises
     ------
@@ -230,7 +236,10 @@ def load_machine(path: str | Path) -> MachineCase:
         for a machine that cannot be, or a key, unit or value that cannot be meant; one sentence that says which.
     """
     path = Path(path)
-    return _machine_case(parse_toml(read_text(path), str(path)), path.parent, str(path))
+    tables = parse_toml(read_text(path), str(path))
+    if overrides:
+        tables = replaced(tables, overrides, str(path))
+    return _machine_case(tables, path.parent, str(path))
 
 
 def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineCase:

@@ -41,9 +41,7 @@ def machine_command(
     quiet: Quiet = False,
 ) -> None:
     """Solve every contact of a machine: film, load sharing, friction, temperature, and which is worst."""
-    chosen = case.load_machine(path)
-    replaced = read_overrides(overrides)
-    chosen = chosen.with_overrides(replaced) if replaced else chosen
+    chosen = case.load_machine(path, read_overrides(overrides))
     if dry_run:
         result = study.machine_conditions(chosen)
     else:
@@ -56,7 +54,7 @@ def machine_command(
         result.scalars,
         _contacts(result),
         table(_ratings(result)),
-        table(_frequencies(result), [*chosen.notes, *_unsolved(result)]),
+        table(_frequencies(result), [*result.notes, *_unsolved(result)]),
         []
         if out is None or dry_run
         else [
@@ -87,12 +85,13 @@ def _ratings(result: "MachineResult") -> Iterator[Row]:
     for rating in result.ratings:
         entry = quantity(rating.key)
         known = [value for value in rating.values.values() if value is not None]
+        beyond = f"; outside its range: {rating.beyond}" if rating.beyond else ""
         if rating.reason:
             yield entry.title, f"not rated: {rating.reason}"
         elif rating.alone is not None:
-            yield entry.title, f"{entry.text(rating.alone)}  ({rating.standard})"
+            yield entry.title, f"{entry.text(rating.alone)}  ({rating.standard}{beyond})"
         else:
-            yield entry.title, f"{entry.number(min(known))} to {entry.text(max(known))}  ({rating.standard})"
+            yield entry.title, f"{entry.number(min(known))} to {entry.text(max(known))}  ({rating.standard}{beyond})"
 
 
 def _contacts(result: "MachineResult") -> Block:

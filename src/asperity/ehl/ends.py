@@ -141,6 +141,9 @@ def _why_not(solution: ContactSolution, name: str, value: float, bar: float | No
     """Why a figure of the ends is not determined; empty where it is."""
     conditions, pressed = solution.conditions, end_load(solution.conditions)
     apart = solution.grid.spacing[1] / conditions.hertz.half_widths[0]
+    hardness = conditions.hardness
+    if name == "edge_pressure" and hardness is not None and value >= hardness * (1.0 - 1e-6):
+        return ""  # the cap is the limit
     if name == "edge_pressure" and pressed > SHARP:
         return (
             "the roller's shape falls back too little for its ends, where the pressure of elastic half-spaces has no "

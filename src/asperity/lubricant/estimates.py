@@ -99,7 +99,7 @@ class Estimator:
     bases: tuple[Base, ...] = ("mineral",)
 
     def __call__(self, oil: KnownOil, temperature: float) -> float:
-        """Alpha [1/Pa]; BadInput for an oil that it is not meant for."""
+        """Alpha [1/Pa]; BadInput for an oil that it is not meant for, or so cold that its alpha falls."""
         if oil.base not in self.bases:
             others = [name for name, other in ESTIMATORS.items() if oil.base in other.bases]
             raise BadInput(
@@ -112,7 +112,13 @@ class Estimator:
                 f"{self.title} holds from {self.thinnest / MM2:g} mm^2/s upwards, and the oil has {nu / MM2:.3g} "
                 f"mm^2/s at {temperature - 273.15:.4g} degC; give alpha"
             )
-        return self.law(oil, temperature)
+        alpha = self.law(oil, temperature)
+        if self.law(oil, temperature + 1.0) > alpha:
+            raise BadInput(
+                f"{self.title} falls off again in oil as cold and thick as {nu / MM2:.3g} mm^2/s at "
+                f"{temperature - 273.15:.4g} degC, where alpha has to rise; give alpha, or take another alpha_estimate"
+            )
+        return alpha
 
 
 ESTIMATORS: dict[str, Estimator] = {

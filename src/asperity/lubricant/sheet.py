@@ -140,7 +140,15 @@ class OilSheet:
         """Kinematic viscosity at 100 °C [m²/s]: as given, or of the viscosity index."""
         if self.viscosity_100 is None:
             assert self.index is not None
-            return viscosity_100_of(self.at_40, self.index)
+            try:
+                return viscosity_100_of(self.at_40, self.index)
+            except BadInput:
+                if self.viscosity_index is not None:
+                    raise
+                raise BadInput(
+                    f"viscosity_100 is missing; give it: the index of {MINERAL_INDEX:g} that mineral oils are taken "
+                    f"for does not reach oils of {self.at_40 / MM2:.3g} mm^2/s at 40 degC"
+                ) from None
         return self.viscosity_100
 
     def _require_one_index(self) -> None:

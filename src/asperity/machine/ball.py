@@ -1,10 +1,11 @@
 """A ball bearing under radial and axial load: every ball's load and contact angle, deep groove or angular contact.
 
-Rings are rigid and bear no moment: the inner one tilts as the balls let it (ISO 16281). Spin of the balls and
-gyroscopic moments are not covered.
+Rings are rigid (ISO 16281): the shaft holds the inner one at a tilt, or lets it tilt until it bears no moment. Spin of
+the balls and gyroscopic moments are not covered.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -21,6 +22,9 @@ from asperity.machine.roller import require_carried
 from asperity.machine.rolling import STEEL_DENSITY, RollingKinematics, centrifugal_notes, grown, load_zone_notes
 
 EXPONENT = 1.5
+STEEPEST = math.radians(60.0)  # contact angle
+LARGEST_TILT = 0.02  # rad
+HALF_ZONE = 1.22  # thrust from which half of the balls bear over radial load times tan α: Sjövall's integrals
 OSCULATION = 0.52, 0.53  # groove radius over ball diameter, of inner and outer ring: ISO 281's
 RINGS = "inner ring", "outer ring"
 
@@ -38,12 +42,13 @@ class BallBearing:
     osculation : groove radius over ball diameter, of inner and outer ring
     clearance : diametral [m]; negative: preload. It decides the free contact angle
     contact_angle : free contact angle [rad], in place of the clearance
+    tilt : of the inner ring, as its shaft holds it [rad]; None: free, until it bears no moment
 
     Raises
     ------
     BadInput
-        for balls that do not fit or none of which carries, grooves that the ball does not fit, or a clearance beside a
-        contact angle that it contradicts.
+        for balls that do not fit or none of which carries, grooves that the ball does not fit, a clearance beside a
+        contact angle that it contradicts, or an angular-contact bearing without the thrust that holds it together.
     """
 
     place: ClassVar[str] = "cycle_angle"
@@ -57,6 +62,7 @@ class BallBearing:
     osculation: tuple[float, float] = OSCULATION
     clearance: float = 0.0
     contact_angle: float = 0.0
+    tilt: float | None = 0.0
 
     def __post_init__(self) -> None:
         for groove in self.osculation:
@@ -72,15 +78,36 @@ class BallBearing:
                 f"clearance and contact_angle say the same thing: {math.degrees(self.contact_angle):g} deg is a "
                 f"clearance of {own:.1f} um in these grooves; leave one of them out"
             )
+        self._require_shape()
         if not 0.0 <= self.axial_load < math.inf:
             raise BadInput(f"axial_load must not be negative, got {self.axial_load:g} N; leave out its sign")
-        require_positive("ball_diameter", self.ball_diameter, "m")
         if not 0.0 <= self.radial_load < math.inf:
             raise BadInput(f"radial_load must not be negative, got {self.radial_load:g} N; leave out its sign")
-        if self.radial_load == self.axial_load == 0.0:
+        if self.radial_load == self.axial_load == 0.0 <= self.clearance:
             raise BadInput("radial_load and axial_load are both 0 N, no ball carries; give one of them")
+        if self.contact_angle > 0.0 and self.axial_load == 0.0:
+            raise BadInput(self._apart(f"radial_load of {self.radial_load:g} N alone"))
         require_carried(math.hypot(self.radial_load, self.axial_load), self.clearance, self.ball_diameter, "ball")
         _ = self._kinematics(0.0)
+
+    def _require_shape(self) -> None:
+        require_positive("ball_diameter", self.ball_diameter, "m")
+        widest = 2.0 * self.groove_distance * (1.0 - math.cos(STEEPEST))
+        if self.clearance > widest:
+            raise BadInput(
+                f"clearance of {1e6 * self.clearance:g} um lets the balls of these grooves bear at more than 60 deg; "
+                f"it must be at most {1e6 * widest:.1f} um, or the osculation wider"
+            )
+        if self.tilt is not None and not abs(self.tilt) <= LARGEST_TILT:
+            raise BadInput(f"tilt must lie between -20 and 20 mrad, got {1e3 * self.tilt:g} mrad; bearings bear 1 or 2")
+
+    def _apart(self, under: str) -> str:
+        """That an angular-contact bearing comes apart, and what would hold it."""
+        needed = HALF_ZONE * self.radial_load * math.tan(self.contact_angle)
+        return (
+            f"an angular-contact bearing comes apart under a {under}: its rings hold the balls on one side only; "
+            f"give axial_load, which half of the balls bear from about {needed:.3g} N"
+        )
 
     @property
     def groove_distance(self) -> float:
@@ -111,43 +138,59 @@ class BallBearing:
     def shifts(self, pair: ElasticPair) -> tuple[float, float, float]:
         """Of the inner ring, where the balls carry the load: radial and axial [m], tilt [rad].
 
-        The axial one counts from the middle of the axial play. The ring tilts until it bears no moment.
+        The axial one counts from the middle of the axial play.
         """
+        if self.radial_load == self.axial_load == 0.0:
+            return 0.0, 0.0, self.tilt or 0.0
         stiffness = self.stiffness(pair)
         elastic = (max(self.radial_load, self.axial_load) / stiffness) ** (1.0 / EXPONENT)
-        if self.axial_load == 0.0 or self.radial_load == 0.0:
+        if not self.tilt and (self.axial_load == 0.0 or self.radial_load == 0.0):
             return self._under_one_load(stiffness, elastic)
         return self._moved(elastic * self._balanced(stiffness, elastic))
+
+    def moment(self, pair: ElasticPair) -> float:
+        """What the shaft bears of the inner ring's tilting [N m]; 0 where the ring is free to tilt."""
+        if self.tilt is None:
+            return 0.0
+        radial, axial, tilt = self.shifts(pair)
+        forces = self._forces(np.array([radial, axial, tilt * self._arm]), self.stiffness(pair))
+        return float(forces[2]) * self._arm
 
     def _balanced(self, stiffness: float, elastic: float) -> Field:
         """Shifts over `elastic` under both loads: the least of a convex energy, so that there is one balance.
 
-        Balls' approaches are distances less a constant, convex in the shifts, and so is their power 5/2.
+        Balls' approaches are distances less a constant, convex in the shifts, and so is their power 5/2. A tilt that
+        the shaft holds is no unknown.
         """
-        wanted = np.array([self.radial_load, self.axial_load, 0.0])
+        free = 3 if self.tilt is None else 2
+        held = np.array([0.0, 0.0, (self.tilt or 0.0) * self._arm / elastic])
+        wanted = np.array([self.radial_load, self.axial_load, 0.0])[:free]
         force = max(self.radial_load, self.axial_load)
 
+        def whole(shifts: Field) -> Field:
+            return np.concatenate([shifts, held[free:]])
+
         def energy(shifts: Field) -> float:
-            loads, _ = self._balls(elastic * shifts, stiffness)
+            loads, _ = self._balls(elastic * whole(shifts), stiffness)
             approaches = (loads / stiffness) ** (1.0 / EXPONENT)
             return float(0.4 * loads @ approaches / elastic - wanted @ shifts) / force
 
         def excess(shifts: Field) -> Field:
-            return np.asarray((self._forces(elastic * shifts, stiffness) - wanted) / force)
+            return np.asarray((self._forces(elastic * whole(shifts), stiffness)[:free] - wanted) / force)
 
         pressed = (max(self.play, 0.0) / 2.0 + elastic) / elastic
-        free = self.groove_distance * math.sqrt(1.0 - self._held_cosine**2) / elastic
+        aside = self.groove_distance * math.sqrt(1.0 - self._held_cosine**2) / elastic
         manner: Any = {
             "jac": excess,
-            "hess": lambda shifts: self._stiffnesses(shifts, stiffness, elastic),
+            "hess": lambda shifts: self._stiffnesses(whole(shifts), stiffness, elastic)[:free, :free],
             "method": "trust-exact",
             "options": {"gtol": 1e-8, "maxiter": 2000},
         }
-        found = scipy.optimize.minimize(energy, [pressed, free, 0.0], **manner).x
+        found = scipy.optimize.minimize(energy, np.array([pressed, aside, 0.0])[:free], **manner).x
         polished = scipy.optimize.root(excess, found, options={"xtol": 1e-13}).x
         best = min((found, polished), key=lambda shifts: float(np.max(np.abs(excess(shifts)))))
         if np.max(np.abs(excess(best))) < 1e-8:
-            return np.asarray(best)
+            return whole(np.asarray(best))
         raise AsperityError(
             f"no balance was found under a radial load of {self.radial_load:g} N and an axial one of "
             f"{self.axial_load:g} N; leave a small axial load out, or check ball_diameter and osculation"
@@ -181,9 +224,18 @@ class BallBearing:
         return float(shifts[0]), float(shifts[1]), float(shifts[2]) / self._arm
 
     def loads(self, pair: ElasticPair) -> tuple[Field, Field]:
-        """On every ball [N], and its contact angle [rad]."""
+        """On every ball [N], and its contact angle [rad].
+
+        Raises
+        ------
+        BadInput
+            for an angular-contact bearing whose thrust does not hold its balls.
+        """
         radial, axial, tilt = self.shifts(pair)
-        return self._balls(np.array([radial, axial, tilt * self._arm]), self.stiffness(pair))
+        loads, angles = self._balls(np.array([radial, axial, tilt * self._arm]), self.stiffness(pair))
+        if self.contact_angle > 0.0 and np.any(angles[loads > 0.0] <= 0.0):
+            raise BadInput(self._apart(f"thrust of {self.axial_load:g} N beside {self.radial_load:g} N across"))
+        return loads, angles
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
         """Both contacts of every loaded ball."""
@@ -213,28 +265,51 @@ class BallBearing:
 
     @property
     def free_angle(self) -> float:
-        """Contact angle at which the grooves just hold the balls under thrust alone [rad]; 0 under radial load alone.
+        """Contact angle at which the grooves just hold the balls under thrust [rad]; 0 under radial load alone.
 
         Loads change it a little; a bearing's characteristic frequencies are usually given for this one.
         """
-        return self.contact_angle
+        return self.contact_angle if self.axial_load == 0.0 else math.acos(self._held_cosine)
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """What the model leaves out, and where it does not hold."""
         contacts = self.contacts(pair)
         loads, angles = self.loads(pair)
-        said = ["Rings are rigid and bear no moment; spin of the balls is not covered."]
+        said = ["Rings are rigid; spin of the balls is not covered."]
+        said += self._tilting(pair)
         largest = float(angles[np.argmax(loads)])
         if largest > 1e-6:
             said.append(f"The most loaded ball bears at a contact angle of {math.degrees(largest):.2f} deg.")
         mass = STEEL_DENSITY * math.pi / 6.0 * self.ball_diameter**3
         centrifugal = centrifugal_notes(self._kinematics(largest).centrifugal_load(mass), contacts)
-        return (*said, *load_zone_notes(loads.tolist()), *centrifugal)
+        return (*said, *load_zone_notes(loads.tolist(), "ball"), *centrifugal)
 
     def title(self) -> str:
         """Balls and kind."""
         kind = "Angular-contact" if self.contact_angle > 0.0 else "Deep-groove"
         return f"{kind} ball bearing, {self.balls} balls"
+
+    def _tilting(self, pair: ElasticPair) -> Iterator[str]:
+        """How the inner ring is held where that makes a difference, and with what moment."""
+        if 0.0 in (self.radial_load, self.axial_load) and not self.tilt:
+            return
+        if self.tilt is None:
+            tilted = 1e3 * self.shifts(pair)[2]
+            yield (
+                f"The inner ring is free and tilts by {tilted:.2f} mrad, until it bears no moment; a shaft that holds "
+                "it upright changes loads and contact angles."
+            )
+        else:
+            yield (
+                f"The shaft holds the inner ring at a tilt of {1e3 * self.tilt:g} mrad, with a moment of "
+                f'{abs(self.moment(pair)):.3g} N m; a ring that is free to tilt (tilt = "free") is loaded otherwise.'
+            )
+        bearing = int(np.count_nonzero(self.loads(pair)[0]))
+        if self.contact_angle > 0.0 and bearing < self.balls // 2:
+            yield (
+                f"The thrust holds {bearing} of {self.balls} balls; angular-contact bearings are mounted so that half "
+                "of them bear or more."
+            )
 
     @property
     def _held_cosine(self) -> float:

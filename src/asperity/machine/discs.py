@@ -84,14 +84,17 @@ class TwinDisc:
         if self.speeds is not None:
             if self.slide_to_roll is not None:
                 raise BadInput("slide_to_roll is that of both speeds, which are given; leave it out")
-            for speed in self.speeds:
-                require_positive("speeds", speed, "rad/s")
+            if min(self.speeds) < 0.0 or max(self.speeds) <= 0.0:
+                raise BadInput(
+                    f"speeds must not be negative nor both 0, got {self.speeds[0]:g} and {self.speeds[1]:g} rad/s; one "
+                    "disc may stand"
+                )
             return
         require_positive("entrainment_speed", self.entrainment_speed or 0.0, "m/s")
-        if abs(self.slide_to_roll or 0.0) >= 2.0:
+        if abs(self.slide_to_roll or 0.0) > 2.0:
             raise BadInput(
-                f"slide_to_roll must lie between -2 and 2, got {self.slide_to_roll:g}: from there on a disc stands or "
-                "runs backwards against the other; correct it"
+                f"slide_to_roll must lie between -2 and 2, where one disc stands, got {self.slide_to_roll:g}: beyond, "
+                "it runs backwards against the other; correct it"
             )
 
     @property

@@ -18,6 +18,7 @@ from asperity.machine.element import MachineContact, require_count, turns
 
 PathPoint = Literal["A", "AB", "B", "C", "D", "DE", "E"]
 JAMMED = 0.002  # modules by which the shifts may exceed what the centre distance leaves, for rounded catalogue values
+DEDENDUM = 1.25  # of the same, down to the roots that it cuts
 ADDENDUM = 1.0  # of the basic rack over the module; its straight flank ends as far below the reference line
 
 
@@ -40,7 +41,7 @@ class SpurGear:
     Raises
     ------
     BadInput
-        for teeth that do not mesh, jam, end in a point, or are undercut where they bear.
+        for teeth that do not mesh, jam, run into the roots, end in a point, or are undercut where they bear.
     """
 
     place: ClassVar[str] = "path_position_m"
@@ -237,11 +238,26 @@ class SpurGear:
                     f"the {name}'s tip reaches below the {other}'s base circle, the teeth cannot mesh; lower the "
                     f"{name}'s tip diameter or raise the {other}'s profile shift"
                 )
+        self._require_room()
         if not 1.0 <= self.contact_ratio < 2.0:
             few = self.contact_ratio < 1.0
             remedy = "raise the tip diameters or bring the axes closer" if few else "lower the tip diameters"
             why = "the teeth lose contact" if few else "three pairs bear, which the load sharing does not cover"
             raise BadInput(f"the contact ratio is {self.contact_ratio:.3f}: {why}; {remedy}")
+
+    def _require_room(self) -> None:
+        """BadInput where tips that are as long as the standard rack makes them reach the roots that it cuts."""
+        if self.tip_diameters is not None:
+            return
+        for body, (name, other) in enumerate((("pinion", "wheel"), ("wheel", "pinion"))):
+            shift = self.profile_shift[1 - body]
+            root = 0.5 * self.module * (self.teeth[1 - body] - 2.0 * (DEDENDUM - shift))
+            room = self.centres - self.tip_radii[body] - root
+            if room < 0.0:
+                raise BadInput(
+                    f"the {name}'s tips run {-1e3 * room:.3f} mm into the {other}'s roots; give tip_diameters that are "
+                    f"{-2e3 * room:.3f} mm less, or lower profile_shift"
+                )
 
     def _require_whole_teeth(self, body: int) -> None:
         name, tip, base = ("pinion", "wheel")[body], self.tip_radii[body], self.base_radii[body]

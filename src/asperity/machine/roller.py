@@ -150,7 +150,7 @@ class CylindricalRollerBearing:
         if abs(pair.effective_modulus / STEEL[0] - 1.0) > STEEL[1]:
             said.append("The load zone is that of steel rollers and rings (ISO 16281), whatever [material] says.")
         centrifugal = centrifugal_notes(self.kinematics.centrifugal_load(mass), self.contacts(pair))
-        return (*said, *load_zone_notes(self.loads.tolist()), *centrifugal)
+        return (*said, *load_zone_notes(self.loads.tolist(), "roller"), *centrifugal)
 
     def title(self) -> str:
         """Rollers and how many of them carry."""

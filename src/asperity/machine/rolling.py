@@ -97,9 +97,13 @@ def centrifugal_notes(load: float, contacts: tuple[MachineContact, ...]) -> tupl
     return (f"The centrifugal load of {load:.3g} N on the outer ring is left out (largest load {largest:.4g} N).",)
 
 
-def load_zone_notes(loads: list[float]) -> tuple[str, ...]:
-    """That one rolling element alone bears the load."""
-    return ("One rolling element alone carries the whole load.",) if sum(load > 0.0 for load in loads) == 1 else ()
+def load_zone_notes(loads: list[float], element: str) -> tuple[str, ...]:
+    """That one rolling element alone bears the load, or where they stand."""
+    if sum(load > 0.0 for load in loads) == 1:
+        return (f"One {element} alone carries the whole load.",)
+    if max(loads) == min(loads):
+        return ()
+    return (f"{element.capitalize()} 0 stands under the radial load; where it passes between two, they bear less.",)
 
 
 def grown(start: float, enough: Callable[[float], bool]) -> float:

@@ -101,8 +101,12 @@ def bulk_temperature(oil: float, loss: float, centres: float, face_width: float,
     return float(oil + 7400.0 * (1e-3 * loss / (1e6 * centres * face_width)) ** 0.72 * supplied / 1.2)
 
 
-def specific_film(point: MeshPoint, mesh: Mesh, oil: GearOil, friction: float, bulk: float) -> tuple[float, float]:
+def specific_film(
+    point: MeshPoint, mesh: Mesh, oil: GearOil, friction: float, bulk: float
+) -> tuple[float | None, float]:
     """λ = h/Ra with h = 1600 ρ G^0.6 U^0.7 W^-0.13 S^0.22 [um, mm], and the flash temperature in it [K].
+
+    None for a flash so hot that the oil has no alpha left.
 
     `bulk` is the teeth's temperature [K]. G = α_M E', U = η_M (v1 + v2)/(2 E' ρ), W = 2 π p²/E'², and S is the same
     α η at the contact's temperature over that at the bulk's. Source: ISO/TR 15144-1:2014; the film is Dowson's of
@@ -111,6 +115,8 @@ def specific_film(point: MeshPoint, mesh: Mesh, oil: GearOil, friction: float, b
     rise = flash_rise(friction, point.line_load, point.half_width, point.speeds, mesh.effusivities, shape=UNIFORM_HEAT)
     contact = bulk + rise
     viscosity, alpha = oil.viscosity(bulk), oil.alpha(bulk)
+    if oil.alpha(contact) <= 0.0:
+        return None, rise
     material = alpha * mesh.modulus
     speed = viscosity * sum(point.speeds) / (2.0 * mesh.modulus * point.radius)
     load = math.tau * (point.pressure / mesh.modulus) ** 2

@@ -1,6 +1,6 @@
 """What became of a machine: its contacts, a row each, the worst of them, what is concluded, and its ratings."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,8 +10,9 @@ from asperity.case import MachineCase
 from asperity.machine import MachineContact
 from asperity.quantities import quantity
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW, Run
-from asperity.study.rated import DangVan, Rating, dang_van_below, machine_ratings
+from asperity.study.rated import DangVan, Rating, dang_van_below, machine_ratings, warmer_teeth
 
+HARDEST, STEEL_FROM = 4.2e9, 180e9  # pressure; Young's modulus of both bodies from which it is meant [Pa]
 SAID = ("viscosity_ratio", "life_factor", "rated_film", "scuffing_margin_k")  # ratings, in the verdict
 
 
@@ -64,6 +65,22 @@ class MachineResult:
         """As standards have them, beside the solved numbers and without them; of fatigue, below the worst contact."""
         return (*machine_ratings(self.case), *(() if self.dang_van is None else self.dang_van.ratings()))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the contacts has to know, a sentence each."""
+        return (*self.case.notes, *self._too_hard(), *warmer_teeth(self.case, self.ratings))
+
+    def _too_hard(self) -> Iterator[str]:
+        """A Hertz pressure that no rolling contact of steel bears."""
+        hardest = max(self.rows, key=lambda row: row["p_hertz_pa"])
+        steel = min(self.case.pair.youngs_moduli) > STEEL_FROM
+        if steel and hardest["p_hertz_pa"] > HARDEST:
+            pressure, most = (quantity("hertz_pressure_pa").text(p) for p in (hardest["p_hertz_pa"], HARDEST))
+            yield (
+                f"Hertz's pressure of {pressure} at {hardest['name']} is above {most}, the static limit of hardened "
+                "bearing steel (ISO 76): the bodies yield for good, and their elastic contact is none of theirs."
+            )
+
     def scalars(self) -> dict[str, Any]:
         """What `machine --json` prints."""
         return {
@@ -72,7 +89,7 @@ class MachineResult:
             "frequencies": self.case.machine.frequencies,
             "worst": self.worst["name"],
             "ratings": [rating.to_dict() for rating in self.ratings],
-            "notes": list(self.case.notes),
+            "notes": list(self.notes),
             "seconds": self.seconds,
         }
 
@@ -104,7 +121,7 @@ class MachineResult:
         """The ratings that a tribologist looks at first, as the end of a sentence."""
         said = []
         for rating in self.ratings:
-            if rating.key in SAID and not rating.reason:
+            if rating.key in SAID and not rating.reason and not rating.beyond:
                 known = {name: value for name, value in rating.values.items() if value is not None}
                 least = min(known, key=lambda name: known[name])
                 where = f" at {least}" if least else ""

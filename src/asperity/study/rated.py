@@ -6,8 +6,8 @@ other way round: of a solved contact's stresses, with no roughness number.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -19,23 +19,28 @@ from asperity.case import Case, MachineCase, SheetSection
 from asperity.ehl import SubsurfaceStress, stress_below
 from asperity.errors import BadInput
 from asperity.lubricant import ESTIMATORS, OilSheet
-from asperity.machine import BallBearing, CylindricalRollerBearing, SpurGear
+from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact, SpurGear
 from asperity.results import Run
 from asperity.study.rating_facts import FACTS
 
 MILLION = 1e6
+PITCH_LINE = 2.0, 80.0  # m/s that the gears' ratings are for, by their standards' scopes
+WORKING = 15.0, 25.0  # deg, of the working pressure angle
+WARMER = 3.0  # K of the teeth above the oil that are said
+SLOW_HEAT = 1.0  # Peclet number u a/2κ below which Blok's flash is more than 6 % too high
 
 
 @dataclass(frozen=True)
 class Rating:
     """A rating: its key among the quantities, and its values by contact; "" is the whole machine.
 
-    `reason` says why it has none.
+    `reason` says why it has none, `beyond` what of the machine lies outside what the standard is for.
     """
 
     key: str
     values: Mapping[str, float | None]
     reason: str = ""
+    beyond: str = ""
 
     @property
     def standard(self) -> str:
@@ -61,7 +66,7 @@ class Rating:
         """As `machine --json` prints it."""
         value: dict[str, Any] = {"value": self.alone} if set(self.values) <= {""} else {"values": dict(self.values)}
         facts = {"standard": self.standard, "formula": self.formula, "validity": self.validity}
-        return {"key": self.key, **value, **facts, "reason": self.reason}
+        return {"key": self.key, **value, **facts, "reason": self.reason, "beyond": self.beyond}
 
 
 def machine_ratings(case: MachineCase) -> tuple[Rating, ...]:
@@ -107,7 +112,8 @@ def _of_bearing(case: MachineCase, bearing: CylindricalRollerBearing | BallBeari
         return (*found, _whole("life_factor", None, no), _whole("modified_life_s", None, no))
     assert given.fatigue_load_limit is not None
     assert given.contamination is not None
-    share = float(given.contamination) * float(given.fatigue_load_limit) / equivalent
+    # a_ISO is of stresses: slices and clearance lengthen a life, but no roller's stress falls below that of the load
+    share = float(given.contamination) * float(given.fatigue_load_limit) / max(equivalent, bearing.radial_load)
     factor = rating.life_factor(element, kappa, share)
     thick = "the viscosity ratio lies below 0.1, where ISO 281 rates nothing"
     hours = None if factor is None else factor * life * math.tau / bearing.speed
@@ -153,35 +159,58 @@ def _of_gears(case: MachineCase, gears: SpurGear, stated: Case) -> tuple[Rating,
     bulk = _bulk(case, gears, friction, supply)
     solids = stated.thermal.solids
     mesh = rating.Mesh(rough, case.pair.effective_modulus, (solids[0].effusivity, solids[1].effusivity))
-    films = {}
-    for contact in case.contacts:
-        hertz = contact.hertz(case.pair)
-        assert contact.line_load is not None
-        assert not isinstance(contact.radius, tuple)
-        point = rating.MeshPoint(
-            contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds
-        )
-        films[contact.name] = rating.specific_film(point, mesh, oil, friction, bulk)
+    points = {contact.name: _mesh_point(case, contact) for contact in case.contacts}
+    films = {name: rating.specific_film(point, mesh, oil, friction, bulk) for name, point in points.items()}
     rises = {name: rise for name, (_, rise) in films.items()}
     film = {name: value for name, (value, _) in films.items()}
-    return (
+    gone = "" if None not in film.values() else "the flash takes the oil beyond 510 degC, where the estimate of α ends"
+    slow = min(
+        (min(point.speeds) * point.half_width / (2.0 * solids[0].diffusivity) for point in points.values()),
+    )
+    teeth, fast = _beyond(gears), "" if slow >= SLOW_HEAT else f"a Peclet number of {slow:.2g}, for 1 and more"
+    both = "; ".join(filter(None, (teeth, fast)))
+    found = (
         _whole("mesh_friction", friction),
         _whole("rated_bulk_k", bulk),
-        Rating("rated_flash_k", rises),
-        Rating("rated_film", film),
+        Rating("rated_flash_k", rises, beyond=both),
+        Rating("rated_film", film, gone),
         *_limits(case, film, bulk + max(rises.values()), oil, supply),
+    )
+    return tuple(replace(each, beyond=each.beyond or teeth) for each in found)
+
+
+def _mesh_point(case: MachineCase, contact: MachineContact) -> rating.MeshPoint:
+    hertz = contact.hertz(case.pair)
+    assert contact.line_load is not None
+    assert not isinstance(contact.radius, tuple)
+    return rating.MeshPoint(
+        contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds
     )
 
 
+def _beyond(gears: SpurGear) -> str:
+    """What of the gears lies outside what the standards' ratings are for; nothing where all is within."""
+    working, found = math.degrees(gears.working_angle), []
+    pitch_line = gears.speed * gears.base_radii[0] / math.cos(gears.working_angle)
+    if not PITCH_LINE[0] <= pitch_line <= PITCH_LINE[1]:
+        found.append(f"a pitch-line speed of {pitch_line:.3g} m/s, for {PITCH_LINE[0]:g} to {PITCH_LINE[1]:g}")
+    if not WORKING[0] <= working <= WORKING[1]:
+        found.append(f"a working pressure angle of {working:.3g} deg, for {WORKING[0]:g} to {WORKING[1]:g}")
+    return ", ".join(found)
+
+
 def _limits(
-    case: MachineCase, film: Mapping[str, float], hottest: float, oil: rating.GearOil, supply: float
+    case: MachineCase, film: Mapping[str, float | None], hottest: float, oil: rating.GearOil, supply: float
 ) -> tuple[Rating, ...]:
     """Safety against micropitting and the margin to scuffing, where their limits are given."""
     given = case.rating
     missing = "[rating] has no permissible_film: it is of a test of the oil"
     safety = _whole("micropitting_safety", None, missing)
-    if given.permissible_film is not None:
-        safety = _whole("micropitting_safety", min(film.values()) / float(given.permissible_film))
+    known = [value for value in film.values() if value is not None]
+    if given.permissible_film is not None and len(known) < len(film):
+        safety = _whole("micropitting_safety", None, "the specific film is not known all along the path")
+    elif given.permissible_film is not None:
+        safety = _whole("micropitting_safety", min(known) / float(given.permissible_film))
     missing = "[rating] has no scuffing_stage: it is of an FZG test of the oil"
     margin = (_whole("scuffing_limit_k", None, missing), _whole("scuffing_margin_k", None, missing))
     if given.scuffing_stage is not None:
@@ -211,9 +240,28 @@ def _bulk(case: MachineCase, gears: SpurGear, friction: float, supply: float) ->
 
 
 def _gear_oil(sheet: OilSheet) -> rating.GearOil:
-    """Beyond 150 °C too, where a flash of microseconds takes it."""
+    """Beyond 150 °C too, where a flash of microseconds takes it: the standard's α is one of the oil at 38 °C.
+
+    No viscosity of the hot oil enters, so that none is too thin for it.
+    """
     return rating.GearOil(
-        lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin), partial(ESTIMATORS["iso"], sheet), sheet.base
+        lambda kelvin: sheet.walther(kelvin) * sheet.density(kelvin), partial(ESTIMATORS["iso"].law, sheet), sheet.base
+    )
+
+
+def warmer_teeth(case: MachineCase, ratings: Sequence[Rating]) -> Iterator[str]:
+    """That gears' contacts are solved with the oil as it is supplied, where their teeth are rated to be warmer."""
+    bulk = next((each.alone for each in ratings if each.key == "rated_bulk_k"), None)
+    drawn = [contact for contact in case.contacts if not contact.stands_still]
+    section = case.case(drawn[0]).contents.lubricant if bulk is not None else None
+    if bulk is None or not isinstance(section, SheetSection) or bulk - float(section.temperature) < WARMER:
+        return
+    supply, sheet = float(section.temperature), section.sheet
+    share = sheet.walther(bulk) * sheet.density(bulk) / sheet.viscosity(supply)
+    yield (
+        f"The contacts are solved with oil of {supply - 273.15:.3g} degC, as it is supplied; at the teeth's rated bulk "
+        f"temperature of {bulk - 273.15:.3g} degC it has {share:.2f} of that viscosity, and films are thinner. State "
+        "that as lubricant.temperature and as rating.bulk_temperature to solve them so."
     )
 
 

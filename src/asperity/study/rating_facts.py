@@ -13,7 +13,10 @@ class RatingFacts(NamedTuple):
 
 _LIFE = "ISO/TS 16281:2008"
 _MICROPITTING = "ISO/TR 15144-1:2014"
-_TEETH = "unmodified spur gears in mineral or PAO oil; dynamic factors, tip relief and coatings are taken as 1"
+_TEETH = (
+    "unmodified spur gears in mineral or PAO oil, tested at modules of 3 to 11 mm, working pressure angles to 25 deg, "
+    "above 2 m/s at the pitch line; dynamic factors, tip relief and coatings are taken as 1"
+)
 _STRESS = "elastic half-space; the pattern of asperities stands still, residual stress is left out"
 FACTS: dict[str, RatingFacts] = {
     "reference_viscosity_m2_s": RatingFacts(
@@ -34,8 +37,9 @@ FACTS: dict[str, RatingFacts] = {
     ),
     "life_factor": RatingFacts(
         "ISO 281:2007, 9.3.3",
-        "a_ISO = 0.1 (1 - (c₁ - c₂/κ^e)^g (e_C C_u/P_ref)^h)^-k, at most 50",
-        "κ of 0.1 to 4; for the whole bearing, of rollers too. Roughness is in κ: no solved film goes in",
+        "a_ISO = 0.1 (1 - (c₁ - c₂/κ^e)^g (e_C C_u/P)^h)^-k, at most 50, P the larger of P_ref and the radial load",
+        "κ of 0.1 to 4; for the whole bearing, of rollers too, whose slices ISO/TS 16281 takes one by one. "
+        "Roughness is in κ: no solved film goes in",
     ),
     "modified_life_s": RatingFacts("ISO 281:2007", "L_10m = a_ISO L₁₀r at the stated speed", "90 % survive"),
     "mesh_friction": RatingFacts(
@@ -49,7 +53,7 @@ FACTS: dict[str, RatingFacts] = {
     "rated_flash_k": RatingFacts(
         _MICROPITTING,
         "θ_fl = 2/√π μ w′ |u₁ - u₂|/((B₁√u₁ + B₂√u₂)√(2a)), Blok's of even heat",
-        "Peclet numbers above 5; with the mean μ above, not the solved friction",
+        "Peclet numbers u a/2κ above 1, within 6 % of fast heat; with the mean μ above, not the solved friction",
     ),
     "rated_film": RatingFacts(
         _MICROPITTING,
