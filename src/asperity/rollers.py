@@ -19,6 +19,7 @@ OUTERMOST = 1e-6  # of 1 - (2y/L)²: as near to the end as a logarithm without a
 STEEPEST_TILT = 0.05  # rad
 STEEP = 0.1  # slope of a chamfer from which the roller ends where it begins
 END_SHARE = 0.5 * math.exp(-0.5)  # 0.3033 of b/L: Johns and Gohar's, the deflection of a strip's end against its middle
+SHARP = 0.8  # load per length on an end, over the mean, from which its pressure has no limit
 SLICES = 400
 ROUNDS = 60
 
@@ -131,6 +132,16 @@ class SlicedLoad(NamedTuple):
     def peak(self) -> float:
         """Largest load per length over the mean of the whole length."""
         return float(self.line_load.max() / self.line_load.mean())
+
+    @property
+    def on_end(self) -> float:
+        """Load per length on the more loaded end over the mean of the whole length."""
+        return float(max(self.line_load[0], self.line_load[-1]) / self.line_load.mean())
+
+    @property
+    def sharp(self) -> bool:
+        """Whether an end is so loaded that the pressure of half-spaces has no limit there."""
+        return self.on_end > SHARP
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -257,7 +257,10 @@ def test_speeds_that_slip_backwards_are_said_or_refused(asp):
         assert words in err
     slid = DISCS.replace('speeds = ["1000 r/min", "500 r/min"]', 'entrainment_speed = "2 m/s"\nslide_to_roll = 2.2')
     Path("discs.toml").write_text(slid, "utf-8")
-    assert "slide_to_roll must lie between -2 and 2, where one disc stands, got 2.2" in asp("machine", "discs.toml", "--dry-run")[2]
+    assert (
+        "slide_to_roll must lie between -2 and 2, where one disc stands, got 2.2"
+        in asp("machine", "discs.toml", "--dry-run")[2]
+    )
 
 
 def test_discs_from_python(tmp_path):

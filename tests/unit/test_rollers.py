@@ -98,6 +98,30 @@ def test_conditions_that_do_not_fit_are_refused():
         replace(roller(ISO), geometry="line")
 
 
+@pytest.mark.parametrize(
+    ("given", "load", "said"),
+    [
+        (
+            {"length": 10e-6},
+            1649.0,
+            r"0.01 mm are shorter than its contact is wide, 5.19 mm under 1649 N: .* lower the load",
+        ),
+        (
+            {},
+            1.0,
+            r"load of 1 N floats on a film of 30.5 um, .* on 333 um where Hertz's half-width is 2.02 um: .* raise",
+        ),
+    ],
+)
+def test_what_is_no_roller_contact_is_refused_at_once(given, load, said):
+    oil = asp.Lubricant(
+        viscosity=asp.Roelands(0.04, 20e-9), density=asp.DowsonHigginson(870.0), rheology=asp.Newtonian()
+    )
+    conditions = roller(None, load, **given)
+    with pytest.raises(asp.BadInput, match=said):
+        asp.solve_contact(conditions, oil, asp.flat_surface(auto_grid(conditions, oil)))
+
+
 def test_slices_share_the_load_about_as_iso_does():
     """w'max/w'mean 1.3318 on 0.955 of the length by ISO's slices; a half-space's differ by a few per cent."""
     load = sliced_load(ISO, LENGTH, LOAD, RADIUS, STEEL.reduced_modulus)

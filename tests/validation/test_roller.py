@@ -296,6 +296,31 @@ def test_the_ends_of_the_range_are_solved(given, load):
     assert 0.0 < state.h_min < state.h_central
 
 
+@pytest.mark.parametrize("shape", [ISO, RollerShape()])
+def test_a_smooth_roller_that_hardly_moves_is_the_dry_one(shape):
+    """Thinner than a few molecules there is no film; from the dry contact that is a dozen steps."""
+    conditions = roller(shape, surface_speeds=(1e-3, 1e-3))
+    slow, dry = (solved(conditions, oil, cells=(96, 120), past=4) for oil in (OIL, None))
+    assert slow.convergence.iterations < 40
+    assert asp.contact_state(slow).clr > 0.99
+    middle = slice(10, -10)
+    reach = np.interp(slow.grid.x, dry.grid.x, dry.pressure[:, 64])
+    assert np.abs(slow.pressure[:, 64] - reach).max() < 0.05 * dry.pressure[:, middle].max()
+
+
+def test_a_straight_roller_is_led_on_from_the_dry_one():
+    """Its sharp ends touch; the film between them is that of the line contact of its own load."""
+    solution = solved(roller(), OIL, cells=(128, 120), past=4)
+    assert solution.convergence.attempt == "coarse to fine"  # on by the accurate wedge
+    assert solution.convergence.iterations < 200
+    along = along_roller(solution)
+    middle = along.y.size // 2
+    line = replace(roller(), geometry="line", load=float(along.line_load[middle]) * LENGTH)
+    lower, upper = (solution.grid.lower[0], -1e-4), (solution.grid.upper[0], 1e-4)
+    even = asp.solve_contact(line, OIL, asp.flat_surface(asp.Grid((128, 8), lower, upper)))
+    assert asp.contact_state(solution).h_central == pytest.approx(asp.contact_state(even).h_central, rel=5e-3)
+
+
 def test_without_speed_a_rough_roller_is_dry():
     conditions = roller(lundberg(1.5 * LOAD), surface_speeds=(1e-4, 1e-4), hardness=4e9)
     grid = auto_grid(conditions, OIL, cells=(64, 128))

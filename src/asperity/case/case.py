@@ -69,7 +69,8 @@ class Case:
         try:
             yield
         except BadInput as error:
-            raise type(error)(f"{self.source}: {part}: {error}") from None
+            named = str(error).startswith(f"{self.source}: ")  # by a part inside this one
+            raise type(error)(str(error) if named else f"{self.source}: {part}: {error}") from None
 
     @cached_property
     def conditions(self) -> ContactConditions:

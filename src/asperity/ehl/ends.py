@@ -9,15 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.conditions import ContactConditions
 from asperity.ehl.along import Along
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.quantities import quantity
 
 LOADED = 0.01  # of the mean load per length, from which a place counts as loaded
-SHARP = 0.8  # load per length on an end by slices, over the mean, from which its pressure has no limit
-BEARING = 0.2  # the same, from which the end bears, and needs lines of cells close together
+BEARING = 0.2  # load per length on an end by slices, over the mean, from which it bears, and needs close lines of cells
 CLOSE = {"edge_pressure": 0.5, "end_film": 0.25}  # half-widths that those may lie apart there
 WIDEST = 0.5  # bar of a figure, over the figure, that still tells something
 
@@ -125,12 +123,6 @@ def along_roller(solution: ContactSolution) -> AlongRoller | None:
     )
 
 
-def end_load(conditions: ContactConditions) -> float:
-    """Load per length that slices put on the more loaded end of a roller, over the mean of its length."""
-    load = conditions.sliced_load
-    return float(max(load.line_load[0], load.line_load[-1]) / load.line_load.mean())
-
-
 def _at_end(solution: ContactSolution, name: str, value: float) -> AtEnd:
     error = solution.convergence.error
     bar = None if error is None else getattr(error, name)
@@ -139,19 +131,19 @@ def _at_end(solution: ContactSolution, name: str, value: float) -> AtEnd:
 
 def _why_not(solution: ContactSolution, name: str, value: float, bar: float | None) -> str:
     """Why a figure of the ends is not determined; empty where it is."""
-    conditions, pressed = solution.conditions, end_load(solution.conditions)
+    conditions, load = solution.conditions, solution.conditions.sliced_load
     apart = solution.grid.spacing[1] / conditions.hertz.half_widths[0]
     hardness = conditions.hardness
     if name == "edge_pressure" and hardness is not None and value >= hardness * (1.0 - 1e-6):
         return ""  # the cap is the limit
-    if name == "edge_pressure" and pressed > SHARP:
+    if name == "edge_pressure" and load.sharp:
         return (
             "the roller's shape falls back too little for its ends, where the pressure of elastic half-spaces has no "
             "limit and grows with the number of cells"
         )
     if solution.lubricant is None and name == "end_film":
         return ""
-    if pressed > BEARING and apart > CLOSE[name] * (1.0 + 1e-9):
+    if load.on_end > BEARING and apart > CLOSE[name] * (1.0 + 1e-9):
         wanted = int(np.ceil(solution.grid.cells[1] * apart / CLOSE[name]))
         return (
             f"its lines of cells lie {apart:.2g} half-widths apart, where loaded ends need {CLOSE[name]:g}; take "

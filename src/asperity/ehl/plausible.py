@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from asperity.conditions import ContactConditions
-from asperity.ehl.ends import BEARING, SHARP, along_roller, end_load
+from asperity.ehl.ends import BEARING, along_roller
 from asperity.ehl.gridding import (
     CELLS_IN_INLET,
     WIDEST_BAR,
@@ -100,13 +100,13 @@ def _solids(conditions: ContactConditions) -> Iterator[str]:
 
 
 def _roller(conditions: ContactConditions) -> Iterator[str]:
-    load, pressed = conditions.sliced_load, end_load(conditions)
-    if pressed > SHARP:
+    load = conditions.sliced_load
+    if load.sharp:
         yield (
             "The roller's shape falls back too little for its ends: the pressure of elastic half-spaces has no limit "
             "there. Take more crown, or read load per length and pressure at mid-length."
         )
-    if pressed > BEARING:
+    if load.on_end > BEARING:
         yield (
             "The roller's ends bear load as ends of half-spaces do; that a real roller ends in a free surface, which "
             "is softer, is not modelled."

@@ -9,6 +9,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.elastic import elastic_contact
+from asperity.ehl.films import central_film
 from asperity.ehl.iterate import Step, newton
 from asperity.ehl.mixed_solve import solve_mixed
 from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
@@ -23,6 +24,7 @@ from asperity.grid import Grid
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
+RIGID = 30.0  # half-widths on which a film bears, from where rollers are refused
 ELASTIC_TO = 0.1  # of the tolerance that a step of Newton's then has to meet
 
 
@@ -57,7 +59,7 @@ def solve_contact(
         when strict and the tolerance was not met; carries the unfinished solution.
     """
     options = options or Options()
-    _check_grid(conditions, surface)
+    _check_grid(conditions, lubricant, surface)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
     solve = SOLVERS[options.model if lubricant else PAPER]  # without oil there is one pressure, and nothing to lose
@@ -162,13 +164,15 @@ def _check_factor(factor: Field, surface: Surface) -> None:
         )
 
 
-def _check_grid(conditions: ContactConditions, surface: Surface) -> None:
+def _check_grid(conditions: ContactConditions, lubricant: Lubricant | None, surface: Surface) -> None:
     grid, line = surface.grid, conditions.endless
     if grid.periodic != (False, line):
         which = "an elliptic" if conditions.geometry == "elliptic" else f"a {conditions.geometry}"
         raise BadInput(f"{which} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}")
     a, b = conditions.hertz.half_widths
     if conditions.geometry == "roller":
+        if lubricant is not None:
+            _check_weight(conditions, lubricant)
         _check_ends(conditions, grid)
     for axis, index, half in [("x", 0, a)] if conditions.long else [("x", 0, a), ("y", 1, b)]:
         low, high, spacing = grid.lower[index], grid.upper[index], grid.spacing[index]
@@ -184,9 +188,27 @@ def _check_grid(conditions: ContactConditions, surface: Surface) -> None:
             )
 
 
+def _check_weight(conditions: ContactConditions, lubricant: Lubricant) -> None:
+    """A roller must be pressed so that it deforms: the solver counts in Hertz's half-widths."""
+    film = central_film(conditions, lubricant)
+    wide = float(np.sqrt(film * conditions.radius_along_rolling))  # where a rigid roller's pressure is
+    if wide > RIGID * conditions.hertz.half_widths[0]:
+        raise BadInput(
+            f"the roller's load of {conditions.load:.3g} N floats on a film of {film * 1e6:.3g} um, which bears it on "
+            f"{wide * 1e6:.3g} um where Hertz's half-width is {conditions.hertz.half_widths[0] * 1e6:.3g} um: the "
+            "bodies stay rigid, and no elastic contact is solved; raise the load, or lower the speed"
+        )
+
+
 def _check_ends(conditions: ContactConditions, grid: Grid) -> None:
     """A roller's grid has to hold what is loaded of its length, or all of it and a line of cells beyond."""
     half, (low, high) = conditions.end, conditions.sliced_load.ends
+    if (wide := 2.0 * conditions.hertz.half_widths[0]) > conditions.line_length:
+        raise BadInput(
+            f"the roller's {conditions.line_length * 1e3:.3g} mm are shorter than its contact is wide, "
+            f"{wide * 1e3:.3g} mm under {conditions.load:.4g} N: it has no length to share a load along; lower the "
+            'load, or take geometry = "elliptic"'
+        )
     middle, reach = 0.5 * (low + high), 0.55 * (high - low)
     wanted = max(middle - reach, -half), min(middle + reach, half)
     if grid.y[0] > wanted[0] or grid.y[-1] < wanted[1]:

@@ -39,7 +39,7 @@ class ReeEyring(Parametric):
         """asinh(S)/S and S/(√(1 + S²) asinh S) - 1."""
         ratio = np.maximum(shear / self.tau0, 1e-6)  # below it both are 1 and 0 to twelve digits
         stress = np.arcsinh(ratio)
-        return stress / ratio, ratio / (np.sqrt(1.0 + ratio**2) * stress) - 1.0
+        return stress / ratio, ratio / (np.hypot(1.0, ratio) * stress) - 1.0
 
 
 RHEOLOGY_LAWS: dict[str, type[RheologyLaw]] = {"newtonian": Newtonian, "ree-eyring": ReeEyring}
