@@ -6,8 +6,9 @@ import pytest
 from asperity.ehl import Options, Scales
 from asperity.ehl.linear import Linear, five_point_pattern
 from asperity.ehl.posing import contact_problem, first_guess
-from asperity.kernels import relax, reynolds
-from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows, Stencil
+from asperity.kernels import relax, reynolds, stencils
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
+from asperity.kernels.stencils import Far, Stencil
 from support import reynolds as twin
 from support.paper import barus, contact, grid, rough
 
@@ -36,7 +37,12 @@ def stencil(rng):
     return Stencil(5.0 + rng.random(CELLS), *(-rng.random(CELLS) for _ in range(4)))
 
 
-def dense(stencil):
+def far_of(cells, rng=None):
+    """Couplings of cells two away along x; nothing without a generator."""
+    return Far(*(np.empty((2, 0, 0)) if rng is None else -rng.random((2, *cells))))
+
+
+def dense(stencil, far=None):
     """The stencil as a matrix: x ends, y goes round."""
     nx, ny = stencil.centre.shape
     matrix = np.zeros((nx * ny, nx * ny))
@@ -50,6 +56,10 @@ def dense(stencil):
                 matrix[row, row + ny] += stencil.east[i, j]
             matrix[row, i * ny + (j + 1) % ny] += stencil.north[i, j]
             matrix[row, i * ny + (j - 1) % ny] += stencil.south[i, j]
+            if far is not None and i > 1:
+                matrix[row, row - 2 * ny] += far.west[i, j]
+            if far is not None and i < nx - 2:
+                matrix[row, row + 2 * ny] += far.east[i, j]
     return matrix
 
 
@@ -177,7 +187,7 @@ def first_order_rows(film, storing=0.0):
 @pytest.mark.parametrize("storing", [0.0, 3.0])
 def test_local_stencil_is_the_twins_matrix(film, rows, storing):
     stencil = Stencil(*(np.empty(CELLS) for _ in range(5)))
-    reynolds.local_stencil(rows, film, faces_of(film), NEAR, (DX, DY), storing, stencil)
+    stencils.local_stencil(rows, film, faces_of(film), NEAR, (DX, DY), storing, stencil)
     wet = first_order_rows(film, storing) * rows.fluid_scale.ravel()[:, None]
     ny = CELLS[1]
     expected = np.eye(wet.shape[0])
@@ -197,7 +207,7 @@ def test_mobility_slopes_are_the_complex_step_of_the_twin(rng, film, rows):
     compliance, pressure = 0.4, rng.random(CELLS)
     pressure[[0, -1]] = 0.0
     stencil = Stencil(*(np.zeros(CELLS) for _ in range(5)))
-    reynolds.add_mobility_slopes(rows, film, faces_of(film), pressure, compliance, (DX, DY), stencil)
+    stencils.add_mobility_slopes(rows, film, faces_of(film), pressure, compliance, (DX, DY), stencil)
     slope = film.log_mobility_by_pressure + compliance * film.log_mobility_by_gap
     expected = np.empty((pressure.size, pressure.size))
     for column in range(pressure.size):
@@ -208,6 +218,41 @@ def test_mobility_slopes_are_the_complex_step_of_the_twin(rng, film, rows):
         out = twin.net_outflow(pressure + nothing, nothing, mobility, film.ambient, nothing[0], DX, DY)
         expected[:, column] = (out.imag / 1e-30 * rows.fluid_scale * (rows.state == LUBRICATED)).ravel()
     np.testing.assert_allclose(dense(stencil), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
+    """Along x a pressure moves its own gap and those on both sides, across x its own; three cells upstream is cut."""
+    ny = CELLS[1]
+    own, beside = 0.4, 0.15
+    pressure, faces = rng.random(CELLS), faces_of(film, **scheme)
+    stencil, far = Stencil(*(np.empty(CELLS) for _ in range(5))), Far(*(np.empty(CELLS) for _ in range(2)))
+    stencils.wedge_stencil(rows, film, faces, pressure, (own, beside), (DX, DY), stencil, far)
+    wet, step = rows.state == LUBRICATED, 1e-30j
+    expected = np.eye(pressure.size)
+    expected[wet.ravel()] = 0.0
+    for column in range(pressure.size):
+        unit = np.zeros(CELLS)
+        unit.ravel()[column] = 1.0
+        d_gap = {"x": own * unit, "y": own * unit}
+        d_gap["x"][1:] += beside * unit[:-1]
+        d_gap["x"][:-1] += beside * unit[1:]
+        for along, other in (("x", (DX, np.inf)), ("y", (np.inf, DY))):
+            d_log = film.log_mobility_by_gap * d_gap[along] + film.log_mobility_by_pressure * unit
+            out = twin.net_outflow(
+                pressure + step * unit,
+                film.content + step * (film.content_by_gap * d_gap[along] + film.content_by_pressure * unit),
+                film.mobility * (1.0 + step * d_log),
+                film.ambient + step * film.ambient_by_gap * d_gap[along][[0, -1]],
+                1.0 + step * film.content_by_gap[0] * d_gap[along][0],
+                *other,
+                **scheme,
+            )
+            rate = np.where(wet, out.imag / 1e-30 * rows.fluid_scale, 0.0)
+            rate[column // ny + 3 :] = 0.0
+            expected[:, column] += rate.ravel()
+    np.testing.assert_allclose(dense(stencil, far), expected, rtol=1e-11, atol=1e-11)
+    assert np.abs(far.west[wet][ny:]).min() > 0.0
 
 
 def test_leaning_outflow_is_its_twins(rng):
@@ -236,33 +281,38 @@ def test_fluid_diagonal_is_the_stencils_own_but_never_below_the_stiff_film(film)
     np.testing.assert_allclose(found, np.maximum(own, least), rtol=1e-12)
 
 
+@pytest.mark.parametrize("reaching", [False, True])
 @pytest.mark.parametrize("across", [8, 7, 2, 1])
 @pytest.mark.parametrize("parity", [0, 1])
-def test_relaxed_lines_leave_no_residual(rng, parity, across):
+def test_relaxed_lines_leave_no_residual(rng, parity, across, reaching):
     """With the lines between held; of an odd number, the first and the last do not feel each other."""
     cells = CELLS[0], across
     stencil = Stencil(5.0 + rng.random(cells), *(-rng.random(cells) for _ in range(4)))
-    lines = relax.Lines(*np.empty((5, CELLS[0], (across + 1 - parity) // 2)))
-    relax.factor_lines(stencil, parity, lines)
+    far = far_of(cells, rng if reaching else None)
+    parts = np.empty((7, CELLS[0], (across + 1 - parity) // 2))
+    lines = relax.Lines(*parts) if reaching else relax.Lines(*parts[:5], *far)
+    relax.factor_lines(stencil, far, parity, lines)
     residual, correction = rng.standard_normal((2, *cells))
     found = np.empty_like(lines.lower)
     relax.relax_lines(lines, parity, residual[:, parity::2].copy(), correction[:, 1 - parity :: 2].copy(), found)
     correction[:, parity::2] = found
     if across % 2:
         stencil.north[:, -1] = stencil.south[:, 0] = 0.0
-    left = residual - (dense(stencil) @ correction.ravel()).reshape(cells)
+    left = residual - (dense(stencil, far if reaching else None) @ correction.ravel()).reshape(cells)
     np.testing.assert_allclose(left[:, parity::2], 0.0, atol=1e-12)
     assert across == 1 or np.abs(left[:, 1 - parity :: 2]).max() > 0.1
 
 
+@pytest.mark.parametrize("reaching", [False, True])
 @pytest.mark.parametrize("across", [8, 7, 1])
-def test_split_residual_is_the_matrix_product(rng, across):
+def test_split_residual_is_the_matrix_product(rng, across, reaching):
     cells = CELLS[0], across
     stencil = Stencil(5.0 + rng.random(cells), *(-rng.random(cells) for _ in range(4)))
     residual, correction = rng.standard_normal((2, *cells))
     even, odd = np.empty((CELLS[0], (across + 1) // 2)), np.empty((CELLS[0], across // 2))
-    relax.split_residual(stencil, residual, correction, even, odd)
-    expected = residual - (dense(stencil) @ correction.ravel()).reshape(cells)
+    far = far_of(cells, rng if reaching else None)
+    relax.split_residual(stencil, far, residual, correction, even, odd)
+    expected = residual - (dense(stencil, far if reaching else None) @ correction.ravel()).reshape(cells)
     np.testing.assert_allclose(even, expected[:, ::2], atol=1e-12)
     np.testing.assert_allclose(odd, expected[:, 1::2], atol=1e-12)
     whole = np.ones(cells)

@@ -26,6 +26,17 @@ def test_two_by_two_cells_make_one():
     np.testing.assert_allclose(averaged(field, (2, 3)), field.reshape(2, 2, 3, 2).mean(axis=(1, 3)))
 
 
+@pytest.mark.parametrize("cells", [((8, 6), (16, 12)), ((9, 5), (17, 9)), ((129, 1), (257, 1))])
+def test_cubics_keep_cubics_and_what_goes_round(cells):
+    coarse, fine = cells
+    x, found = centres(fine[0]), interpolated(centres(coarse[0])[:, None] ** 3 * np.ones(coarse), fine, cubic=True)
+    inside = (x > centres(coarse[0])[1]) & (x < centres(coarse[0])[-2])
+    np.testing.assert_allclose(found[inside], (x**3)[inside, None] * np.ones(fine)[inside], atol=1e-12)
+    waves = np.broadcast_to(np.cos(2.0 * np.pi * centres(64)), (4, 64))
+    around = interpolated(waves, (4, 128), cubic=True)
+    np.testing.assert_allclose(around, np.broadcast_to(np.cos(2.0 * np.pi * centres(128)), (4, 128)), atol=1e-5)
+
+
 @pytest.mark.parametrize("cells", [((4, 3), (8, 6)), ((5, 4), (9, 7)), ((129, 1), (257, 1))])
 def test_interpolation_keeps_straight_lines_and_what_goes_round(cells):
     coarse, fine = cells

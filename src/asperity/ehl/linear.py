@@ -12,8 +12,9 @@ import scipy
 
 from asperity.arrays import Field
 from asperity.ehl.problem import Balance, Past
-from asperity.kernels import relax, reynolds
-from asperity.kernels.reynolds import LUBRICATED, Faces, Film, Stencil
+from asperity.kernels import relax, reynolds, stencils
+from asperity.kernels.reynolds import LUBRICATED, Faces, Film
+from asperity.kernels.stencils import Far, Stencil
 
 MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors
 LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
@@ -97,7 +98,7 @@ class Linear:
         faces = self.faces or Faces(nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0])
         problem = self.balance.problem
         near = problem.deflection.near
-        reynolds.local_stencil(self.rows, film, faces, near, problem.spacing, self.storing, stencil)
+        stencils.local_stencil(self.rows, film, faces, near, problem.spacing, self.storing, stencil)
         if self.kept is not None:
             own, neighbour = (self.dtype(near[k] - near[3]) for k in (0, 1))
             stencil.centre[:] += self.kept.by_gap * own + self.kept.by_pressure
@@ -107,21 +108,29 @@ class Linear:
 
 
 class LineRelaxation:
-    """Zebra relaxation of a five-point stencil: its x lines solved exactly, even, odd and even ones in turn."""
+    """Zebra relaxation of a stencil of five points, or seven with `far` ones: its x lines are solved exactly.
 
-    def __init__(self, stencil: Stencil) -> None:
-        self.stencil = stencil
+    Even, odd and even ones in turn.
+    """
+
+    def __init__(self, stencil: Stencil, far: Far | None = None) -> None:
         nx, ny = stencil.centre.shape
-        self.even, self.odd = (
-            relax.Lines(*np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)) for parity in (0, 1)
-        )
-        for parity, lines in enumerate((self.even, self.odd)):
-            relax.factor_lines(stencil, parity, lines)
+        nothing = np.empty((0, 0), stencil.centre.dtype)
+        self.stencil, self.far = stencil, far or Far(nothing, nothing)
+        for parity in (0, 1):
+            near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
+            beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
+            lines = relax.Lines(*near, *beyond)
+            relax.factor_lines(stencil, self.far, parity, lines)
+            if parity:
+                self.odd = lines
+            else:
+                self.even = lines
 
     def __call__(self, residual: Field, change: Field) -> Field:
         """`change`, improved in place so that it better answers the residual, both (nx, ny)."""
         rest_even, rest_odd, even, odd = (np.zeros_like(part.lower) for part in (self.even, self.odd) * 2)
-        relax.split_residual(self.stencil, residual, change, rest_even, rest_odd)
+        relax.split_residual(self.stencil, self.far, residual, change, rest_even, rest_odd)
         relax.relax_lines(self.even, 0, rest_even, odd[:, :0], even)
         relax.relax_lines(self.odd, 1, rest_odd, even, odd)
         relax.relax_lines(self.even, 0, rest_even, odd, even)

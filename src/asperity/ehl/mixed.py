@@ -214,6 +214,9 @@ def _evaluate(
     rim = problem.rim
     state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
     solid[:, rim], solid_residual[:, rim] = FREE, borne[:, rim]
+    if problem.held is not None:
+        state[problem.held], solid[problem.held] = RUPTURED, FREE
+        oil_residual[problem.held] = solid_residual[problem.held] = 0.0
     rows, left = Rows(state, scale, contact_scale), (oil_residual, solid_residual)
     balance = MixedBalance(problem, unknowns, gap, *left, rows, solid, film, faces, lean, outflow, shut)
     return replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil) if problem.conserve else balance

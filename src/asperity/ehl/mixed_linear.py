@@ -19,10 +19,13 @@ from asperity.ehl.krylov import gmres
 from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces
 from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, lean_slopes, transported, upwind_at_outlet
 from asperity.ehl.problem import Past
-from asperity.kernels import reynolds
-from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows, Stencil
+from asperity.kernels import reynolds, stencils
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
+from asperity.kernels.stencils import Far, Stencil
 
-LEFT = 0.1  # share to which the linearised equations are left
+LEFT = 0.1  # share to which the linearised equations are left ...
+LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
+OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
 MOST_KRYLOV_STEPS = 60
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
 
@@ -45,7 +48,9 @@ class MixedLinear:
             pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
             self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
             self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
-        self.lean_own, self.lean_upstream = (part.astype(self.real) for part in lean_slopes(balance))
+        self.leans = bool(np.any(balance.lean))
+        if self.leans:
+            self.lean_own, self.lean_upstream = (part.astype(self.real) for part in lean_slopes(balance))
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale)
         self.film = Film(*(part.astype(self.real) for part in balance.film))
@@ -54,26 +59,32 @@ class MixedLinear:
         self.kept = self._kept(problem.past)
         if problem.past is not None and problem.past.followed:
             self.film = self.film.followed
-        stencil = self._stencil()
+        stencil, far = self._stencil()
         self.blocks = Blocks(
             stencil, np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         )
-        self.lines = LineRelaxation(stencil)
+        self.lines = LineRelaxation(stencil, far)
 
-    def _stencil(self) -> Stencil:
+    def _stencil(self) -> tuple[Stencil, Far | None]:
         problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
         rows, film = self.rows._replace(state=state), self.film.held_where(~self.free)
-        own = 1.0 / self.rows.contact_scale
-        near = np.array([own, 0.0, 0.0, 0.0])
-        reynolds.local_stencil(rows, film, self.faces, near, problem.spacing, 0.0, stencil)
-        reynolds.add_mobility_slopes(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
+        own, far = 1.0 / self.rows.contact_scale, None
+        if problem.accurate:
+            far, near = Far(*np.empty((2, *self.cells), self.real)), problem.deflection.near
+            stencils.wedge_stencil(
+                rows, film, self.faces, self.oil, (own, near[1] - near[3]), problem.spacing, stencil, far
+            )
+        else:
+            near = np.array([own, 0.0, 0.0, 0.0])
+            stencils.local_stencil(rows, film, self.faces, near, problem.spacing, 0.0, stencil)
+            stencils.add_mobility_slopes(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
         if self.kept is not None:
             by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
             stencil.centre[:] += np.where(self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0)
         if self.conserves:
             self._loosen(stencil)
-        return stencil
+        return stencil, far
 
     def _loosen(self, stencil: Stencil) -> None:
         """Cells whose unknown is not a pressure hand what they hold to the next cell downstream, and to no other."""
@@ -119,7 +130,7 @@ class MixedLinear:
             d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
             upwind_at_outlet(problem, d_content, rest)
             wet += rest * self.rows.fluid_scale
-        else:
+        elif self.leans:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
             wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.rows.fluid_scale
         zero = self.real(0.0)
@@ -130,7 +141,10 @@ class MixedLinear:
 
     def answer(self, wet: Field, closed: Field) -> tuple[Field, Field]:
         """Approximate changes of the oil's pressure and of touching cells' total pressure that answer both rows."""
-        return self.lines(wet, self.blocks(wet)), closed
+        change = self.blocks(wet)
+        if self.balance.problem.accurate:
+            change *= self.real(OVER)
+        return self.lines(wet, change), closed
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
         """Change of the total pressure: the oil's in free cells, their own in touching ones."""
@@ -149,15 +163,19 @@ def newton_step(balance: MixedBalance) -> Pressures:
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
     known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
     known = np.where(linear.free, linear.pressure_of(known_oil) - balance.solid_residual, known)
-    wet, closed = linear.product(known_oil.astype(real), known.astype(real), 0.0)
-    wet = np.where(linear.lubricated, -balance.oil_residual - wet, zero).astype(real)
-    closed = np.where(linear.touching, -balance.solid_residual - closed, zero).astype(real)
+    wet, closed = -balance.oil_residual, -balance.solid_residual
+    if np.any(known_oil) or np.any(known):
+        by_known = linear.product(known_oil.astype(real), known.astype(real), 0.0)
+        wet, closed = wet - by_known[0], closed - by_known[1]
+    wet = np.where(linear.lubricated, wet, zero).astype(real)
+    closed = np.where(linear.touching, closed, zero).astype(real)
     dx, dy = problem.spacing
-    missing = -balance.load_error * problem.load / (dx * dy) - known.sum()
+    moves = problem.held is None
+    missing = -balance.load_error * problem.load / (dx * dy) - known.sum() if moves else 0.0
 
-    # unknowns: of the oil, of touching cells and, last, the approach; last equation: the missing load
+    # unknowns: of the oil, of touching cells and, last, the approach; last equation: the missing load, or none
     weight = real(1.0 / np.sqrt(count))
-    by_approach = linear.product(np.zeros(cells, real), np.zeros(cells, real), 1.0)
+    by_approach = linear.of_gap(np.zeros(cells, real), np.ones(cells, real))
     response = linear.answer(*by_approach)
     whole = float(linear.total(*response).sum())
     if whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
@@ -179,15 +197,19 @@ def newton_step(balance: MixedBalance) -> Pressures:
         d_oil, d_closed = split(vector)
         d_total = linear.total(d_oil, d_closed)
         wet, closed = linear.product(d_oil, d_total, float(vector[-1]))
-        return joined(np.where(linear.lubricated, wet, d_oil), closed, float(weight * d_total.sum()))
+        carried = float(weight * d_total.sum()) if moves else float(vector[-1])
+        return joined(np.where(linear.lubricated, wet, d_oil), closed, carried)
 
     def precondition(vector: Field) -> Field:
         d_oil, d_closed = linear.answer(*split(vector))
+        if not moves:
+            return joined(d_oil, d_closed, float(vector[-1]))
         d_approach = float((linear.total(d_oil, d_closed).sum() - vector[-1] / weight) / whole)
         return joined(d_oil - d_approach * response[0], d_closed - d_approach * response[1], d_approach)
 
     wanted = joined(wet, closed, float(weight * missing))
-    solved = gmres(product, precondition, wanted, tolerance=LEFT, most_steps=MOST_KRYLOV_STEPS)
+    left = LEFT_SMOOTH if problem.accurate else LEFT
+    solved = gmres(product, precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
     d_oil, d_closed = split(solved)
     d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)
     d_total = np.where(

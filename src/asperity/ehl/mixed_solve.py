@@ -4,15 +4,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
-from asperity.ehl.dry import dry_contact
 from asperity.ehl.iterate import Step
-from asperity.ehl.iterate import newton as one_pressure
+from asperity.ehl.locally import smoothed
 from asperity.ehl.mixed import MixedBalance, Pressures, evaluate, may_lean
 from asperity.ehl.mixed_iterate import newton
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Options
@@ -29,7 +28,7 @@ from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import COARSE_TOLERANCE, FAR_OFF, MOST_COARSE_ITERATIONS, Progress, Search
 from asperity.ehl.solution import ContactSolution, Oil
-from asperity.ehl.transfer import interpolated
+from asperity.ehl.starts import Lubricated, dry_start, handed_up, on_a_roller
 from asperity.errors import BadInput
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
@@ -39,7 +38,6 @@ MOST_BETWEEN_ENDS = 60  # accurate steps on a roller's finest grid: sharp ends t
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
-MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
 MOST_AT_ONCE = 40
 MOST_BACK = 20  # steps from the second-order wedge's solution to the first-order one
 MOST_NEAR = 12  # steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
@@ -47,6 +45,7 @@ BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflo
 LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
 SHORTEST = 0.05  # step of time, over the first one that was tried
 LEAP = 10.0  # from a long step of time that was easy to the next one
+MOST_TURNS, STEPS_A_TURN = 4, 2  # of a smooth contact on a coarse grid
 IN_TIME = 5e-2  # what a step of time is met to ...
 MOST_A_STEP, MOST_IN_TIME = 10, 60  # ... in so many of Newton's, and how many there are
 STRAY = 10.0  # times what was left at first: from there steps seldom come back
@@ -101,21 +100,6 @@ def _ways(conditions: ContactConditions, surface: Surface, film: float, contact_
         sharp = conditions.geometry == "roller" and conditions.sliced_load.sharp  # ends that the dry contact has right
         return (FROM_DRY, CLIMB, STURDY) if sharp or film < contact_film else (CLIMB, STURDY)
     return (FROM_DRY, CLIMB) if film < THIN * surface.sq else (CLIMB, FROM_DRY)
-
-
-class Lubricated(NamedTuple):
-    """A contact on one grid without oil and with it."""
-
-    dry: Pressures
-    wet: Pressures
-
-    def granted(self, dry: Pressures, cap: float) -> Pressures:
-        """About what oil makes of the dry contact on another grid."""
-        cells = dry.total.shape
-        changed = interpolated(self.wet.total - self.dry.total, cells)
-        total = np.clip(dry.total + changed, 0.0, cap)
-        oil = np.minimum(interpolated(np.maximum(self.wet.oil, 0.0), cells), total)
-        return Pressures(oil, total, dry.approach + self.wet.approach - self.dry.approach)
 
 
 class MixedSearch(Search):
@@ -272,30 +256,45 @@ class MixedSearch(Search):
         """Coarse to fine from Hertz's pressure, all of it the oil's; from there again after a grid that led nowhere."""
         self.figures, self.smooth = [], not np.any(levels[0].roughness)
         unknowns = None
+        roller = levels[0].accurate and levels[0].form.along is not None
+        before: Lubricated | None = None
         for problem in reversed(levels):
-            if unknowns is None:
+            if roller:
+                dry, unknowns = on_a_roller(problem, before, *guess(problem))
+            elif unknowns is None:
                 pressure, approach = guess(problem)
                 unknowns = Pressures(pressure, pressure, approach)
             elif problem.cells != unknowns.total.shape:
-                total = interpolated(unknowns.total, problem.cells)
-                oil = interpolated(np.maximum(unknowns.oil, 0.0), problem.cells)
-                unknowns = Pressures(np.minimum(oil, total), total, unknowns.approach)
+                unknowns = handed_up(problem, unknowns)
             if problem is levels[0]:
                 step = self.at_once(problem, unknowns) if self.figures else self.finish(problem, unknowns)
             else:
-                steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
-                step = self.run(problem, steps, max(COARSE_TOLERANCE, self.options.tolerance), MOST_COARSE_ITERATIONS)
+                step = self.coarsely(problem, unknowns)
             if self.smooth and not self.settled(LED_NOWHERE):
-                self.figures, unknowns = [], None
+                self.figures, unknowns, before = [], None, None
                 continue
             if problem is not levels[0] and not self.settled(ROUGHLY):
                 self.figures = []  # a start, but no solution to compare with
             elif coarser_all_along(problem, levels[0]):
                 self.figures.append(self._figures(step))
             unknowns = _reached(step)
+            before = Lubricated(dry, unknowns) if roller else None
         if levels[0].conserve:  # on coarser grids oil was made
             self.figures = self.figures[-1:]
         return step
+
+    def coarsely(self, problem: Problem, unknowns: Pressures) -> Step:
+        """A start for the next finer grid; of smooth bodies by a few steps, then the worst cells, in turns."""
+        tolerance = max(COARSE_TOLERANCE, self.options.tolerance)
+        steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
+        for _ in range(MOST_TURNS if problem.accurate else 0):
+            step = self.run(problem, steps, tolerance, STEPS_A_TURN)
+            if self.settled(tolerance):
+                return step
+            if step.balance.residual_rms < ROUGHLY:
+                break
+            steps = newton(problem, smoothed(problem, _reached(step)), second_order=False)
+        return self.run(problem, steps, tolerance, MOST_COARSE_ITERATIONS)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
         """From bodies that carry all the load themselves, on grid after grid.
@@ -305,7 +304,7 @@ class MixedSearch(Search):
         self.figures, self.smooth = [], False
         before: Lubricated | None = None
         for problem in reversed(levels):
-            total, approach = _dry(problem)
+            total, approach = dry_start(problem)
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
             start = dry if before is None else before.granted(dry, problem.p_cap)
@@ -338,20 +337,6 @@ class MixedSearch(Search):
         self.history = [*beside.history, *self.history]
         if beside.settled(self.options.tolerance):
             self.figures = [*beside.figures, *self.figures]
-
-
-def _dry(problem: Problem) -> tuple[Field, float]:
-    """Pressure and approach without oil: by conjugate gradients, and by Newton's steps where the cap is too busy."""
-    dry = replace(problem, lubricant=None, contact_gap=0.0)
-    pressure = problem.form.hertz(problem.x, problem.y)
-    pressure, approach, met = dry_contact(dry, pressure, most_steps=MOST_GRADIENTS)
-    if not met:
-        for step in one_pressure(dry, pressure, approach):
-            left = max(step.balance.residual_rms, abs(step.balance.load_error))
-            if left < COARSE_TOLERANCE or step.number == MOST_DRY:
-                break
-        pressure, approach = step.balance.pressure, step.approach
-    return pressure, approach
 
 
 def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:

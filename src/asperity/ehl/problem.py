@@ -87,7 +87,7 @@ class Problem:
     leaves of the viscosity, shape (nx, ny), None for all of it. A contact that does not repeat in y is bounded by lines
     of cells at ambient pressure, a roller by all beyond its ends. `accurate` takes the third-order wedge and
     logarithmic mean mobilities. `conserve` lets no oil appear or vanish. `past` is None where nothing moves but the
-    oil.
+    oil. `held` tells of the cells, (nx, ny), whose pressures are given, and the distance of the bodies with them.
     """
 
     form: Form
@@ -105,6 +105,7 @@ class Problem:
     accurate: bool = False
     conserve: bool = False
     past: Past | None = None
+    held: Mask | None = None
 
     @property
     def cells(self) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""Cheap approximate inverses of a five-point stencil: line relaxation along x and aggregation onto a coarse grid.
+"""Cheap approximate inverses of a stencil: line relaxation along x and, of five points, aggregation onto a coarse grid.
 
 Every second x line is kept in arrays of its own and all of them are eliminated side by side, so that the innermost
 loop runs along a contiguous axis. All arrays of a call share one precision, which is also that of the arithmetic.
@@ -10,25 +10,31 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.kernels.compiled import njit
-from asperity.kernels.reynolds import Stencil
+from asperity.kernels.stencils import Far, Stencil
 
 
 class Lines(NamedTuple):
-    """Every second x line of a stencil: Thomas factors, and the couplings to the lines on both sides; (nx, lines)."""
+    """Every second x line of a stencil: its LU factors, and the couplings to the lines on both sides; (nx, lines).
+
+    `far_lower` and `far_east` are of cells two away, (0, 0) where the stencil does not reach them.
+    """
 
     lower: Field
     inverse: Field
     east: Field
     north: Field
     south: Field
+    far_lower: Field
+    far_east: Field
 
 
 @njit(cache=True)
-def factor_lines(stencil: Stencil, parity: int, lines: Lines) -> None:
+def factor_lines(stencil: Stencil, far: Far, parity: int, lines: Lines) -> None:
     """Eliminate every second x line, starting with `parity`, in place of `lines`.
 
     Where an odd number of lines goes round, the first and the last are not coupled.
     """
+    reaching = lines.far_east.size > 0
     nx, ny = stencil.centre.shape
     one = stencil.centre.dtype.type(1.0)
     count = lines.lower.shape[1]
@@ -38,10 +44,20 @@ def factor_lines(stencil: Stencil, parity: int, lines: Lines) -> None:
             lines.north[i, k] = stencil.north[i, j]
             lines.south[i, k] = stencil.south[i, j]
             lines.east[i, k] = stencil.east[i, j]
-            pivot = stencil.centre[i, j]
+            pivot, west = stencil.centre[i, j], stencil.west[i, j]
+            if reaching:
+                lines.far_east[i, k] = far.east[i, j]
+                lines.far_lower[i, k] = 0.0
+            if reaching and i > 1:
+                factor = far.west[i, j] * lines.inverse[i - 2, k]
+                west -= factor * lines.east[i - 2, k]
+                pivot -= factor * lines.far_east[i - 2, k]
+                lines.far_lower[i, k] = factor
             if i > 0:
-                factor = stencil.west[i, j] * lines.inverse[i - 1, k]
-                pivot -= factor * stencil.east[i - 1, j]
+                factor = west * lines.inverse[i - 1, k]
+                pivot -= factor * lines.east[i - 1, k]
+                if reaching:
+                    lines.east[i, k] -= factor * lines.far_east[i - 1, k]
                 lines.lower[i, k] = factor
             else:
                 lines.lower[i, k] = 0.0
@@ -55,7 +71,7 @@ def factor_lines(stencil: Stencil, parity: int, lines: Lines) -> None:
 def relax_lines(lines: Lines, parity: int, residual: Field, others: Field, change: Field) -> None:
     """Solve every second x line for its residual, the lines between held at `others`; in place of `change`."""
     nx, count = residual.shape
-    between = others.shape[1]
+    between, reaching = others.shape[1], lines.far_east.size > 0
     for i in range(nx):
         for k in range(count):
             change[i, k] = residual[i, k]
@@ -76,19 +92,25 @@ def relax_lines(lines: Lines, parity: int, residual: Field, others: Field, chang
         if i > 0:
             for k in range(count):
                 change[i, k] -= lines.lower[i, k] * change[i - 1, k]
+        if reaching and i > 1:
+            for k in range(count):
+                change[i, k] -= lines.far_lower[i, k] * change[i - 2, k]
     for k in range(count):
         change[nx - 1, k] *= lines.inverse[nx - 1, k]
     for i in range(nx - 2, -1, -1):
+        if reaching and i < nx - 2:
+            for k in range(count):
+                change[i, k] -= lines.far_east[i, k] * change[i + 2, k]
         for k in range(count):
             change[i, k] = (change[i, k] - lines.east[i, k] * change[i + 1, k]) * lines.inverse[i, k]
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def split_residual(stencil: Stencil, residual: Field, correction: Field, even: Field, odd: Field) -> None:
+def split_residual(stencil: Stencil, far: Far, residual: Field, correction: Field, even: Field, odd: Field) -> None:
     """What the stencil leaves of `residual` after `correction`, even and odd x lines apart."""
     nx, ny = residual.shape
     left = np.empty(ny, residual.dtype)
-    last = ny - 1
+    last, reaching = ny - 1, far.west.size > 0
     for i in range(nx):
         for j in range(ny):
             left[j] = residual[i, j] - stencil.centre[i, j] * correction[i, j]
@@ -104,6 +126,12 @@ def split_residual(stencil: Stencil, residual: Field, correction: Field, even: F
         if i < nx - 1:
             for j in range(ny):
                 left[j] -= stencil.east[i, j] * correction[i + 1, j]
+        if reaching and i > 1:
+            for j in range(ny):
+                left[j] -= far.west[i, j] * correction[i - 2, j]
+        if reaching and i < nx - 2:
+            for j in range(ny):
+                left[j] -= far.east[i, j] * correction[i + 2, j]
         for k in range(odd.shape[1]):
             even[i, k] = left[2 * k]
             odd[i, k] = left[2 * k + 1]

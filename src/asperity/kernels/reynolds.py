@@ -1,4 +1,4 @@
-"""The finite-volume Reynolds equation on arrays: net outflow of each cell, its derivative, its local stencil.
+"""The finite-volume Reynolds equation on arrays: net outflow of each cell, and its derivative.
 
 x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and periodic. The wedge
 leans upstream, face value m + a (m_next - m) + b (m - m_upstream): second order with (a, b) = (0, 1/2), third with
@@ -81,16 +81,6 @@ class Rows(NamedTuple):
     state: Codes
     fluid_scale: Field  # 1/diagonal of the Reynolds rows
     contact_scale: float  # 1/compliance of the contact rows
-
-
-class Stencil(NamedTuple):
-    """Five-point approximation of the scaled Jacobian: self, both x neighbours, both y neighbours."""
-
-    centre: Field
-    west: Field
-    east: Field
-    north: Field
-    south: Field
 
 
 @njit(cache=True)
@@ -277,89 +267,3 @@ def fluid_diagonal(film: Film, faces: Faces, near: Field, dx: float, dy: float, 
             wedge = max(wedge, near[0] - near[1])
             across = faces.north[i, j] + faces.north[i, js]
             out[i, j] = (east + west) / (dx * dx) + across / (dy * dy) + wedge / dx
-
-
-@njit(cache=True)
-def local_stencil(
-    rows: Rows, film: Film, faces: Faces, near: Field, spacing: tuple[float, float], storing: float, out: Stencil
-) -> None:
-    """Fill the five-point approximation of the scaled Jacobian, in the precision of `out`.
-
-    `near` holds the compliance of cells 0, 1, 2 along x and, last, that of the cell from which on it counts as far.
-    """
-    nx, ny = out.centre.shape
-    real = out.centre.dtype.type
-    none, one, two, kept = real(0.0), real(1.0), real(2.0), real(storing)
-    dx, dy = spacing
-    over_dx, over_dx2, over_dy2 = real(1.0 / dx), real(1.0 / (dx * dx)), real(1.0 / (dy * dy))
-    near0, near1, near2 = real(near[0]), real(near[1]), real(near[2])
-    touching_own = real((near[0] - near[3]) * rows.contact_scale)
-    touching_next = real((near[1] - near[3]) * rows.contact_scale)
-    m_h, m_p = film.content_by_gap, film.content_by_pressure
-    across = np.empty(ny + 1, out.centre.dtype)  # of the y faces, each between its southern and northern cell
-    for i in range(nx):
-        west_of, at_inlet, at_outlet = max(i - 1, 0), i == 0, i == nx - 1
-        for j in range(ny):
-            across[j + 1] = over_dy2 * faces.north[i, j]
-        across[0] = across[ny]
-        for j in range(ny):
-            wet, touching = rows.state[i, j] == LUBRICATED, rows.state[i, j] == TOUCHING
-            here, above = m_h[i, j], m_h[west_of, j]
-            above_p = none if at_inlet else m_p[west_of, j]
-            scale = rows.fluid_scale[i, j]
-            east = over_dx2 * (two * faces.east[i, j] if at_outlet else faces.east[i, j])
-            west = over_dx2 * (two * faces.inlet[j] if at_inlet else faces.east[west_of, j])
-            wedge = here * near0 - above * near1 + m_p[i, j]
-            own_kept, next_kept = kept * (here * near0 + m_p[i, j]), kept * here * near1
-            centre = (east + west + across[j] + across[j + 1] + wedge * over_dx + own_kept) * scale
-            upstream = (-west + (here * near1 - above * near0 - above_p) * over_dx + next_kept) * scale
-            downstream = (-east + (here * near1 - above * near2) * over_dx + next_kept) * scale
-            out.centre[i, j] = centre if wet else (touching_own if touching else one)
-            out.west[i, j] = upstream if wet else (touching_next if touching else none)
-            out.east[i, j] = downstream if wet else (touching_next if touching else none)
-            out.north[i, j] = -across[j + 1] * scale if wet else none
-            out.south[i, j] = -across[j] * scale if wet else none
-
-
-@njit(cache=True)
-def add_mobility_slopes(
-    rows: Rows,
-    film: Film,
-    faces: Faces,
-    pressure: Field,
-    compliance: float,
-    spacing: tuple[float, float],
-    out: Stencil,
-) -> None:
-    """Add to a local stencil what changed pressures do to the mobilities of the inner faces, in the precision of `out`.
-
-    `compliance` is that of a cell's gap to its own pressure.
-    """
-    nx, ny = pressure.shape
-    real = out.centre.dtype.type
-    dx, dy = spacing
-    over_dx2, over_dy2, own = real(1.0 / (dx * dx)), real(1.0 / (dy * dy)), real(compliance)
-    slope = film.log_mobility_by_pressure + own * film.log_mobility_by_gap
-    for i in range(nx):
-        for j in range(ny):
-            here, scale = rows.state[i, j] == LUBRICATED, rows.fluid_scale[i, j]
-            if i < nx - 1:
-                falling = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
-                by_own = falling * faces.east_by_own[i, j] * slope[i, j]
-                by_next = falling * faces.east_by_next[i, j] * slope[i + 1, j]
-                if here:
-                    out.centre[i, j] += scale * by_own
-                    out.east[i, j] += scale * by_next
-                if rows.state[i + 1, j] == LUBRICATED:
-                    out.centre[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_next
-                    out.west[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_own
-            jn = j + 1 if j < ny - 1 else 0
-            falling = over_dy2 * (pressure[i, j] - pressure[i, jn])
-            by_own = falling * faces.north_by_own[i, j] * slope[i, j]
-            by_next = falling * faces.north_by_next[i, j] * slope[i, jn]
-            if here:
-                out.centre[i, j] += scale * by_own
-                out.north[i, j] += scale * by_next
-            if rows.state[i, jn] == LUBRICATED:
-                out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
-                out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own

@@ -1,0 +1,228 @@
+"""The linearised Reynolds equation as stencils of a few cells, for approximate inverses; see `reynolds`.
+
+All arrays of a call share one precision, which is also that of the arithmetic.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.kernels.compiled import njit
+from asperity.kernels.reynolds import LUBRICATED, TOUCHING, Faces, Film, Rows
+
+
+class Stencil(NamedTuple):
+    """Five-point approximation of the scaled Jacobian: self, both x neighbours, both y neighbours."""
+
+    centre: Field
+    west: Field
+    east: Field
+    north: Field
+    south: Field
+
+
+class Far(NamedTuple):
+    """What a stencil has of the cells two away along x; (0, 0) where it does not reach them."""
+
+    west: Field
+    east: Field
+
+
+@njit(cache=True)
+def local_stencil(
+    rows: Rows, film: Film, faces: Faces, near: Field, spacing: tuple[float, float], storing: float, out: Stencil
+) -> None:
+    """Fill the five-point approximation of the scaled Jacobian, in the precision of `out`.
+
+    `near` holds the compliance of cells 0, 1, 2 along x and, last, that of the cell from which on it counts as far.
+    """
+    nx, ny = out.centre.shape
+    real = out.centre.dtype.type
+    none, one, two, kept = real(0.0), real(1.0), real(2.0), real(storing)
+    dx, dy = spacing
+    over_dx, over_dx2, over_dy2 = real(1.0 / dx), real(1.0 / (dx * dx)), real(1.0 / (dy * dy))
+    near0, near1, near2 = real(near[0]), real(near[1]), real(near[2])
+    touching_own = real((near[0] - near[3]) * rows.contact_scale)
+    touching_next = real((near[1] - near[3]) * rows.contact_scale)
+    m_h, m_p = film.content_by_gap, film.content_by_pressure
+    across = np.empty(ny + 1, out.centre.dtype)  # of the y faces, each between its southern and northern cell
+    for i in range(nx):
+        west_of, at_inlet, at_outlet = max(i - 1, 0), i == 0, i == nx - 1
+        for j in range(ny):
+            across[j + 1] = over_dy2 * faces.north[i, j]
+        across[0] = across[ny]
+        for j in range(ny):
+            wet, touching = rows.state[i, j] == LUBRICATED, rows.state[i, j] == TOUCHING
+            here, above = m_h[i, j], m_h[west_of, j]
+            above_p = none if at_inlet else m_p[west_of, j]
+            scale = rows.fluid_scale[i, j]
+            east = over_dx2 * (two * faces.east[i, j] if at_outlet else faces.east[i, j])
+            west = over_dx2 * (two * faces.inlet[j] if at_inlet else faces.east[west_of, j])
+            wedge = here * near0 - above * near1 + m_p[i, j]
+            own_kept, next_kept = kept * (here * near0 + m_p[i, j]), kept * here * near1
+            centre = (east + west + across[j] + across[j + 1] + wedge * over_dx + own_kept) * scale
+            upstream = (-west + (here * near1 - above * near0 - above_p) * over_dx + next_kept) * scale
+            downstream = (-east + (here * near1 - above * near2) * over_dx + next_kept) * scale
+            out.centre[i, j] = centre if wet else (touching_own if touching else one)
+            out.west[i, j] = upstream if wet else (touching_next if touching else none)
+            out.east[i, j] = downstream if wet else (touching_next if touching else none)
+            out.north[i, j] = -across[j + 1] * scale if wet else none
+            out.south[i, j] = -across[j] * scale if wet else none
+
+
+@njit(cache=True)
+def add_mobility_slopes(
+    rows: Rows,
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    compliance: float,
+    spacing: tuple[float, float],
+    out: Stencil,
+) -> None:
+    """Add to a local stencil what changed pressures do to the mobilities of the inner faces, in the precision of `out`.
+
+    `compliance` is that of a cell's gap to its own pressure.
+    """
+    nx, ny = pressure.shape
+    real = out.centre.dtype.type
+    dx, dy = spacing
+    over_dx2, over_dy2, own = real(1.0 / (dx * dx)), real(1.0 / (dy * dy)), real(compliance)
+    slope = film.log_mobility_by_pressure + own * film.log_mobility_by_gap
+    for i in range(nx):
+        for j in range(ny):
+            here, scale = rows.state[i, j] == LUBRICATED, rows.fluid_scale[i, j]
+            if i < nx - 1:
+                falling = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
+                by_own = falling * faces.east_by_own[i, j] * slope[i, j]
+                by_next = falling * faces.east_by_next[i, j] * slope[i + 1, j]
+                if here:
+                    out.centre[i, j] += scale * by_own
+                    out.east[i, j] += scale * by_next
+                if rows.state[i + 1, j] == LUBRICATED:
+                    out.centre[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_next
+                    out.west[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_own
+            jn = j + 1 if j < ny - 1 else 0
+            falling = over_dy2 * (pressure[i, j] - pressure[i, jn])
+            by_own = falling * faces.north_by_own[i, j] * slope[i, j]
+            by_next = falling * faces.north_by_next[i, j] * slope[i, jn]
+            if here:
+                out.centre[i, j] += scale * by_own
+                out.north[i, j] += scale * by_next
+            if rows.state[i, jn] == LUBRICATED:
+                out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
+                out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def wedge_stencil(
+    rows: Rows,
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    near: tuple[float, float],
+    spacing: tuple[float, float],
+    out: Stencil,
+    far: Far,
+) -> None:
+    """Fill an approximation of the scaled Jacobian that follows wedge and mobilities, in the precision of `out`.
+
+    A gap gives way to the pressure of its own cell and of the next ones along x, by the compliances `near`; across x
+    to its own alone. What the wedge then has of cells three upstream is left out.
+    """
+    nx, ny = pressure.shape
+    real = out.centre.dtype.type
+    zero, one = real(0.0), real(1.0)
+    n0, n1, over_dx, over_dy2 = real(near[0]), real(near[1]), real(1.0 / spacing[0]), real(1.0 / spacing[1] ** 2)
+    # of the flow through a face: its slopes in gap and pressure of the cells upstream, here and downstream, and from
+    # these in the pressures of the cells -2 ... 2 from here; the face to the east, and the one to the west
+    by_gap, by_pressure = np.zeros((3, ny), out.centre.dtype), np.zeros((3, ny), out.centre.dtype)
+    flow, before = np.zeros((5, ny), out.centre.dtype), np.zeros((5, ny), out.centre.dtype)
+    for i in range(-1, nx):
+        _flow_slopes(film, faces, pressure, over_dx, i, by_gap, by_pressure)
+        for j in range(ny):
+            flow[0, j] = n1 * by_gap[0, j]
+            flow[1, j] = n0 * by_gap[0, j] + n1 * by_gap[1, j] + by_pressure[0, j]
+            flow[2, j] = n1 * (by_gap[0, j] + by_gap[2, j]) + n0 * by_gap[1, j] + by_pressure[1, j]
+            flow[3, j] = n1 * by_gap[1, j] + n0 * by_gap[2, j] + by_pressure[2, j]
+            flow[4, j] = n1 * by_gap[2, j]
+        if i >= 0:
+            first, second = real(i > 0) * over_dx, real(i > 1) * over_dx
+            last, last_but_one = real(i < nx - 1) * over_dx, real(i < nx - 2) * over_dx
+            for j in range(ny):
+                wet = rows.state[i, j] == LUBRICATED
+                scale = rows.fluid_scale[i, j] if wet else zero
+                far.west[i, j] = second * scale * (flow[0, j] - before[1, j])
+                out.west[i, j] = first * scale * (flow[1, j] - before[2, j])
+                out.centre[i, j] = over_dx * scale * (flow[2, j] - before[3, j]) if wet else one
+                out.east[i, j] = last * scale * (flow[3, j] - before[4, j])
+                far.east[i, j] = last_but_one * scale * flow[4, j]
+                out.north[i, j], out.south[i, j] = zero, zero
+            if ny > 1:
+                _add_across(rows, film, faces, pressure, n0, over_dy2, i, out)
+        flow, before = before, flow
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def _flow_slopes(
+    film: Film, faces: Faces, pressure: Field, over_dx: float, i: int, by_gap: Field, by_pressure: Field
+) -> None:
+    """Slopes of the flow through the faces east of cells `i`, -1 for the inlet's, in what is upstream, here and next.
+
+    Of the ambient oil's mobility at the ends too.
+    """
+    nx, ny = pressure.shape
+    real = pressure.dtype.type
+    half, one, two = real(0.5), real(1.0), real(2.0)
+    m_h, m_p, log_h, log_p = (
+        film.content_by_gap,
+        film.content_by_pressure,
+        film.log_mobility_by_gap,
+        film.log_mobility_by_pressure,
+    )
+    if i < 0:
+        for j in range(ny):
+            gone = over_dx * pressure[0, j]
+            by_gap[2, j] = m_h[0, j] - gone * (film.mobility[0, j] * log_h[0, j] + film.ambient_by_gap[0, j])
+            by_pressure[2, j] = -two * over_dx * faces.inlet[j] - gone * film.mobility[0, j] * log_p[0, j]
+    elif i == nx - 1:
+        for j in range(ny):
+            gone = two * over_dx * pressure[i, j]
+            own = gone * faces.east_by_own[i, j]
+            by_gap[0, j], by_pressure[0, j] = -half * m_h[i - 1, j], -half * m_p[i - 1, j]
+            by_gap[1, j] = (one + half) * m_h[i, j] + own * log_h[i, j] + gone * half * film.ambient_by_gap[1, j]
+            by_pressure[1, j] = (one + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
+            by_gap[2, j], by_pressure[2, j] = real(0.0), real(0.0)
+    else:
+        inner = real(i > 0)
+        ahead, back, upstream = inner * faces.wedge[0], inner * faces.wedge[1], max(i - 1, 0)
+        for j in range(ny):
+            falling, through = over_dx * (pressure[i, j] - pressure[i + 1, j]), over_dx * faces.east[i, j]
+            own, following = falling * faces.east_by_own[i, j], falling * faces.east_by_next[i, j]
+            by_gap[0, j], by_pressure[0, j] = -back * m_h[upstream, j], -back * m_p[upstream, j]
+            by_gap[1, j] = (one - ahead + back) * m_h[i, j] + own * log_h[i, j]
+            by_pressure[1, j] = (one - ahead + back) * m_p[i, j] + own * log_p[i, j] + through
+            by_gap[2, j] = ahead * m_h[i + 1, j] + following * log_h[i + 1, j]
+            by_pressure[2, j] = ahead * m_p[i + 1, j] + following * log_p[i + 1, j] - through
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def _add_across(
+    rows: Rows, film: Film, faces: Faces, pressure: Field, own: float, over_dy2: float, i: int, out: Stencil
+) -> None:
+    """Add the flows between the x lines, the gap answering to each cell's `own` pressure, to row `i` of a stencil."""
+    ny = pressure.shape[1]
+    for j in range(ny):
+        jn = j + 1 if j < ny - 1 else 0
+        through, falling = over_dy2 * faces.north[i, j], over_dy2 * (pressure[i, j] - pressure[i, jn])
+        slope = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
+        slope_next = film.log_mobility_by_pressure[i, jn] + own * film.log_mobility_by_gap[i, jn]
+        by_own = through + falling * faces.north_by_own[i, j] * slope
+        by_next = -through + falling * faces.north_by_next[i, j] * slope_next
+        if rows.state[i, j] == LUBRICATED:
+            out.centre[i, j] += rows.fluid_scale[i, j] * by_own
+            out.north[i, j] += rows.fluid_scale[i, j] * by_next
+        if rows.state[i, jn] == LUBRICATED:
+            out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
+            out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own

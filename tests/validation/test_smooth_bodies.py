@@ -1,0 +1,124 @@
+"""Smooth bodies are solved in a few steps a grid: the approximate inverse, the worst cells first, a roller's start."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks import rollers
+from benchmarks.films import BARUS, NO_FLOOR, REFERENCE, ROELANDS, ball
+
+from asperity.ehl import Options, Scales, mixed_linear, solve_contact
+from asperity.ehl.locally import smoothed
+from asperity.ehl.mixed import Pressures, evaluate
+from asperity.ehl.mixed_iterate import newton
+from asperity.ehl.posing import contact_problem
+from asperity.grid import Grid
+from asperity.rollers import RollerShape
+from asperity.surface import flat_surface
+
+OPTIONS = Options(contact_film=NO_FLOOR)
+
+
+def on_a_grid(conditions, cells):
+    a, b = conditions.hertz.half_widths
+    return flat_surface(Grid((cells, cells), (-4.5 * a, -3.0 * b), (1.5 * a, 3.0 * b), periodic=(False, False)))
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """A ball with a sharp spike, its problem, and what solves it closely."""
+    conditions, _ = ball(20, 10)
+    surface = on_a_grid(conditions, 65)
+    problem = contact_problem(conditions, BARUS, surface, OPTIONS)
+    solution = solve_contact(conditions, BARUS, surface, options=replace(OPTIONS, tolerance=1e-7))
+    scales = Scales.of(conditions, BARUS)
+    pressure = solution.pressure / scales.pressure
+    return problem, Pressures(pressure, pressure, solution.rigid_approach / scales.gap)
+
+
+def dented(problem, unknowns):
+    """The solution with the spike taken off: a tenth of the pressure in a few cells."""
+    x, y = np.meshgrid(problem.x, problem.y, indexing="ij")
+    spike = (np.abs(x - 0.5) < 0.15) & (np.abs(y) < 0.3)
+    total = np.where(spike, 0.9, 1.0) * unknowns.total
+    return spike, Pressures(total, total, unknowns.approach)
+
+
+def test_worst_cells_are_solved_for_what_is_around_them(solved):
+    """Where all else is right the box has the whole contact's solution, and nothing else moves."""
+    problem, right = solved
+    spike, start = dented(problem, right)
+    found = smoothed(problem, start)
+    assert found.approach == right.approach
+    dent = np.abs(start.total - right.total).max()
+    assert dent > 0.1
+    assert np.abs(found.total - right.total).max() < 0.15 * dent
+    far = (np.abs(problem.x - 0.5) > 1.6)[:, None] | (np.abs(problem.y) > 1.6)
+    np.testing.assert_array_equal(found.total[far], right.total[far])
+    assert not np.any(spike & far)
+    before, after = (evaluate(problem, each, second_order=False).residual_rms for each in (start, found))
+    assert after < 0.15 * before
+
+
+def test_nothing_is_done_where_little_or_everything_is_left(solved):
+    problem, right = solved
+    np.testing.assert_array_equal(smoothed(problem, right).total, right.total)
+    noise = right.total * (1.0 + 0.05 * np.random.default_rng(3).standard_normal(problem.cells))
+    np.testing.assert_array_equal(smoothed(problem, Pressures(noise, noise, right.approach)).total, noise)
+
+
+def test_held_cells_and_bodies_stay(solved):
+    problem, right = solved
+    _, start = dented(problem, right)
+    held = np.broadcast_to(np.abs(problem.y) > 0.5, problem.cells)
+    for step in newton(replace(problem, held=held), start, second_order=False):
+        if step.number == 3:
+            break
+    assert step.approach == right.approach
+    np.testing.assert_array_equal(step.balance.unknowns.total[held], start.total[held])
+    assert not np.any(step.balance.oil_residual[held])
+    assert np.abs(step.balance.unknowns.total - start.total)[~held].max() > 0.05
+
+
+@pytest.mark.parametrize(
+    ("load_number", "oil_number", "oil", "most"),
+    [(20, 10, BARUS, 5), (100, 5, BARUS, 3), (500, 10, ROELANDS, 4), (20, 2, BARUS, 3), (100, 15, ROELANDS, 5)],
+)
+def test_few_steps_a_grid_and_few_vectors_a_step(monkeypatch, load_number, oil_number, oil, most):
+    """Of the finest grid; before, up to 10 steps (14 on 257 x 257) of 12 to 20 vectors."""
+    vectors, gmres = [], mixed_linear.gmres
+
+    def counted(product, precondition, wanted, **how):
+        vectors.append(0)
+
+        def counting(vector):
+            vectors[-1] += 1
+            return product(vector)
+
+        return gmres(counting, precondition, wanted, **how)
+
+    monkeypatch.setattr(mixed_linear, "gmres", counted)
+    conditions, unit = ball(load_number, oil_number)
+    solution = solve_contact(conditions, oil, on_a_grid(conditions, 129), options=OPTIONS)
+    finest = [step for step in solution.convergence.history if step.cells == (129, 129)]
+    assert solution.convergence.attempt == "coarse to fine"
+    assert len(finest) - 1 <= most
+    assert max(vectors) <= 18
+    assert np.mean(vectors) < 9.0
+    found = np.interp(0.0, solution.grid.x, solution.gap[:, 64]) / unit, solution.gap.min() / unit
+    key = (load_number, oil_number, oil.viscosity.__class__.__name__)
+    if key in REFERENCE:
+        assert found == pytest.approx(REFERENCE[key], rel=0.015)
+
+
+@pytest.mark.parametrize("shape", ["straight", "the load's own drop"])
+def test_a_roller_starts_from_its_dry_contact(shape):
+    """Sharp ends carry what no coarser grid foretells; before, a straight one took 345 steps and 25 times as long."""
+    contact = rollers.conditions(RollerShape() if shape == "straight" else rollers.lundberg(1.0))
+    wide = contact.sliced_load.peak**0.5
+    surface = flat_surface(rollers.between(contact, (96, 192), (-4.5 * wide, 1.5 * wide)))
+    solution = solve_contact(contact, rollers.OIL, surface)
+    assert solution.convergence.attempt == "coarse to fine"
+    assert solution.convergence.iterations <= 24
+    cold = solve_contact(contact, rollers.OIL, surface, start=solution, options=Options(tolerance=1e-6))
+    np.testing.assert_allclose(cold.gap, solution.gap, rtol=1e-3)
