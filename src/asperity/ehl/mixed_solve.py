@@ -73,7 +73,7 @@ def solve_mixed(
     if start is not None:
         way, step = CLIMB, search.go_on(finest, pressures_of(start, finest, scales))
     else:
-        for way in _ways(conditions, surface, smooth_film(conditions, lubricant), options.contact_film):
+        for way in _ways(surface, smooth_film(conditions, lubricant), options.contact_film):
             posed = finest if way == CLIMB else replace(finest, accurate=False)
             levels = levels_in_reach(posed, conditions, lubricant)
             step = search.along(way, levels, lambda on: first_guess(on, conditions, lubricant, scales))
@@ -94,11 +94,10 @@ def solve_mixed(
     )
 
 
-def _ways(conditions: ContactConditions, surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
+def _ways(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
     """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
     if not np.any(surface.heights):
-        sharp = conditions.geometry == "roller" and conditions.sliced_load.sharp  # ends that the dry contact has right
-        return (FROM_DRY, CLIMB, STURDY) if sharp or film < contact_film else (CLIMB, STURDY)
+        return (FROM_DRY, CLIMB, STURDY) if film < contact_film else (CLIMB, STURDY)
     return (FROM_DRY, CLIMB) if film < THIN * surface.sq else (CLIMB, FROM_DRY)
 
 
