@@ -35,6 +35,7 @@ from asperity.surface import Surface
 
 CLIMB, STURDY = ATTEMPTS[:2]
 MOST_BETWEEN_ENDS = 60  # accurate steps on a roller's finest grid: sharp ends take the sturdier way
+MOST_WORK = 1.5  # of as many steps as are allowed on a roller's finest grid: all steps, on all grids, of all ways
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
@@ -70,6 +71,8 @@ def solve_mixed(
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = on_one_line(whole) if whole.uniform else whole
     search = MixedSearch(options, scales.gap, progress)
+    if conditions.geometry == "roller":
+        search.most_work = MOST_WORK * options.max_iterations * finest.roughness.size
     if start is not None:
         way, step = CLIMB, search.go_on(finest, pressures_of(start, finest, scales))
     else:
@@ -81,6 +84,8 @@ def solve_mixed(
                 if way != CLIMB and finest.accurate and finest.form.along is not None:
                     way, step = search.refined(finest, step)
                 search.coarser(finest)
+                break
+            if search.given_up:
                 break
     return search.solution(
         step,

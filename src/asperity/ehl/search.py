@@ -46,6 +46,7 @@ class Search:
         self.iteration_error: Figures | None = None
         self.smooth, self.order = False, 1 if options.model == CONSERVING else 2  # bodies, and wedge
         self.lost = False
+        self.work, self.most_work = 0.0, np.inf  # cells of all steps
 
     @property
     def discretisation_error(self) -> GridError | None:
@@ -53,6 +54,11 @@ class Search:
         return grid_error(
             self.figures, smooth=self.smooth, cell=self.cell, by_first_order=self.by_first_order, order=self.order
         )
+
+    @property
+    def given_up(self) -> bool:
+        """Whether all the work that the search may take is done."""
+        return self.work >= self.most_work
 
     def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
         """Whether the last step met the tolerance in residual, change and, `of_load`, load."""
@@ -101,7 +107,7 @@ class Search:
         while True:
             self._record(problem, step)
             self.lost = step.number > 0 and not np.isfinite(step.change)
-            if self.settled(tolerance, of_load=of_load) or step.number >= most or self.lost:
+            if self.settled(tolerance, of_load=of_load) or step.number >= most or self.lost or self.given_up:
                 break
             if step.balance.residual_rms > astray:
                 break
@@ -197,6 +203,7 @@ class Search:
         balance = step.balance
         iteration = Iteration(problem.cells, step.number, balance.residual_rms, abs(balance.load_error), step.change)
         self.history.append(iteration)
+        self.work += problem.roughness.size if step.number > 0 else 0
         if self.progress:
             self.progress(iteration)
 
