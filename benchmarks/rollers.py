@@ -76,8 +76,8 @@ def lines(*, fast: bool) -> Iterator[str]:
     for name, shape in shapes.items():
         for cells in TIMED[:1] if fast else TIMED:
             yield _timed(name, conditions(shape), cells)
-    if not fast:
-        yield _timed("straight", conditions(RollerShape()), TIMED[0])
+    for cells in TIMED[:1] if fast else TIMED:
+        yield _timed("straight", conditions(RollerShape()), cells)
 
 
 def _timed(name: str, contact: ContactConditions, cells: tuple[int, int]) -> str:

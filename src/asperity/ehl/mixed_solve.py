@@ -35,7 +35,7 @@ from asperity.surface import Surface
 
 CLIMB, STURDY = ATTEMPTS[:2]
 MOST_BETWEEN_ENDS = 60  # accurate steps on a roller's finest grid: sharp ends take the sturdier way
-MOST_WORK = 1.5  # of as many steps as are allowed on a roller's finest grid: all steps, on all grids, of all ways
+MOST_WORK = 1.25  # of as many steps as are allowed on a roller's finest grid: all steps, on all grids, of all ways
 MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
