@@ -103,7 +103,8 @@ def nijenbanning(load_number: float, oil_number: float, ratio: float = 1.0) -> f
     return float((thin ** (2.0 * s / 3.0) + thick) ** (1.0 / s))
 
 
-def _line_case(load_number: float, oil_number: float, law: str) -> tuple[ContactConditions, Lubricant, float]:
+def line_case(load_number: float, oil_number: float, law: str) -> tuple[ContactConditions, Lubricant, float]:
+    """A line contact with these Moes numbers, its oil, and the film [m] that H = 1 stands for."""
     modulus, radius = PAIR.effective_modulus, 5.4e-3
     twice_u = (oil_number / (ALPHA * modulus)) ** 4
     speed = twice_u * modulus * radius / (2.0 * ETA0)
@@ -122,7 +123,7 @@ def _line_case(load_number: float, oil_number: float, law: str) -> tuple[Contact
 
 def line_films(load_number: float, oil_number: float, law: str, cells: int) -> tuple[float, float]:
     """Film at x = 0 and least film, in units of H; the inlet is longer for light loads."""
-    conditions, oil, unit = _line_case(load_number, oil_number, law)
+    conditions, oil, unit = line_case(load_number, oil_number, law)
     a = conditions.hertz.half_widths[0]
     reach = 10.0 if load_number <= 10.0 else 4.5 if load_number <= 20.0 else 2.5  # thin films need a short inlet only
     grid = Grid((cells, 8), (-reach * a, -a), (max(1.4, 0.3 * reach) * a, a))

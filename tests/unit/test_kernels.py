@@ -303,6 +303,17 @@ def test_relaxed_lines_leave_no_residual(rng, parity, across, reaching):
     assert across == 1 or np.abs(left[:, 1 - parity :: 2]).max() > 0.1
 
 
+def test_a_pivot_that_vanishes_is_replaced(rng):
+    """Lines of five are not dominated by their centres; elimination never divides by nothing."""
+    stencil, far = Stencil(*(-rng.random(CELLS) for _ in range(5))), far_of(CELLS, rng)
+    stencil.centre[0] = 0.0
+    lines = relax.Lines(*np.empty((7, CELLS[0], CELLS[1] // 2)))
+    relax.factor_lines(stencil, far, 0, lines)
+    least = relax.LEAST_PIVOT * (np.abs(stencil.west) + np.abs(stencil.centre) + np.abs(stencil.east))[:, ::2]
+    assert np.all(1.0 / lines.inverse >= 0.999 * least)
+    np.testing.assert_allclose(lines.inverse[0], 1.0 / least[0])
+
+
 @pytest.mark.parametrize("reaching", [False, True])
 @pytest.mark.parametrize("across", [8, 7, 1])
 def test_split_residual_is_the_matrix_product(rng, across, reaching):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.films import _line_case
+from benchmarks.films import line_case
 
 from asperity import load_case, solve_case
 from asperity.ehl import Texture, auto_grid, contact_state, film_fits, grid_shortfalls, regime_card, solve_contact
@@ -44,7 +44,7 @@ def films(solution):
 @pytest.mark.parametrize("row", FILMS, ids=NAMES)
 def test_smooth_lines_have_their_film_within_one_per_cent_or_their_own_bar(row):
     m, l, law, central, least, _ = row  # noqa: E741
-    conditions, oil, unit = _line_case(m, l, law)
+    conditions, oil, unit = line_case(m, l, law)
     solution = solve_contact(conditions, oil, flat_surface(auto_grid(conditions, oil)))
     error = solution.convergence.error
     found = films(solution)
@@ -60,7 +60,7 @@ def test_smooth_lines_have_their_film_within_one_per_cent_or_their_own_bar(row):
 @pytest.mark.parametrize("row", FILMS, ids=NAMES)
 def test_a_grid_given_by_hand_is_too_coarse_where_its_film_is_off_by_one_per_cent(row):
     m, l, law, *_, errors = row  # noqa: E741
-    conditions, oil, _ = _line_case(m, l, law)
+    conditions, oil, _ = line_case(m, l, law)
     a = conditions.hertz.half_widths[0]
     left, right = (-10.0, 3.0) if m == 5 else (-4.5, 1.9)
     for cells, error in zip((64, 128, 256, 512, 1024), errors, strict=True):
@@ -72,7 +72,7 @@ def test_a_grid_given_by_hand_is_too_coarse_where_its_film_is_off_by_one_per_cen
 @pytest.mark.parametrize(("m", "l"), [(2.4, 17), (0.47, 17), (0.15, 17), (2.4, 5), (0.47, 5)])
 def test_light_contacts_are_flooded(m, l):  # noqa: E741
     """Within 1 % of -30 a, where -4.5 a takes 2 to 69 % off."""
-    conditions, oil, _ = _line_case(m, l, "Roelands")
+    conditions, oil, _ = line_case(m, l, "Roelands")
     a = conditions.hertz.half_widths[0]
     far = solve_contact(conditions, oil, flat_surface(Grid((1024, 8), (-30.0 * a, -a), (8.0 * a, a))))
     near = solve_contact(conditions, oil, flat_surface(auto_grid(conditions, oil)))

@@ -41,6 +41,7 @@ class MixedLinear:
         self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
         self.oil = balance.oil_pressure.astype(self.real)
         self.conserves = balance.surplus is not None
+        self.follows_wedge = problem.accurate and problem.cells[1] > 1  # on one line own pressures tell more
         if balance.surplus is not None and balance.surplus_by_oil is not None:
             self.surplus_by_oil = balance.surplus_by_oil.astype(self.real)
             missing = np.minimum(balance.unknowns.oil, 0.0)
@@ -70,7 +71,7 @@ class MixedLinear:
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
         rows, film = self.rows._replace(state=state), self.film.held_where(~self.free)
         own, far = 1.0 / self.rows.contact_scale, None
-        if problem.accurate:
+        if self.follows_wedge:
             far, near = Far(*np.empty((2, *self.cells), self.real)), problem.deflection.near
             stencils.wedge_stencil(
                 rows, film, self.faces, self.oil, (own, near[1] - near[3]), problem.spacing, stencil, far
@@ -142,7 +143,7 @@ class MixedLinear:
     def answer(self, wet: Field, closed: Field) -> tuple[Field, Field]:
         """Approximate changes of the oil's pressure and of touching cells' total pressure that answer both rows."""
         change = self.blocks(wet)
-        if self.balance.problem.accurate:
+        if self.follows_wedge:
             change *= self.real(OVER)
         return self.lines(wet, change), closed
 
@@ -208,7 +209,7 @@ def newton_step(balance: MixedBalance) -> Pressures:
         return joined(d_oil - d_approach * response[0], d_closed - d_approach * response[1], d_approach)
 
     wanted = joined(wet, closed, float(weight * missing))
-    left = LEFT_SMOOTH if problem.accurate else LEFT
+    left = LEFT_SMOOTH if linear.follows_wedge else LEFT
     solved = gmres(product, precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
     d_oil, d_closed = split(solved)
     d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)

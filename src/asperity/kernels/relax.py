@@ -12,6 +12,8 @@ from asperity.arrays import Field
 from asperity.kernels.compiled import njit
 from asperity.kernels.stencils import Far, Stencil
 
+LEAST_PIVOT = 0.02  # of a row's nearest entries
+
 
 class Lines(NamedTuple):
     """Every second x line of a stencil: its LU factors, and the couplings to the lines on both sides; (nx, lines).
@@ -32,7 +34,8 @@ class Lines(NamedTuple):
 def factor_lines(stencil: Stencil, far: Far, parity: int, lines: Lines) -> None:
     """Eliminate every second x line, starting with `parity`, in place of `lines`.
 
-    Where an odd number of lines goes round, the first and the last are not coupled.
+    Where an odd number of lines goes round, the first and the last are not coupled. Lines of five are not dominated by
+    their centres: a pivot that vanishes beside its row is replaced.
     """
     reaching = lines.far_east.size > 0
     nx, ny = stencil.centre.shape
@@ -61,6 +64,9 @@ def factor_lines(stencil: Stencil, far: Far, parity: int, lines: Lines) -> None:
                 lines.lower[i, k] = factor
             else:
                 lines.lower[i, k] = 0.0
+            if reaching:
+                least = LEAST_PIVOT * (abs(stencil.west[i, j]) + abs(stencil.centre[i, j]) + abs(stencil.east[i, j]))
+                pivot = max(pivot, least)
             lines.inverse[i, k] = one / pivot
         if ny % 2 == 1 and parity == 0:
             lines.north[i, count - 1] = 0.0
