@@ -31,6 +31,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "condition": "Conditions",
     "oil": "An oil by its data sheet",
     "rating": "Ratings of a machine",
+    "knob": "Knobs of the live page",
     "band": "Where a resonance is looked for",
     "table1": "The paper's Table 1",
 }

@@ -96,6 +96,15 @@ def line_pressure(x: Field, half_width: float, p_max: float) -> Field:
     return np.asarray(p_max * np.sqrt(np.maximum(1.0 - (x / half_width) ** 2, 0.0)))
 
 
+def ellipse_pressure(x: Field, y: float, half_widths: tuple[float, float], p_max: float) -> Field:
+    """Pressure of a point or elliptic contact along the line at y [Pa]: p_h sqrt(1 - (x/a)^2 - (y/b)^2), 0 outside.
+
+    Source: K. L. Johnson, Contact Mechanics (1985), section 3.2 and eq. 4.24.
+    """
+    a, b = half_widths
+    return np.asarray(p_max * np.sqrt(np.maximum(1.0 - (x / a) ** 2 - (y / b) ** 2, 0.0)))
+
+
 def line_gap(x: Field, half_width: float, radius: float) -> Field:
     """Gap of a dry line contact at x [m], zero inside: a²/(2R) (X √(X²−1) − ln(X + √(X²−1))), X = |x|/a."""
     outside = np.maximum(np.abs(x) / half_width, 1.0)

@@ -1,0 +1,269 @@
+"""The page of a contact: knobs beside what becomes of them, drawn anew whenever the desk changes."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from bokeh.models import Column
+
+from asperity.page import take
+from asperity.page.answer import Answer
+from asperity.page.desk import Desk
+from asperity.page.figures import Cut, Maps, Spectrum, Trail
+from asperity.page.jobs import Queue, Workshop
+from asperity.page.settings import Settings
+from asperity.page.uploads import Drop
+from asperity.page.widgets import (
+    DROP,
+    LOOK,
+    TILE_STYLES,
+    Handout,
+    KnobWidget,
+    button,
+    button_row,
+    sentences,
+    text_block,
+    tiles,
+)
+from asperity.page.work import Refused, make_report, open_surface
+from asperity.quantities import quantity
+
+SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
+OLD = ":host { opacity: .55; }"
+
+
+class ContactView:
+    """One user's contact with its widgets.
+
+    Parameters
+    ----------
+    settings : the opened case
+    workshop : solves
+    deliver : calls a function under the document's lock
+    set_address : puts a query into the browser's address
+    solved : an answer that is there already, as of a kept run
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        workshop: Workshop,
+        deliver: Callable[[Callable[[], None]], None],
+        set_address: Callable[[str], None],
+    ) -> None:
+        self._set_address = set_address
+        self._workshop, self._deliver = workshop, deliver
+        self.desk = Desk(settings, Queue(workshop, deliver), self.draw)
+        self._side = Queue(workshop, deliver)
+        self.maps = Maps(self._cut_at)
+        self.cut, self.spectrum, self.trail = Cut(self.maps), Spectrum(), Trail(self._again)
+        self.status, self.verdict, self.notes, self.said = (text_block() for _ in range(4))
+        self.tiles = text_block(TILE_STYLES)
+        self.handout = Handout()
+        self.knobs: dict[str, KnobWidget] = {}
+        self.knob_column = Column(sizing_mode="stretch_width")
+        self._cut_y, self._more = 0.0, False
+        self._drawn: tuple[Answer, Answer | None] | None = None
+        self.drop = Drop(
+            limit=SURFACE_LIMIT, arrived=self._surface_came, refused=self._say, several=False,
+            name="Measured surface, dropped here", sizing_mode="stretch_width", margin=0, stylesheets=[LOOK, DROP],
+        )  # fmt: skip
+        self.more = button("More knobs", self._show_more)
+        self.pin = button("Pin to compare", self._pin)
+        self.report = button("Report", self._make_report)
+        self.take = button_row(
+            self.pin, button("Case file", self._give_case), button("Python lines", self._give_script), self.report
+        )
+        self._build_knobs()
+
+    def begin(self, query: str, answer: Answer | None = None) -> None:
+        """Solve what the address says, or show what is solved already."""
+        if answer is not None and not query:
+            self.desk.open(self.desk.settings.opened, answer)
+            return
+        self._say(*self.desk.go_to(query))
+
+    def close(self) -> None:
+        """Give back what the session took."""
+        self.desk.close()
+        self._side.close()
+        self.drop.close()
+
+    # What is shown ---------------------------------------------------------------------------------------------------
+
+    def draw(self) -> None:
+        """Draw the desk as it is now."""
+        desk = self.desk
+        if desk.settings.opened is not self._built:
+            self._build_knobs()
+        warming = "" if self._workshop.is_warm else "Warming up: the solver is loaded, and compiled the first time. "
+        kind = "alarm" if desk.problem or (desk.answer is not None and not desk.answer.converged) else "soft"
+        self.status.text = sentences([f"{warming}{desk.status}"], kind)
+        for key, widget in self.knobs.items():
+            refusal = desk.refusals.get(key)
+            widget.show(refusal.text if refusal else desk.settings.text(key), refusal.sentence if refusal else "")
+        self._mark(desk.stale)
+        if desk.answer is not None:
+            self.tiles.text = tiles(desk.answer.tiles, desk.answer, desk.pinned, old=desk.pending)
+            if (desk.answer, desk.pinned) != self._drawn:
+                self._draw_answer(desk.answer, desk.pinned)
+                self._drawn = (desk.answer, desk.pinned)
+        self.pin.label = "Unpin" if desk.pinned is not None else "Pin to compare"
+
+    def _draw_answer(self, answer: Answer, pinned: Answer | None) -> None:
+        self.maps.show(answer, pinned)
+        self._draw_cut()
+        if answer.coarse:
+            return
+        self.verdict.text = sentences([answer.verdict], "" if answer.converged else "alarm")
+        self.notes.text = sentences(answer.notes, "soft")
+        self.spectrum.show(answer.sound, None if pinned is None else pinned.sound, _heard(answer))
+        self.trail.show(self.desk.trail)
+        self._set_address(self.desk.settings.address)
+
+    def _draw_cut(self) -> None:
+        answer = self.desk.answer
+        if answer is not None:
+            self._cut_y = float(answer.y[answer.line(self._cut_y)])
+            self.maps.cut(self._cut_y)
+            self.cut.show(answer, self.desk.pinned, self._cut_y)
+
+    def _mark(self, old: bool) -> None:
+        """Mark a picture that is not of the knobs as they are set."""
+        sheets = [OLD] if old else []
+        for shown in (self.maps.film, self.maps.pressure, self.cut.pressure, self.cut.film, self.spectrum.figure):
+            if shown.stylesheets != sheets:
+                shown.stylesheets = sheets
+
+    def _say(self, *lines: str) -> None:
+        self.said.text = sentences(lines, "alarm")
+
+    # What is turned --------------------------------------------------------------------------------------------------
+
+    def _build_knobs(self) -> None:
+        """A widget for every knob of the opened case, under the headings of their groups."""
+        self._built = self.desk.settings.opened
+        self.knobs = {key: KnobWidget(knob, self._turned) for key, knob in self.desk.settings.knobs.items()}
+        children: list[Any] = []
+        group = ""
+        for widget in self.knobs.values():
+            if widget.knob.more and not self._more:
+                continue
+            if widget.knob.group != group:
+                group = widget.knob.group
+                heading = text_block("h3 { font-size: .95rem; margin: 12px 0 2px; }")
+                heading.text = f"<h3>{group}</h3>"
+                children.append(heading)
+            children.append(widget.model)
+        self.knob_column.children = children
+
+    def _turned(self, key: str, text: str) -> None:
+        self._say()
+        self.desk.turn(key, text)
+
+    def _show_more(self) -> None:
+        self._more = not self._more
+        self.more.label = "Fewer knobs" if self._more else "More knobs"
+        self._build_knobs()
+        self.draw()
+
+    def _cut_at(self, y: float) -> None:
+        self._cut_y = y / quantity("y_m").factor
+        self._draw_cut()
+
+    def _again(self, number: int) -> None:
+        """Go back to a setting that was tried."""
+        self._say()
+        self.desk.go_back(number)
+
+    def _pin(self) -> None:
+        if self.desk.pinned is not None:
+            self.desk.unpin()
+        else:
+            self.desk.pin()
+
+    # What is dropped and taken away ----------------------------------------------------------------------------------
+
+    def _surface_came(self, path: Path) -> None:
+        self._say()
+        case = self.desk.settings.case
+        self._side.ask((open_surface, (case, path)), self._surface_read)
+
+    def _surface_read(self, result: Any) -> None:
+        if isinstance(result, Refused):
+            self._say(result.sentence)
+            return
+        case, steps = result
+        self.said.text = sentences(steps, "soft")
+        self.desk.open(case, dropped=case.contents.surface.name)
+
+    def _give_case(self) -> None:
+        self.handout.give(take.CASE_FILE, "application/toml", take.case_text(self.desk.settings.case))
+
+    def _give_script(self) -> None:
+        self.handout.give(take.SCRIPT, "text/x-python", take.python_lines())
+
+    def _make_report(self) -> None:
+        self.report.disabled, self.report.label = True, "Report is made ..."
+        self._side.ask((make_report, (self.desk.settings.case,)), self._report_made)
+
+    def _report_made(self, result: Any) -> None:
+        self.report.disabled, self.report.label = False, "Report"
+        if isinstance(result, Refused):
+            self._say(result.sentence)
+        else:
+            self.handout.give(take.REPORT, "text/html", result)
+
+
+def _heard(answer: Answer) -> str:
+    """What the spectrum says, as its title."""
+    sound = answer.sound
+    if sound is None:
+        return "No vibration asked for"
+    if sound.crf_hz is None:
+        return f"No contact resonance: {sound.reason}"
+    return f"Contact resonance at {quantity('crf_hz').text(sound.crf_hz, sound.crf_std_hz)}"
+
+
+def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The parts of the page by name, and the sections that they stand in."""
+    parts = {
+        "knobs": view.knob_column,
+        "more": view.more,
+        "drop": view.drop,
+        "status": view.status,
+        "verdict": view.verdict,
+        "said": view.said,
+        "tiles": view.tiles,
+        "take": view.take,
+        "film": view.maps.film,
+        "pressure": view.maps.pressure,
+        "change": view.maps.change,
+        "cut": Column(view.cut.pressure, view.cut.film, sizing_mode="stretch_width"),
+        "spectrum": view.spectrum.figure,
+        "share": view.trail.share,
+        "pitch": view.trail.pitch,
+        "notes": view.notes,
+        "handout": view.handout.model,
+    }
+    block: Any = partial(dict, heading="", live=False, key=(), first=False)
+    key = (("touching", "asperity contact"), ("ruptured", "cavitated"), ("hertz", "Hertz zone"))
+    knobs = [block(names=["knobs"]), block(names=["more"]), block(names=["drop"])]
+    shown = [
+        block(names=["status"], live=True, first=True),
+        block(names=["said"], live=True, first=True),
+        block(names=["tiles"], first=True),
+        block(names=["verdict"]),
+        block(names=["take"]),
+        block(names=["film", "pressure"], key=key, first=True),
+        block(names=["change"]),
+        block(names=["cut", "spectrum"]),
+        block(names=["share", "pitch"], heading="What was tried"),
+        block(names=["notes"], heading="To read with the numbers"),
+        block(names=["handout"]),
+    ]
+    return parts, [
+        {"kind": "knobs", "label": "Knobs", "blocks": knobs},
+        {"kind": "shown", "label": "The contact", "blocks": shown},
+    ]

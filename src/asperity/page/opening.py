@@ -1,0 +1,57 @@
+"""What the page is opened with: a case, a kept run, the folder of a study, a history or recordings; or nothing."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from asperity.case import Case, load_case
+from asperity.errors import UnreadableFile
+from asperity.history import is_history
+from asperity.page.answer import Answer
+from asperity.page.settings import require_few
+from asperity.page.work import open_run
+from asperity.paper import papers_case
+
+FIRST = {"grid.cells": [128, 128]}  # of the paper's contact, which is there where nothing is named
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opened:
+    """What is looked at: which page comes first, its name, the contact, and the path of what else there is.
+
+    `answer` is the contact's where it is solved already.
+    """
+
+    kind: str
+    name: str
+    case: Case
+    answer: Answer | None = None
+    path: Path | None = None
+
+
+def open_page(what: Path | None) -> Opened:
+    """Read what the page is opened with.
+
+    Raises
+    ------
+    UnreadableFile
+        for a path that leads nowhere, or to a file that is neither a case nor a run.
+    BadInput
+        for a case that is refused.
+    """
+    if what is None:
+        return Opened(kind="contact", name="the paper's contact", case=papers_case().with_overrides(FIRST))
+    if what.is_dir():
+        paper = papers_case().with_overrides(FIRST)
+        if is_history(what):
+            return Opened(kind="history", name=what.name, case=paper, path=what)
+        kind = "study" if (what / "manifest.json").is_file() else "recordings"
+        return Opened(kind=kind, name=what.name, case=paper, path=what)
+    if not what.exists():
+        raise UnreadableFile(f"{what} does not exist; check its name")
+    if what.suffix == ".nc":
+        case, answer = open_run(what)
+        return Opened(kind="contact", name=what.name, case=case, answer=answer)
+    case = load_case(what)
+    if case.contents.grid.cells != "auto":
+        require_few(case.source, case.contents.grid.cells)
+    return Opened(kind="contact", name=what.name, case=case)

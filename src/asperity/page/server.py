@@ -1,0 +1,188 @@
+"""The server: on this machine alone unless asked otherwise, one document a visit, nothing fetched from elsewhere."""
+
+import ipaddress
+import os
+import secrets
+import socket
+from collections.abc import Callable
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+from urllib.parse import urlencode
+
+import panel
+from bokeh.models import UIElement
+from tornado.web import RedirectHandler
+
+from asperity.errors import BadInput
+from asperity.page import contact
+from asperity.page.jobs import Workshop
+from asperity.page.opening import Opened
+from asperity.page.settings import Settings
+
+HERE = "127.0.0.1"
+PORT = 5006
+PASSWORD = "ASPERITY_PAGE_PASSWORD"
+SHORTEST = 8  # characters of a password
+WAIT_MS = 15_000  # for a visitor that has gone
+MESSAGE = 24_000_000  # bytes that a browser may send at a time
+
+
+def origins(address: str, port: int) -> list[str]:
+    """Hosts whose pages may talk to the server: itself by the names that it has."""
+    names = {HERE, "localhost"} if _local(address) else {address}
+    if address in ("0.0.0.0", "::"):
+        names = {HERE, "localhost", socket.gethostname()}
+        names |= {str(found[4][0]) for found in socket.getaddrinfo(socket.gethostname(), None)}
+    return sorted(f"[{name}]:{port}" if ":" in name else f"{name}:{port}" for name in names)
+
+
+def _local(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
+
+
+def password_for(address: str) -> str | None:
+    """The password that others have to know; None on this machine alone. BadInput where there has to be one."""
+    if _local(address):
+        return None
+    given = os.environ.get(PASSWORD, "")
+    if len(given) < SHORTEST:
+        raise BadInput(
+            f"--listen {address} lets others in, who need a password; put one of at least {SHORTEST} characters into "
+            f"the environment variable {PASSWORD}, or leave --listen out"
+        )
+    return given
+
+
+def require_free(address: str, port: int) -> int:
+    """The port, or any that is free for 0; BadInput where it cannot be had."""
+    try:
+        with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((address, port))
+            return int(probe.getsockname()[1])
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise BadInput(
+            f"cannot listen on {address}, port {port}: {reason}; choose another --port or --listen"
+        ) from None
+    except OverflowError:
+        raise BadInput(f"--port must be 0 to 65535, got {port}") from None
+
+
+class House:
+    """All pages of one server, and the processes that work for them."""
+
+    def __init__(self, opened: Opened, workshop: Workshop) -> None:
+        self.opened, self.workshop = opened, workshop
+        panel.extension("filedropper", notifications=False)
+        self.template = files("asperity.page").joinpath("page.html.j2").read_text("utf-8")
+        self.style = files("asperity.page").joinpath("style.css").read_text("utf-8")
+        self.places = [("contact", "Contact")]
+
+    def contact(self) -> Any:
+        """The page of a contact, for one visit."""
+        view = contact.ContactView(Settings(self.opened.case), self.workshop, _deliver(), _address())
+        parts, sections = contact.layout(view)
+        view.begin(_query(), self.opened.answer)
+        panel.state.on_session_destroyed(lambda _context: view.close())
+        return self._page("contact", "Contact", parts, sections)
+
+    def pages(self) -> dict[str, Callable[[], Any]]:
+        """The pages by their places."""
+        made = {"contact": self.contact}
+        return {name: made[name] for name, _ in self.places}
+
+    def _page(self, here: str, heading: str, parts: dict[str, Any], sections: list[dict[str, Any]]) -> Any:
+        page = panel.Template(self.template, location=True)
+        for name, part in parts.items():
+            shown = panel.pane.Bokeh(part, sizing_mode="stretch_width") if isinstance(part, UIElement) else part
+            page.add_panel(name, shown)
+        told = {"heading": heading, "here": here, "places": self.places, "sections": sections, "style": self.style}
+        for name, value in {
+            **told,
+            "kind": here,
+            "foot": f"asperity {version('asperity')}, {self.opened.name}",
+        }.items():
+            page.add_variable(name, value)
+        return page
+
+
+def _deliver() -> Callable[[Callable[[], None]], None]:
+    """What lets a function run under the lock of the document that is being made, from any thread."""
+    document = panel.state.curdoc
+
+    def deliver(function: Callable[[], None]) -> None:
+        if document.session_context is not None and not document.session_context.destroyed:
+            document.add_next_tick_callback(function)
+
+    return deliver
+
+
+def _address() -> Callable[[str], None]:
+    """What puts a query into the address of the browser that is visiting."""
+    location = panel.state.location
+
+    def put(query: str) -> None:
+        location.search = f"?{query}" if query else ""
+
+    return put
+
+
+def _query() -> str:
+    """The query of the visit's address."""
+    pairs = [
+        (name, value.decode("utf-8", "replace"))
+        for name, values in panel.state.session_args.items()
+        if not name.startswith("bokeh-")
+        for value in values
+    ]
+    return urlencode(pairs)
+
+
+def serve_page(opened: Opened, *, port: int = PORT, listen: str = HERE, ready: Callable[[str], None]) -> None:
+    """Serve the pages until interrupted.
+
+    Parameters
+    ----------
+    opened : what is looked at
+    port : 0 for any that is free
+    listen : address to listen on; one that others can reach needs a password, in `ASPERITY_PAGE_PASSWORD`
+    ready : called with the page's address when it can be visited
+
+    Raises
+    ------
+    BadInput
+        for a port that is taken, an address that is none of this machine's, no password where there has to be one.
+    """
+    password = password_for(listen)
+    port = require_free(listen, port)
+    workshop = Workshop()
+    try:
+        workshop.warm()
+        house = House(opened, workshop)
+        guarded = {} if password is None else {"basic_auth": password, "cookie_secret": secrets.token_hex(32)}
+        server = panel.serve(
+            house.pages(),
+            port=port,
+            address=listen,
+            websocket_origin=origins(listen, port),
+            show=False,
+            start=False,
+            verbose=False,
+            title="asperity",
+            use_index=False,
+            extra_patterns=[("/", RedirectHandler, {"url": f"/{opened.kind}", "permanent": False})],
+            check_unused_sessions_milliseconds=WAIT_MS // 3,
+            unused_session_lifetime_milliseconds=WAIT_MS,
+            websocket_max_message_size=MESSAGE,
+            **guarded,
+        )
+        server.start()
+        ready(f"http://{f'[{listen}]' if ':' in listen else listen}:{port}/")
+        server.io_loop.start()
+    finally:
+        workshop.close()

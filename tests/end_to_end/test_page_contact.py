@@ -1,0 +1,248 @@
+"""The page of a contact in a browser: knobs, what becomes of them, files dropped, links, and who is let in."""
+
+import http.client
+import json
+import re
+import tomllib
+
+import numpy as np
+import pytest
+import x3pio
+
+from support.browser import Visit, chromium, serving
+
+uploads = pytest.importorskip("asperity.page.uploads", reason="the extra page is not installed")
+
+HOSTILE_NAMES = [
+    "<img src=x onerror=window.pwned=1>.x3p", "..%2f..%2fetc%2fpasswd.x3p", "$(touch pwned).x3p", "`touch pwned`.x3p",
+    "a'; import os; os.system('touch pwned').x3p", '"><script>window.pwned=1</script>.x3p', "{{7*7}}.x3p",
+    "{file=1}\n[surface].x3p", "-rf .x3p", ".." + "x" * 200 + ".x3p",
+]  # fmt: skip
+HOSTILE_ADDRESSES = [
+    "contact.load=<script>window.pwned=1</script>", "<img src=x onerror=window.pwned=1>=1",
+    "contact.load=\"><svg onload=window.pwned=1>", "dropped=<img src=x onerror=window.pwned=1>",
+    "case=</script><script>window.pwned=1</script>", "contact.load={{7*7}}", "surface.file=/etc/passwd",
+    "contact.load=__import__('os').system('touch pwned')", "contact.load=500 N%0d%0aSet-Cookie: a=b",
+    "surface.seed=javascript:window.pwned=1",
+]  # fmt: skip
+HOSTILE_HEADERS = [
+    {"Host": "evil.example"}, {"Host": "\"><script>pwned</script>"}, {"X-Forwarded-Host": "<script>pwned</script>"},
+    {"X-Forwarded-Proto": "javascript"}, {"X-Forwarded-Prefix": "/<script>pwned</script>"},
+    {"Referer": "<script>pwned</script>"}, {"User-Agent": "<script>pwned</script>"},
+    {"Cookie": "is_guest=1; user=<script>pwned</script>"}, {"Bokeh-Session-Id": "<script>pwned</script>"},
+    {"Accept-Language": "{{7*7}}<script>pwned</script>"},
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def server(browser, tmp_path_factory):  # noqa: ARG001 - none is started where there is no browser
+    with serving(tmp_path_factory.mktemp("server")) as started:
+        yield started
+
+
+@pytest.fixture
+def visit(browser, server):
+    made = Visit(browser, server)
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    """A measured surface, large enough for the contact."""
+    path = tmp_path_factory.mktemp("surface") / "ring.x3p"
+    rng = np.random.default_rng(3)
+    waves = rng.standard_normal((40, 40)).repeat(8, axis=0).repeat(8, axis=1) * 5e-7
+    x3pio.write(str(path), waves, x_scale=2e-6, y_scale=2e-6)
+    return path
+
+
+def tile(page, name="CLR"):
+    return page.locator("dl div", has_text=name).locator("dd").first
+
+
+def film(page):
+    """The film map's numbers as the browser has them."""
+    return page.evaluate(
+        "() => { for (const d of Bokeh.documents) for (const m of d._all_models.values())"
+        " if (m.type === 'ColumnDataSource' && m.data.image?.[0]?.dtype === 'float32')"
+        " return Array.from(m.data.image[0]).slice(0, 4000) }"
+    )
+
+
+def turn(page, name, text):
+    box = page.get_by_role("textbox", name=name)
+    box.fill(text)
+    box.press("Enter")
+    return box
+
+
+def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
+    page = visit.solved()
+    clr, crf, map_before = tile(page).inner_text(), tile(page, "CRF").inner_text(), film(page)
+    turn(page, "Load, F", "800 N")
+    page.wait_for_function("() => location.search.includes('contact.load=800')")
+    assert tile(page).inner_text() != clr
+    assert tile(page, "CRF").inner_text() != crf
+    assert film(page) != map_before
+    again = tile(page).inner_text()
+    page.reload()
+    page.get_by_text("Solved on").wait_for()
+    page.wait_for_function("() => location.search.includes('contact.load=800')")
+    assert tile(page).inner_text() == again
+    assert page.get_by_role("textbox", name="Load, F").input_value() == "800 N"
+
+
+def test_a_slider_turns_by_the_keyboard(visit):
+    page = visit.solved()
+    page.get_by_role("group", name="Load, F, slider").locator(".noUi-handle").focus()
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function("() => location.search.includes('contact.load=530')")
+    assert page.get_by_role("textbox", name="Load, F").input_value() == "530 N"
+
+
+def test_a_wrong_value_is_named_beside_its_knob(visit):
+    page = visit.solved()
+    box = turn(page, "Composite roughness, Sq", "2")
+    sentence = page.get_by_text('surface.sq must be a length such as "5.4 mm", got the bare number 2')
+    sentence.wait_for()
+    below, above = sentence.bounding_box(), box.bounding_box()
+    assert 0 < below["y"] - above["y"] < 120
+    assert page.locator(".bk-Figure").first.evaluate("element => getComputedStyle(element).opacity") != "1"
+    turn(page, "Composite roughness, Sq", "1 um")
+    sentence.wait_for(state="hidden")
+    assert page.locator(".bk-Figure").first.evaluate("element => getComputedStyle(element).opacity") == "1"
+
+
+def test_a_pinned_contact_is_compared_with(visit):
+    page = visit.solved()
+    page.get_by_role("button", name="Pin to compare").click()
+    turn(page, "Entrainment speed, u", "3 m/s")
+    page.wait_for_function("() => location.search.includes('entrainment')")
+    assert re.search(r"[−-][\d.]+ % against pinned", tile(page).inner_text())
+    page.get_by_role("button", name="Unpin").click()
+    page.get_by_text("against pinned").first.wait_for(state="hidden")
+
+
+def test_case_file_and_lines_are_taken_away(visit):
+    page = visit.solved("contact?contact.load=600+N")
+    with page.expect_download() as taken:
+        page.get_by_role("button", name="Case file").click()
+    assert taken.value.suggested_filename == "contact.toml"
+    assert tomllib.loads(taken.value.path().read_text("utf-8"))["contact"]["load"] == "600 N"
+    with page.expect_download() as taken:
+        page.get_by_role("button", name="Python lines").click()
+    compile(taken.value.path().read_text("utf-8"), "contact.py", "exec")
+
+
+def test_a_dropped_surface_is_solved(visit, ring):
+    page = visit.solved()
+    clr = tile(page).inner_text()
+    page.locator("input[type=file]").set_input_files(ring)
+    page.get_by_text("Measured surface ring.x3p").wait_for()
+    page.wait_for_function("() => location.search.includes('dropped=ring.x3p')")
+    assert tile(page).inner_text() != clr
+    assert page.get_by_role("textbox", name="Composite roughness, Sq").count() == 0
+
+
+def test_a_damaged_file_is_refused_in_a_sentence(visit, ring, tmp_path):
+    page = visit.solved()
+    clr = tile(page).inner_text()
+    (tmp_path / "cut.x3p").write_bytes(ring.read_bytes()[:3000])
+    page.locator("input[type=file]").set_input_files(tmp_path / "cut.x3p")
+    page.get_by_text(re.compile(r"cut\.x3p .*\.$")).wait_for()
+    assert tile(page).inner_text() == clr
+
+
+def test_a_files_name_is_a_name_and_nothing_more(visit, server):
+    page = visit.solved()
+    for number, name in enumerate(HOSTILE_NAMES):
+        content = f"no surface {number}".encode() * (number + 1)
+        page.locator("input[type=file]").set_input_files({"name": name, "mimeType": "", "buffer": content})
+        page.get_by_text(uploads.safe_name(name)).filter(has_text=re.compile("in no format|cannot|is no")).wait_for()
+        assert page.evaluate("() => window.pwned") is None
+    assert not (server.log.parent / "pwned").exists()
+
+
+def test_an_address_is_values_and_nothing_more(visit, server):
+    for query in HOSTILE_ADDRESSES:
+        page = visit.go(f"contact?{query}")
+        page.get_by_text(re.compile("^(The link|Of the link) ")).wait_for()
+        assert page.evaluate("() => window.pwned") is None
+        assert page.get_by_role("textbox", name="Load, F").input_value() == "500 N"
+        assert page.get_by_text("root:").count() == 0
+    assert not (server.log.parent / "pwned").exists()
+
+
+@pytest.mark.parametrize("header", HOSTILE_HEADERS, ids=lambda header: next(iter(header)))
+def test_a_header_is_nowhere_in_the_page(server, header):
+    connection = http.client.HTTPConnection(server.host)
+    connection.request("GET", "/contact", headers=header)
+    answer = connection.getresponse()
+    said = f"{answer.getheaders()} {answer.read().decode('utf-8')}"
+    assert answer.status in (200, 400, 403)
+    for text in ("pwned", "evil.example", "{{7*7}}"):
+        assert text not in said
+    connection.close()
+
+
+def handshake(server, origin):
+    connection = http.client.HTTPConnection(server.host)
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Origin": origin}
+    connection.request("GET", "/contact/ws", headers={**upgrade, "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="})
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "http://127.0.0.1:1", "null", "http://127.0.0.1.evil.example"]
+)
+def test_a_foreign_origin_gets_403(server, origin):
+    assert handshake(server, origin) == 403
+
+
+def test_the_first_address_leads_to_the_contact(server):
+    connection = http.client.HTTPConnection(server.host)
+    connection.request("GET", "/")
+    answer = connection.getresponse()
+    assert (answer.status, answer.getheader("Location")) == (302, "/contact")
+    connection.close()
+
+
+def test_dark_and_light_have_legible_ink(browser, server):
+    for scheme in ("dark", "light"):
+        visit = Visit(browser, server, color_scheme=scheme)
+        page = visit.solved()
+        colours = page.evaluate(
+            "() => { const s = getComputedStyle(document.body); return JSON.stringify([s.color, s.backgroundColor]) }"
+        )
+        ink, paper = ([int(part) / 255 for part in re.findall(r"\d+", text)[:3]] for text in json.loads(colours))
+        assert contrast(ink, paper) > 7.0
+        assert (sum(paper) < 1.0) == (scheme == "dark")
+        visit.close()
+
+
+def contrast(one, other):
+    """WCAG's ratio of two colours."""
+
+    def luminance(colour):
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("width", [390, 1280, 2560])
+def test_nothing_is_wider_than_the_window(browser, server, width):
+    visit = Visit(browser, server, viewport={"width": width, "height": 900})
+    page = visit.solved()
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+    visit.close()

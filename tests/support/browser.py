@@ -1,0 +1,126 @@
+"""A live page's server and a browser that lets no request leave the machine; both tell what went wrong in them."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+REQUIRED = "ASPERITY_CHROMIUM"  # where it is set, as in CI, a browser that is not there fails the tests
+
+
+def missing(what: str) -> None:
+    """Skip, or fail where the browser's tests have to run."""
+    if os.environ.get(REQUIRED):
+        pytest.fail(f"{what}, and {REQUIRED} asks for these tests")
+    pytest.skip(f"{what}: pip install 'asperity[page]' playwright, apt-get install chromium")
+
+
+class Server:
+    """A running `asperity page`."""
+
+    def __init__(self, folder: Path, *arguments: str, **environment: str) -> None:
+        self.log = folder / "server.log"
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "asperity", "page", *arguments, "--port", "0"],
+                stdout=subprocess.PIPE, stderr=log, text=True, cwd=folder, env={**os.environ, **environment},
+            )  # fmt: skip
+        said = self.process.stdout.readline()
+        found = re.search(r"http://\S+/", said)
+        assert found, f"{said}{self.log.read_text('utf-8')}"
+        self.url = found[0]
+
+    @property
+    def host(self) -> str:
+        return urlsplit(self.url).netloc
+
+    def stop(self) -> str:
+        """End it as Ctrl-C does; what it complained of."""
+        self.process.send_signal(2)
+        try:
+            self.process.wait(30)
+        finally:
+            self.process.kill()
+            self.process.stdout.close()
+        return self.log.read_text("utf-8")
+
+
+@contextmanager
+def serving(folder: Path, *arguments: str, **environment: str):
+    """A server, which must not have met an exception when it ends."""
+    server = Server(folder, *arguments, **environment)
+    try:
+        yield server
+    finally:
+        complained = server.stop()
+    assert "Traceback" not in complained, complained
+    assert "Exception" not in complained, complained
+
+
+@contextmanager
+def chromium():
+    """Debian's browser, driven by Playwright."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        missing("Playwright is not installed")
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        missing("chromium is not installed")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A page in the browser, what it asked others for, and what went wrong in it."""
+
+    def __init__(self, browser, server: Server, **settings) -> None:
+        self.server, self.foreign, self.errors = server, [], []
+        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 1000}, **settings})
+        self.context.route(re.compile(".*"), self._let_through)
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(60_000)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", self._heard)
+        self.page.on("websocket", self._socket)
+        self.page.on("dialog", lambda dialog: (self.errors.append(f"dialog {dialog.message}"), dialog.dismiss()))
+
+    def _let_through(self, route):
+        if urlsplit(route.request.url).netloc == self.server.host:
+            route.continue_()
+        else:
+            self.foreign.append(route.request.url)
+            route.abort()
+
+    def _socket(self, socket):
+        if urlsplit(socket.url).netloc != self.server.host:
+            self.foreign.append(socket.url)
+
+    def _heard(self, message):
+        if message.type == "error":
+            self.errors.append(message.text)
+
+    def go(self, path: str = "contact"):
+        """Visit a path and wait until a document is there."""
+        self.page.goto(f"{self.server.url}{path}")
+        self.page.wait_for_function("() => window.Bokeh !== undefined && Bokeh.documents.length > 0")
+        return self.page
+
+    def solved(self, path: str = "contact"):
+        """Visit a contact and wait until it is solved."""
+        page = self.go(path)
+        page.get_by_text(re.compile("^(Warming up.*)?Solved on")).wait_for()
+        return page
+
+    def close(self):
+        self.context.close()
+        assert self.foreign == []
+        assert self.errors == []

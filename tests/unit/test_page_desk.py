@@ -1,0 +1,303 @@
+"""A contact without its widgets: answered twice, marked while it is old, compared, tried again, taken away."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import x3pio
+
+from asperity.case import load_case
+from asperity.ehl import Options, contact_state, solve_contact
+from asperity.hertz import ellipse_pressure, line_pressure
+from asperity.page import take, work
+from asperity.page.answer import NOT_DETERMINED, RUPTURED, TILES, TOUCHING, answer_of, difference
+from asperity.page.desk import Desk
+from asperity.page.opening import open_page
+from asperity.page.settings import Settings
+from asperity.page.work import Refused, Ticket, told
+from asperity.paper import papers_case
+from asperity.results import solve_case
+from asperity.surface import Surface
+
+NOBODY = Ticket(-1, 0)
+CELLS = {"grid.cells": [96, 64], "surface.correlation_length": "30 um", "vibration.duration": "1 s"}
+MUTE = {**CELLS, "vibration": "none"}
+
+
+class AtOnce:
+    """Stands in for a queue: does the work when it is asked to, or keeps it."""
+
+    def __init__(self):
+        self.kept, self.held, self.going = [], False, False
+
+    @property
+    def busy(self):
+        return bool(self.kept)
+
+    def ask(self, wish, arrived):
+        self.kept.append((wish, arrived))
+        while self.kept and not self.held and not self.going:
+            self.go()
+
+    def go(self):
+        (function, arguments), arrived = self.kept.pop(0)
+        self.going = True
+        arrived(told(function, NOBODY, *arguments))
+        self.going = False
+
+    def close(self):
+        self.kept.clear()
+
+
+@pytest.fixture(scope="module")
+def run():
+    return solve_case(papers_case().with_overrides(CELLS))
+
+
+@pytest.fixture(scope="module")
+def answer(run):
+    return answer_of(run, 0.1)
+
+
+def desk_of(overrides=MUTE):
+    drawn = []
+    queue = AtOnce()
+    desk = Desk(Settings(papers_case().with_overrides(overrides)), queue, lambda: drawn.append(desk.answer))
+    return desk, queue, drawn
+
+
+def test_an_answer_is_what_the_run_says(run, answer):
+    summary = run.summary()
+    assert {key: answer.row[key] for key in TILES} == {key: summary[key] for key in TILES}
+    np.testing.assert_allclose(answer.pressure, run.solution.pressure, rtol=1e-6)
+    np.testing.assert_array_equal(answer.cells == TOUCHING, run.solution.in_contact)
+    np.testing.assert_array_equal(answer.cells == RUPTURED, run.solution.cavitated)
+    assert answer.verdict == run.verdict()
+    assert set(run.notes) <= set(answer.notes)
+
+
+def test_tiles_have_the_intervals_that_the_verdict_has(run, answer):
+    doubts = {tile.key: tile.doubt for tile in answer.tiles}
+    assert doubts["clr"] in run.verdict()
+    assert doubts["crf_hz"] in run.verdict()
+    assert doubts["car"].startswith("± ")
+    assert doubts["lambda_ratio"] == ""
+
+
+def test_a_grid_that_cannot_tell_says_so_in_the_tiles(answer):
+    assert {tile.key: tile.doubt for tile in replace(answer, determined=False).tiles}["clr"] == NOT_DETERMINED
+    unknown = replace(answer, row={**answer.row, "clr_low": None})
+    assert {tile.key: tile.doubt for tile in unknown.tiles}["clr"] == NOT_DETERMINED
+    silent = replace(answer, row={**answer.row, "crf_hz": None})
+    assert {tile.key: (tile.value, tile.doubt) for tile in silent.tiles}["crf_hz"] == ("–", "")
+
+
+def test_the_spectrum_is_the_runs_near_its_band(run, answer):
+    sound, spectrum = answer.sound, run.vibration.spectrum
+    assert sound.crf_hz == run.vibration.resonance.crf_hz
+    assert sound.frequency.size <= 500
+    near = (spectrum.frequency_hz >= sound.frequency[0]) & (spectrum.frequency_hz <= sound.frequency[-1])
+    assert sound.density.mean() == pytest.approx(spectrum.density[near].mean(), rel=0.02)
+    peak = sound.frequency[np.argmax(sound.curve)]
+    assert peak == pytest.approx(sound.crf_hz, abs=2.0 * float(np.diff(sound.frequency[:2])[0]))
+
+
+def test_hertzs_pressure_carries_the_load():
+    x = np.linspace(-1.2, 1.2, 1201)
+    y = np.linspace(-2.4, 2.4, 1201)
+    pressure = np.array([ellipse_pressure(x, float(at), (1.0, 2.0), 3.0) for at in y])
+    assert pressure.sum() * (x[1] - x[0]) * (y[1] - y[0]) == pytest.approx(2.0 / 3.0 * np.pi * 2.0 * 3.0, rel=1e-4)
+    np.testing.assert_allclose(ellipse_pressure(x, 0.0, (1.0, 2.0), 3.0), line_pressure(x, 1.0, 3.0))
+    assert not ellipse_pressure(x, 2.0, (1.0, 2.0), 3.0).any()
+
+
+def test_a_line_contacts_profile_is_one_all_along(answer):
+    conditions = papers_case().conditions
+    np.testing.assert_allclose(
+        answer.hertz(0), line_pressure(answer.x, conditions.hertz.half_widths[0], conditions.hertz.p_max)
+    )
+
+
+def test_a_coarse_answer_comes_first_and_the_full_one_after_it():
+    desk, _, drawn = desk_of()
+    desk.solve()
+    shown = list({id(answer): answer for answer in drawn if answer is not None}.values())
+    assert [answer.coarse for answer in shown] == [True, False]
+    coarse, full = shown
+    assert coarse.gap.shape == (48, 32)
+    assert full.gap.shape == (96, 64)
+    assert coarse.row["clr"] == pytest.approx(full.row["clr"], abs=0.15)
+    assert all(tile.doubt in ("coarse, without error bar", "") for tile in coarse.tiles)
+
+
+def test_a_coarse_answer_goes_on_from_the_one_before():
+    case = papers_case().with_overrides(MUTE)
+    first = work.solve_coarsely(NOBODY, case, None)
+    turned = case.with_overrides({"contact.load": "520 N"})
+    cold = work.solve_coarsely(NOBODY, turned, None)
+    warm = work.solve_coarsely(NOBODY, turned, first.solution)
+    assert warm.solution.convergence.iterations < cold.solution.convergence.iterations / 2
+    assert warm.answer.row["clr"] == pytest.approx(cold.answer.row["clr"], abs=0.02)
+    other = case.with_overrides({"surface.seed": 99})
+    assert work.solve_coarsely(NOBODY, other, first.solution).solution.convergence.iterations == (
+        work.solve_coarsely(NOBODY, other, None).solution.convergence.iterations
+    )
+
+
+def test_a_coarse_answer_is_the_averaged_surfaces():
+    case = papers_case().with_overrides(MUTE)
+    coarse = work.solve_coarsely(NOBODY, case, None)
+    fine = case.surface()
+    along = (fine.heights[::2] + fine.heights[1::2]) / 2
+    heights = (along[:, ::2] + along[:, 1::2]) / 2
+    np.testing.assert_allclose(coarse.solution.surface.heights, heights)
+    alone = Surface(heights, coarse.solution.grid)
+    solved = solve_contact(case.conditions, case.lubricant, alone, options=Options(tolerance=1e-3, max_iterations=40))
+    assert coarse.answer.row["clr"] == pytest.approx(contact_state(solved).clr)
+
+
+def test_a_contact_on_few_cells_has_no_coarse_answer():
+    coarse = work.solve_coarsely(NOBODY, papers_case().with_overrides({**MUTE, "grid.cells": [64, 64]}), None)
+    assert coarse == work.Coarse(None, None)
+
+
+def test_what_is_shown_is_old_until_its_answer_has_come():
+    desk, queue, _ = desk_of()
+    desk.solve()
+    assert not desk.stale
+    queue.held = True
+    desk.turn("contact.load", "600 N")
+    assert desk.stale
+    assert desk.status == "Solving ..."
+    queue.go()
+    assert desk.status == "Coarse answer, solving in full ..."
+    assert desk.stale
+    queue.go()
+    assert not desk.stale
+    assert desk.status.startswith("Solved on 96 × 64 cells")
+
+
+def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mended():
+    desk, _, _ = desk_of()
+    desk.solve()
+    before = desk.answer
+    desk.turn("contact.load", "600")
+    assert "bare number 600" in desk.refusals["contact.load"].sentence
+    assert desk.answer is before
+    assert desk.stale
+    desk.turn("contact.load", "500 N")  # as it was
+    assert not desk.refusals
+    assert not desk.stale
+
+
+def test_a_contact_that_is_not_solved_says_so(monkeypatch):
+    desk, _, _ = desk_of({**MUTE, "solver.max_iterations": 1})
+    desk.solve()
+    assert desk.status.startswith("NOT CONVERGED, do not use: out of iterations")
+    assert desk.trail == []
+    monkeypatch.setattr(work, "LONGEST_S", -1.0)
+    desk.turn("contact.load", "900 N")
+    assert desk.status.startswith("Not solved: The contact was given up")
+    assert desk.stale
+
+
+def test_a_contact_that_its_grid_cannot_carry_says_so():
+    desk, _, _ = desk_of()
+    desk.turn("surface.correlation_length.0", "3 um")
+    assert desk.status.startswith("Not solved: paper.toml: surface: ")
+    assert desk.answer is None
+
+
+def test_what_is_pinned_stays_to_compare_with():
+    desk, queue, _ = desk_of()
+    desk.solve()
+    pinned = desk.answer
+    desk.pin()
+    desk.turn("contact.load", "900 N")
+    assert desk.pinned is pinned
+    change = desk.answer.row["clr"] - pinned.row["clr"]
+    assert difference("clr", desk.answer.row["clr"], pinned.row["clr"]).startswith("+" if change >= 0 else "−")
+    assert difference("crf_hz", None, 3.0) == "–"
+    queue.held = True
+    desk.turn("contact.load", "800 N")
+    desk.pin()  # not what is old
+    assert desk.pinned is pinned
+    desk.unpin()
+    assert desk.pinned is None
+
+
+def test_what_was_tried_lies_in_the_trail_once_and_comes_back():
+    desk, _, _ = desk_of()
+    desk.solve()
+    desk.turn("surface.sq", "2 um")
+    desk.turn("contact.load", "900")
+    assert [tried.sq for tried in desk.trail] == pytest.approx([1e-6, 2e-6])
+    assert desk.trail[1].clr == desk.answer.row["clr"]
+    desk.go_back(0)
+    assert desk.settings.case.contents.surface.sq == 1e-6
+    assert not desk.refusals
+    assert len(desk.trail) == 2
+
+
+def test_an_address_is_gone_to():
+    desk, _, _ = desk_of()
+    turned = desk.settings.turned("contact.load", "700 N")
+    assert desk.go_to(turned.address) == []
+    assert desk.answer.text == turned.case.text
+
+
+def test_a_desk_that_closes_holds_nothing():
+    desk, _, _ = desk_of()
+    desk.solve()
+    desk.pin()
+    desk.close()
+    assert (desk.answer, desk.pinned, desk.trail) == (None, None, [])
+
+
+def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
+    heights = np.random.default_rng(5).standard_normal((400, 400)) * 1e-6
+    x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=2e-6)
+    case, steps = work.open_surface(NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p")
+    assert case.contents.surface.name == "ring.x3p"
+    assert steps[0] == "Measured surface ring.x3p:"
+    assert len(steps) > 3
+    text = take.case_text(case)
+    assert "# ring.x3p lies beside this file." in text
+    assert str(tmp_path) not in text
+    assert load_case(text, folder=tmp_path).surface().sq == case.surface().sq
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"<script>", bytes(range(256)) * 20])
+def test_a_damaged_surface_is_a_sentence(tmp_path, content):
+    (tmp_path / "ring.x3p").write_bytes(content)
+    refused = told(work.open_surface, NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p")
+    assert isinstance(refused, Refused)
+    assert "ring.x3p" in refused.sentence
+
+
+def test_what_is_taken_away_solves_to_the_same_numbers(tmp_path):
+    case = papers_case().with_overrides(MUTE)
+    (tmp_path / take.CASE_FILE).write_text(take.case_text(case), "utf-8")
+    (tmp_path / take.SCRIPT).write_text(take.python_lines(), "utf-8")
+    said = subprocess.run([sys.executable, take.SCRIPT], cwd=tmp_path, capture_output=True, text=True, check=True)
+    state = solve_case(case).state
+    assert f"CLR {state.clr:.4f}, CAR {state.car:.4f}, film {state.h_central:.4g} m" in said.stdout
+
+
+def test_the_report_is_our_own_page():
+    text = work.make_report(NOBODY, papers_case().with_overrides(MUTE))
+    assert text.startswith("<!doctype html>")
+    assert "Content-Security-Policy" in text
+
+
+def test_a_kept_run_is_opened_as_it_was_solved(tmp_path, run, answer):
+    run.save(tmp_path / "run.nc")
+    opened = open_page(tmp_path / "run.nc")
+    assert opened.kind == "contact"
+    assert json.dumps(opened.answer.row) == json.dumps(answer.row)
+    assert opened.case.stored is not None
+    turned = Settings(opened.case).turned("contact.slip", "0.4")
+    np.testing.assert_array_equal(turned.case.surface().heights, run.solution.surface.heights)

@@ -1,0 +1,140 @@
+"""Knobs of cases and the settings they make: in the case file's words, back from an address, nothing let through."""
+
+from pathlib import Path
+
+import pytest
+
+from asperity.case import load_case
+from asperity.page.knobs import TURNED, knobs_of, overrides
+from asperity.page.settings import Refusal, Settings
+from asperity.paper import papers_case
+from asperity.quantities import catalogue
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+CONTACTS = ("paper", "ball-on-disc", "data-sheet-oil", "roller")
+HOSTILE = [  # addresses: none of this may be turned, run, or shown as anything but text
+    "surface.file=/etc/passwd",
+    "surface=%7Bfile%3D%22/etc/passwd%22%7D",
+    "contact.load=%7Bfile%3D%22/etc/passwd%22%7D",
+    "contact.load=500%20N%22%0Amodel%3D%22paper",
+    "contact.load=__import__('os').system('touch%20pwned')",
+    "contact.load=%3Cscript%3Ealert(1)%3C/script%3E",
+    "%3Cimg%20src=x%20onerror=alert(1)%3E=1",
+    "material.__class__=1",
+    "grid.cells=%5B100000,100000%5D",
+    f"contact.load={'9' * 5000}%20N",
+]
+
+
+@pytest.fixture(scope="module")
+def settings():
+    return Settings(papers_case())
+
+
+def test_every_knob_is_in_the_catalogue():
+    assert {turned.quantity for turned in TURNED.values()} <= set(catalogue())
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+def test_a_case_has_the_knobs_that_its_own_tables_have(name):
+    case = load_case(EXAMPLES / f"{name}.toml")
+    knobs = knobs_of(case)
+    assert {"contact.load", "contact.entrainment_speed", "contact.slip", "grid.cells"} <= set(knobs)
+    assert ("lubricant.temperature" in knobs) == (name == "data-sheet-oil")
+    assert ("surface.sq" in knobs) == (name != "roller")
+    assert ("vibration.mass" in knobs) == (name != "roller")
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+def test_every_position_of_every_slider_is_a_value_of_its_knob(name):
+    case = load_case(EXAMPLES / f"{name}.toml")
+    for key, knob in knobs_of(case).items():
+        if knob.choices:
+            continue
+        first, last = knob.positions
+        for position in range(first, last + 1):
+            assert knob.position(knob.at(position)) == position, (key, position)
+        turned = case.with_overrides(overrides(case, {key: knob.at(knob.position(knob.text))}))
+        assert turned.conditions == case.conditions, key
+
+
+def test_a_slider_goes_a_decade_up_and_down_from_the_cases_own_value(settings):
+    load = settings.knobs["contact.load"]
+    assert [load.at(place) for place in (load.positions[0], 0, load.positions[1])] == ["50 N", "500 N", "5000 N"]
+    assert load.position("5 kN") == load.positions[1]
+    assert load.position("1 MN") == load.positions[1]
+    assert load.position("5 m") is None
+    assert load.position("many") is None
+
+
+def test_one_entry_of_a_pair_is_turned_and_the_other_stays(settings):
+    turned = settings.turned("surface.correlation_length.1", "40 um")
+    assert turned.case.contents.surface.correlation_length == (20e-6, 40e-6)
+
+
+def test_cells_are_typed_as_people_write_them(settings):
+    assert settings.turned("grid.cells", "96 x 64").case.grid.cells == (96, 64)
+    assert settings.turned("grid.cells", "96 × 64").case.grid.cells == (96, 64)
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "says"),
+    [
+        ("contact.load", "800", 'contact.load must be a force such as "500 N", got the bare number 800'),
+        ("contact.load", "-5 N", "contact.load must be positive and finite"),
+        ("surface.sq", "2 mm2", "surface.sq must be a length"),
+        ("surface.correlation_length.0", "x", "surface.correlation_length[0] must be a length"),
+        ("material.boundary_friction", "5", "material.boundary_friction must be less than or equal to 2, got 5"),
+        ("grid.cells", "1024 x 1024", "grid.cells must be at most 262144 in all on this page"),
+        ("contact.load", "1" * 300, "is 300 characters long"),
+    ],
+)
+def test_a_wrong_value_is_refused_in_the_case_files_own_sentence(settings, key, text, says):
+    refusal = settings.turned(key, text)
+    assert isinstance(refusal, Refusal)
+    assert refusal.key == key
+    assert says in refusal.sentence
+
+
+def test_an_address_brings_the_settings_back(settings):
+    turned = settings
+    for key, text in {
+        "contact.load": "0.8 kN", "surface.correlation_length.0": "30 um", "contact.slip": "-0.5", "surface.seed": "3",
+    }.items():  # fmt: skip
+        turned = turned.turned(key, text)
+    back, notes = settings.from_address(turned.address)
+    assert notes == []
+    assert back.changes == turned.changes
+    assert back.case.text == turned.case.text
+
+
+def test_a_knob_that_is_turned_back_leaves_the_address(settings):
+    turned = settings.turned("contact.load", "800 N").turned("contact.load", "500 N")
+    assert turned.address == ""
+    assert turned.case is settings.opened
+
+
+def test_a_link_of_another_case_says_so(settings):
+    other = Settings(load_case(EXAMPLES / "ball-on-disc.toml")).turned("contact.load", "20 N")
+    back, notes = settings.from_address(other.address)
+    assert back.case.conditions.load == 20.0
+    assert notes == ["The link was made with another case; what it turned is turned here."]
+
+
+def test_a_link_of_a_dropped_surface_says_that_it_has_none(settings):
+    _, notes = settings.from_address(Settings(settings.opened, dropped="ring.x3p").address)
+    assert notes == ["The link was made with the dropped surface ring.x3p, which no link carries."]
+
+
+@pytest.mark.parametrize("query", HOSTILE)
+def test_nothing_but_values_of_knobs_comes_in_by_an_address(settings, query):
+    back, notes = settings.from_address(query)
+    assert back.case is settings.opened
+    assert len(notes) == 1
+    assert len(notes[0]) < 400
+
+
+def test_an_address_may_be_as_long_as_anybody_likes(settings):
+    back, notes = settings.from_address("&".join(f"contact.load={load} N" for load in range(1, 5000)))
+    assert notes == []
+    assert back.case.conditions.load == 100.0
