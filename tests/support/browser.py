@@ -38,7 +38,7 @@ class Server:
 
     @property
     def host(self) -> str:
-        return urlsplit(self.url).netloc
+        return urlsplit(self.url).netloc.replace("0.0.0.0", "127.0.0.1")
 
     def stop(self) -> str:
         """End it as Ctrl-C does; what it complained of."""

@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
+from asperity.conditions import ContactConditions
 from asperity.ehl import ContactSolution, ContactState, contact_state, hertz_zone
+from asperity.grid import Grid
 from asperity.hertz import ellipse_pressure
 from asperity.quantities import NO_VALUE, Quantity, lines, quantity, read
 from asperity.results import DOUBT, Run
@@ -55,22 +57,14 @@ class Sound:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
-    """A solved contact as the page shows it.
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """Maps of a contact as the page shows them.
 
     `x` and `y` [m] are cell centres, `gap` [m], `pressure` [Pa] and `cells` (`OPEN`, `TOUCHING`, `RUPTURED`) have shape
-    (nx, ny). `row` holds numbers by their keys in the catalogue, SI. `coarse` is an answer on fewer cells, which is
-    shown until the full one has come, and has no error bar. `gap_top` is where the colours of a film map end [m].
+    (nx, ny). `gap_top` is where the colours of a film map end [m].
     """
 
-    text: str
-    coarse: bool
-    converged: bool
-    determined: bool
-    verdict: str
-    explained: str
-    notes: tuple[str, ...]
     x: Field
     y: Field
     extent: tuple[tuple[float, float], tuple[float, float]]
@@ -81,6 +75,32 @@ class Answer:
     half_widths: tuple[float, float]
     hertz_pressure: float
     endless: bool
+
+    def line(self, y: float) -> int:
+        """The row of cells nearest to y [m]."""
+        return int(np.argmin(np.abs(self.y - y)))
+
+    def hertz(self, row: int) -> Field:
+        """Hertz's pressure of the smooth, dry contact along that row of cells [Pa]."""
+        y = 0.0 if self.endless else float(self.y[row])
+        return ellipse_pressure(self.x, y, self.half_widths, self.hertz_pressure)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer(Picture):
+    """A solved contact as the page shows it.
+
+    `row` holds numbers by their keys in the catalogue, SI. `coarse` is an answer on fewer cells, which is shown until
+    the full one has come, and has no error bar.
+    """
+
+    text: str
+    coarse: bool
+    converged: bool
+    determined: bool
+    verdict: str
+    explained: str
+    notes: tuple[str, ...]
     row: dict[str, Any]
     seconds: float
     sound: Sound | None = None
@@ -109,16 +129,6 @@ class Answer:
             _, _, spread = entry.number(value, deviation).partition(" ± ")
             return f"± {spread.rstrip(')')} {entry.display}".rstrip() if spread else ""
         return ""
-
-    def line(self, y: float) -> int:
-        """The row of cells nearest to y [m]."""
-        return int(np.argmin(np.abs(self.y - y)))
-
-    def hertz(self, row: int) -> Field:
-        """Hertz's pressure of the smooth, dry contact along that row of cells [Pa]."""
-        return ellipse_pressure(
-            self.x, 0.0 if self.endless else float(self.y[row]), self.half_widths, self.hertz_pressure
-        )
 
 
 def numbers_of(run: Run) -> dict[str, Any]:
@@ -163,28 +173,35 @@ def coarse_answer(solution: ContactSolution, text: str, seconds: float) -> Answe
 
 
 def _answer(solution: ContactSolution, text: str, row: dict[str, Any], **told: Any) -> Answer:
-    grid, hertz = solution.grid, solution.conditions.hertz
-    cells = np.full(grid.cells, OPEN, np.uint8)
-    cells[solution.cavitated] = RUPTURED
-    cells[solution.in_contact] = TOUCHING
-    zone = solution.gap[hertz_zone(solution.conditions, grid)]
-    return Answer(
-        text=text,
-        converged=solution.convergence.converged,
-        explained=solution.convergence.explain(),
-        x=grid.x,
-        y=grid.y,
-        extent=((grid.lower[0], grid.upper[0]), (grid.lower[1], grid.upper[1])),
-        gap=solution.gap.astype(np.float32),
-        pressure=solution.pressure.astype(np.float32),
-        cells=cells,
-        gap_top=float(np.percentile(zone, CLEAR_SHARE)) if zone.size else 0.0,
-        half_widths=hertz.half_widths,
-        hertz_pressure=hertz.p_max,
-        endless=solution.conditions.endless,
-        row=row,
-        **told,
+    drawn = picture_parts(
+        solution.conditions, solution.grid, solution.gap, solution.pressure, solution.in_contact, solution.cavitated
     )
+    convergence = solution.convergence
+    return Answer(
+        text=text, row=row, converged=convergence.converged, explained=convergence.explain(), **drawn, **told
+    )  # fmt: skip
+
+
+def picture_parts(
+    conditions: ContactConditions, grid: Grid, gap: Field, pressure: Field, touching: Mask, ruptured: Mask
+) -> dict[str, Any]:
+    """What a `Picture` is made of: fields in single precision, and Hertz's contact."""
+    cells = np.full(grid.cells, OPEN, np.uint8)
+    cells[ruptured] = RUPTURED
+    cells[touching] = TOUCHING
+    zone = gap[hertz_zone(conditions, grid)]
+    return {
+        "x": grid.x,
+        "y": grid.y,
+        "extent": ((grid.lower[0], grid.upper[0]), (grid.lower[1], grid.upper[1])),
+        "gap": gap.astype(np.float32),
+        "pressure": pressure.astype(np.float32),
+        "cells": cells,
+        "gap_top": float(np.percentile(zone, CLEAR_SHARE)) if zone.size else 0.0,
+        "half_widths": conditions.hertz.half_widths,
+        "hertz_pressure": conditions.hertz.p_max,
+        "endless": conditions.endless,
+    }
 
 
 def _sound(run: Run) -> Sound | None:

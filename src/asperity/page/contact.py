@@ -1,7 +1,6 @@
 """The page of a contact: knobs beside what becomes of them, drawn anew whenever the desk changes."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from asperity.page.uploads import Drop
 from asperity.page.widgets import (
     DROP,
     LOOK,
+    MAP_KEY,
     TILE_STYLES,
     Handout,
     KnobWidget,
@@ -247,21 +247,19 @@ def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         "notes": view.notes,
         "handout": view.handout.model,
     }
-    block: Any = partial(dict, heading="", live=False, key=(), first=False)
-    key = (("touching", "asperity contact"), ("ruptured", "cavitated"), ("hertz", "Hertz zone"))
-    knobs = [block(names=["knobs"]), block(names=["more"]), block(names=["drop"])]
-    shown = [
-        block(names=["status"], live=True, first=True),
-        block(names=["said"], live=True, first=True),
-        block(names=["tiles"], first=True),
-        block(names=["verdict"]),
-        block(names=["take"]),
-        block(names=["film", "pressure"], key=key, first=True),
-        block(names=["change"]),
-        block(names=["cut", "spectrum"]),
-        block(names=["share", "pitch"], heading="What was tried"),
-        block(names=["notes"], heading="To read with the numbers"),
-        block(names=["handout"]),
+    knobs: list[dict[str, Any]] = [{"names": [name]} for name in ("knobs", "more", "drop")]
+    shown: list[dict[str, Any]] = [
+        {"names": ["status"], "live": True, "first": True},
+        {"names": ["said"], "live": True, "first": True},
+        {"names": ["tiles"], "first": True},
+        {"names": ["verdict"]},
+        {"names": ["take"]},
+        {"names": ["film", "pressure"], "key": MAP_KEY, "first": True},
+        {"names": ["change"]},
+        {"names": ["cut", "spectrum"]},
+        {"names": ["share", "pitch"], "heading": "What was tried"},
+        {"names": ["notes"], "heading": "To read with the numbers"},
+        {"names": ["handout"]},
     ]
     return parts, [
         {"kind": "knobs", "label": "Knobs", "blocks": knobs},

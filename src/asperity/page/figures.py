@@ -22,7 +22,7 @@ from bokeh.models import (
 from bokeh.palettes import Cividis256, Inferno256, Viridis256
 from bokeh.plotting import figure
 
-from asperity.page.answer import RUPTURED, TOUCHING, Answer, Sound
+from asperity.page.answer import RUPTURED, TOUCHING, Picture, Sound
 from asperity.page.desk import Tried
 from asperity.quantities import quantity
 
@@ -38,14 +38,17 @@ def shown(key: str, values: Any) -> Any:
     return np.asarray(values) * quantity(key).factor
 
 
-def plain_figure(x: str, y: str, *, label: str, height: int = HEIGHT, **settings: Any) -> Any:
-    """An empty figure whose axes are named by the catalogue; `label` is what a screen reader calls it."""
+def plain_figure(x: str, y: str, *, label: str, height: int = HEIGHT, tapped: bool = False, **settings: Any) -> Any:
+    """An empty figure whose axes are named by the catalogue; `label` is what a screen reader calls it.
+
+    `tapped`: marks in it may be clicked.
+    """
     made = figure(
         height=height,
         sizing_mode="stretch_width",
         x_axis_label=quantity(x).axis if x else "",
         y_axis_label=quantity(y).label if y else "",
-        tools="pan,wheel_zoom,box_zoom,reset,save",
+        tools=f"pan,wheel_zoom,box_zoom,reset,save{',tap' if tapped else ''}",
         active_scroll=None,
         html_attributes={"role": "img", "aria-label": label},
         min_border=2,
@@ -104,7 +107,7 @@ class Maps:
         made.tags = [{"mapper": mapper, "source": source, "over": over, "zone": zone, "cut": cut}]
         return made
 
-    def show(self, answer: Answer, pinned: Answer | None) -> None:
+    def show(self, answer: Picture, pinned: Picture | None) -> None:
         """Draw an answer, and how its film differs from a pinned one on the same cells."""
         (x0, x1), (y0, y1) = ((shown("x_m", end) for end in ends) for ends in answer.extent)
         self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
@@ -138,7 +141,7 @@ class Maps:
             parts["over"].data = {"image": [marks], **place}
 
 
-def _marks(answer: Answer) -> Any:
+def _marks(answer: Picture) -> Any:
     """Contact and cavitation as colours over the film, shape (ny, nx)."""
     colours = np.zeros((*answer.cells.T.shape, 4), np.uint8)
     cells = answer.cells.T
@@ -150,7 +153,7 @@ def _marks(answer: Answer) -> Any:
     return colours.view(np.uint32).reshape(cells.shape)
 
 
-def _hertz_outline(answer: Answer, ends: tuple[float, float]) -> dict[str, Any]:
+def _hertz_outline(answer: Picture, ends: tuple[float, float]) -> dict[str, Any]:
     """The outline of the smooth, dry contact, in the maps' unit."""
     a, b = (shown("x_m", half) for half in answer.half_widths)
     if answer.endless:
@@ -165,7 +168,9 @@ class Cut:
     def __init__(self, maps: Maps) -> None:
         label = "Cut along rolling: pressure with Hertz's pressure"
         self.pressure = plain_figure("", "pressure", label=label, title="Cut", height=250, x_range=maps.x)
-        self.film = plain_figure("x_m", "gap", label="Cut along rolling: film", height=230, x_range=maps.x)
+        self.film = plain_figure(
+            "x_m", "gap", label="Cut along rolling: film", title="Film in the cut", height=250, x_range=maps.x
+        )
         for made in (self.pressure, self.film):
             made.add_tools(CrosshairTool(overlay=[Span(dimension="width", line_dash="dotted"), maps.along]))
             made.y_range = Range1d(0.0, 1.0)
@@ -180,7 +185,7 @@ class Cut:
         self.film.line("x", "h", source=self.then, color=VERMILION, line_dash="dotted", legend_label="pinned")
         self._pinned = [_key_above(made) for made in (self.pressure, self.film)]
 
-    def show(self, answer: Answer, pinned: Answer | None, y: float) -> None:
+    def show(self, answer: Picture, pinned: Picture | None, y: float) -> None:
         """Draw the cut at y [m]."""
         row = answer.line(y)
         self.pressure.title.text = f"Cut along rolling at y = {quantity('y_m').text(float(answer.y[row]))}"
@@ -197,7 +202,7 @@ class Cut:
         self.film.y_range.update(start=0.0, end=1.2 * float(shown("gap", top)) or 1.0)
 
     @staticmethod
-    def _line(answer: Answer, row: int) -> dict[str, Any]:
+    def _line(answer: Picture, row: int) -> dict[str, Any]:
         touching = np.where(answer.cells[:, row] == TOUCHING, 0.0, np.nan)
         return {
             "x": shown("x_m", answer.x),
@@ -262,8 +267,7 @@ class Trail:
         self.source.selected.on_change("indices", lambda _name, _old, new: chosen(new[0]) if new else None)
 
     def _plane(self, x: str, y: str, across: str, up: str, label: str) -> Any:
-        made = plain_figure(x, y, label=label, title=label, height=240)
-        made.tools = [*made.tools, *figure(tools="tap").tools]
+        made = plain_figure(x, y, label=label, title=label, height=240, tapped=True)
         made.scatter(across, up, source=self.source, size=10, color=BLUE, alpha="alpha")
         made.scatter(across, up, source=self.last, size=15, line_color=VERMILION, fill_alpha=0, line_width=2)
         return made

@@ -5,11 +5,13 @@ from pathlib import Path
 
 from asperity.case import Case, load_case
 from asperity.errors import UnreadableFile
-from asperity.history import is_history
+from asperity.history import is_history, load_history
+from asperity.kept import MANIFEST
 from asperity.page.answer import Answer
 from asperity.page.settings import require_few
 from asperity.page.work import open_run
 from asperity.paper import papers_case
+from asperity.study import load_study
 
 FIRST = {"grid.cells": [128, 128]}  # of the paper's contact, which is there where nothing is named
 
@@ -18,7 +20,7 @@ FIRST = {"grid.cells": [128, 128]}  # of the paper's contact, which is there whe
 class Opened:
     """What is looked at: which page comes first, its name, the contact, and the path of what else there is.
 
-    `answer` is the contact's where it is solved already.
+    `answer` is the contact's where it is solved already. `stated` says whether the case was named, and not the paper's.
     """
 
     kind: str
@@ -26,6 +28,12 @@ class Opened:
     case: Case
     answer: Answer | None = None
     path: Path | None = None
+    stated: bool = False
+
+
+def paper() -> Case:
+    """The paper's contact on cells that are solved while one waits."""
+    return papers_case().with_overrides(FIRST)
 
 
 def open_page(what: Path | None) -> Opened:
@@ -39,19 +47,19 @@ def open_page(what: Path | None) -> Opened:
         for a case that is refused.
     """
     if what is None:
-        return Opened(kind="contact", name="the paper's contact", case=papers_case().with_overrides(FIRST))
+        return Opened(kind="contact", name="the paper's contact", case=paper())
     if what.is_dir():
-        paper = papers_case().with_overrides(FIRST)
         if is_history(what):
-            return Opened(kind="history", name=what.name, case=paper, path=what)
-        kind = "study" if (what / "manifest.json").is_file() else "recordings"
-        return Opened(kind=kind, name=what.name, case=paper, path=what)
+            return Opened(kind="history", name=what.name, case=load_history(what).case, path=what)
+        if (what / MANIFEST).is_file():
+            return Opened(kind="study", name=what.name, case=load_study(what).plan.case, path=what)
+        return Opened(kind="recordings", name=what.name, case=paper(), path=what)
     if not what.exists():
         raise UnreadableFile(f"{what} does not exist; check its name")
     if what.suffix == ".nc":
         case, answer = open_run(what)
-        return Opened(kind="contact", name=what.name, case=case, answer=answer)
+        return Opened(kind="contact", name=what.name, case=case, answer=answer, stated=True)
     case = load_case(what)
     if case.contents.grid.cells != "auto":
         require_few(case.source, case.contents.grid.cells)
-    return Opened(kind="contact", name=what.name, case=case)
+    return Opened(kind="contact", name=what.name, case=case, stated=True)

@@ -1,6 +1,7 @@
 """The server: on this machine alone unless asked otherwise, one document a visit, nothing fetched from elsewhere."""
 
 import ipaddress
+import logging
 import os
 import secrets
 import socket
@@ -13,9 +14,10 @@ from urllib.parse import urlencode
 import panel
 from bokeh.models import UIElement
 from tornado.web import RedirectHandler
+from tornado.websocket import WebSocketClosedError
 
 from asperity.errors import BadInput
-from asperity.page import contact
+from asperity.page import contact, history, recordings, study
 from asperity.page.jobs import Workshop
 from asperity.page.opening import Opened
 from asperity.page.settings import Settings
@@ -24,6 +26,7 @@ HERE = "127.0.0.1"
 PORT = 5006
 PASSWORD = "ASPERITY_PAGE_PASSWORD"
 SHORTEST = 8  # characters of a password
+LOOK_MS, FRAME_MS = 5000, 250  # between two looks at a folder, and two steps of a history
 WAIT_MS = 15_000  # for a visitor that has gone
 MESSAGE = 24_000_000  # bytes that a browser may send at a time
 
@@ -73,6 +76,9 @@ def require_free(address: str, port: int) -> int:
         raise BadInput(f"--port must be 0 to 65535, got {port}") from None
 
 
+_BLOCK: dict[str, Any] = {"heading": "", "live": False, "first": False, "key": ()}  # of a page, where it says no more
+
+
 class House:
     """All pages of one server, and the processes that work for them."""
 
@@ -81,7 +87,9 @@ class House:
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.page").joinpath("page.html.j2").read_text("utf-8")
         self.style = files("asperity.page").joinpath("style.css").read_text("utf-8")
-        self.places = [("contact", "Contact")]
+        self.places = [("contact", "Contact"), ("recordings", "Recordings")]
+        if opened.kind in ("study", "history"):
+            self.places.append((opened.kind, opened.kind.capitalize()))
 
     def contact(self) -> Any:
         """The page of a contact, for one visit."""
@@ -91,9 +99,37 @@ class House:
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections)
 
+    def recordings(self) -> Any:
+        """The page of recordings, for one visit."""
+        folder = self.opened.path if self.opened.kind == "recordings" else None
+        case = self.opened.case if self.opened.stated else None
+        view = recordings.RecordingsView(folder, case, self.workshop, _deliver())
+        panel.state.on_session_destroyed(lambda _context: view.close())
+        if folder is not None:
+            _document().add_periodic_callback(view.look, LOOK_MS)
+            view.look()
+        return self._page("recordings", "Recordings", *recordings.layout(view))
+
+    def study(self) -> Any:
+        """The page of a study, for one visit."""
+        assert self.opened.path is not None
+        view = study.StudyView(self.opened.path, self.opened.case, self.workshop, _deliver())
+        panel.state.on_session_destroyed(lambda _context: view.close())
+        view.begin()
+        return self._page("study", "Study", *study.layout(view))
+
+    def history(self) -> Any:
+        """The page of a history, for one visit."""
+        assert self.opened.path is not None
+        view = history.HistoryView(self.opened.path, self.workshop, _deliver())
+        panel.state.on_session_destroyed(lambda _context: view.close())
+        _document().add_periodic_callback(view.advance, FRAME_MS)
+        view.begin()
+        return self._page("history", "History", *history.layout(view))
+
     def pages(self) -> dict[str, Callable[[], Any]]:
         """The pages by their places."""
-        made = {"contact": self.contact}
+        made = {"contact": self.contact, "recordings": self.recordings, "study": self.study, "history": self.history}
         return {name: made[name] for name, _ in self.places}
 
     def _page(self, here: str, heading: str, parts: dict[str, Any], sections: list[dict[str, Any]]) -> Any:
@@ -101,6 +137,8 @@ class House:
         for name, part in parts.items():
             shown = panel.pane.Bokeh(part, sizing_mode="stretch_width") if isinstance(part, UIElement) else part
             page.add_panel(name, shown)
+        for section in sections:
+            section["blocks"] = [{**_BLOCK, **block} for block in section["blocks"]]
         told = {"heading": heading, "here": here, "places": self.places, "sections": sections, "style": self.style}
         for name, value in {
             **told,
@@ -111,15 +149,35 @@ class House:
         return page
 
 
+class _NobodyListens(logging.Filter):
+    """Passes over what libraries say of a visitor that left in the middle of a message."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether a record is told."""
+        return not (record.exc_info and record.exc_info[0] is WebSocketClosedError)
+
+
+def _quieten() -> None:
+    """Let the terminal hear of mistakes, not of visitors that come and go."""
+    logging.getLogger("asyncio").addFilter(_NobodyListens())
+    for name in ("bokeh.server.views.ws", "tornado.access"):
+        logging.getLogger(name).setLevel(logging.ERROR)
+
+
 def _deliver() -> Callable[[Callable[[], None]], None]:
     """What lets a function run under the lock of the document that is being made, from any thread."""
-    document = panel.state.curdoc
+    document = _document()
 
     def deliver(function: Callable[[], None]) -> None:
         if document.session_context is not None and not document.session_context.destroyed:
             document.add_next_tick_callback(function)
 
     return deliver
+
+
+def _document() -> Any:
+    """The document that is being made."""
+    return panel.state.curdoc
 
 
 def _address() -> Callable[[str], None]:
@@ -158,6 +216,7 @@ def serve_page(opened: Opened, *, port: int = PORT, listen: str = HERE, ready: C
     BadInput
         for a port that is taken, an address that is none of this machine's, no password where there has to be one.
     """
+    _quieten()
     password = password_for(listen)
     port = require_free(listen, port)
     workshop = Workshop()

@@ -22,13 +22,19 @@ LOOK = """
 .noUi-handle { background: var(--paper); border: 2px solid var(--accent); box-shadow: none; }
 """
 BAR = "#5b9fd4"
+MAP_KEY = (("touching", "asperity contact"), ("ruptured", "cavitated"), ("hertz", "Hertz zone"))
 DROP = """
 :host { color: var(--ink); }
 .filepond--panel-root { background: var(--wash); border: 1px dashed var(--soft); }
 .filepond--drop-label, .filepond--drop-label label { color: var(--ink); font-size: .88rem; }
 """
 WRONG = ".bk-input { border-color: var(--alarm); border-width: 2px; }"
-SENTENCE = "p { margin: 2px 0 4px; } .alarm { color: var(--alarm); font-weight: 600; } .soft { color: var(--soft); }"
+SENTENCE = """
+p { margin: 2px 0 4px; }
+a { color: var(--accent); }
+.alarm { color: var(--alarm); font-weight: 600; }
+.soft { color: var(--soft); }
+"""
 TILE_STYLES = """
 dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 8px; margin: 0; }
 dl div { background: var(--wash); border-radius: 4px; padding: 6px 10px; }
@@ -36,8 +42,17 @@ dt { font-size: .78rem; line-height: 1.25; color: var(--soft); }
 dd { margin: 1px 0 0; font-size: 1.22rem; font-weight: 650; font-variant-numeric: tabular-nums; line-height: 1.25; }
 dd small { display: block; font-size: .78rem; font-weight: 400; color: var(--soft); min-height: 1.25em; }
 dd small.than { color: var(--accent); }
+dd span { font-size: .95rem; font-weight: 500; white-space: nowrap; }
 dl.old dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
 @media (max-width: 480px) { dl { grid-template-columns: 1fr 1fr; } }
+"""
+
+
+TABLE = """
+div { overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; font-size: .86rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; vertical-align: top; padding: 4px 12px 4px 0; border-bottom: 1px solid var(--line); }
+tbody th { font-weight: 600; overflow-wrap: anywhere; }
 """
 
 
@@ -59,8 +74,9 @@ def tiles(shown: Sequence[Tile], answer: Answer, pinned: Answer | None, *, old: 
         if pinned is not None:
             text = difference(tile.key, answer.row.get(tile.key), pinned.row.get(tile.key))
             than = Markup('<small class="than">{} against pinned</small>').format(text)
-        inside = Markup("<div><dt>{}</dt><dd>{}<small>{}</small>{}</dd></div>")
-        parts.append(inside.format(tile.name, tile.value, tile.doubt, than))
+        number, _, unit = tile.value.partition(" ")
+        inside = Markup("<div><dt>{}</dt><dd>{} <span>{}</span><small>{}</small>{}</dd></div>")
+        parts.append(inside.format(tile.name, number, unit, tile.doubt, than))
     kind = "old" if old else "" if answer.converged else "wrong"
     return Markup('<dl class="{}">{}</dl>').format(kind, Markup("").join(parts))
 

@@ -1,0 +1,127 @@
+"""The page of a history: maps that move with a slider over the steps, and curves over time."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from bokeh.models import Column, ColumnDataSource, Range1d, Slider, Span
+
+from asperity.page.figures import BLUE, VERMILION, Cut, Maps, plain_figure, shown
+from asperity.page.jobs import Queue, Workshop
+from asperity.page.looking import Moved, open_history
+from asperity.page.widgets import BAR, LOOK, button, sentences, text_block
+from asperity.page.work import Refused
+from asperity.quantities import quantity
+
+MICROSECONDS = 1e6
+
+
+class HistoryView:
+    """One user's look at a history, with its widgets."""
+
+    def __init__(self, folder: Path, workshop: Workshop, deliver: Callable[[Callable[[], None]], None]) -> None:
+        self._folder = folder
+        self._queue = Queue(workshop, deliver)
+        self.moved: Moved | None = None
+        self.playing = False
+        self._cut_y = 0.0
+        self.status, self.verdict, self.notes = (text_block() for _ in range(3))
+        self.step = Slider(
+            title="", start=0, end=1, step=1, value=0, bar_color=BAR, sizing_mode="stretch_width", show_value=False,
+            stylesheets=[LOOK], margin=(0, 12, 6, 12), html_attributes={"role": "group", "aria-label": "Step, slider"},
+        )  # fmt: skip
+        self.step.on_change("value", lambda _name, _old, new: self._show(int(new)))
+        self.play = button("Play", self._toggle)
+        self.maps = Maps(self._cut_at)
+        self.cut = Cut(self.maps)
+        self.curves = Column(sizing_mode="stretch_width")
+        self._now: list[Span] = []
+
+    def begin(self) -> None:
+        """Read the history."""
+        self.status.text = sentences(["Reading the history ..."], "soft")
+        self._queue.ask((open_history, (self._folder,)), self._read)
+
+    def close(self) -> None:
+        """Give back what the session took."""
+        self._queue.close()
+        self.moved = None
+
+    def advance(self) -> None:
+        """Go one kept step on while it plays, and from the last to the first."""
+        if self.playing and self.moved is not None and self.moved.pictures:
+            self.step.value = (int(self.step.value) + 1) % len(self.moved.pictures)
+
+    def _toggle(self) -> None:
+        self.playing = not self.playing
+        self.play.label = "Stop" if self.playing else "Play"
+
+    def _read(self, result: Any) -> None:
+        if isinstance(result, Refused):
+            self.status.text = sentences([result.sentence], "alarm")
+            return
+        moved: Moved = result
+        self.moved = moved
+        self.verdict.text, self.notes.text = sentences([moved.verdict]), sentences(moved.notes, "soft")
+        self._draw_curves(moved)
+        if not moved.pictures:
+            self.status.text = sentences(["No maps were kept of this history."], "soft")
+            return
+        self.step.update(start=0, end=max(1, len(moved.pictures) - 1))
+        self._show(0)
+
+    def _draw_curves(self, moved: Moved) -> None:
+        time = moved.time * MICROSECONDS
+        across = Range1d(float(time[0]), float(time[-1]) or 1.0)
+        figures = []
+        for key, values in moved.curves.items():
+            made = plain_figure("", key, label=f"{quantity(key).title} over time", height=170, x_range=across)
+            made.line("x", "y", source=ColumnDataSource({"x": time, "y": shown(key, values)}), color=BLUE)
+            self._now.append(Span(dimension="height", line_color=VERMILION, line_dash="dashed", location=0.0))
+            made.add_layout(self._now[-1])
+            figures.append(made)
+        if figures:
+            figures[-1].xaxis.axis_label = "time [µs]"
+        self.curves.children = figures
+
+    def _show(self, place: int) -> None:
+        """Draw the maps of a kept step."""
+        moved = self.moved
+        if moved is None or not 0 <= place < len(moved.pictures):
+            return
+        at = moved.times[place] * MICROSECONDS
+        told = f"Step {moved.numbers[place]}, {at:.4g} µs, map {place + 1} of {len(moved.pictures)}"
+        self.status.text = sentences([told], "soft")
+        self.maps.show(moved.pictures[place], None)
+        for mark in self._now:
+            mark.location = at
+        self._cut_at(float(shown("y_m", self._cut_y)))
+
+    def _cut_at(self, y: float) -> None:
+        if self.moved is not None and self.moved.pictures:
+            picture = self.moved.pictures[min(int(self.step.value), len(self.moved.pictures) - 1)]
+            self._cut_y = float(picture.y[picture.line(y / quantity("y_m").factor)])
+            self.maps.cut(self._cut_y)
+            self.cut.show(picture, None, self._cut_y)
+
+
+def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The parts of the page by name, and the sections that they stand in."""
+    parts = {
+        "step": view.step, "play": view.play, "status": view.status, "verdict": view.verdict, "film": view.maps.film,
+        "pressure": view.maps.pressure, "cutpressure": view.cut.pressure, "cutfilm": view.cut.film,
+        "curves": view.curves, "notes": view.notes,
+    }  # fmt: skip
+    key = (("touching", "asperity contact"), ("ruptured", "no pressure"), ("hertz", "Hertz zone"))
+    shown_parts = [
+        {"names": ["verdict"], "first": True},
+        {"names": ["status"], "live": True, "first": True},
+        {"names": ["film", "pressure"], "key": key, "first": True},
+        {"names": ["cutpressure", "cutfilm"]},
+        {"names": ["curves"], "heading": "Over time"},
+        {"names": ["notes"], "heading": "To read with the numbers"},
+    ]
+    return parts, [
+        {"kind": "knobs", "label": "Steps", "blocks": [{"names": ["step"]}, {"names": ["play"]}]},
+        {"kind": "shown", "label": "The history", "blocks": shown_parts},
+    ]

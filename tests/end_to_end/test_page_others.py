@@ -1,0 +1,134 @@
+"""Recordings, a study and a history in a browser: dropped, watched, clicked, moved; and who is let in with --listen."""
+
+import http.client
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from asperity.cli import main
+from asperity.history import run_history
+from asperity.paper import papers_case
+from asperity.study import plan_study, run_study
+from support.browser import Visit, chromium, serving
+
+pytest.importorskip("panel", reason="the extra page is not installed")
+
+SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um", "vibration": "none"}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """Seven short recordings of the simulated rig."""
+    folder = tmp_path_factory.mktemp("rig") / "rig"
+    with pytest.raises(SystemExit):
+        main(["rig", "--out", str(folder), "--samples", "7", "--repeats", "1", "--duration", "2 s", "--quiet"])
+    return folder
+
+
+def test_dropped_recordings_show_their_resonance_or_why_not(browser, tmp_path, rig):
+    with serving(tmp_path) as server:
+        visit = Visit(browser, server)
+        page = visit.go("recordings")
+        np.save(tmp_path / "silent.npy", np.random.default_rng(0).standard_normal(20_000))
+        page.locator("input[type=file]").set_input_files(tmp_path / "silent.npy")
+        page.get_by_text("give the sampling rate").wait_for()
+        box = page.get_by_role("textbox", name=re.compile("^Sampling rate"))
+        box.fill("20")
+        box.press("Enter")
+        page.get_by_role("button", name="Read again").click()
+        page.get_by_text('the sampling rate must be a frequency such as "50 kHz"').wait_for()
+        box.fill("20 kHz")
+        box.press("Enter")
+        page.get_by_role("button", name="Read again").click()
+        page.get_by_text("1 recordings read").wait_for()
+        page.get_by_text("These recordings cannot tell").wait_for()
+        page.locator("input[type=file]").set_input_files(sorted(rig.glob("*.h5")))
+        page.get_by_text("8 recordings read").wait_for()
+        page.get_by_text(re.compile("contact resonance found in 7 of 8 recordings")).wait_for()
+        page.get_by_label("Recording", exact=True).select_option(index=1)
+        page.wait_for_function("() => true")
+        assert page.locator("table tbody tr").count() == 8
+        (tmp_path / "cut.h5").write_bytes(next(rig.glob("*.h5")).read_bytes()[:5000])
+        page.locator("input[type=file]").set_input_files(tmp_path / "cut.h5")
+        page.get_by_text("9 recordings read").wait_for()
+        assert "cut.h5" in page.locator("table tbody tr").last.inner_text()
+        visit.close()
+
+
+def test_a_folder_is_watched(browser, tmp_path, rig):
+    folder, files = tmp_path / "arriving", sorted(rig.glob("*.h5"))
+    folder.mkdir()
+    for path in files[:6]:
+        shutil.copy2(path, folder)
+    with serving(tmp_path, str(folder)) as server:
+        visit = Visit(browser, server)
+        page = visit.go("recordings")
+        page.get_by_text("6 recordings read; the folder is watched.").wait_for()
+        shutil.copy2(files[6], folder)
+        page.get_by_text("7 recordings read; the folder is watched.").wait_for()
+        visit.close()
+
+
+def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tmp_path):
+    study = {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}
+    run_study(plan_study(papers_case().with_overrides({**SMALL, "study": study})), out=tmp_path / "wear", workers=1)
+    with serving(tmp_path, "wear") as server:
+        visit = Visit(browser, server)
+        page = visit.go("study")
+        page.get_by_text("Click a point to see its contact.").wait_for()
+        page.get_by_label("A contact of the study").select_option(index=4)
+        page.get_by_text(re.compile("^surface.sq 1.5 um.*asperities carry")).wait_for()
+        clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
+        page.get_by_text("Turn its knobs").click()
+        page.get_by_text("Solved on 32 × 24 cells").wait_for()
+        assert page.get_by_role("textbox", name="Composite roughness, Sq").input_value() == "1.5 um"
+        assert page.locator("dl div", has_text="CLR").locator("dd").first.inner_text() == clr
+        visit.close()
+
+
+def test_a_history_moves(browser, tmp_path):
+    run_history(papers_case().with_overrides(SMALL), out=tmp_path / "moving", steps=4)
+    with serving(tmp_path, "moving") as server:
+        visit = Visit(browser, server)
+        page = visit.go("history")
+        page.get_by_text("Step 0, 0 µs, map 1 of 5").wait_for()
+        page.get_by_role("group", name="Step, slider").locator(".noUi-handle").focus()
+        page.keyboard.press("ArrowRight")
+        page.get_by_text(re.compile("^Step 1, .* map 2 of 5")).wait_for()
+        page.get_by_role("button", name="Play").click()
+        page.get_by_text(re.compile("^Step 3, ")).wait_for()
+        page.get_by_role("button", name="Stop").click()
+        visit.close()
+
+
+def test_others_have_to_know_the_password(browser, tmp_path):  # noqa: ARG001 - none is served where there is no browser
+    with serving(tmp_path, "--listen", "0.0.0.0", ASPERITY_PAGE_PASSWORD="long enough") as server:
+        connection = http.client.HTTPConnection(server.host)
+        connection.request("GET", "/contact")
+        answer = connection.getresponse()
+        body = answer.read()
+        assert (answer.status, answer.getheader("Location", "").split("?")[0].lstrip(".")) == (302, "/login")
+        assert b"Bokeh" not in body
+        connection.close()
+        visit = Visit(browser, server)
+        page = visit.page
+        page.goto(f"http://{server.host}/contact")
+        assert page.url.split("?")[0].endswith("/login")
+        page.locator("input[type=password]").fill("wrong one")
+        page.keyboard.press("Enter")
+        page.wait_for_load_state()
+        assert page.get_by_role("textbox", name="Load, F").count() == 0
+        page.goto(f"http://{server.host}/contact")
+        page.locator("input[name=username]").fill("somebody")
+        page.locator("input[type=password]").fill("long enough")
+        page.keyboard.press("Enter")
+        page.get_by_role("textbox", name="Load, F").wait_for()
+        visit.close()
