@@ -21,6 +21,7 @@ PARTS = (  # those first that the others' times are told against
     "prompt",
     "roughness_levels",
     "first_call",
+    "page",
     "speed",
     "films",
     "friction",
@@ -40,7 +41,7 @@ PARTS = (  # those first that the others' times are told against
     "damping_stages",
     "motion_table",
 )
-ON_ALL = ("recordings", "study", "first_call", "prompt")  # as their users have them, on all processors
+ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors
 TIMES = "times"  # the part that says how long the others took
 
 

@@ -39,7 +39,7 @@ class Tile(NamedTuple):
         return f"{title[:1].upper()}{title[1:]}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sound:
     """The spectrum about the searched band, with the line fitted to it; `reason` says why there is none.
 
@@ -57,7 +57,7 @@ class Sound:
     reason: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Picture:
     """Maps of a contact as the page shows them.
 
@@ -86,7 +86,7 @@ class Picture:
         return ellipse_pressure(self.x, y, self.half_widths, self.hertz_pressure)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Answer(Picture):
     """A solved contact as the page shows it.
 

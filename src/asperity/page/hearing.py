@@ -41,7 +41,7 @@ class Ear(NamedTuple):
     unit: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Heard:
     """A series of recordings as the page shows it.
 

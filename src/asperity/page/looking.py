@@ -26,7 +26,7 @@ class Scatter(NamedTuple):
     logarithmic: bool
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Swept:
     """A study as the page shows it.
 
@@ -86,7 +86,7 @@ def _study(folder: Path, stamp: float) -> StudyResult:  # noqa: ARG001 - one tha
     return load_study(folder)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Moved:
     """A history as the page shows it: curves over time, SI by key, and maps of some steps."""
 

@@ -25,6 +25,7 @@ from asperity.page.settings import Settings
 HERE = "127.0.0.1"
 PORT = 5006
 PASSWORD = "ASPERITY_PAGE_PASSWORD"
+USER = "asperity"  # under whom everybody comes in; the page for the password says so
 SHORTEST = 8  # characters of a password
 LOOK_MS, FRAME_MS = 5000, 250  # between two looks at a folder, and two steps of a history
 WAIT_MS = 15_000  # for a visitor that has gone
@@ -223,7 +224,13 @@ def serve_page(opened: Opened, *, port: int = PORT, listen: str = HERE, ready: C
     try:
         workshop.warm()
         house = House(opened, workshop)
-        guarded = {} if password is None else {"basic_auth": password, "cookie_secret": secrets.token_hex(32)}
+        guarded: dict[str, Any] = {}
+        if (
+            password is not None
+        ):  # by a name of its own: Panel would take a password alone for a file's, if there is one
+            login = str(files("asperity.page").joinpath("login.html.j2"))
+            guarded = {"basic_auth": {USER: password}, "basic_login_template": login}
+            guarded["cookie_secret"] = secrets.token_hex(32)
         server = panel.serve(
             house.pages(),
             port=port,

@@ -1,0 +1,178 @@
+"""The live page in headless Chromium: from a turned knob to new maps, first content, three users, a file, memory.
+
+Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock: the machine's load stands beside them.
+"""
+
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+STEPS, USERS, SESSIONS, GIVEN_BACK_S = 40, 3, 200, 40.0
+RECORDING = 37_500_000  # samples of eight bytes: 300 MB
+TURN = """([key, text]) => new Promise(done => {
+  const models = Bokeh.documents.flatMap(d => [...d._all_models.values()])
+  const film = models.find(m => m.type === 'ColumnDataSource' && m.data.image?.[0]?.dtype === 'float32')
+  const status = models.find(m => m.type === 'Div' && /Solved on/.test(m.text))
+  const knob = models.find(m => m.type === 'TextInput' && m.title === key)
+  const before = film.data, began = performance.now()
+  let first = null, left = false
+  knob.value = text
+  const look = () => {
+    const now = performance.now() - began
+    if (first === null && film.data !== before) first = now
+    if (!/Solved on/.test(status.text)) left = true
+    if (left && /Solved on|NOT CONVERGED|Not solved/.test(status.text) || now > 60000) done([first ?? now, now])
+    else setTimeout(look, 4)
+  }
+  look()
+})"""
+
+
+@contextmanager
+def _server(folder: Path) -> Iterator[tuple[str, int]]:
+    """The address of a page's server and the number of its process."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "asperity", "page", "--port", "0"], stdout=subprocess.PIPE, text=True, cwd=folder
+    )
+    try:
+        assert process.stdout is not None
+        found = re.search(r"http://\S+/", process.stdout.readline())
+        assert found is not None
+        yield found[0], process.pid
+    finally:
+        process.send_signal(2)
+        process.wait(60)
+
+
+def _knob(rng: random.Random) -> tuple[str, str]:
+    """A knob and a value for it."""
+    return rng.choice(
+        [
+            ("Load, F", f"{rng.uniform(300, 900):.0f} N"),
+            ("Entrainment speed, u", f"{rng.uniform(1, 4):.3g} m/s"),
+            ("Composite roughness, Sq", f"{rng.uniform(0.5, 2):.3g} um"),
+            ("Viscosity, η₀", f"{rng.uniform(0.05, 0.2):.3g} Pa s"),
+        ]
+    )
+
+
+def _solved(page: Any) -> None:
+    page.get_by_text(re.compile("Solved on")).wait_for(timeout=120_000)
+
+
+def _row(name: str, seconds: list[float]) -> str:
+    half, most, worst = (float(np.quantile(seconds, share)) for share in (0.5, 0.95, 1.0))
+    return f"| {name} | {half:.2f} | {most:.2f} | {worst:.2f} |"
+
+
+def _steps(page: Any, count: int, seed: int) -> tuple[list[float], list[float]]:
+    rng = random.Random(seed)
+    pairs = [page.evaluate(TURN, list(_knob(rng))) for _ in range(count)]
+    return [first / 1e3 for first, _ in pairs], [whole / 1e3 for _, whole in pairs]
+
+
+def _resident(process: int) -> float:
+    """Memory of a process [MB]."""
+    status = Path(f"/proc/{process}/status").read_text("ascii")
+    return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024.0  # type: ignore[index]
+
+
+def _memory(url: str, process: int, count: int) -> tuple[float, float]:
+    """The server's memory before and after so many visits that have gone [MB]."""
+    from bokeh.client import pull_session
+
+    def visits(number: int) -> None:
+        for _ in range(number):
+            pull_session(url=f"{url}contact").close()
+
+    visits(20)  # what is loaded once
+    time.sleep(GIVEN_BACK_S)
+    before = _resident(process)
+    visits(count)
+    time.sleep(GIVEN_BACK_S)
+    return before, _resident(process)
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    """What was measured, as markdown."""
+    from playwright.sync_api import sync_playwright
+
+    steps = 10 if fast else STEPS
+    path = shutil.which("chromium")
+    if path is None:
+        raise SystemExit("the live page is measured in chromium; apt-get install chromium")
+    yield "## The live page\n"
+    with tempfile.TemporaryDirectory() as folder, _server(Path(folder)) as (url, process), sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.goto(f"{url}contact")
+        _solved(page)
+        yield "| seconds by the clock | median | 95 % | longest |"
+        yield "|---|---|---|---|"
+        contents = []
+        for _ in range(3 if fast else 8):
+            began = time.perf_counter()
+            visit = browser.new_page()
+            visit.goto(f"{url}contact")
+            visit.get_by_role("textbox", name="Load, F").wait_for()
+            contents.append(time.perf_counter() - began)
+            visit.close()
+        yield _row("first content", contents)
+        for cells in (128, 256):
+            page.goto(f"{url}contact?grid.cells={cells}+x+{cells}")
+            _solved(page)
+            first, whole = _steps(page, steps, cells)
+            yield _row(f"a knob to new maps, {cells} x {cells}, coarse", first)
+            yield _row(f"a knob to the full answer, {cells} x {cells}", whole)
+        yield _row(f"a knob to the full answer, 128 x 128, {USERS} users at once", _crowd(browser, url, steps // 4))
+        yield _row("a recording of 300 MB dropped, to its verdict", [_drop(browser, url, Path(folder), fast=fast)])
+        browser.close()
+        before, after = _memory(url, process, 20 if fast else SESSIONS)
+        yield ""
+        yield (
+            f"{20 if fast else SESSIONS} visits come and gone: the server grew from {before:.0f} to {after:.0f} MB. "
+            f"Load of the machine ({os.cpu_count()} processors) at the end: {os.getloadavg()[1]:.1f}."
+        )
+
+
+def _crowd(browser: Any, url: str, count: int) -> list[float]:
+    """Seconds of every step, where several users turn knobs at once."""
+    pages = [browser.new_context().new_page() for _ in range(USERS)]
+    for page in pages:
+        page.goto(f"{url}contact")
+        _solved(page)
+    rng, seconds = random.Random(3), []
+    for _ in range(count):
+        for page in pages:
+            page.evaluate(f"pair => {{ window.turned = ({TURN})(pair) }}", list(_knob(rng)))
+        seconds += [page.evaluate("() => window.turned")[1] / 1e3 for page in pages]
+    for page in pages:
+        page.context.close()
+    return seconds
+
+
+def _drop(browser: Any, url: str, folder: Path, *, fast: bool) -> float:
+    """Seconds from dropping a large recording to what is said of it."""
+    np.save(folder / "long.npy", np.random.default_rng(0).standard_normal(RECORDING // (10 if fast else 1)))
+    page = browser.new_page()
+    page.goto(f"{url}recordings")
+    for name, text in (("Sampling rate", "50 kHz"), ("Unit of the values", "m/s^2")):
+        box = page.get_by_role("textbox", name=re.compile(f"^{name}"))
+        box.fill(text)
+        box.press("Enter")
+    began = time.perf_counter()
+    page.locator("input[type=file]").set_input_files(folder / "long.npy")
+    page.get_by_text("1 recordings read").wait_for(timeout=300_000)
+    page.close()
+    return time.perf_counter() - began
