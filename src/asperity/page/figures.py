@@ -19,7 +19,7 @@ from bokeh.models import (
     Range1d,
     Span,
 )
-from bokeh.palettes import Cividis256, Inferno256, Viridis256
+from bokeh.palettes import Inferno256, RdBu11, Viridis256, interp_palette
 from bokeh.plotting import figure
 
 from asperity.page.answer import RUPTURED, TOUCHING, Picture, Sound
@@ -28,9 +28,11 @@ from asperity.quantities import quantity
 
 BLUE, VERMILION, GREEN, GREY = "#2b8fd0", "#d55e00", "#00a577", "#808893"
 FILMS = Viridis256[:208]  # without its yellow, which is that of contact
+CHANGES = interp_palette(RdBu11[::-1], 256)  # thinner is blue, thicker red
 CONTACT, CAVITY = (0xF7, 0xDC, 0x4A), (0x5B, 0x6B, 0x86)
 TYPE = "#74818f"  # of keys and colour bars, which take no ink from the style sheet: legible on light and on dark
 HEIGHT = 300
+SHAPES, BESIDE = (0.9, 2.0), 0.8  # widths of maps over their heights; of that, what axes and colour bar leave
 
 
 def shown(key: str, values: Any) -> Any:
@@ -80,13 +82,14 @@ class Maps:
         self.across, self.along = (Span(dimension=way, line_dash="dotted") for way in ("width", "height"))
         self.film = self._map("Film thickness, contact and cavitation", FILMS, "gap")
         self.pressure = self._map("Pressure", Inferno256, "pressure")
-        self.change = self._map("Film less the pinned film", Cividis256, "gap")
+        self.change = self._map("Film less the pinned film", CHANGES, "gap")
         self.change.visible = False
         for made in (self.film, self.pressure, self.change):
             made.on_event(Tap, lambda event: cut_at(event.y))
 
     def _map(self, title: str, palette: Sequence[str], key: str) -> Any:
-        made = plain_figure("x_m", "y_m", label=title, title=title, x_range=self.x, y_range=self.y)
+        made = plain_figure("x_m", "y_m", label=title, title=title, x_range=self.x, y_range=self.y, min_height=HEIGHT)
+        made.update(sizing_mode="scale_width", aspect_ratio=SHAPES[1])
         made.add_tools(CrosshairTool(overlay=[self.across, self.along]))
         mapper = LinearColorMapper(palette=palette)
         source = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
@@ -112,6 +115,9 @@ class Maps:
         (x0, x1), (y0, y1) = ((shown("x_m", end) for end in ends) for ends in answer.extent)
         self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
         self.y.update(start=y0, end=y1, reset_start=y0, reset_end=y1)
+        shape = BESIDE * min(max(float((x1 - x0) / (y1 - y0)), SHAPES[0]), SHAPES[1])
+        for made in (self.film, self.pressure, self.change):
+            made.aspect_ratio = shape
         place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
         marks = _marks(answer)
         self._fill(self.film, shown("gap", answer.gap), (0.0, shown("gap", answer.gap_top) or 1.0), place, marks)
