@@ -91,6 +91,7 @@ def _resident(process: int) -> float:
 def _memory(url: str, process: int, count: int) -> tuple[float, float]:
     """The server's memory before and after so many visits that have gone [MB]."""
     from bokeh.client import pull_session
+    from panel.models import file_dropper, location  # noqa: F401 - what a visit is made of
 
     def visits(number: int) -> None:
         for _ in range(number):

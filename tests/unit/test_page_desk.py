@@ -19,6 +19,7 @@ from asperity.page.opening import open_page
 from asperity.page.settings import Settings
 from asperity.page.work import Refused, Ticket, told
 from asperity.paper import papers_case
+from asperity.report import write_report
 from asperity.results import solve_case
 from asperity.surface import Surface
 
@@ -288,7 +289,7 @@ def test_what_is_taken_away_solves_to_the_same_numbers(tmp_path):
 
 
 def test_the_report_is_our_own_page():
-    text = work.make_report(NOBODY, papers_case().with_overrides(MUTE))
+    text = work.make_report(NOBODY, papers_case().with_overrides(MUTE), write_report)
     assert text.startswith("<!doctype html>")
     assert "Content-Security-Policy" in text
 

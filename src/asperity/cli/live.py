@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from asperity import report
 from asperity.cli.app import app
 from asperity.errors import BadInput
 
@@ -32,7 +33,7 @@ def page_command(what: What = None, port: Port = 5006, listen: Listen = "127.0.0
         from asperity import page
 
         opened = page.open_page(what)
-        page.serve_page(opened, port=port, listen=listen, ready=_ready)
+        page.serve_page(opened, port=port, listen=listen, ready=_ready, write_report=report.write_report)
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in ("panel", "bokeh", "tornado", "markupsafe"):
             raise

@@ -26,7 +26,7 @@ from asperity.page.widgets import (
     text_block,
     tiles,
 )
-from asperity.page.work import Refused, make_report, open_surface
+from asperity.page.work import Refused, ReportWriter, make_report, open_surface
 from asperity.quantities import quantity
 
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
@@ -42,7 +42,7 @@ class ContactView:
     workshop : solves
     deliver : calls a function under the document's lock
     set_address : puts a query into the browser's address
-    solved : an answer that is there already, as of a kept run
+    write_report : makes a run's page
     """
 
     def __init__(
@@ -51,8 +51,9 @@ class ContactView:
         workshop: Workshop,
         deliver: Callable[[Callable[[], None]], None],
         set_address: Callable[[str], None],
+        write_report: ReportWriter,
     ) -> None:
-        self._set_address = set_address
+        self._set_address, self._write_report = set_address, write_report
         self._workshop, self._deliver = workshop, deliver
         self.desk = Desk(settings, Queue(workshop, deliver), self.draw)
         self._side = Queue(workshop, deliver)
@@ -206,7 +207,7 @@ class ContactView:
 
     def _make_report(self) -> None:
         self.report.disabled, self.report.label = True, "Report is made ..."
-        self._side.ask((make_report, (self.desk.settings.case,)), self._report_made)
+        self._side.ask((make_report, (self.desk.settings.case, self._write_report)), self._report_made)
 
     def _report_made(self, result: Any) -> None:
         self.report.disabled, self.report.label = False, "Report"

@@ -28,7 +28,7 @@ from asperity.quantities import quantity
 
 BLUE, VERMILION, GREEN, GREY = "#2b8fd0", "#d55e00", "#00a577", "#808893"
 FILMS = Viridis256[:208]  # without its yellow, which is that of contact
-CHANGES = interp_palette(RdBu11[::-1], 256)  # thinner is blue, thicker red
+CHANGES = interp_palette(RdBu11, 256)  # thinner is blue, thicker red
 CONTACT, CAVITY = (0xF7, 0xDC, 0x4A), (0x5B, 0x6B, 0x86)
 TYPE = "#74818f"  # of keys and colour bars, which take no ink from the style sheet: legible on light and on dark
 HEIGHT = 300

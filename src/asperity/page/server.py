@@ -21,6 +21,7 @@ from asperity.page import contact, history, recordings, study
 from asperity.page.jobs import Workshop
 from asperity.page.opening import Opened
 from asperity.page.settings import Settings
+from asperity.page.work import ReportWriter
 
 HERE = "127.0.0.1"
 PORT = 5006
@@ -83,8 +84,8 @@ _BLOCK: dict[str, Any] = {"heading": "", "live": False, "first": False, "key": (
 class House:
     """All pages of one server, and the processes that work for them."""
 
-    def __init__(self, opened: Opened, workshop: Workshop) -> None:
-        self.opened, self.workshop = opened, workshop
+    def __init__(self, opened: Opened, workshop: Workshop, write_report: ReportWriter) -> None:
+        self.opened, self.workshop, self.write_report = opened, workshop, write_report
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.page").joinpath("page.html.j2").read_text("utf-8")
         self.style = files("asperity.page").joinpath("style.css").read_text("utf-8")
@@ -94,7 +95,7 @@ class House:
 
     def contact(self) -> Any:
         """The page of a contact, for one visit."""
-        view = contact.ContactView(Settings(self.opened.case), self.workshop, _deliver(), _address())
+        view = contact.ContactView(Settings(self.opened.case), self.workshop, _deliver(), _address(), self.write_report)
         parts, sections = contact.layout(view)
         view.begin(_query(), self.opened.answer)
         panel.state.on_session_destroyed(lambda _context: view.close())
@@ -202,7 +203,9 @@ def _query() -> str:
     return urlencode(pairs)
 
 
-def serve_page(opened: Opened, *, port: int = PORT, listen: str = HERE, ready: Callable[[str], None]) -> None:
+def serve_page(
+    opened: Opened, *, port: int = PORT, listen: str = HERE, ready: Callable[[str], None], write_report: ReportWriter
+) -> None:
     """Serve the pages until interrupted.
 
     Parameters
@@ -211,6 +214,7 @@ def serve_page(opened: Opened, *, port: int = PORT, listen: str = HERE, ready: C
     port : 0 for any that is free
     listen : address to listen on; one that others can reach needs a password, in `ASPERITY_PAGE_PASSWORD`
     ready : called with the page's address when it can be visited
+    write_report : makes the page of a run, `asperity.report.write_report`
 
     Raises
     ------
@@ -223,7 +227,7 @@ def serve_page(opened: Opened, *, port: int = PORT, listen: str = HERE, ready: C
     workshop = Workshop()
     try:
         workshop.warm()
-        house = House(opened, workshop)
+        house = House(opened, workshop, write_report)
         guarded: dict[str, Any] = {}
         if (
             password is not None

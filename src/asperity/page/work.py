@@ -4,7 +4,7 @@ A worker asks between steps of the solver whether its answer is still wanted, an
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,9 +21,10 @@ from asperity.page.answer import Answer, answer_of, coarse_answer
 from asperity.page.settings import require_few
 from asperity.paper import papers_case
 from asperity.processes import set_up_worker
-from asperity.report import write_report
-from asperity.results import load_run, solve_case
+from asperity.results import Run, load_run, solve_case
 from asperity.surface import Surface
+
+ReportWriter = Callable[[Sequence[Run], Path], Path]  # `asperity.report.write_report`, which the command line hands in
 
 COARSE = 64 * 64  # cells, at most, of a coarse answer
 COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS = 1e-3, 12, 40
@@ -171,11 +172,11 @@ def open_run(path: Path) -> tuple[Case, Answer]:
     return run.case, answer_of(run, run.solution.convergence.seconds)
 
 
-def make_report(ticket: Ticket, case: Case) -> str:
-    """Our own page of the contact, as text."""
+def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:
+    """The page that `write` makes of the contact, as text."""
     run = solve_case(case, strict=False, progress=_hook(ticket, LONGEST_S))
     with TemporaryDirectory() as folder:
-        return write_report([run], Path(folder) / "report.html").read_text("utf-8")
+        return write([run], Path(folder) / "report.html").read_text("utf-8")
 
 
 def open_surface(ticket: Ticket, case: Case, path: Path) -> tuple[Case, tuple[str, ...]]:  # noqa: ARG001
