@@ -1,6 +1,8 @@
 """Who is let in, what is dropped where, what the page is opened with; and widgets that escape what they show."""
 
 import socket
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -127,7 +129,8 @@ def test_what_is_shown_is_escaped():
 def test_the_page_is_opened_with_what_is_named(tmp_path):
     assert (open_page(None).kind, open_page(None).case.grid.cells) == ("contact", (128, 128))
     (tmp_path / "manifest.json").write_text("{}", "utf-8")
-    assert open_page(tmp_path).kind == "study"
+    with pytest.raises(UnreadableFile, match="carries no digest"):
+        open_page(tmp_path)
     (tmp_path / "recordings").mkdir()
     assert open_page(tmp_path / "recordings").kind == "recordings"
     with pytest.raises(UnreadableFile, match="does not exist"):
@@ -135,3 +138,10 @@ def test_the_page_is_opened_with_what_is_named(tmp_path):
     (tmp_path / "case.toml").write_text("[contact]\n", "utf-8")
     with pytest.raises(BadInput, match="is missing"):
         open_page(tmp_path / "case.toml")
+
+
+def test_without_panel_the_extra_is_named():
+    without = "import sys; sys.modules['panel'] = None; from asperity.cli import main; main(['page', '--port', '0'])"
+    done = subprocess.run([sys.executable, "-c", without], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "error: the live page needs Panel; pip install 'asperity[page]'\n"
