@@ -6,6 +6,7 @@ Parameters of laws say their unit and symbol beside the parameter, as `Parameter
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -18,7 +19,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units over their SI unit; any other display unit is the SI unit itself
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
 _FACTORS |= {"1/µm": 1e-6, "1/GPa": 1e9, "mm/s": 1e3, "N/µm": 1e-6, "N/mm": 1e-3, "mJ": 1e3, "mm²/s": 1e6, "mPa s": 1e3}
-_FACTORS |= {"°": 180.0 / math.pi, "h": 1.0 / 3600.0, "10⁶ turns": 1e-6}
+_FACTORS |= {"mm³": 1e9, "°": 180.0 / math.pi, "h": 1.0 / 3600.0, "10⁶ turns": 1e-6}
 _DISPLAYS = {"Pa": "MPa", "1/Pa": "1/GPa", "kg/m^3": "kg/m³"}  # of laws' parameters, where it is not the SI unit
 
 
@@ -169,7 +170,7 @@ def catalogue() -> dict[str, Quantity]:
 
 
 def quantity(key: str) -> Quantity:
-    """The quantity of this key; `crf_sound_hz` is `crf_hz` by the vibration preset sound."""
+    """The quantity of this key; `crf_sound_hz` is `crf_hz` by the vibration preset sound, `sq_1_m` `sq_m` of body 1."""
     known = catalogue()
     if key in known:
         return known[key]
@@ -179,6 +180,10 @@ def quantity(key: str) -> Quantity:
             base = known[plain]
             deviation = base.deviation.replace("_std", f"_std_{preset}")
             return replace(base, key=key, symbol=f"{base.short}, {preset}", deviation=deviation, source="")
+    plain, body = re.sub(r"_[12](?=_m3?$|$)", "", key), re.search(r"_([12])(?=_m3?$|$)", key)
+    if body is not None and plain in known:
+        base = known[plain]
+        return replace(base, key=key, symbol=f"{base.short} of body {body[1]}", deviation="", source="")
     raise KeyError(f"{key} is not in the catalogue of quantities; add it to quantities.csv")
 
 

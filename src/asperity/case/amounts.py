@@ -40,6 +40,7 @@ _MEASURES = {  # SI unit -> what it measures, and how one is written
     "rad": ("an angle", "20 deg"),
     "N m": ("a torque", "265 N m"),
     "N/m": ("a stiffness", "30 N/mm"),
+    "J/mol": ("a molar energy", "49 kJ/mol"),
 }
 _TURN = Decimal("6.283185307179586476925286766559")  # 2 pi
 _PER_MINUTE = str(_TURN / 60)
@@ -78,6 +79,8 @@ _COMMON = {  # unit -> its SI unit, and what one is worth in it: pint and its re
     "N m": ("N m", "1"),
     "N/m": ("N/m", "1"),
     "N/mm": ("N/m", "1e3"),
+    "J/mol": ("J/mol", "1"),
+    "kJ/mol": ("J/mol", "1e3"),
     "rad": ("rad", "1"),
     "mrad": ("rad", "1e-3"),
     "deg": ("rad", str(_TURN / 360)),

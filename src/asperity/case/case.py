@@ -26,6 +26,7 @@ from asperity.grid import Grid
 from asperity.limits import require_affordable
 from asperity.lubricant import Lubricant, OilFact, Thermal
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
+from asperity.wearing import WearModel
 
 # surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
 MANY_SURFACES, FEW_SURFACES = 5, 3
@@ -53,7 +54,7 @@ class Case:
         measured = any(
             isinstance(part, FileSection) for part in self.contents.surface.parts.values()
         )  # a grid chosen by it asks for the file
-        for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration"):
+        for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration", "wear"):
             if name == "grid" and measured and self.contents.grid.chosen:
                 continue
             with self.naming({"conditions": "contact and material", "options": "solver"}.get(name, name)):
@@ -164,6 +165,12 @@ class Case:
     def vibration(self) -> VibrationModel | None:
         """The vibration model; None when the case has no [vibration]."""
         return vibration_model(self.contents.vibration)
+
+    @cached_property
+    def wear(self) -> WearModel | None:
+        """How the contact wears; None when the case has no [wear]."""
+        section = self.contents.wear
+        return None if section is None else section.model(self.conditions, self.boundary_friction)
 
     @cached_property
     def _roughness(self) -> tuple[Surface, tuple[str, ...]]:

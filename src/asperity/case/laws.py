@@ -4,6 +4,7 @@ A parameter is a quantity where its law gives it a unit, else a plain value. Sec
 a law needs nothing here.
 """
 
+from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from functools import cache, partial
 from typing import Annotated, Any, NamedTuple, cast, get_type_hints
@@ -51,9 +52,14 @@ def _law_section(name: str, law: type) -> type[Section]:
 
 def one_of(family: LawFamily) -> PlainValidator:
     """What reads a section's field that is a law of a family."""
+    return one_of_table(LAWS[family])
+
+
+def one_of_table(table: Mapping[str, type]) -> PlainValidator:
+    """What reads a section's field that is a law of a table, by its name there."""
 
     def sections() -> dict[str, type[Section]]:
-        return {name: _law_section(name, law) for name, law in LAWS[family].items()}
+        return {name: _law_section(name, law) for name, law in table.items()}
 
     return PlainValidator(partial(choose, "law", sections))
 

@@ -24,6 +24,7 @@ from asperity.case.shapes import ShapeSection
 from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.sweep import StudySection, parse_study
 from asperity.case.vibration import parse_vibration
+from asperity.case.wear import WearSection
 from asperity.conditions import Geometry
 from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, ContactModel, Options, Start
 from asperity.errors import BadInput
@@ -137,3 +138,4 @@ class CaseFile(Section):
     vibration: Annotated[Any, PlainValidator(parse_vibration)] = None
     study: Annotated[StudySection | None, PlainValidator(parse_study)] = None
     motion: Annotated[MotionSection | None, OPTIONAL] = None
+    wear: Annotated[WearSection | None, OPTIONAL] = None

@@ -58,6 +58,7 @@ from .solution import Contents as Contents
 from .solution import Oil as Oil
 from .solve import solve_contact as solve_contact
 from .state import contact_state as contact_state
+from .state import plastic_overlap as plastic_overlap
 from .stiffness import TangentStiffness as TangentStiffness
 from .stiffness import Yielded as Yielded
 from .stiffness import roller_depth as roller_depth

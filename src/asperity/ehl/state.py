@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.films import least_film
 from asperity.ehl.mixed import MixedBalance, evaluate
@@ -42,6 +43,14 @@ def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | Mi
         return evaluate(problem, pressures_of(solution, problem, scales), second_order=True)
     pressure = solution.pressure[:, : problem.cells[1]] / scales.pressure
     return problem.evaluate(pressure, solution.rigid_approach / scales.gap)
+
+
+def plastic_overlap(solution: ContactSolution) -> Field:
+    """How deep the pressure cap has let the bodies overlap [m], (nx, ny): what stays flattened when they part."""
+    balance = balance_of(solution)
+    depth = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)  # the solution's own gap ends at the film
+    depth = depth * (balance.pressure >= balance.problem.p_cap) * Scales.of(solution.conditions, solution.lubricant).gap
+    return np.broadcast_to(depth, solution.grid.cells)
 
 
 def state_of(solution: ContactSolution, balance: Balance | MixedBalance) -> ContactState:

@@ -12,10 +12,9 @@ import numpy as np
 
 from asperity.conditions import ContactConditions
 from asperity.ehl.outcome import CONSERVING
-from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.solve import solve_contact
-from asperity.ehl.state import balance_of
+from asperity.ehl.state import plastic_overlap
 from asperity.errors import BadInput, require_positive
 
 LOAD_STEP = 0.02  # up and down, as a share of the load
@@ -97,13 +96,10 @@ def tangent_stiffness(
 
 def _shaken_down(solution: ContactSolution) -> ContactSolution:
     """The same contact, its asperities as flat as the load has made them and hard enough to stay so."""
-    balance, surface, conditions = balance_of(solution), solution.surface, solution.conditions
+    surface, conditions = solution.surface, solution.conditions
     if solution.options.model == CONSERVING or conditions.hardness is None:
         raise BadInput("a contact is shaken down in the models unified and mixed only; solve by one of them")
-    overlap = np.maximum(balance.problem.contact_gap - balance.gap, 0.0)  # the solution's own gap ends at the film
-    overlap *= balance.pressure >= balance.problem.p_cap
-    lower = surface.heights - overlap * Scales.of(conditions, solution.lubricant).gap
-    flattened = replace(solution, surface=replace(surface, heights=lower))
+    flattened = replace(solution, surface=replace(surface, heights=surface.heights - plastic_overlap(solution)))
     hardened = replace(conditions, hardness=HARDENED * conditions.hardness)
     return _solved_again(replace(flattened, conditions=hardened), 1.0)
 

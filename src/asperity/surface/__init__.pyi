@@ -21,6 +21,7 @@ from .parameters import SurfaceDescription as SurfaceDescription
 from .parameters import SurfaceParameters as SurfaceParameters
 from .parameters import correlation_lengths as correlation_lengths
 from .parameters import describe_surface as describe_surface
+from .parameters import height_parameters as height_parameters
 from .parameters import known_once as known_once
 from .parameters import surface_parameters as surface_parameters
 from .prepare import CompositeSurface as CompositeSurface
@@ -33,3 +34,4 @@ from .profile import profile_parameters as profile_parameters
 from .read import read_surface as read_surface
 from .spectrum import SurfaceSpectrum as SurfaceSpectrum
 from .spectrum import surface_spectrum as surface_spectrum
+from .write import write_surface as write_surface

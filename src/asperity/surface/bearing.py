@@ -44,7 +44,8 @@ def bearing_curve(heights: Field) -> BearingCurve:
     """The curve of heights of any shape [m]; NaN are left out, the mean is removed."""
     known = heights[np.isfinite(heights)]
     share = np.linspace(0.0, 1.0, _POINTS)
-    return BearingCurve(share, np.asarray(np.quantile(known - known.mean(), 1.0 - share)))
+    ordered = np.sort(known - known.mean(), axis=None)  # once: numpy's quantile is fifty times slower for so many
+    return BearingCurve(share, np.interp((1.0 - share) * (known.size - 1), np.arange(known.size), ordered))
 
 
 def core_heights(curve: BearingCurve) -> CoreHeights:

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy
@@ -142,21 +142,52 @@ def describe_surface(
     return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps, profile, letter)
 
 
-def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
-    """The parameters of a surface as it is; a measured one wants its form removed first (`level`)."""
+class HeightParameters(NamedTuple):
+    """Those of `SurfaceParameters` that ask for heights alone, wherever they lie."""
+
+    sa: float
+    sq: float
+    ssk: float
+    sku: float
+    sk: float
+    spk: float
+    svk: float
+    smr1: float
+    smr2: float
+
+
+def height_parameters(surface: Surface | MeasuredSurface) -> HeightParameters:
+    """Mean heights, skewness, kurtosis and the bearing curve's core, of a surface as it is."""
     heights = surface.heights - np.nanmean(surface.heights)
     sq = float(np.sqrt(np.nanmean(heights**2)))
     if sq == 0.0:
-        nan = float("nan")
-        return SurfaceParameters(0.0, 0.0, nan, nan, 0.0, 0.0, 0.0, 0.0, 0.0, nan, nan, False, 0.0, 0.0, 0.0, 0.0, 1.0)
-    sal, texture, bounded = _texture(heights, surface.grid)
-    sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
+        return HeightParameters(0.0, 0.0, float("nan"), float("nan"), 0.0, 0.0, 0.0, 0.0, 1.0)
     core = core_heights(bearing_curve(known_once(surface)))
-    return SurfaceParameters(
+    return HeightParameters(
         sa=float(np.nanmean(np.abs(heights))),
         sq=sq,
         ssk=float(np.nanmean(heights**3)) / sq**3,
         sku=float(np.nanmean(heights**4)) / sq**4,
+        sk=core.core,
+        spk=core.peaks,
+        svk=core.pits,
+        smr1=core.upper,
+        smr2=core.lower,
+    )
+
+
+def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
+    """The parameters of a surface as it is; a measured one wants its form removed first (`level`)."""
+    heights, own = surface.heights - np.nanmean(surface.heights), height_parameters(surface)
+    if own.sq == 0.0:
+        nan = float("nan")
+        return SurfaceParameters(
+            **own._asdict(), sp=0.0, sv=0.0, sz=0.0, sdq=0.0, sdr=0.0, sal=nan, str_=nan, str_bounded=False
+        )
+    sal, texture, bounded = _texture(heights, surface.grid)
+    sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
+    return SurfaceParameters(
+        **own._asdict(),
         sp=sp,
         sv=sv,
         sz=sp + sv,
@@ -165,11 +196,6 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
         sal=sal,
         str_=texture,
         str_bounded=bounded,
-        sk=core.core,
-        spk=core.peaks,
-        svk=core.pits,
-        smr1=core.upper,
-        smr2=core.lower,
     )
 
 

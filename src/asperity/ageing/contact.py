@@ -1,0 +1,147 @@
+"""One position of the tracks, solved: maps that wear needs, and numbers; here or in worker processes.
+
+Each is solved from nothing, so that neither the order nor the process changes a number.
+"""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Protocol
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from asperity import ehl
+from asperity.arrays import Field
+from asperity.case import Case
+from asperity.conditions import ContactConditions
+from asperity.ehl import ContactSolution, ContactState, Friction, Options
+from asperity.errors import AsperityError
+from asperity.lubricant import Lubricant, Thermal
+from asperity.processes import cores, set_up_worker
+from asperity.surface import Surface
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solved:
+    """A contact at one position, on its own grid; or `failure`, why there is none.
+
+    Maps: `pressure`, `asperity_pressure` and `shear` on body 1 [Pa], `film` and `overlap` (None unless asked for) [m],
+    `temperatures` of both surfaces [K above ambient], None where heat could not be shared between the bodies.
+    """
+
+    pressure: Field
+    asperity_pressure: Field
+    shear: Field
+    film: Field
+    overlap: Field | None
+    temperatures: tuple[Field, Field] | None
+    state: ContactState
+    friction_coefficient: float
+    flash_temperature: float
+    at_edge: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failed:
+    """A position that could not be solved, and why."""
+
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionSolver:
+    """Solves the case's contact over a roughness."""
+
+    conditions: ContactConditions
+    lubricant: Lubricant | None
+    options: Options
+    thermal: Thermal
+    boundary_friction: float
+    flattening: bool
+
+    @classmethod
+    def of(cls, case: Case, *, flattening: bool) -> "PositionSolver":
+        """That of a case."""
+        return cls(
+            conditions=case.conditions,
+            lubricant=case.lubricant,
+            options=case.options,
+            thermal=case.thermal,
+            boundary_friction=case.boundary_friction,
+            flattening=flattening,
+        )
+
+    def __call__(self, surface: Surface) -> Solved | Failed:
+        """The contact there; one thread does the algebra, as two would sum in another order."""
+        with threadpool_limits(1):
+            try:
+                solution = ehl.solve_thermal_contact(
+                    self.conditions,
+                    self.lubricant,
+                    surface,
+                    boundary_friction=self.boundary_friction,
+                    thermal=self.thermal,
+                    options=self.options,
+                )
+            except AsperityError as refusal:
+                return Failed(reason=str(refusal).rstrip("."))
+            return self._read(solution)
+
+    def _read(self, solution: ContactSolution) -> Solved:
+        touching, oil = solution.in_contact, 0.0 if solution.oil is None else solution.oil.pressure
+        borne = np.where(touching, np.maximum(solution.pressure - oil, 0.0), 0.0)
+        rubbing: Friction | None = None
+        temperatures, flash = None, np.nan
+        try:
+            rubbing, heat = ehl.friction_and_heat(
+                solution, boundary_friction=self.boundary_friction, thermal=self.thermal
+            )
+            temperatures, flash = (heat.surface_1, heat.surface_2), heat.max_k
+        except AsperityError:  # the contact is as good without its heat
+            rubbing = rubbing or ehl.friction(solution, boundary_friction=self.boundary_friction)
+        endless = self.conditions.endless
+        return Solved(
+            pressure=solution.pressure,
+            asperity_pressure=borne,
+            shear=rubbing.shear,
+            film=solution.gap,
+            overlap=np.array(ehl.plastic_overlap(solution)) if self.flattening else None,
+            temperatures=temperatures,
+            state=ehl.contact_state(solution),
+            friction_coefficient=rubbing.coefficient,
+            flash_temperature=flash,
+            at_edge=not endless and bool(borne[:, [0, -1]].any()),  # a scar that has grown as wide as the grid
+        )
+
+
+class Crew(Protocol):
+    """What solves several positions at once."""
+
+    def __call__(self, surfaces: Sequence[Surface]) -> list[Solved | Failed]:
+        """In their order."""
+        ...
+
+
+@contextmanager
+def crew(solver: PositionSolver, workers: int) -> Iterator[Crew]:
+    """So many processes, or none but this one; raises AsperityError, as it works, where one cannot start or dies."""
+    if min(workers, cores()) <= 1:
+        yield lambda surfaces: [solver(surface) for surface in surfaces]
+        return
+    pool = ProcessPoolExecutor(min(workers, cores()), get_context("spawn"), set_up_worker)
+
+    def solve(surfaces: Sequence[Surface]) -> list[Solved | Failed]:
+        try:
+            return list(pool.map(solver, surfaces))
+        except BrokenExecutor:
+            raise AsperityError(
+                "a worker process could not start or died, for want of memory perhaps; wear with workers=1"
+            ) from None
+
+    try:
+        yield solve
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,208 @@
+"""A contact worn over hours: a row a jump, the surfaces before and after, and what they come to."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+
+from asperity.ageing.jump import BODIES, Ageing
+from asperity.ageing.rows import of_body, state_of_row
+from asperity.ageing.worn import Worn
+from asperity.arrays import finite_or_none
+from asperity.case import Case
+from asperity.ehl import ContactState
+from asperity.errors import BadInput
+from asperity.quantities import quantity
+from asperity.surface import MovingSurfaces
+from asperity.wear import Stages, split_stages
+
+HOUR = 3600.0
+MOST_PLACES = 60  # that stages are read from
+ENDS = ("sq_m", "clr", "car", "solid_load_ratio", "h_mean_m", "friction_coefficient", "crf_hz", "crfa")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WearHistory:
+    """A contact worn over hours.
+
+    `table` has a row a jump, the contact at its beginning, and one for the end; `docs/quantities.md` describes its
+    columns, of which `..._1_m` and so on are one body's. `before` and `worn` are the tracks at first, and what they
+    have come to; `seconds` what computing took this time, of `computed` jumps; `failed` how many positions of all
+    jumps could not be solved and were left out of means; `folder` where it is kept.
+    """
+
+    ageing: Ageing
+    table: pandas.DataFrame
+    worn: Worn
+    folder: Path | None = None
+    files: tuple[Path, ...] = ()
+    seconds: float = 0.0
+    computed: int = 0
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def case(self) -> Case:
+        """What wore."""
+        return self.ageing.case
+
+    @property
+    def hours(self) -> float:
+        """How long it wore."""
+        return self.worn.time / HOUR
+
+    @property
+    def before(self) -> MovingSurfaces:
+        """Both tracks at first."""
+        return self.ageing.surfaces
+
+    @property
+    def after(self) -> MovingSurfaces:
+        """Both tracks at the end."""
+        return self.ageing.worn_surfaces(self.worn)
+
+    @property
+    def overrollings(self) -> tuple[float, float]:
+        """How often a point of each body has passed the contact."""
+        first, second = (rate * self.worn.time for rate in self.ageing.overrolling)
+        return first, second
+
+    @property
+    def worn_volume(self) -> tuple[float, float]:
+        """What each body has lost all round it [m^3]: by law and mechanisms, not what was pressed flat."""
+        return self._lost(0), self._lost(1)
+
+    def _lost(self, body: int) -> float:
+        return self.ageing.volume(self.worn.worn[body] - self.worn.changed[body], body)
+
+    @property
+    def volume_error(self) -> float:
+        """How far what the tracks lost is from k times asperity load times sliding distance, and mechanisms; relative.
+
+        The larger of both bodies'.
+        """
+        booked = [self.worn.booked[body] + self.worn.mechanical[body] for body in BODIES]
+        misses = [abs(self._lost(body) - booked[body]) for body in BODIES]
+        scale = [abs(self.worn.booked[body]) + abs(self.worn.mechanical[body]) for body in BODIES]
+        return max((miss / whole for miss, whole in zip(misses, scale, strict=True) if whole > 0.0), default=0.0)
+
+    @property
+    def failed(self) -> int:
+        """Positions that could not be solved, over all jumps."""
+        return int(self.table["failed"].sum())
+
+    @property
+    def scaled_by(self) -> tuple[float, float] | None:
+        """Ends of the 90 % interval of k over k, the same for both bodies; None where it is not the only clock.
+
+        Removal alone depends on k times time: with another k, all that happens, happens so much earlier or later.
+        """
+        first, second = self.ageing.model.coefficients
+        same = first.k == 0.0 or second.k == 0.0 or (first.low, first.high) == (second.low, second.high)
+        if not self.ageing.model.removal_alone or not same:
+            return None
+        known = second if first.k == 0.0 else first
+        return known.low, known.high
+
+    def at(self, hours: float) -> dict[str, float]:
+        """Every number at a moment, straight between the rows.
+
+        Raises
+        ------
+        BadInput
+            for a moment before the beginning or after the end.
+        """
+        last = float(self.table["hours"].iloc[-1])
+        if not 0.0 <= hours <= last * (1.0 + 1e-12):
+            raise BadInput(f"the wear history has 0 to {last:g} h, got {hours:g} h; wear it for longer")
+        along = self.table["hours"].to_numpy()
+        return {key: float(np.interp(hours, along, self.table[key].to_numpy(float))) for key in self.table.columns}
+
+    def state(self, hours: float) -> ContactState:
+        """The mean contact at a moment; raises as `at`."""
+        return state_of_row(self.at(hours))
+
+    def with_k(self, key: str) -> "pandas.DataFrame | None":
+        """A number over the hours with its interval by k: columns `hours`, `low`, `high`.
+
+        It is the range that the number has between the ends of the interval of k times the time; nan from where the
+        history would have to be longer. None where k is not the only clock (`scaled_by`).
+        """
+        if self.scaled_by is None:
+            return None
+        slow, fast = self.scaled_by
+        hours, values = self.table["hours"].to_numpy(float), self.table[key].to_numpy(float)
+        ends = []
+        for now in hours:
+            inside = values[(hours >= slow * now) & (hours <= fast * now)]
+            reached = np.append(inside, np.interp([slow * now, min(fast * now, hours[-1])], hours, values))
+            whole = fast * now <= hours[-1] * (1.0 + 1e-12)
+            ends.append((float(np.min(reached)), float(np.max(reached))) if whole else (math.nan, math.nan))
+        low, high = np.array(ends).T
+        return pandas.DataFrame({"hours": hours, "low": low, "high": high})
+
+    def volume_interval(self, body: int) -> tuple[float, float] | None:
+        """The 90 % interval of a body's worn volume [m^3], by k; beyond the end it goes on as it last went."""
+        if self.scaled_by is None:
+            return None
+        hours = self.table["hours"].to_numpy(float)
+        volume = self.table[of_body("worn_volume_m3", body)].to_numpy(float)
+        slow, fast = (end * hours[-1] for end in self.scaled_by)
+        rate = (volume[-1] - volume[-2]) / (hours[-1] - hours[-2]) if len(hours) > 1 else 0.0
+        return float(np.interp(slow, hours, volume)), float(volume[-1] + rate * (fast - hours[-1]))
+
+    @cached_property
+    def stages(self) -> Stages | None:
+        """Stages of wear that the present detectors find in CRF over hours; None where there is no CRF."""
+        rows = self.table[self.table["crf_hz"].notna()]
+        if len(rows) < 2:
+            return None
+        places = np.unique(np.linspace(0, len(rows) - 1, min(MOST_PLACES, len(rows))).round().astype(int))
+        chosen = rows.iloc[places]
+        return split_stages(chosen["hours"], chosen["crf_hz"], chosen["crfa"], unit="h")
+
+    def scalars(self) -> dict[str, Any]:
+        """What `asperity wear --json` says of it."""
+        first, last = self.table.iloc[0], self.table.iloc[-1]
+        scalars: dict[str, Any] = {
+            "verdict": self.verdict(),
+            "hours": self.hours,
+            "overrollings": list(self.overrollings),
+            "worn_volume_m3": list(self.worn_volume),
+            "worn_volume_interval_m3": [self.volume_interval(body) for body in BODIES],
+            "worn_depth_m": [float(last[of_body("worn_depth_m", body)]) for body in BODIES],
+            "volume_error": self.volume_error,
+            "jump_error": self.worn.error,
+            "jumps": len(self.table) - 1,
+            "computed": self.computed,
+            "failed": self.failed,
+            "patches": self.ageing.patches,
+            "seconds": self.seconds,
+            "folder": None if self.folder is None else str(self.folder),
+        }
+        for key in ENDS:
+            scalars[key] = finite_or_none(last[key])
+            scalars[f"{key}_start"] = finite_or_none(first[key])
+        for key in ("clr_low", "clr_high", "crf_low_hz", "crf_high_hz"):
+            scalars[key] = finite_or_none(last[key])
+        scalars["stage"] = None if self.stages is None else self.stages.kind
+        return scalars
+
+    def verdict(self) -> str:
+        """One sentence: what wear did to the contact."""
+        first, last = self.table.iloc[0], self.table.iloc[-1]
+        depths = " and ".join(quantity("worn_depth_m").text(last[of_body("worn_depth_m", body)]) for body in BODIES)
+        changes = ", ".join(
+            f"{quantity(key).short} {quantity(key).number(first[key])} to {quantity(key).text(last[key])}"
+            for key in ("sq_m", "clr", "crf_hz")
+            if math.isfinite(float(last[key])) and math.isfinite(float(first[key]))
+        )
+        return f"After {self.hours:.4g} h the bodies have worn by {depths}: {changes}."
+
+    def facts(self) -> Mapping[str, float]:
+        """What mechanisms said of the last jump."""
+        return self.worn.facts

@@ -1,0 +1,136 @@
+"""A moment of a wearing contact as a row: roughness of both bodies, what they have lost, and the contact over it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from asperity.ageing.contact import Solved
+from asperity.case import Case
+from asperity.coupling import excitation, oscillator, resonance_at
+from asperity.ehl import ContactState, Sides, Uncertainty
+from asperity.errors import BadInput
+from asperity.results import one_surface
+from asperity.surface import Surface, height_parameters
+
+Row = dict[str, float | int]
+
+ROUGHNESS = {  # column: field of HeightParameters
+    "sq_m": "sq",
+    "sa_m": "sa",
+    "ssk": "ssk",
+    "sku": "sku",
+    "sk_m": "sk",
+    "spk_m": "spk",
+    "svk_m": "svk",
+}
+STATE = {  # field of ContactState: its column
+    "clr": "clr",
+    "car": "car",
+    "car_domain": "car_domain",
+    "capped_oil_load_ratio": "capped_oil_load_ratio",
+    "h_min": "h_min_m",
+    "h_central": "h_central_m",
+    "h_mean": "h_mean_m",
+    "p_max": "p_max_pa",
+    "contact_slope": "contact_slope",
+    "sq": "sq_m",
+}
+
+
+def of_body(key: str, body: int) -> str:
+    """The column of one body's number: `sq_1_m` of `sq_m`."""
+    stem, mark, unit = key.rpartition("_")
+    return f"{stem}_{body + 1}_{unit}" if mark and unit in ("m", "m3") else f"{key}_{body + 1}"
+
+
+def roughness(surfaces: tuple[Surface, Surface]) -> Row:
+    """Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body, and of both as they lie on one another at first."""
+    first, second = surfaces
+    both = Surface(first.heights + second.heights[:, ::-1], first.grid)
+    row: Row = {}
+    for surface, name in ((first, 0), (second, 1), (both, None)):
+        parameters = height_parameters(surface)
+        for key, field in ROUGHNESS.items():
+            row[key if name is None else of_body(key, name)] = float(getattr(parameters, field))
+    return row
+
+
+def load_share(solved: Sequence[Solved]) -> Uncertainty:
+    """CLR over the positions: the cells' part, and how far a further position's may lie from the mean."""
+    shares = [one.state.clr for one in solved]
+    own = [one.state.error.clr for one in solved if one.state.error is not None]
+
+    def mean(sides: list[Sides | None]) -> Sides | None:
+        known = [both for both in sides if both is not None]
+        below, above = np.mean(known, axis=0) if known and len(known) == len(sides) else (math.nan, math.nan)
+        return None if math.isnan(below) else (float(below), float(above))
+
+    value, scatter = (shares[0], None) if len(shares) < 2 else one_surface(shares, share=True)
+    return Uncertainty(
+        value=float(np.mean(shares)) if len(shares) > 1 else value,
+        iteration=mean([one.iteration for one in own]),
+        grid=mean([one.grid for one in own]),
+        surfaces=scatter,
+        range=(0.0, 1.0),
+    )
+
+
+def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
+    """What the mean contact is like, with the 90 % interval of its load share and resonance.
+
+    `sq` [m] is that of the tracks, the form that wear gave them left out.
+    """
+    share = load_share(solved)
+    low, high = share.interval or (math.nan, math.nan)
+    borne = [float(one.asperity_pressure.sum() / one.pressure.sum()) for one in solved]
+    flashes = [one.flash_temperature for one in solved]
+    row: Row = {"sq_m": sq}
+    for name, key in STATE.items():
+        values = [value for one in solved if (value := getattr(one.state, name)) is not None]
+        if name != "sq":
+            row[key] = float(np.mean(values)) if values else math.nan
+    row |= {
+        "clr_low": low,
+        "clr_high": high,
+        "solid_load_ratio": float(np.mean(borne)),
+        "friction_coefficient": float(np.mean([one.friction_coefficient for one in solved])),
+        "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
+    }
+    return row | _resonance(case, state_of_row(row), low, high)
+
+
+def _resonance(case: Case, state: ContactState, low: float, high: float) -> Row:
+    """Of the mean contact's oscillator, and the height of its line, in closed form."""
+    nothing = dict.fromkeys(("crf_hz", "crf_low_hz", "crf_high_hz", "crfa"), math.nan)
+    model, conditions = case.vibration, case.conditions
+    if model is None or model.needs_solution:
+        return nothing
+    try:
+        spring = oscillator(state, conditions, model)
+        below = excitation(state, conditions, model)
+    except BadInput:  # nothing touches, or nothing is rough: there is no spring, or nothing that excites it
+        return nothing
+    own = np.array(spring.natural_frequency_hz)
+    ends = [math.nan if math.isnan(end) else resonance_at(end, state, conditions, model) for end in (low, high)]
+    return {
+        "crf_hz": float(own),
+        "crf_low_hz": math.nan if ends[0] is None else ends[0],
+        "crf_high_hz": math.nan if ends[1] is None else ends[1],
+        "crfa": float(spring.gain(own) * below.density(own, model.rate_hz)),
+    }
+
+
+def state_of_row(row: Mapping[str, Any]) -> ContactState:
+    """The mean contact of a row, for what vibrates on it; how it was solved is not in it."""
+    known: dict[str, Any] = {name: float(row[key]) for name, key in STATE.items()}
+    slope = known.pop("contact_slope")
+    return ContactState(
+        **known,
+        lambda_ratio=None,
+        reynolds_residual=0.0,
+        load_error=0.0,
+        mass_flux_imbalance=0.0,
+        contact_slope=None if math.isnan(slope) else slope,
+    )

@@ -1,0 +1,68 @@
+"""[wear] of a case file: how the contact wears, for `asperity wear`."""
+
+from typing import Annotated, Any, cast
+
+from pydantic import Field, PlainValidator, Strict, create_model
+
+from asperity.case.amounts import OPTIONAL, PAIRED, Count, amount_in, parse_amount, plain
+from asperity.case.laws import law_description, one_of_table
+from asperity.case.refusals import Section, quoted
+from asperity.conditions import ContactConditions
+from asperity.errors import BadInput
+from asperity.wearing import MECHANISMS, REMOVAL_LAWS, SCATTER, SEVERITIES, Coefficient, RemovalLaw, WearModel
+
+
+def _parse_coefficient(value: object) -> Any:
+    """An amount in 1/Pa, 0 or more, or the name of a class of wear."""
+    if isinstance(value, str) and value in SEVERITIES:
+        return value
+    if isinstance(value, str) and value.strip().isalpha():
+        raise BadInput(f'must be such as "1e-18 1/Pa", or one of {", ".join(SEVERITIES)}, got {quoted(value)}')
+    return parse_amount("1/Pa", value, 0.0)
+
+
+_FREQUENCY = Annotated[float, amount_in("Hz")]
+_COEFFICIENT = Annotated[Any, PlainValidator(_parse_coefficient)]
+_MECHANISMS: dict[str, Any] = {
+    name: (Annotated[Section | None, one_of_table(table)], None) for name, table in MECHANISMS.items()
+}
+_Mechanisms: Any = create_model("wear", __base__=Section, **_MECHANISMS)
+
+
+class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughens are those of MECHANISMS
+    """[wear]: law and coefficients of removal, flattening, what roughens, and how time is cut into jumps."""
+
+    law: Annotated[Section, one_of_table(REMOVAL_LAWS), Field(validate_default=True)] = cast(Section, "archard")
+    k: Annotated[tuple[_COEFFICIENT, _COEFFICIENT], PAIRED]  # of each body: 1/Pa, or "mild", "moderate", "severe"
+    scatter: Annotated[float, Strict(), Field(ge=0.0, le=10.0)] = SCATTER  # of a stated k: deviation of its logarithm
+    flattening: Annotated[bool, Strict()] = False  # what is pressed flat stays flat
+    overrolling: Annotated[tuple[_FREQUENCY, _FREQUENCY] | None, PAIRED, OPTIONAL] = None
+    patches: Count | None = None
+    step: Annotated[float, Strict(), Field(gt=0.0, le=0.5)] = WearModel.step
+
+    def model(self, conditions: ContactConditions, boundary_friction: float) -> WearModel:
+        """How the bodies of a contact wear."""
+        law = cast(RemovalLaw, _made(self.law, REMOVAL_LAWS))
+
+        def coefficient(stated: Any) -> Coefficient:
+            if not isinstance(stated, str):
+                return Coefficient.stated(plain(stated), self.scatter)
+            middle = Coefficient.of_class(stated, conditions.hardness)  # type: ignore[arg-type]
+            return Coefficient(law.equal_to_archard(middle.k, boundary_friction), middle.low, middle.high)
+
+        first, second = map(coefficient, self.k)
+        chosen = {name: getattr(self, name) for name in MECHANISMS}
+        return WearModel(
+            law=law,
+            coefficients=(first, second),
+            flattening=self.flattening,
+            mechanisms={name: _made(one, MECHANISMS[name]) for name, one in chosen.items() if one is not None},
+            overrolling=plain(self.overrolling),
+            patches=self.patches,
+            step=self.step,
+        )
+
+
+def _made(section: Section, table: Any) -> Any:
+    described = law_description(section)
+    return table[described.pop("law")](**described)

@@ -1,0 +1,52 @@
+"""How a contact wears, as a case states it: law, coefficients, mechanisms, and how time is cut into jumps."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from asperity.errors import BadInput, require_positive
+from asperity.wearing.laws import Coefficient, RemovalLaw
+from asperity.wearing.model import Mechanism
+
+MECHANISMS: dict[str, Mapping[str, type[Mechanism]]] = {}  # what roughens: by key of [wear], its laws by name
+
+
+@dataclass(frozen=True, kw_only=True)
+class WearModel:
+    """How both bodies wear.
+
+    Parameters
+    ----------
+    law : of removal
+    coefficients : k of each body in that law
+    flattening : whether what the pressure cap presses flat stays so
+    mechanisms : what roughens, by its key in MECHANISMS, in the order in which it is asked
+    overrolling : how often a point of each body passes the contact [1/s]; None: bodies of equal radius, 2R each
+    patches : positions of the tracks that a jump is the mean of; None: one every Hertz half-width, and at least 4
+    step : depth that a jump takes off anywhere over the Sq of both, at most
+    """
+
+    law: RemovalLaw
+    coefficients: tuple[Coefficient, Coefficient]
+    flattening: bool = False
+    mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
+    overrolling: tuple[float, float] | None = None
+    patches: int | None = None
+    step: float = 0.05
+
+    def __post_init__(self) -> None:
+        for rate in self.overrolling or ():
+            require_positive("overrolling", rate, "Hz")
+        if self.patches is not None and not 1 <= self.patches <= 1000:
+            raise BadInput(f"patches must be 1 to 1000, got {self.patches}; leave it out for one every half-width")
+        if not 0.0 < self.step <= 0.5:
+            raise BadInput(f"step must lie above 0 and up to 0.5 of Sq, got {self.step:g}; 0.05 is usual")
+
+    @property
+    def needs_temperature(self) -> bool:
+        """Whether law or mechanisms ask for the temperature of the surfaces."""
+        return self.law.needs_temperature or any(one.needs_temperature for one in self.mechanisms.values())
+
+    @property
+    def removal_alone(self) -> bool:
+        """Whether nothing but the law of removal acts: then all depends on k times time alone."""
+        return not self.flattening and not self.mechanisms
