@@ -1,3 +1,4 @@
+from .ageing import run_wear as run_wear
 from .case import Case as Case
 from .case import load_case as load_case
 from .conditions import ContactConditions as ContactConditions

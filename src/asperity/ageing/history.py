@@ -1,7 +1,6 @@
 """A contact worn over hours: a row a jump, the surfaces before and after, and what they come to."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -33,13 +32,15 @@ class WearHistory:
     `table` has a row a jump, the contact at its beginning, and one for the end; `docs/quantities.md` describes its
     columns, of which `..._1_m` and so on are one body's. `before` and `worn` are the tracks at first, and what they
     have come to; `seconds` what computing took this time, of `computed` jumps; `failed` how many positions of all
-    jumps could not be solved and were left out of means; `folder` where it is kept.
+    jumps could not be solved and were left out of means; `folder` where it is kept, `path` of its table and `files` of
+    its surfaces.
     """
 
     ageing: Ageing
     table: pandas.DataFrame
     worn: Worn
     folder: Path | None = None
+    path: Path | None = None
     files: tuple[Path, ...] = ()
     seconds: float = 0.0
     computed: int = 0
@@ -89,6 +90,11 @@ class WearHistory:
         misses = [abs(self._lost(body) - booked[body]) for body in BODIES]
         scale = [abs(self.worn.booked[body]) + abs(self.worn.mechanical[body]) for body in BODIES]
         return max((miss / whole for miss, whole in zip(misses, scale, strict=True) if whole > 0.0), default=0.0)
+
+    @property
+    def numbers_at_end(self) -> dict[str, float | None]:
+        """The last row by its columns; None for what is not known."""
+        return {str(key): finite_or_none(float(value)) for key, value in self.table.iloc[-1].items()}
 
     @property
     def failed(self) -> int:
@@ -183,10 +189,12 @@ class WearHistory:
             "patches": self.ageing.patches,
             "seconds": self.seconds,
             "folder": None if self.folder is None else str(self.folder),
+            "table": None if self.path is None else str(self.path),
+            "surfaces": list(map(str, self.files)),
+            "notes": list(self.notes),
         }
         for key in ENDS:
-            scalars[key] = finite_or_none(last[key])
-            scalars[f"{key}_start"] = finite_or_none(first[key])
+            scalars[key] = [finite_or_none(first[key]), finite_or_none(last[key])]
         for key in ("clr_low", "clr_high", "crf_low_hz", "crf_high_hz"):
             scalars[key] = finite_or_none(last[key])
         scalars["stage"] = None if self.stages is None else self.stages.kind
@@ -203,6 +211,19 @@ class WearHistory:
         )
         return f"After {self.hours:.4g} h the bodies have worn by {depths}: {changes}."
 
-    def facts(self) -> Mapping[str, float]:
-        """What mechanisms said of the last jump."""
-        return self.worn.facts
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the numbers has to know, a sentence each."""
+        model, ageing = self.ageing.model, self.ageing
+        notes = [*self.remarks, *self.case.notes]
+        if model.overrolling is None:
+            rates = " and ".join(f"{rate:.4g}" for rate in ageing.overrolling)
+            notes.append(f"Bodies of equal radius are assumed: {rates} over-rollings a second; state wear.overrolling.")
+        if self.failed:
+            notes.append(f"{self.failed} contacts could not be solved and were left out of the means of their jumps.")
+        if self.case.conditions.sliding_speed == 0.0:
+            notes.append("Without sliding nothing is worn off.")
+        acting = [name for name in ("fatigue", "ploughing", "scuffing") if name in model.mechanisms]
+        acting += ["flattening"] if model.flattening else []
+        notes.append(f"Besides removal: {', '.join(acting)}." if acting else "Nothing but removal acts.")
+        return tuple(notes)

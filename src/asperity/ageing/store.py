@@ -100,6 +100,7 @@ class Keeper:
             table=pandas.DataFrame(self.rows[: self.end.number + 1]),
             worn=self.end,
             folder=self.folder,
+            path=None if self.folder is None else self.folder / TABLE,
             files=() if self.folder is None else surface_files(self.folder),
             seconds=seconds,
             computed=computed,
@@ -141,6 +142,7 @@ def load_wear(folder: str | Path) -> WearHistory:
         table=pandas.DataFrame(_rows(folder, identity)[: end.number + 1]),
         worn=end,
         folder=folder,
+        path=folder / TABLE,
         files=surface_files(folder),
         remarks=version_notes(manifest["versions"]),
     )

@@ -18,6 +18,7 @@ from asperity.cli import (  # each adds its commands
     study,
     surface,
     vibrate,
+    wear,
 )
 from asperity.cli.app import app, main
 
@@ -37,4 +38,5 @@ __all__ = [
     "study",
     "surface",
     "vibrate",
+    "wear",
 ]

@@ -1,11 +1,11 @@
-"""`asperity report`: pages of what was kept, runs, a study or a history."""
+"""`asperity report`: pages of what was kept, runs, a study, a history or wear."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from asperity import history, paper, report, results, study
+from asperity import ageing, history, paper, report, results, study
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, StudyFigures, require_output
 from asperity.cli.show import progress, show, written
@@ -17,7 +17,8 @@ def report_command(
     paths: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RUN...|DIR", help="Runs kept by asperity solve --out, or the folder of a study or history."
+            metavar="RUN...|DIR",
+            help="Runs kept by asperity solve --out, or the folder of a study, a history or of wear.",
         ),
     ],
     out: Annotated[
@@ -30,11 +31,12 @@ def report_command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one self-contained HTML page of one run, of several, of a study or of a history."""
+    """Make one self-contained HTML page of one run, of several, of a study, of a history or of wear."""
     folders = [path for path in paths if path.is_dir()]
     if folders and len(paths) > 1:
         raise BadInput(f"a study's page holds nothing else, got {len(paths)} paths; name {folders[0]} alone")
-    of_study = bool(folders) and not history.is_history(folders[0])
+    of_wear = bool(folders) and ageing.is_wear(folders[0])
+    of_study = bool(folders) and not of_wear and not history.is_history(folders[0])
     if not of_study and (figures is not None or anchors is not None):
         option = "--figures" if figures is not None else "--anchors"
         raise BadInput(f"{option} is for a study's folder, got {paths[0]}; name the folder")
@@ -44,6 +46,8 @@ def report_command(
     require_output(out, ".html")
     if of_study:
         _report_study(folders[0], out, figures, anchors, as_json=as_json, quiet=quiet)
+    elif of_wear:
+        _report_wear(folders[0], out, as_json=as_json, quiet=quiet)
     elif folders:
         _report_history(folders[0], out, as_json=as_json, quiet=quiet)
     else:
@@ -68,6 +72,18 @@ def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> N
     show(
         kept.verdict(),
         lambda: {"report": str(out), "history": kept.scalars()},
+        written("Report", out),
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _report_wear(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
+    kept = ageing.load_wear(folder)
+    report.write_wear_report(kept, out)
+    show(
+        kept.verdict(),
+        lambda: {"report": str(out), "wear": kept.scalars()},
         written("Report", out),
         as_json=as_json,
         quiet=quiet,

@@ -13,3 +13,4 @@ from .study.page import write_study_report as write_study_report
 from .style import Medium as Medium
 from .style import write_figure as write_figure
 from .track.page import write_track_report as write_track_report
+from .wearing.page import write_wear_report as write_wear_report

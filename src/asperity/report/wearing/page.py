@@ -1,0 +1,81 @@
+"""One HTML page of a wear history: curves over hours, surfaces before and after, CRF beside the paper's, limits."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from asperity.ageing import WearHistory, of_body
+from asperity.paper import is_papers_contact
+from asperity.quantities import quantity
+from asperity.report.base import heading, in_print, render, tile, write_page
+from asperity.report.wearing import exhibits
+
+TILES = ("sq_m", "clr", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
+CONTACT = (
+    "sq_m", "sa_m", "ssk", "sku", "sk_m", "spk_m", "svk_m", "clr", "solid_load_ratio", "car", "h_mean_m", "h_min_m",
+    "friction_coefficient", "flash_temperature_max_k", "crf_hz", "crfa",
+)  # fmt: skip
+OF_BODIES = (
+    "overrollings", "worn_depth_m", "worn_depth_max_m", "worn_volume_m3", "flattened_m", "sq_m", "ssk", "spk_m",
+    "svk_m",
+)  # fmt: skip
+
+
+class Line(NamedTuple):
+    """A row of a table: what it is, two numbers, unit."""
+
+    name: str
+    first: str
+    second: str
+    unit: str
+
+
+def write_wear_report(history: WearHistory, path: str | Path) -> Path:
+    """Write one self-contained HTML page about a wear history, whole or not at all.
+
+    Raises
+    ------
+    BadInput
+        for a path that cannot be written to.
+    """
+    return write_page(path, lambda: render_wear_page(history))
+
+
+def render_wear_page(history: WearHistory) -> str:
+    """The page as HTML text."""
+    first, last = history.table.iloc[0], history.table.iloc[-1]
+    at_end = history.numbers_at_end
+    bodies = exhibits.worn_bodies(history)
+    sounds = bool(history.table["crf_hz"].notna().any())
+    papers = is_papers_contact(history.case)
+    return render(
+        "wearing/page.html.j2",
+        title="A contact that wears",
+        history=history,
+        tiles=[tile(quantity(key), at_end) for key in TILES if last[key] == last[key]],
+        resonance=exhibits.resonance(history, papers=papers).picture() if sounds else None,
+        curves=exhibits.curves(history).picture(),
+        surfaces=[exhibits.surfaces(body).picture() for body in bodies],
+        profiles=exhibits.profiles(bodies).picture() if bodies else None,
+        contact=[_line(key, first[key], last[key]) for key in CONTACT],
+        bodies=[_line(key, last[of_body(key, 0)], last[of_body(key, 1)]) for key in OF_BODIES],
+        volumes=_volumes(history),
+        law=(type(history.ageing.model.law).__doc__ or "").split("\n")[0],
+        coefficients=[f"{one.k:.3g}" for one in history.ageing.model.coefficients],
+        stages=None if history.stages is None else in_print(history.stages.verdict),
+        jump_error=quantity("jump_error").text(history.worn.error),
+    )
+
+
+def _line(key: str, first: float, second: float) -> Line:
+    entry = quantity(key)
+    return Line(heading(entry), entry.number(float(first)), entry.number(float(second)), entry.display)
+
+
+def _volumes(history: WearHistory) -> list[str]:
+    """What each body has lost, in words, with the interval of k."""
+    entry, sentences = quantity("worn_volume_m3"), []
+    for body, volume in enumerate(history.worn_volume):
+        ends = history.volume_interval(body)
+        interval = "" if ends is None else f", {entry.number(ends[0])} to {entry.text(ends[1])} by the interval of k"
+        sentences.append(f"Body {body + 1} has lost {entry.text(volume)}{interval}.")
+    return sentences
