@@ -113,7 +113,8 @@ class PositionSolver:
             state=ehl.contact_state(solution),
             friction_coefficient=rubbing.coefficient,
             flash_temperature=flash,
-            at_edge=not endless and bool(borne[:, [0, -1]].any()),  # a scar that has grown as wide as the grid
+            at_edge=not endless
+            and bool(borne[:, [1, -2]].any()),  # a scar as wide as the grid, whose rim bears nothing
         )
 
 

@@ -152,7 +152,10 @@ class WearHistory:
         return pandas.DataFrame({"hours": hours, "low": low, "high": high})
 
     def volume_interval(self, body: int) -> tuple[float, float] | None:
-        """The 90 % interval of a body's worn volume [m^3], by k; beyond the end it goes on as it last went."""
+        """The 90 % interval of a body's worn volume [m^3], by k.
+
+        Beyond the end it goes on as it last went: its upper end is too high where wear slows down.
+        """
         if self.scaled_by is None:
             return None
         hours = self.table["hours"].to_numpy(float)

@@ -158,6 +158,12 @@ class Ageing:
         count = self.patches if first or second else 1
         return positions(cells, (first, second), count, worn.number, self.seed)
 
+    def height(self, sq: float) -> float:
+        """What steps and errors are counted against [m]: Sq, on smooth bodies a share of their approach."""
+        conditions = self.case.conditions
+        approach = conditions.hertz.half_widths[0] ** 2 / (2.0 * conditions.radius_along_rolling)
+        return max(sq, LEAST_HEIGHT * approach)
+
     # What is taken off -----------------------------------------------------------------------------------------------
 
     def rubbing(self, solved: Solved, body: int) -> Rubbing:
@@ -197,9 +203,7 @@ class Ageing:
     def seconds(self, worn: Worn, rates: tuple[Field, Field]) -> float:
         """How long the jump may be."""
         conditions, grid = self.case.conditions, self.surfaces.grid
-        approach = conditions.hertz.half_widths[0] ** 2 / (2.0 * conditions.radius_along_rolling)
-        rough = math.hypot(*(surface.sq for surface in self.levelled(worn)))
-        height = self.model.step * max(rough, LEAST_HEIGHT * approach)
+        height = self.model.step * self.height(math.hypot(*(surface.sq for surface in self.levelled(worn))))
         modulus = conditions.pair.reduced_modulus
         longest = worn.factor * longest_jump(self.exposures, rates, height, grid.spacing, modulus)
         if self.model.removal_alone:
@@ -270,7 +274,7 @@ class Ageing:
         at_once = math.hypot(
             *(float(np.std(levels[body].heights + once[body] + removed[body] - twice[body])) for body in BODIES)
         )
-        error = abs(at_once - now) / now if now > 0.0 else 0.0
+        error = abs(at_once - now) / self.height(now)
         change = SHORTER if error > WORST_ERROR else LONGER if error < WORST_ERROR / 3.0 else 1.0
         factor = min(1.0, max(SHORTEST, change * after.factor))
         return replace(after, factor=factor, error=after.error + error)

@@ -15,6 +15,7 @@ from asperity.ageing.worn import Worn
 from asperity.case import Case
 from asperity.errors import AsperityError, BadInput, NotConverged, require_positive
 from asperity.limits import require_affordable
+from asperity.surface import MovingSurfaces
 from asperity.wearing import Position, longest_jump, seen
 
 CELL_S = 2e-5  # that a position takes, a cell
@@ -35,6 +36,7 @@ def run_wear(
     case: Case,
     *,
     hours: float,
+    surfaces: MovingSurfaces | None = None,
     out: Path | None = None,
     workers: int = 1,
     progress: Callable[[WearProgress], None] | None = None,
@@ -45,6 +47,7 @@ def run_wear(
     ----------
     case : with a [wear]; its [motion] says which body is rough, and how long the tracks are
     hours : of running
+    surfaces : both bodies' tracks, in place of the case's own
     out : folder to keep the history in, and to go on from where it holds the same case's; None keeps it in memory
     workers : processes that solve positions of the tracks at once; they change no number
     progress : called before every jump, and at the end
@@ -62,7 +65,7 @@ def run_wear(
     if case.wear is None:
         raise BadInput(f"{case.source}: wear is left out; add [wear] with k, the wear coefficient of each body")
     end = require_positive("hours of wear", hours, "h") * HOUR
-    ageing = Ageing(case, case.wear, case.moving_surfaces())
+    ageing = Ageing(case, case.wear, surfaces or case.moving_surfaces())
     _require_affordable(ageing, end)
     began = time.perf_counter()
     with open_keeper(ageing, out) as keeper, crew(ageing.solver, workers) as solve:

@@ -76,12 +76,19 @@ STUDY = """
 sq = { from = "0.2 um", to = "1 um", step = "0.2 um" }
 seeds = 3                       # surfaces a point
 """
+WEAR = """
+[wear]                          # for `asperity wear CASE.toml --hours 10`
+law = "archard"                 # or energy, film-defect
+k = ["1e-17 1/Pa", "1e-17 1/Pa"]  # of each body; or "mild", "moderate", "severe", which ask for the hardness
+flattening = false              # true: what the hardness presses flat stays flat
+overrolling = ["50 Hz", "50 Hz"]  # how often a point of each body passes the contact
+"""
 HEAD = "# A case to start from: change what is yours. `asperity solve` says which value it cannot take, and why.\n\n"
 SMOOTH = """
 [surface]                       # of both bodies together
 kind = "flat"                   # smooth; or gaussian, ground, run-in, sandblasted, self-affine, non-gaussian
 """
-KINDS = ("line", "point", "elliptic", "roller", "dry", "measured", "motion", "study")
+KINDS = ("line", "point", "elliptic", "roller", "dry", "measured", "motion", "study", "wear")
 
 
 def beginning(kind: str) -> str:
@@ -89,5 +96,5 @@ def beginning(kind: str) -> str:
     contact = f"[contact]\n{CONTACTS.get(kind, CONTACTS['line'])}{MOVES}"
     parts = [HEAD, 'lubricant = "none"\n\n' if kind == "dry" else "", contact, BODIES, "" if kind == "dry" else OIL]
     parts += [{"measured": MEASURED, "roller": SMOOTH}.get(kind, GENERATED), GRID, SOUND]
-    parts += [{"motion": MOTION, "study": STUDY}.get(kind, "")]
+    parts += [{"motion": MOTION, "study": STUDY, "wear": WEAR}.get(kind, "")]
     return "".join(parts)

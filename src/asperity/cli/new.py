@@ -10,10 +10,13 @@ from asperity.cli.app import app
 from asperity.errors import BadInput, require_choice
 
 
+NEXT = {"wear": "wear {} --hours 1"}  # by kind of case, where it is not to solve it
+
+
 @app.command()
 def new(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="line, point, elliptic, roller, dry, measured, motion or study.")
+        str, typer.Argument(metavar="KIND", help="line, point, elliptic, roller, dry, measured, motion, study or wear.")
     ],
     out: Annotated[Path | None, typer.Option(metavar="CASE.toml", help="File to write; default: KIND.toml.")] = None,
 ) -> None:
@@ -23,4 +26,5 @@ def new(
     if path.exists():
         raise BadInput(f"{path} is there already; name another with --out")
     files.write_text(path, case.beginning(kind))
-    print(f"{path}: a case to start from. Try next: asperity solve {path}")
+    following = NEXT.get(kind, "solve {}").format(path)
+    print(f"{path}: a case to start from. Try next: asperity {following}")

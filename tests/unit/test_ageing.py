@@ -1,0 +1,228 @@
+"""A wear history in its folder: killed and gone on with, gone on to more hours, in processes, refused."""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+
+from asperity import load_case, read_surface, run_wear
+from asperity.ageing import WearHistory, WearProgress, load_wear, of_body, store
+from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.surface import height_parameters
+from asperity.surface.read import surface_topography
+
+CASE = """
+[contact]
+geometry = "line"
+radius = "5.4 mm"
+length = "10 mm"
+load = "500 N"
+entrainment_speed = "1.91 m/s"
+slip = 0.2
+[material]
+youngs_modulus = "200 GPa"
+poisson_ratio = 0.3
+hardness = "2 GPa"
+[lubricant]
+viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
+density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
+rheology = { law = "newtonian" }
+[surface]
+kind = "gaussian"
+sq = "1 um"
+correlation_length = ["30 um", "30 um"]
+seed = 7
+[grid]
+cells = [32, 16]
+x = [-2.2, 1.9]
+y = [-1.0, 1.0]
+[vibration]
+mass = "0.1 kg"
+damping_ratio = 0.02
+[wear]
+k = "1e-16 1/Pa"
+overrolling = ["50 Hz", "5 Hz"]
+patches = 4
+step = 0.1
+"""
+HOURS = 2.0
+
+
+class Stop(Exception):
+    """A run that is stopped where it stands."""
+
+
+def case(overrides: dict[str, object] | None = None):
+    return load_case(CASE, name="case.toml").with_overrides(overrides or {})
+
+
+def same(one: WearHistory, other: WearHistory) -> None:
+    pandas.testing.assert_frame_equal(one.table, other.table, check_exact=True)
+    for a, b in ((one.after.first, other.after.first), (one.after.second, other.after.second)):
+        np.testing.assert_array_equal(a.heights, b.heights)
+    assert one.worn_volume == other.worn_volume
+
+
+@pytest.fixture(scope="module")
+def unbroken() -> WearHistory:
+    return run_wear(case(), hours=HOURS)
+
+
+def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(unbroken, tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "KEPT_EVERY_S", 0.0)
+    jumps = len(unbroken.table) - 1
+    assert jumps >= 10
+    rng = np.random.default_rng(3)
+    for when in sorted(rng.choice(np.arange(1, jumps + 1), 10, replace=False)):
+
+        def stop(progress: WearProgress, when: int = int(when)) -> None:
+            if progress.row["jump"] == when:
+                raise Stop
+
+        with pytest.raises(Stop):
+            run_wear(case(), hours=HOURS, out=tmp_path / "worn", progress=stop)
+    again = run_wear(case(), hours=HOURS, out=tmp_path / "worn")
+    assert again.computed < jumps
+    same(again, unbroken)
+    same(load_wear(tmp_path / "worn"), unbroken)
+    assert run_wear(case(), hours=HOURS, out=tmp_path / "worn").computed == 0
+
+
+def test_killed_by_the_system_it_goes_on_to_the_same(unbroken, tmp_path):
+    (tmp_path / "case.toml").write_text(CASE, "utf-8")
+    command = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "wear",
+        "case.toml",
+        "--hours",
+        f"{HOURS:g}",
+        "--out",
+        "worn",
+        "--quiet",
+    ]
+    for seconds in (4.0, 6.5):
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(seconds)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
+
+
+def test_more_hours_go_on_as_if_they_had_been_asked_for_at_first(unbroken, tmp_path):
+    short = run_wear(case(), hours=0.55 * HOURS, out=tmp_path / "worn")
+    assert short.hours == pytest.approx(0.55 * HOURS, rel=1e-12)
+    same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
+    with pytest.raises(BadInput, match=r"holds .* h of wear, got 0.1 h"):
+        run_wear(case(), hours=0.1, out=tmp_path / "worn")
+
+
+def test_processes_change_nothing(unbroken):
+    same(run_wear(case(), hours=HOURS, workers=2), unbroken)
+
+
+def test_surfaces_are_files_that_others_open(unbroken, tmp_path):
+    worn = run_wear(case(), hours=HOURS, out=tmp_path / "worn")
+    assert [path.name for path in worn.files] == [
+        "first-before.x3p", "first-after.x3p", "second-before.x3p", "second-after.x3p"
+    ]  # fmt: skip
+    for path, surface in zip(worn.files[:2], (worn.before.first, worn.after.first), strict=True):
+        theirs = surface_topography().open_topography(str(path)).topography()
+        assert theirs.unit == "m"
+        np.testing.assert_array_equal(theirs.heights(), surface.heights)
+        np.testing.assert_allclose(theirs.physical_sizes, surface.grid.extent, rtol=1e-12)
+        ours = read_surface(path)
+        np.testing.assert_array_equal(ours.heights, surface.heights)
+        row = worn.table.iloc[0 if "before" in path.name else -1]
+        parameters = height_parameters(ours)
+        for key, value in (("sq_m", parameters.sq), ("spk_m", parameters.spk), ("ssk", parameters.ssk)):
+            assert row[of_body(key, 0)] == pytest.approx(value, rel=1e-9)
+
+
+def test_a_moment_lies_between_its_rows(unbroken):
+    table = unbroken.table
+    between = unbroken.at(0.5 * (table["hours"][3] + table["hours"][4]))
+    assert between["clr"] == pytest.approx(0.5 * (table["clr"][3] + table["clr"][4]))
+    assert unbroken.state(0.0).clr == table["clr"][0]
+    with pytest.raises(BadInput, match="got 2.5 h"):
+        unbroken.at(2.5)
+
+
+def test_the_interval_of_k_is_another_clock(unbroken):
+    """What happens by the end with k at the ends of its interval, computed: it lies where the interval says."""
+    band = unbroken.with_k("sq_m")
+    slow, fast = unbroken.scaled_by
+    assert (slow, fast) == pytest.approx((np.exp(-0.8224), np.exp(0.8224)), rel=1e-4)
+    known = band[band["low"].notna()].iloc[-1]
+    faster = run_wear(case({"wear.k": f"{1e-16 * fast!r} 1/Pa"}), hours=float(known["hours"]))
+    assert known["low"] == pytest.approx(faster.table["sq_m"].iloc[-1], rel=2e-3)
+    low, high = unbroken.volume_interval(0)
+    assert low < unbroken.worn_volume[0] < high
+    later = run_wear(case(), hours=HOURS * fast).worn_volume[0]
+    assert later < high < 1.25 * later  # wear slows down, and the interval goes on as it last went
+    assert run_wear(case({"wear.flattening": True}), hours=1e-4).with_k("sq_m") is None
+
+
+def test_flattening_is_kept_apart_from_what_is_lost():
+    soft = {"wear.flattening": True, "material.hardness": "1 GPa", "wear.k": "0 1/Pa"}
+    worn = run_wear(case(soft), hours=0.01)
+    assert worn.worn_volume == (0.0, 0.0)
+    assert worn.table["flattened_1_m"].iloc[-1] > 1e-9
+    assert worn.table["clr"].iloc[-1] < worn.table["clr"].iloc[0]
+    assert worn.after.first.sq < worn.before.first.sq
+    np.testing.assert_array_equal(worn.after.second.heights, worn.before.second.heights)  # smooth, and lies below
+
+
+def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
+    with pytest.raises(BadInput, match=r"add \[wear\] with k"):
+        run_wear(case({"wear": "none"}), hours=1.0)
+    with pytest.raises(BadInput, match="hours of wear must be positive"):
+        run_wear(case(), hours=0.0, out=tmp_path / "worn")
+    with pytest.raises(BadInput, match="wear of 10000 h in .* jumps would take about .*; ask for less"):
+        run_wear(case({"wear.k": "1e-9 1/Pa"}), hours=1e4, out=tmp_path / "worn")
+    assert not (tmp_path / "worn").exists()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thing").touch()
+    with pytest.raises(BadInput, match="is not empty and holds no wear history"):
+        run_wear(case(), hours=1.0, out=tmp_path / "other")
+
+
+def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
+    run_wear(case(), hours=0.05, out=tmp_path / "worn")
+    with pytest.raises(BadInput, match="holds the wear of another case"):
+        run_wear(case({"contact.load": "400 N"}), hours=0.05, out=tmp_path / "worn")
+    for name in (store.END, store.TABLE, store.MEMORY):
+        shutil.copytree(tmp_path / "worn", tmp_path / name)
+        path: Path = tmp_path / name / name
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 1
+        path.write_bytes(content)
+        with pytest.raises(UnreadableFile, match="damaged"):
+            run_wear(case(), hours=0.1, out=tmp_path / name)
+    (tmp_path / "worn" / store.END).unlink()
+    with pytest.raises(UnreadableFile, match="has not come to its end"):
+        load_wear(tmp_path / "worn")
+
+
+def test_contacts_that_cannot_be_solved_stop_it_with_a_reason(tmp_path):
+    few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6}
+    with pytest.raises(NotConverged, match=r"4 of 4 contacts could not be solved after 0 h: contact not solved"):
+        run_wear(case(few), hours=1.0, out=tmp_path / "worn")
+
+
+def test_a_contact_that_outgrows_its_grid_is_stopped():
+    text = (
+        CASE.replace('length = "10 mm"\n', "")
+        .replace('"line"', '"point"')
+        .replace("y = [-1.0, 1.0]", "y = [-1.6, 1.6]")
+    )
+    narrow = {"contact.load": "60 N", "lubricant": "none", "surface": "flat"}
+    with pytest.raises(AsperityError, match=r"as wide as its grid after .* h; state a wider grid.y"):
+        run_wear(load_case(text, name="case.toml").with_overrides(narrow), hours=10.0)

@@ -1,0 +1,160 @@
+"""Laws of removal, jumps and tracks against closed forms and against what they are told to keep."""
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.grid import Grid
+from asperity.surface import MovingSurfaces, Surface
+from asperity.wearing import (
+    PRIORS,
+    Archard,
+    Body,
+    Coefficient,
+    DissipatedEnergy,
+    Exposure,
+    FilmDefect,
+    Position,
+    Rubbing,
+    across,
+    is_even,
+    longest_jump,
+    on_track,
+    positions,
+    seen,
+    taken_off,
+)
+
+STEEL = Body(youngs_modulus=2e11, poisson_ratio=0.3, hardness=2e9, speed=2.0)
+MODULUS = 1.1e11
+
+
+def exposure(k: float = 1e-17, speed: float = 2.0, overrolling: float = 50.0) -> Exposure:
+    body = Body(youngs_modulus=2e11, poisson_ratio=0.3, hardness=2e9, speed=speed)
+    return Exposure(k=k, body=body, overrolling=overrolling, width=1e-4, sliding_speed=0.4)
+
+
+def test_a_flat_pin_wears_by_k_p_v_t():
+    rubbing = Rubbing(pressure=np.array([1e6]), shear=np.array([1e5]), sliding_speed=0.1)
+    assert 1e-16 * Archard()(rubbing)[0] * 3600.0 == pytest.approx(36e-9, rel=1e-12)  # machines.md 5.3
+    assert DissipatedEnergy()(rubbing)[0] == pytest.approx(1e4)
+    k = DissipatedEnergy().equal_to_archard(1e-16, 0.1)
+    assert k * DissipatedEnergy()(rubbing)[0] == pytest.approx(1e-16 * Archard()(rubbing)[0])
+    with pytest.raises(BadInput, match="boundary friction of 0"):
+        DissipatedEnergy().equal_to_archard(1e-16, 0.0)
+
+
+def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
+    law, speed = FilmDefect(spacing=3e-10, period=3e-12, heat=5e4), 0.5
+    assert law.defects(np.array([200.0]), speed)[0] == pytest.approx(
+        200.0 * math.exp(-5e4 / (8.31446 * 200.0)), rel=1e-3
+    )
+    assert law.defects(np.array([1e6]), speed)[0] == pytest.approx(1.0, abs=1e-12)
+    warm = np.linspace(300.0, 700.0, 9)
+    assert np.all(np.diff(law.defects(warm, speed)) > 0.0)
+    # a temperature at which the exponent is known: E/(R T) = ln(crossing), so that half the sites ... 1 - 1/e are bare
+    at = 5e4 / (8.31446261815324 * math.log(200.0))
+    assert law.defects(np.array([at]), speed)[0] == pytest.approx(1.0 - math.exp(-1.0), rel=1e-12)
+    still = Rubbing(pressure=np.ones(3), shear=np.ones(3), sliding_speed=0.0, temperature=np.full(3, 400.0))
+    assert not law(still).any()
+
+
+def test_a_class_of_wear_is_an_interval_of_k_times_the_hardness():
+    for name, (low, high) in PRIORS.items():
+        known = Coefficient.of_class(name, 2e9)
+        assert known.k * known.low * 2e9 == pytest.approx(low, rel=1e-12)
+        assert known.k * known.high * 2e9 == pytest.approx(high, rel=1e-12)
+    with pytest.raises(BadInput, match="hardness"):
+        Coefficient.of_class("mild", None)
+    stated = Coefficient.stated(1e-17, 0.5)
+    assert stated.high == pytest.approx(math.exp(1.6449 * 0.5), rel=1e-4)
+    assert stated.low * stated.high == pytest.approx(1.0)
+
+
+def test_a_jump_takes_off_the_mean_and_adds_nothing():
+    rng = np.random.default_rng(1)
+    grid = Grid((64, 48), (0.0, 0.0), (1e-4, 6e-5), periodic=(True, True))
+    rate = np.maximum(rng.normal(size=grid.cells) - 1.5, 0.0) * 1e-12
+    for seconds in (1e-3, 1.0, 1e6):
+        depth = taken_off(rate, seconds, exposure(), grid, MODULUS)
+        assert depth.mean() == pytest.approx(rate.mean() * seconds, rel=1e-13)
+        assert depth.min() >= 0.0
+    short = exposure()
+    steps = 1e-6 / short.decay(1e6, 1.0, MODULUS)  # so short that no wave decays
+    np.testing.assert_allclose(
+        taken_off(rate, steps, short, grid, MODULUS), rate * steps, rtol=0, atol=3e-6 * rate.max() * steps
+    )
+    even = np.broadcast_to(rate[:1], rate.shape)
+    assert is_even(taken_off(even, 1.0, exposure(), grid, MODULUS))
+
+
+@pytest.mark.parametrize("jumps", [1, 7])
+def test_a_wave_in_full_contact_decays_as_in_closed_form_whatever_the_jump(jumps):
+    grid = Grid((64, 64), (0.0, 0.0), (8e-5, 8e-5), periodic=(True, True))
+    wave = 2.0 * np.pi / 2e-5
+    heights, body, mean = 1e-8 * np.cos(wave * grid.x)[:, None] * np.ones(64), exposure(k=1e-15), 1e9
+    seconds = 2.0 / float(body.decay(wave, 1.0, MODULUS))  # two decay lengths in all
+    now = heights
+    for _ in range(jumps):
+        pressure = mean + 0.5 * MODULUS * wave * (now - now.mean())
+        rate = body.k * pressure * body.sliding_speed * body.share
+        now = now - taken_off(rate, seconds / jumps, body, grid, MODULUS)
+    swing = 2.0 * np.abs(np.fft.rfft(now[:, 0]))[4] / 64
+    assert swing == pytest.approx(1e-8 * math.exp(-2.0), rel=1e-9)
+    sliding = seconds * body.sliding_speed * body.share
+    assert -now.mean() == pytest.approx(body.k * mean * sliding, rel=1e-9)
+
+
+def test_a_jump_is_no_longer_than_its_depth_and_its_shortest_wave_allow():
+    grid = Grid((64, 64), (0.0, 0.0), (8e-5, 8e-5), periodic=(True, True))
+    fast, slow = np.full(grid.cells, 1e-9), np.full(grid.cells, 1e-12)
+    gentle = exposure(k=1e-22)
+    assert longest_jump((gentle, gentle), (slow, fast), 1e-8, grid.spacing, MODULUS) == pytest.approx(10.0)
+    steep = exposure(k=1e-15)
+    longest = longest_jump((gentle, steep), (slow, slow), 1.0, grid.spacing, MODULUS)
+    shortest_wave = math.pi * math.hypot(*(1.0 / side for side in grid.spacing))
+    assert float(steep.decay(shortest_wave, longest, MODULUS)) == pytest.approx(1.0)
+    still = exposure(k=0.0)
+    assert longest_jump((still, still), (0.0 * slow, 0.0 * slow), 1.0, grid.spacing, MODULUS) == math.inf
+
+
+def test_what_passes_is_in_the_contact_for_its_width_over_its_speed():
+    assert exposure().share == pytest.approx(50.0 * 1e-4 / 2.0)
+    assert exposure(speed=0.0).share == 1.0
+    assert exposure(speed=-2.0).passages(3e-4) == pytest.approx(50.0 * 3e-4 / 2.0)
+    assert exposure(speed=0.0).passages(3e-4) == 1.0
+
+
+def test_maps_come_back_onto_the_cells_that_they_were_seen_on():
+    rng = np.random.default_rng(2)
+    contact = Grid((16, 12), (0.0, 0.0), (1.6, 1.2))
+    track = Grid((40, 12), (0.0, 0.0), (4.0, 1.2), periodic=(True, True))
+    first, second = (Surface(rng.normal(size=track.cells), track) for _ in range(2))
+    surfaces = MovingSurfaces(first, second, (2.0, 1.5), contact)
+    place = Position(33, 7)
+    there = seen(surfaces, place).heights
+    i, j = 5, 3  # a cell of the contact, and where it is on either track
+    assert there[i, j] == first.heights[(33 + i) % 40, j] + second.heights[(7 + i) % 40, 11 - j]
+    marked = np.zeros(contact.cells)
+    marked[i, j] = 1.0
+    assert on_track(marked, track.cells, place, 0)[(33 + i) % 40, j] == 1.0
+    assert on_track(marked, track.cells, place, 1)[(7 + i) % 40, 11 - j] == 1.0
+    assert on_track(marked, track.cells, place, 0, np.inf).min() == 0.0
+    moved = across(on_track(marked, track.cells, place, 0), place, 0)
+    np.testing.assert_array_equal(moved, on_track(marked, track.cells, place, 1))
+    np.testing.assert_array_equal(across(moved, place, 1), on_track(marked, track.cells, place, 0))
+
+
+def test_positions_lie_evenly_and_differ_from_jump_to_jump():
+    places = [positions((120, 120), (True, True), 6, jump, 5) for jump in range(40)]
+    assert places[3] == positions((120, 120), (True, True), 6, 3, 5)
+    assert places[3] != places[4]
+    for body in (0, 1):
+        for jump in places:
+            steps = np.diff(sorted(place[body] for place in jump))
+            assert np.all((steps >= 19) & (steps <= 21))  # 120/6 cells apart, to rounding
+        starts = {place[body] for jump in places for place in jump}
+        assert len(starts) > 100  # almost every cell has been a start
+    assert {place.second for place in positions((120, 120), (True, False), 6, 0, 5)} == {0}

@@ -1,0 +1,180 @@
+"""Wear of solved contacts against closed forms: volume, depth a passage, Hertz's profile, the decay of a wave.
+
+Equations of Archard's wear; J. F. Archard, J. Appl. Phys. 24 (1953) 981, and K. L. Johnson, Contact Mechanics (1985)
+for pressures.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity import load_case, run_wear
+from asperity.ageing import WearHistory
+from asperity.surface import MovingSurfaces, Surface
+
+LINE = """
+[contact]
+geometry = "line"
+radius = "5.4 mm"
+length = "10 mm"
+load = "500 N"
+entrainment_speed = "1.91 m/s"
+slip = 0.2
+[material]
+youngs_modulus = "200 GPa"
+poisson_ratio = 0.3
+hardness = "2 GPa"
+[lubricant]
+viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
+density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
+rheology = { law = "newtonian" }
+[surface]
+kind = "gaussian"
+sq = "1 um"
+correlation_length = ["25 um", "25 um"]
+seed = 7
+[grid]
+cells = [48, 32]
+x = [-2.2, 1.9]
+y = [-1.6, 1.6]
+[wear]
+k = ["1e-17 1/Pa", "3e-17 1/Pa"]
+overrolling = ["56.25 Hz", "5 Hz"]
+"""
+DRY = {"lubricant": "none", "material.hardness": "none"}
+
+
+def worn(hours: float, overrides: dict[str, object] | None = None) -> WearHistory:
+    return run_wear(load_case(LINE, name="line.toml").with_overrides(overrides or {}), hours=hours)
+
+
+def jump_by_jump(history: WearHistory, body: int) -> float:
+    """The sum of k times the load between solids times the sliding distance, from the table's own columns."""
+    case, table = history.case, history.table
+    load, sliding = case.conditions.load, case.conditions.sliding_speed
+    k, ratio = history.ageing.model.coefficients[body].k, table["solid_load_ratio"].to_numpy()[:-1]
+    return float(np.sum(k * ratio * load * sliding * 3600.0 * np.diff(table["hours"])))
+
+
+@pytest.mark.parametrize("rough", ["first", "both"])
+def test_worn_volume_is_k_times_load_times_sliding_distance(rough):
+    history = worn(1.0, {"motion.rough": rough})
+    assert len(history.table) > 3
+    assert history.volume_error < 1e-9
+    for body in (0, 1):
+        lost = np.mean((history.before.first if body == 0 else history.before.second).heights)
+        lost -= np.mean((history.after.first if body == 0 else history.after.second).heights)
+        speed, rate = history.case.conditions.surface_speeds[body], (56.25, 5.0)[body]
+        assert lost * speed / rate * 10e-3 == pytest.approx(history.worn_volume[body], rel=1e-9)
+        assert history.worn_volume[body] == pytest.approx(jump_by_jump(history, body), rel=3e-4)  # load is met to 1e-4
+
+
+def test_depth_a_passage_is_the_line_load_slid_over_the_speed():
+    history = worn(0.01)
+    assert len(history.table) == 2  # one jump, all at the pressure of the new surfaces
+    conditions, ratio = history.case.conditions, float(history.table["solid_load_ratio"].iloc[0])
+    for body, k in ((0, 1e-17), (1, 3e-17)):
+        a_passage = k * 5e4 * ratio * conditions.sliding_speed / conditions.surface_speeds[body]
+        depth = float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
+        assert depth == pytest.approx(a_passage, rel=3e-4)
+
+
+def test_depth_a_passage_does_not_ask_for_the_shape_of_the_pressure():
+    # machines.md 5.2: w' = 2e5 N/m, 2 and 1.5 m/s, k = 1e-17: 5.0e-13 and 6.667e-13 m
+    smooth = {"surface": "flat", "contact.load": "2000 N", "contact.entrainment_speed": "1.75 m/s"}
+    history = worn(0.001, {**DRY, **smooth, "contact.slip": 0.5 / 1.75, "wear.k": "1e-17 1/Pa"})
+    for body, expected in ((0, 5.0e-13), (1, 6.667e-13)):
+        depth = float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
+        assert depth == pytest.approx(expected, rel=2e-4)
+
+
+@pytest.mark.parametrize("cells", [[64, 64], [128, 128]])
+def test_a_ball_wears_a_parabola_across_its_track(cells):
+    """A Hertz contact, dry and smooth: k (pi/2) p0 a (1 - y^2/a^2) |u_s|/u_i over the track, within 1 %."""
+    ball = {"contact.geometry": "point", "contact.load": "20 N", "surface": "flat", "grid.cells": cells}
+    ends = {"grid.x": [-1.6, 1.6], "grid.y": [-1.6, 1.6]}
+    text = LINE.replace('length = "10 mm"\n', "")
+    case = load_case(text.replace('"line"', '"point"'), name="ball.toml").with_overrides({**DRY, **ball, **ends})
+    history = run_wear(case, hours=1e-4)
+    conditions, hertz = case.conditions, case.conditions.hertz
+    a, p0 = hertz.half_widths[0], hertz.p_max
+    y = history.before.grid.y
+    for body, k in ((0, 1e-17), (1, 3e-17)):
+        a_passage = k * 0.5 * math.pi * p0 * a * conditions.sliding_speed / conditions.surface_speeds[body]
+        profile = history.worn.worn[body].mean(axis=0) / history.overrollings[body]
+        expected = a_passage * np.maximum(1.0 - (y / a) ** 2, 0.0)
+        inner = np.abs(y) < 0.8 * a
+        np.testing.assert_allclose(profile[inner], expected[inner], rtol=0.01)
+        assert np.max(np.abs(profile - expected)) < 0.01 * a_passage * (64 / cells[0] + 1.0)
+        area = profile.sum() * history.before.grid.spacing[1]
+        assert area == pytest.approx(k * 20.0 * conditions.sliding_speed / conditions.surface_speeds[body], rel=3e-4)
+
+
+def decay_of_ridges(half_width: float, hours: float) -> tuple[float, float]:
+    """How much ridges along rolling have decayed, ln(A0/A), by the solver and in closed form."""
+    grid = {"grid.cells": [96, 32], "grid.x": [-1.2, 1.2], "grid.y": [-half_width, half_width]}
+    overrides = {**DRY, **grid, "surface": "flat", "wear.k": ["1e-15 1/Pa", "0 1/Pa"]}
+    case = load_case(LINE, name="line.toml").with_overrides(overrides)
+    flat, b, across = case.moving_surfaces(), case.conditions.hertz.half_widths[0], case.grid
+    wave = 2.0 * np.pi / across.extent[1]
+    ridges = 2e-10 * np.cos(wave * (across.y - across.lower[1]))
+    track = Surface(np.tile(ridges, (across.cells[0], 1)), flat.first.grid)
+    history = run_wear(case, hours=hours, surfaces=MovingSurfaces(track, flat.second, flat.speeds, flat.grid))
+    left = history.after.first.heights[0]
+    swing = 2.0 * np.abs(np.fft.rfft(left))[1] / across.cells[1]
+    speeds, sliding = case.conditions.surface_speeds, case.conditions.sliding_speed
+    passages = history.overrollings[0]
+    return math.log(
+        2e-10 / swing
+    ), passages * 1e-15 * case.conditions.pair.reduced_modulus * wave * b * sliding / speeds[0]
+
+
+def test_ridges_in_full_contact_decay_by_the_way_that_slides_past_them():
+    """A factor exp(-k E* q b |u_s|/u_1) a passage, where the pressure is more than E* q A/2 all over: within 2 %.
+
+    The closed form is that of waves much shorter than the contact is wide, and is come nearer to as they are.
+    """
+    (wide, of_wide), (narrow, of_narrow) = decay_of_ridges(0.1, 0.006), decay_of_ridges(0.05, 0.003)
+    assert of_wide == pytest.approx(of_narrow)
+    assert 0.5 < of_wide < 1.0  # they decay by a good part, and something is left
+    assert wide == pytest.approx(of_wide, rel=0.02)
+    assert narrow == pytest.approx(of_narrow, rel=0.01)
+
+
+def test_without_sliding_nothing_is_worn_off():
+    history = worn(100.0, {"contact.slip": 0.0, "wear.k": "1e-12 1/Pa"})
+    assert history.worn_volume == (0.0, 0.0)
+    np.testing.assert_array_equal(history.after.first.heights, history.before.first.heights)
+    assert len(history.table) == 2
+    assert "Without sliding nothing is worn off." in history.notes
+
+
+def test_the_energy_law_is_archards_at_k_over_the_boundary_friction():
+    by_pressure = worn(0.2)
+    by_energy = worn(0.2, {"wear.law": "energy", "wear.k": [f"{1e-17 / 0.15!r} 1/Pa", f"{3e-17 / 0.15!r} 1/Pa"]})
+    np.testing.assert_allclose(by_energy.after.first.heights, by_pressure.after.first.heights, rtol=0, atol=1e-18)
+
+
+def test_removal_alone_lowers_summits_and_leaves_pits():
+    history = worn(1.0, {"wear.k": ["6e-17 1/Pa", "0 1/Pa"]})
+    first, last = history.table.iloc[0], history.table.iloc[-1]
+    assert last["sq_m"] < 0.98 * first["sq_m"]
+    assert last["ssk"] < first["ssk"]
+    assert last["spk_m"] / first["spk_m"] < 0.8
+    assert abs(last["svk_m"] / first["svk_m"] - 1.0) < 0.1
+    assert last["clr"] < first["clr"]
+    assert np.all(history.after.first.heights <= history.before.first.heights)
+
+
+def test_a_harder_wear_coefficient_is_a_faster_clock():
+    slow, fast = worn(0.4), worn(0.1, {"wear.k": ["4e-17 1/Pa", "12e-17 1/Pa"]})
+    for key in ("sq_m", "clr", "worn_depth_1_m", "worn_depth_2_m"):
+        assert fast.table[key].iloc[-1] == pytest.approx(slow.table[key].iloc[-1], rel=1e-9)
+
+
+def test_halving_the_jump_moves_roughness_and_load_share_little():
+    whole, half = (worn(1.0, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02))
+    assert len(half.table) > 1.3 * len(whole.table)
+    for key in ("sq_m", "clr"):
+        assert half.table[key].iloc[-1] == pytest.approx(whole.table[key].iloc[-1], rel=0.02)
