@@ -128,8 +128,8 @@ def test_processes_change_nothing(unbroken):
     same(run_wear(case(), hours=HOURS, workers=2), unbroken)
 
 
-def test_surfaces_are_files_that_others_open(unbroken, tmp_path):
-    worn = run_wear(case(), hours=HOURS, out=tmp_path / "worn")
+def test_surfaces_are_files_that_others_open(tmp_path):
+    worn = run_wear(case(), hours=0.2, out=tmp_path / "worn")
     assert [path.name for path in worn.files] == [
         "first-before.x3p", "first-after.x3p", "second-before.x3p", "second-after.x3p"
     ]  # fmt: skip
@@ -151,7 +151,7 @@ def test_a_moment_lies_between_its_rows(unbroken):
     between = unbroken.at(0.5 * (table["hours"][3] + table["hours"][4]))
     assert between["clr"] == pytest.approx(0.5 * (table["clr"][3] + table["clr"][4]))
     assert unbroken.state(0.0).clr == table["clr"][0]
-    with pytest.raises(BadInput, match="got 2.5 h"):
+    with pytest.raises(BadInput, match=r"got 2\.5 h"):
         unbroken.at(2.5)
 
 
@@ -185,7 +185,7 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
         run_wear(case({"wear": "none"}), hours=1.0)
     with pytest.raises(BadInput, match="hours of wear must be positive"):
         run_wear(case(), hours=0.0, out=tmp_path / "worn")
-    with pytest.raises(BadInput, match="wear of 10000 h in .* jumps would take about .*; ask for less"):
+    with pytest.raises(BadInput, match=r"wear of 10000 h in .* jumps would take about .*; ask for less"):
         run_wear(case({"wear.k": "1e-9 1/Pa"}), hours=1e4, out=tmp_path / "worn")
     assert not (tmp_path / "worn").exists()
     (tmp_path / "other").mkdir()

@@ -10,6 +10,7 @@ from asperity.surface import ProfileParameters, SurfaceParameters
 SCALED = (
     "1",
     "m",
+    "m3",
     "Pa",
     "s",
     "Hz",

@@ -1,6 +1,11 @@
+from .contact import Failed as Failed
+from .contact import PositionSolver as PositionSolver
+from .contact import Solved as Solved
 from .history import WearHistory as WearHistory
+from .jump import Ageing as Ageing
 from .rows import of_body as of_body
 from .run import WearProgress as WearProgress
 from .run import run_wear as run_wear
 from .store import is_wear as is_wear
 from .store import load_wear as load_wear
+from .worn import Worn as Worn

@@ -29,3 +29,4 @@ from .sweep import Seeding as Seeding
 from .sweep import StudyKind as StudyKind
 from .sweep import StudySection as StudySection
 from .text import relative_path as relative_path
+from .wear import WearSection as WearSection

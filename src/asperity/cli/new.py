@@ -9,7 +9,6 @@ from asperity import case, files
 from asperity.cli.app import app
 from asperity.errors import BadInput, require_choice
 
-
 NEXT = {"wear": "wear {} --hours 1"}  # by kind of case, where it is not to solve it
 
 

@@ -17,6 +17,7 @@ from .model import flat_surface as flat_surface
 from .model import length_text as length_text
 from .moving import MovingSurfaces as MovingSurfaces
 from .moving import track_grid as track_grid
+from .parameters import HeightParameters as HeightParameters
 from .parameters import SurfaceDescription as SurfaceDescription
 from .parameters import SurfaceParameters as SurfaceParameters
 from .parameters import correlation_lengths as correlation_lengths

@@ -1,0 +1,79 @@
+"""`asperity wear` as a user types it."""
+
+import json
+from pathlib import Path
+
+import pandas
+import pytest
+
+WEAR = (Path(__file__).parents[2] / "examples" / "wear.toml").read_text("utf-8")
+COARSE = ("--set", "grid.cells=[32, 16]", "--set", "surface.correlation_length='50 um'", "--workers", "1")
+KEYS = [
+    *("verdict", "hours", "overrollings", "worn_volume_m3", "worn_volume_interval_m3", "worn_depth_m", "volume_error"),
+    *("jump_error", "jumps", "computed", "failed", "patches", "seconds", "folder", "table", "surfaces", "notes"),
+    *("sq_m", "clr", "car", "solid_load_ratio", "h_mean_m", "friction_coefficient", "crf_hz", "crfa"),
+    *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "stage", "report"),
+]
+
+
+@pytest.fixture
+def worn_case(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wear.toml").write_text(WEAR, "utf-8")
+    return tmp_path
+
+
+def test_json_holds_the_contract(asp, worn_case):
+    code, out, err = asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--report", "w.html", "--json", *COARSE)
+    assert (code, err) == (0, "")
+    said = json.loads(out)
+    assert sorted(said) == sorted(KEYS)
+    assert said["hours"] == 1.0
+    assert said["overrollings"] == pytest.approx([56.25 * 3600.0, 5.0 * 3600.0])
+    assert said["volume_error"] < 1e-9
+    table = pandas.read_parquet(said["table"])
+    assert len(table) == said["jumps"] + 1
+    for key in ("sq_m", "clr", "crf_hz"):
+        assert said[key] == [table[key].iloc[0], table[key].iloc[-1]]
+    assert [Path(name).is_file() for name in said["surfaces"]] == [True] * 4
+    page = (worn_case / "w.html").read_text("utf-8")
+    assert "A contact that wears" in page
+    assert "http" not in page.split("<body")[1].split("<footer")[0].replace("http://www.w3.org", "")
+    again = json.loads(asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--json", *COARSE)[1])
+    assert again["computed"] == 0
+    assert {key: again[key] for key in ("sq_m", "clr", "crf_hz")} == {
+        key: said[key] for key in ("sq_m", "clr", "crf_hz")
+    }
+    code, out, _ = asp("report", "worn", "--json")
+    assert code == 0
+    assert json.loads(out)["wear"]["sq_m"] == said["sq_m"]
+    assert (worn_case / "worn" / "report.html").is_file()
+
+
+def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG001
+    code, out, _ = asp("wear", "wear.toml", "--hours", "0.5", *COARSE)
+    assert code == 0
+    first, *rest = out.splitlines()
+    assert first.startswith("After 0.5 h the bodies have worn by ")
+    assert any(line.split() == ["new", "after", "0.5", "h"] for line in rest)
+    assert any(line.strip().startswith("worn volume") for line in rest)
+    assert "  note: Nothing but removal acts." in rest
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--hours", "0"), "hours of wear must be positive"),
+        (("--hours", "1", "--set", "wear=none"), "wear is left out; add [wear] with k"),
+        (("--hours", "1", "--set", "wear.k=hard"), 'wear.k[0] must be such as "1e-18 1/Pa", or one of mild'),
+        (("--hours", "1", "--set", "wear.k=mild", "--set", "material.hardness=none"), "the case states no hardness"),
+        (("--hours", "1", "--set", "wear.law=archrd"), "must be one of archard, energy, film-defect"),
+        (("--hours", "1", "--report", "w.txt"), "--report must be a file that ends in .html"),
+    ],
+)
+def test_what_cannot_be_meant_is_one_sentence(asp, worn_case, arguments, words):
+    code, out, err = asp("wear", "wear.toml", *arguments, "--out", "worn")
+    assert (code, out) == (2, "")
+    assert words in err
+    assert len(err.splitlines()) == 1
+    assert not (worn_case / "worn").exists()
