@@ -39,6 +39,7 @@ PARTS = (  # those first that the others' times are told against
     "intervals",
     "damping",
     "damping_stages",
+    "wearing",
     "motion_table",
 )
 ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors

@@ -14,6 +14,7 @@ import pytest
 from asperity import load_case, read_surface, run_wear
 from asperity.ageing import WearHistory, WearProgress, load_wear, of_body, store
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.paper import simulate_rig, write_rig
 from asperity.surface import height_parameters
 from asperity.surface.read import surface_topography
 
@@ -226,3 +227,19 @@ def test_a_contact_that_outgrows_its_grid_is_stopped():
     narrow = {"contact.load": "60 N", "lubricant": "none", "surface": "flat"}
     with pytest.raises(AsperityError, match=r"as wide as its grid after .* h; state a wider grid.y"):
         run_wear(load_case(text, name="case.toml").with_overrides(narrow), hours=10.0)
+
+
+def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
+    rig = simulate_rig(case=unbroken.case, moments=unbroken.moments([0.0, HOURS]), repeats=2, repeat_std_hz=0.0)
+    assert [recording.sample for recording in rig.recordings] == [1, 1, 2, 2]
+    for recording, hours in zip(rig.recordings[::2], (0.0, HOURS), strict=True):
+        moment = unbroken.at(hours)
+        assert recording.clr == pytest.approx(moment["clr"])
+        assert recording.crf_hz == pytest.approx(moment["crf_hz"], rel=1e-9)
+        assert recording.true_sq_m == pytest.approx(moment["sq_m"])
+        assert abs(recording.sq_m - recording.true_sq_m) < 1e-7
+    write_rig(rig, tmp_path / "rig")
+    table = pandas.read_csv(tmp_path / "rig" / "table.csv")
+    assert table["hours"].tolist() == [0.0, 0.0, HOURS, HOURS]
+    assert table.columns[1] == "hours"  # which `asperity track` takes for x
+    assert len(unbroken.moments()) == 12

@@ -1,6 +1,7 @@
 """A contact worn over hours: a row a jump, the surfaces before and after, and what they come to."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,7 @@ from asperity.arrays import finite_or_none
 from asperity.case import Case
 from asperity.ehl import ContactState
 from asperity.errors import BadInput
+from asperity.paper import Moment
 from asperity.quantities import quantity
 from asperity.surface import MovingSurfaces
 from asperity.wear import Stages, split_stages
@@ -131,6 +133,11 @@ class WearHistory:
     def state(self, hours: float) -> ContactState:
         """The mean contact at a moment; raises as `at`."""
         return state_of_row(self.at(hours))
+
+    def moments(self, hours: Sequence[float] | None = None, count: int = 12) -> list[Moment]:
+        """When it may be recorded (`paper.simulate_rig`): at these hours, or so many spread evenly; raises as `at`."""
+        places = hours or list(np.linspace(0.0, float(self.table["hours"].iloc[-1]), count))
+        return [Moment(float(place), self.state(float(place))) for place in places]
 
     def with_k(self, key: str) -> "pandas.DataFrame | None":
         """A number over the hours with its interval by k: columns `hours`, `low`, `high`.

@@ -205,7 +205,7 @@ class Ageing:
         conditions, grid = self.case.conditions, self.surfaces.grid
         height = self.model.step * self.height(math.hypot(*(surface.sq for surface in self.levelled(worn))))
         modulus = conditions.pair.reduced_modulus
-        longest = worn.factor * longest_jump(self.exposures, rates, height, grid.spacing, modulus)
+        longest = worn.factor * longest_jump(self.exposures, rates, height, self.model.decay, grid.spacing, modulus)
         if self.model.removal_alone:
             return longest
         slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)

@@ -1,16 +1,19 @@
 """`asperity rig`: recordings of a simulated wear test, with the truth beside them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import case, paper
+from asperity import ageing, case, paper
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, case_at
-from asperity.cli.show import known, progress, show, span, table
+from asperity.cli.show import Row, known, progress, show, span, table
 from asperity.errors import BadInput
 from asperity.quantities import quantity
+
+if TYPE_CHECKING:
+    from asperity.ageing import WearHistory
 
 
 @app.command()
@@ -21,6 +24,14 @@ def rig(
         typer.Option(
             "--case", metavar="CASE.toml", help="Solve this contact at each roughness, in place of the paper's trend."
         ),
+    ] = None,
+    worn: Annotated[
+        Path | None,
+        typer.Option("--wear", metavar="DIR", help="Record the contact that asperity wear --out kept, as it wears."),
+    ] = None,
+    hours: Annotated[
+        list[float] | None,
+        typer.Option(metavar="H", help="With --wear: record it after so long; repeat. Else --samples over all of it."),
     ] = None,
     samples: Annotated[int, typer.Option(help="Worn rings, from Sq 0.54 to 3.49 um.")] = 12,
     repeats: Annotated[int, typer.Option(help="Tests of each ring.")] = 5,
@@ -39,6 +50,7 @@ def rig(
     """Simulate the paper's wear test: recordings to try asperity track on, and the truth to judge it by."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out} is there already and not an empty folder; name a new one")
+    history = _wear(worn, hours, case_file)
     with progress("rig", "simulating ...", quiet=quiet) as display:
         made = paper.simulate_rig(
             samples=samples,
@@ -48,7 +60,8 @@ def rig(
             disturbance=paper.Disturbance(snr_db=snr, modes=modes),
             trend=trend,  # type: ignore[arg-type]
             seed=seed,
-            case=case_at(case_file),
+            case=case_at(case_file) if history is None else history.case,
+            moments=None if history is None else history.moments(hours, samples),
         )
         paths = paper.write_rig(
             made,
@@ -56,13 +69,6 @@ def rig(
             file_format=file_format,  # type: ignore[arg-type]
             progress=lambda done, total: display(f"{done} of {total} recordings written", done, total),
         )
-    shafts = " and ".join(f"{speed:g}" for speed in made.shaft_hz)
-    rows = [
-        (quantity("band_hz").title, span("band_hz", made.band_hz)),
-        *known({"full_load_crf_hz": made.full_load_crf_hz}),
-        ("SNR in that band", f"{snr:g} dB, {modes} structural modes, shafts at {shafts} Hz, mains"),
-        ("truth", str(out / "truth.csv")),
-    ]
     show(
         paper.rig_verdict(made),
         lambda: {
@@ -73,8 +79,28 @@ def rig(
             "truth": str(out / "truth.csv"),
             "case": str(out / "rig.toml"),
         },
-        table(rows),
+        table(_rows(made, out)),
         [f"Try next: asperity track {out} --table {out / 'table.csv'} --case {out / 'rig.toml'}"],
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _rows(made: paper.Rig, out: Path) -> list[Row]:
+    shafts = " and ".join(f"{speed:g}" for speed in made.shaft_hz)
+    beside = f"{made.disturbance.snr_db:g} dB, {made.disturbance.modes} structural modes, shafts at {shafts} Hz, mains"
+    return [
+        (quantity("band_hz").title, span("band_hz", made.band_hz)),
+        *known({"full_load_crf_hz": made.full_load_crf_hz}),
+        ("SNR in that band", beside),
+        ("truth", str(out / "truth.csv")),
+    ]
+
+
+def _wear(worn: Path | None, hours: list[float] | None, case_file: Path | None) -> "WearHistory | None":
+    """The wear history that is to be recorded, if any."""
+    if worn is None and hours:
+        raise BadInput(f"--hours {hours[0]:g} is a moment of a wear history; name one with --wear")
+    if worn is not None and case_file is not None:
+        raise BadInput(f"--wear {worn} brings its own case along; leave --case {case_file} out")
+    return None if worn is None else ageing.load_wear(worn)

@@ -21,6 +21,7 @@ from .numbers import SAMPLES_STD_UM as SAMPLES_STD_UM
 from .numbers import TABLE1_PRINTED as TABLE1_PRINTED
 from .numbers import Citation as Citation
 from .rig import TRENDS as TRENDS
+from .rig import Moment as Moment
 from .rig import RecordingFormat as RecordingFormat
 from .rig import Rig as Rig
 from .rig import RigTrend as RigTrend

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
@@ -36,6 +36,7 @@ SATURATION_UM = 0.8
 CONSTANT_HZ = 3400.0
 RATE_PER_BAND = 3.0  # sampling rate over the upper end of the search band, at least
 SHORTEST_RECORD = 1000
+MEASURED_STD = 2e-8  # of a worn surface's Sq, by a profilometer [m]; ours
 SAMPLE_BYTES, SAMPLE_S = 50.0, 2e-7  # what a sample takes of memory and time
 AT_ONCE = 2  # recordings made at the same time: 300 s at 20 kHz take 0.3 GB each
 
@@ -60,13 +61,20 @@ TRENDS: dict[RigTrend, Callable[[Field], Field]] = {  # CRF [Hz] over Sq [m]
 }
 
 
+class Moment(NamedTuple):
+    """A contact that wears, when it is recorded: after so many hours, and its mean state then."""
+
+    hours: float
+    state: ContactState
+
+
 @dataclass(frozen=True, kw_only=True)
 class Rig:
     """Recordings and what is true of them all.
 
     `band_hz` is the contact's search band, in which SNR is counted; `full_load_crf_hz` the resonance with all load on
     asperities; `split_sq_m` where the trend has its knee, None where it has none; `case_text` a case file of the
-    contact.
+    contact. `hours` of each sample, where one contact was recorded as it wore.
     """
 
     recordings: tuple[RigRecording, ...]
@@ -77,6 +85,7 @@ class Rig:
     load_n: float
     shaft_hz: tuple[float, ...]
     case_text: str
+    hours: tuple[float, ...] | None = None
 
 
 def simulate_rig(
@@ -90,6 +99,7 @@ def simulate_rig(
     repeat_std_hz: float = 15.0,
     seed: int = 7,
     case: Case | None = None,
+    moments: Sequence[Moment] | None = None,
 ) -> Rig:
     """The paper's test, 12 worn rings 5 times each at 500 N, or another number of them spread over the same range.
 
@@ -104,6 +114,7 @@ def simulate_rig(
     seed : of everything drawn
     case : its contact solved at each Sq gives load and area shares, in place of `trend`; its load, radius, mass,
         damping (the solved contact's own, by the damping law "contact") and excitation make the line
+    moments : of that case's contact as it wears, in place of contacts of its own at each Sq; a sample each
 
     Raises
     ------
@@ -113,13 +124,12 @@ def simulate_rig(
     NotConverged
         if a contact of the case cannot be solved.
     """
+    samples = len(moments or range(samples))
     _require_settings(samples, repeats, trend, repeat_std_hz, seed, duration_s, rate_hz)
     conditions, model = _contact(case)
     band_hz = _band(conditions, model, rate_hz)
-    positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
-    sq, sq_std = (np.interp(positions, range(len(um)), um) * 1e-6 for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
-    whole = replace(dry_full_load(conditions, float(sq[0])), clr=1.0)
-    full_load_crf_hz = oscillator(whole, conditions, model.with_choices(damping_law="ratio")).natural_frequency_hz
+    sq, sq_std = _measured(samples, moments, seed)
+    full_load_crf_hz = _full_load_crf_hz(conditions, model, float(sq[0]))
     disturbance = disturbance or Disturbance()
     own, *draws = np.random.SeedSequence(seed).spawn(1 + samples)
     frequency = np.arange(0.0, rate_hz / 2.0 + GRID_HZ, GRID_HZ)
@@ -128,16 +138,13 @@ def simulate_rig(
     for number, draw in enumerate(draws):
         rng = np.random.default_rng(draw)
         true_sq = max(float(sq[number] + sq_std[number] * rng.standard_normal()), 0.1 * float(sq[number]))
-        if case is None:
-            clr = min((float(TRENDS[trend](np.array(true_sq))) / full_load_crf_hz) ** 6, 1.0)
-            state, ridden = replace(dry_full_load(conditions, true_sq), clr=clr), model
-        else:
-            state, ridden = _solved(case, true_sq, model)
+        state, ridden = _on_trend(trend, true_sq, conditions, full_load_crf_hz), model
+        if case is not None:
+            state, ridden = _touching(moments[number], model) if moments else _solved(case, true_sq, model)
         for repeat in range(repeats):
             test = RigTest(number + 1, repeat + 1, float(sq[number]), float(sq_std[number]), rate_hz, duration_s)
-            shift = repeat_std_hz * rng.standard_normal() / full_load_crf_hz
-            clr = min(max(state.clr ** (1.0 / 6.0) + shift, 0.01) ** 6, 1.0)
-            line = contact_line(replace(state, clr=clr), conditions, ridden, frequency, rate_hz)
+            tested = _shifted(state, repeat_std_hz * rng.standard_normal() / full_load_crf_hz)
+            line = contact_line(tested, conditions, ridden, frequency, rate_hz)
             recordings.append(background.recorded(test, line, disturbance, rng))
     return Rig(
         recordings=tuple(recordings),
@@ -148,7 +155,49 @@ def simulate_rig(
         load_n=conditions.load,
         shaft_hz=SHAFT_HZ,
         case_text=(case or rig_case()).text,
+        hours=None if moments is None else tuple(moment.hours for moment in moments),
     )
+
+
+def _full_load_crf_hz(conditions: ContactConditions, model: VibrationModel, sq: float) -> float:
+    """The resonance with all load on asperities [Hz]."""
+    whole = replace(dry_full_load(conditions, sq), clr=1.0)
+    return oscillator(whole, conditions, model.with_choices(damping_law="ratio")).natural_frequency_hz
+
+
+def _on_trend(trend: RigTrend, sq: float, conditions: ContactConditions, full_load_crf_hz: float) -> ContactState:
+    """A contact whose load share gives the trend's CRF."""
+    clr = min((float(TRENDS[trend](np.array(sq))) / full_load_crf_hz) ** 6, 1.0)
+    return replace(dry_full_load(conditions, sq), clr=clr)
+
+
+def _shifted(state: ContactState, shift: float) -> ContactState:
+    """The same contact with so much more CRF, relative to that of all load on asperities."""
+    return replace(state, clr=min(max(state.clr ** (1.0 / 6.0) + shift, 0.01) ** 6, 1.0))
+
+
+def _measured(samples: int, moments: Sequence[Moment] | None, seed: int) -> tuple[Field, Field]:
+    """What a profilometer says of each sample's Sq, and its deviation [m]: the paper's rings, or a contact that wears.
+
+    Of the paper's rings the true Sq is drawn about it, of a contact that wears it is drawn about the true one.
+    """
+    if moments is None:
+        positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
+        sq, std = (np.interp(positions, range(len(um)), um) * 1e-6 for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
+        return sq, std
+    off = MEASURED_STD * np.random.default_rng([seed, samples]).standard_normal(samples)
+    true = np.array([moment.state.sq for moment in moments])
+    return np.maximum(true + off, 0.1 * true), np.full(samples, MEASURED_STD)
+
+
+def _touching(moment: Moment, model: VibrationModel) -> tuple[ContactState, VibrationModel]:
+    """The contact of a moment, and the model as it is."""
+    if moment.state.clr <= 0.0 or moment.state.car <= 0.0:
+        raise BadInput(
+            f"no asperity touches after {moment.hours:g} h, and a rig without contact has no truth to tell; "
+            "record it earlier"
+        )
+    return moment.state, model
 
 
 def _require_settings(
@@ -266,13 +315,15 @@ def write_rig(
 
 
 def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
-    known: list[tuple[str, ...]] = [("file", "sq_um", "sq_um_std", "load_n", "speed_hz")]
+    when = () if rig.hours is None else ("hours",)
+    known: list[tuple[str, ...]] = [("file", *when, "sq_um", "sq_um_std", "load_n", "speed_hz")]
     truth: list[tuple[str, ...]] = [
         ("file", "sample", "repeat", "true_sq_um", "clr", "crf_hz", "crfa", "damping_ratio", "snr_db")
     ]
     for recording, path in zip(rig.recordings, paths, strict=True):
         sq, sq_std, true_sq = (1e6 * m for m in (recording.sq_m, recording.sq_std_m, recording.true_sq_m))
-        known.append((path.name, f"{sq:.4g}", f"{sq_std:.3g}", f"{rig.load_n:g}", f"{rig.shaft_hz[0]:g}"))
+        at = () if rig.hours is None else (f"{rig.hours[recording.sample - 1]:.6g}",)
+        known.append((path.name, *at, f"{sq:.4g}", f"{sq_std:.3g}", f"{rig.load_n:g}", f"{rig.shaft_hz[0]:g}"))
         figures = (true_sq, recording.clr, recording.crf_hz, recording.crfa, recording.damping_ratio, recording.snr_db)
         truth.append((path.name, str(recording.sample), str(recording.repeat), *(f"{value:.6g}" for value in figures)))
     for name, rows in (("table.csv", known), ("truth.csv", truth)):

@@ -17,8 +17,6 @@ from asperity.arrays import Field
 from asperity.grid import Grid
 from asperity.wearing.model import Body
 
-STEEPEST = 1.0  # decay of the shortest wave in a jump, at most
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exposure:
@@ -61,17 +59,18 @@ def longest_jump(
     exposures: tuple[Exposure, Exposure],
     rates: tuple[Field, Field],
     height: float,
+    decay: float,
     spacing: tuple[float, float],
     reduced_modulus: float,
 ) -> float:
-    """Seconds in which no point loses more than `height` [m], and the shortest wave no more than its decay.
+    """Seconds in which no point loses more than `height` [m], and the shortest wave decays by exp(-`decay`) at most.
 
     Infinite where nothing wears.
     """
     steepest = math.pi * math.hypot(1.0 / spacing[0], 1.0 / spacing[1])
     decays = max(float(exposure.decay(steepest, 1.0, reduced_modulus)) for exposure in exposures)
     fastest = max(float(rate.max()) for rate in rates)
-    return min(math.inf if part <= 0.0 else most / part for most, part in ((height, fastest), (STEEPEST, decays)))
+    return min(math.inf if part <= 0.0 else most / part for most, part in ((height, fastest), (decay, decays)))
 
 
 def taken_off(rate: Field, seconds: float, exposure: Exposure, grid: Grid, reduced_modulus: float) -> Field:

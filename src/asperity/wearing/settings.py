@@ -8,6 +8,7 @@ from asperity.wearing.laws import Coefficient, RemovalLaw
 from asperity.wearing.model import Mechanism
 
 MECHANISMS: dict[str, Mapping[str, type[Mechanism]]] = {}  # what roughens: by key of [wear], its laws by name
+DECAY = 20.0  # of the shortest wave, over the step: a factor e at the usual 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +23,8 @@ class WearModel:
     mechanisms : what roughens, by its key in MECHANISMS, in the order in which it is asked
     overrolling : how often a point of each body passes the contact [1/s]; None: bodies of equal radius, 2R each
     patches : positions of the tracks that a jump is the mean of; None: one every Hertz half-width, and at least 4
-    step : depth that a jump takes off anywhere over the Sq of both, at most
+    step : depth that a jump takes off anywhere over the Sq of both, at most; and a twentieth of the decay of the
+        shortest wave in it
     """
 
     law: RemovalLaw
@@ -40,6 +42,11 @@ class WearModel:
             raise BadInput(f"patches must be 1 to 1000, got {self.patches}; leave it out for one every half-width")
         if not 0.0 < self.step <= 0.5:
             raise BadInput(f"step must lie above 0 and up to 0.5 of Sq, got {self.step:g}; 0.05 is usual")
+
+    @property
+    def decay(self) -> float:
+        """Of the shortest wave in a jump, as the exponent, at most."""
+        return DECAY * self.step
 
     @property
     def needs_temperature(self) -> bool:
