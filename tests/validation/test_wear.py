@@ -5,6 +5,7 @@ for pressures.
 """
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ import pytest
 from asperity import load_case, run_wear
 from asperity.ageing import WearHistory
 from asperity.surface import MovingSurfaces, Surface
+from asperity.surface.read import surface_topography
+
+MEASURED = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces" / "milled_1.opd"
 
 LINE = """
 [contact]
@@ -178,3 +182,20 @@ def test_halving_the_jump_moves_roughness_and_load_share_little():
     assert len(half.table) > 1.3 * len(whole.table)
     for key in ("sq_m", "clr"):
         assert half.table[key].iloc[-1] == pytest.approx(whole.table[key].iloc[-1], rel=0.02)
+
+
+@pytest.mark.skipif(not MEASURED.is_file(), reason="the measured surface is not beside the project")
+def test_a_measured_surface_runs_in(tmp_path):
+    """Its files before and after hold, opened by SurfaceTopography, the parameters that the table has."""
+    surface = {"file": str(MEASURED), "fit": "tile"}
+    case = load_case(LINE, name="line.toml").with_overrides({"surface": surface, "wear.k": ["2e-16 1/Pa", "0 1/Pa"]})
+    history = run_wear(case, hours=0.2, out=tmp_path / "worn")
+    first, last = history.table.iloc[0], history.table.iloc[-1]
+    for path, row in zip(history.files[:2], (first, last), strict=True):
+        heights = surface_topography().open_topography(str(path)).topography().heights()
+        sq = float(np.std(heights))
+        assert row["sq_1_m"] == pytest.approx(sq, rel=1e-9)
+        assert row["ssk_1"] == pytest.approx(np.mean((heights - heights.mean()) ** 3) / sq**3, rel=1e-6, abs=1e-9)
+    assert last["sq_m"] < first["sq_m"]
+    assert last["spk_m"] < first["spk_m"]
+    assert history.volume_error < 1e-9

@@ -179,7 +179,8 @@ class WearHistory:
             return None
         places = np.unique(np.linspace(0, len(rows) - 1, min(MOST_PLACES, len(rows))).round().astype(int))
         chosen = rows.iloc[places]
-        return split_stages(chosen["hours"], chosen["crf_hz"], chosen["crfa"], unit="h")
+        off = chosen["crf_std_hz"] if bool(chosen["crf_std_hz"].notna().all()) else None
+        return split_stages(chosen["hours"], chosen["crf_hz"], chosen["crfa"], crf_std_hz=off, unit="h")
 
     def scalars(self) -> dict[str, Any]:
         """What `asperity wear --json` says of it."""

@@ -98,12 +98,14 @@ def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
         "friction_coefficient": float(np.mean([one.friction_coefficient for one in solved])),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }
-    return row | _resonance(case, state_of_row(row), low, high)
+    shares = [one.state.clr for one in solved]
+    off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
+    return row | _resonance(case, state_of_row(row), (low, high), off)
 
 
-def _resonance(case: Case, state: ContactState, low: float, high: float) -> Row:
-    """Of the mean contact's oscillator, and the height of its line, in closed form."""
-    nothing = dict.fromkeys(("crf_hz", "crf_low_hz", "crf_high_hz", "crfa"), math.nan)
+def _resonance(case: Case, state: ContactState, interval: tuple[float, float], off: float) -> Row:
+    """Of the mean contact's oscillator, and the height of its line, in closed form; `off` of the mean CLR."""
+    nothing = dict.fromkeys(("crf_hz", "crf_std_hz", "crf_low_hz", "crf_high_hz", "crfa"), math.nan)
     model, conditions = case.vibration, case.conditions
     if model is None or model.needs_solution:
         return nothing
@@ -113,11 +115,16 @@ def _resonance(case: Case, state: ContactState, low: float, high: float) -> Row:
     except BadInput:  # nothing touches, or nothing is rough: there is no spring, or nothing that excites it
         return nothing
     own = np.array(spring.natural_frequency_hz)
-    ends = [math.nan if math.isnan(end) else resonance_at(end, state, conditions, model) for end in (low, high)]
+
+    def at(clr: float) -> float:
+        known = None if math.isnan(clr) else resonance_at(min(max(clr, 0.0), 1.0), state, conditions, model)
+        return math.nan if known is None else known
+
     return {
         "crf_hz": float(own),
-        "crf_low_hz": math.nan if ends[0] is None else ends[0],
-        "crf_high_hz": math.nan if ends[1] is None else ends[1],
+        "crf_std_hz": 0.5 * (at(state.clr + off) - at(state.clr - off)),
+        "crf_low_hz": at(interval[0]),
+        "crf_high_hz": at(interval[1]),
         "crfa": float(spring.gain(own) * below.density(own, model.rate_hz)),
     }
 

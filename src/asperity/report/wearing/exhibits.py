@@ -101,7 +101,7 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         for axes, x, key in ((left, hours, "hours"), (right, sq, "sq_m")):
             axes.fill_between(x, low, high, color=BLUE, alpha=0.15, linewidth=0, label="90 % of positions and grid")
             axes.plot(x, crf, color=BLUE, label="this contact")
-            name_axes(axes, key, "crf_hz")
+            axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
         right.plot(sq[:1], crf[:1], "o", color=BLUE, markersize=4, label="new")
         stages = history.stages
         if stages is not None and stages.found:
@@ -146,12 +146,14 @@ def surfaces(body: Worn) -> Exhibit:
         figure = Figure(figsize=(medium.double, 3.3), layout="constrained")
         panels = panels_in_rows(figure, 3, sharey=True)
         height = quantity("height_m")
-        reach = height.factor * float(np.percentile(np.abs(body.before.heights), 99.5)) or 1.0
         lost = body.before.heights - body.after.heights
+        shown_after = body.after.heights + lost.mean()
+        both = np.stack([body.before.heights, shown_after])
+        reach = height.factor * float(np.percentile(np.abs(both), 99.5)) or 1.0
         extent = (0.0, display("surface_x_m", grid.extent[0]), 0.0, display("y_m", grid.extent[1]))
         shown: list[tuple[str, Field, dict[str, Any]]] = [
             ("new", body.before.heights, {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
-            ("after", body.after.heights + lost.mean(), {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
+            ("after", shown_after, {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
             ("lost", lost, {"cmap": "inferno", "vmin": min(0.0, height.factor * float(lost.min()))}),
         ]
         for axes, (name, heights, style) in zip(panels, shown, strict=True):
@@ -160,7 +162,8 @@ def surfaces(body: Worn) -> Exhibit:
             )
             axes.set(title=f"{body.name}, {name}", xlabel=quantity("surface_x_m").axis)
             if name != "new":
-                figure.colorbar(image, ax=axes, label=height.axis if name == "after" else "depth [µm]", extend="both")
+                title = quantity("worn_depth_m").label if name == "lost" else height.label
+                figure.colorbar(image, ax=axes, label=title, extend="both")
         panels[0].set_ylabel(quantity("y_m").axis)
         return figure
 
