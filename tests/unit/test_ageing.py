@@ -119,7 +119,7 @@ def test_killed_by_the_system_it_goes_on_to_the_same(unbroken, tmp_path):
 
 def test_more_hours_go_on_as_if_they_had_been_asked_for_at_first(unbroken, tmp_path):
     short = run_wear(case(), hours=0.55 * HOURS, out=tmp_path / "worn")
-    assert short.hours == pytest.approx(0.55 * HOURS, rel=1e-12)
+    assert short.hours == pytest.approx(0.55 * HOURS, rel=1e-12, abs=0.0)
     same(run_wear(case(), hours=HOURS, out=tmp_path / "worn"), unbroken)
     with pytest.raises(BadInput, match=r"holds .* h of wear, got 0.1 h"):
         run_wear(case(), hours=0.1, out=tmp_path / "worn")
@@ -144,7 +144,7 @@ def test_surfaces_are_files_that_others_open(tmp_path):
         row = worn.table.iloc[0 if "before" in path.name else -1]
         parameters = height_parameters(ours)
         for key, value in (("sq_m", parameters.sq), ("spk_m", parameters.spk), ("ssk", parameters.ssk)):
-            assert row[of_body(key, 0)] == pytest.approx(value, rel=1e-9)
+            assert row[of_body(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
 
 
 def test_a_moment_lies_between_its_rows(unbroken):
@@ -160,10 +160,10 @@ def test_the_interval_of_k_is_another_clock(unbroken):
     """What happens by the end with k at the ends of its interval, computed: it lies where the interval says."""
     band = unbroken.with_k("sq_m")
     slow, fast = unbroken.scaled_by
-    assert (slow, fast) == pytest.approx((np.exp(-0.8224), np.exp(0.8224)), rel=1e-4)
+    assert (slow, fast) == pytest.approx((np.exp(-0.8224), np.exp(0.8224)), rel=1e-4, abs=0.0)
     known = band[band["low"].notna()].iloc[-1]
     faster = run_wear(case({"wear.k": f"{1e-16 * fast!r} 1/Pa"}), hours=float(known["hours"]))
-    assert known["low"] == pytest.approx(faster.table["sq_m"].iloc[-1], rel=2e-3)
+    assert known["low"] == pytest.approx(faster.table["sq_m"].iloc[-1], rel=2e-3, abs=0.0)
     low, high = unbroken.volume_interval(0)
     assert low < unbroken.worn_volume[0] < high
     later = run_wear(case(), hours=HOURS * fast).worn_volume[0]
@@ -235,7 +235,7 @@ def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
     for recording, hours in zip(rig.recordings[::2], (0.0, HOURS), strict=True):
         moment = unbroken.at(hours)
         assert recording.clr == pytest.approx(moment["clr"])
-        assert recording.crf_hz == pytest.approx(moment["crf_hz"], rel=1e-9)
+        assert recording.crf_hz == pytest.approx(moment["crf_hz"], rel=1e-9, abs=0.0)
         assert recording.true_sq_m == pytest.approx(moment["sq_m"])
         assert abs(recording.sq_m - recording.true_sq_m) < 1e-7
     write_rig(rig, tmp_path / "rig")

@@ -3,8 +3,9 @@
 Where bodies touch all over, a wave of height A e^(iqx) carries a pressure of E* q A/2 and wears at k times it: A falls
 as exp(-k E* q s/2), s the way slid past it. A step that is longer than the shortest wave's decay would turn such waves
 over instead, and feed them. So a jump is no longer than that decay, and what it takes off is integrated along it
-exactly for such waves, by the factor (1 - exp(-z))/z, z = k E* q s/2, on every wave of the map: the mean is kept, and
-nothing is added anywhere, as the factor is a Cauchy density spread over widths.
+exactly for such waves, by the factor (1 - exp(-z))/z, z = k E* q s/2, on every wave of the map: a mean of Cauchy
+densities, so that the mean is kept and nothing is added anywhere. Where the cells end its spectrum it dips below 0 by
+some thousandths, which is cut off.
 """
 
 import math
@@ -82,7 +83,7 @@ def taken_off(rate: Field, seconds: float, exposure: Exposure, grid: Grid, reduc
     z = np.asarray(exposure.decay(np.hypot(waves[0][:, None], waves[1]), seconds, reduced_modulus))
     factor = np.where(z > 0.0, -np.expm1(-z) / np.where(z > 0.0, z, 1.0), 1.0)
     depth = scipy.fft.irfft2(scipy.fft.rfft2(rate * seconds) * factor, s=rate.shape)
-    # the transform rounds to a few ulps of the mean, and a cut-off spectrum may dip below 0: put back into the mean
+    # what dips below 0 is cut off, and the mean put back
     depth = np.maximum(depth, 0.0)
     if is_even(rate):
         depth = np.broadcast_to(depth.mean(axis=0), depth.shape)
