@@ -209,7 +209,8 @@ class Ageing:
         if self.model.removal_alone:
             return longest
         slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
-        return min(longest, max(worn.time, 1.0 / slowest))  # what settles at once is looked at often at first
+        settled = max(worn.time, 1.0 / slowest)  # what settles at once is looked at often at first
+        return min(longest, worn.longest, settled)
 
     def jumped(self, worn: Worn, at: Sequence[tuple[Position, Solved]], seconds: float) -> Worn:
         """Both bodies after a jump of so many seconds from the contacts at those positions."""
@@ -226,6 +227,7 @@ class Ageing:
             booked=(booked[0], booked[1]),
             rates=rates,
             seconds=seconds,
+            longest=math.inf,
             facts={},
         )
         after = self._controlled(worn, after, removed)
@@ -325,8 +327,10 @@ class Ageing:
             mechanical[other] -= self.volume(given, other)
         states: dict[str, State] = {**after.states, label: change.state}
         facts: Mapping[str, float] = {f"{label}.{key}": float(value) for key, value in change.facts.items()}
+        rate = self.overrolling[body]
         return replace(
             after,
+            longest=min(after.longest, change.longest / rate if rate > 0.0 else math.inf),
             changed=(changed[0], changed[1]),
             mechanical=(mechanical[0], mechanical[1]),
             states=states,

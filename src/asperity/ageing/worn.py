@@ -1,5 +1,6 @@
 """What a wearing contact has come to between two jumps: all that the next one needs, and its way to and from arrays."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -24,7 +25,8 @@ class Worn:
     `changed` what mechanisms added (or, negative, took). `booked` is what `worn` must be of volume [m^3], k times
     asperity load times sliding distance; `mechanical` what mechanisms took. `rates` [m/s] and `seconds` of the jump
     before, for the comparison of two jumps with one; `factor` on the length of jumps that it led to, `error` of Sq,
-    relative, that it has summed up to. `facts` of the jump and `states` of mechanisms, by name and body.
+    relative, that it has summed up to; `longest` [s] that mechanisms let the next jump take. `facts` of the jump and
+    `states` of mechanisms, by name and body.
     """
 
     number: int = 0
@@ -38,6 +40,7 @@ class Worn:
     mechanical: tuple[float, float] = (0.0, 0.0)
     factor: float = 1.0
     error: float = 0.0
+    longest: float = math.inf
     facts: Mapping[str, float] = field(default_factory=dict)
     states: Mapping[str, State] = field(default_factory=dict)
 
@@ -54,7 +57,16 @@ class Worn:
     def arrays(self) -> Arrays:
         """As arrays by name."""
         arrays: Arrays = {f"{name}_{body}": getattr(self, name)[body] for name in FIELDS for body in (0, 1)}
-        numbers = (self.number, self.time, self.seconds, self.factor, self.error, *self.booked, *self.mechanical)
+        numbers = (
+            self.number,
+            self.time,
+            self.seconds,
+            self.factor,
+            self.error,
+            self.longest,
+            *self.booked,
+            *self.mechanical,
+        )
         arrays["numbers"] = np.array(numbers)
         for name, value in self.facts.items():
             arrays[f"fact:{name}"] = np.array(value)
@@ -65,7 +77,7 @@ class Worn:
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "Worn":
         """What `arrays` made."""
-        number, time, seconds, factor, error, *volumes = map(float, arrays["numbers"])
+        number, time, seconds, factor, error, longest, *volumes = map(float, arrays["numbers"])
         states: dict[str, dict[str, npt.NDArray[Any]]] = {}
         for name, value in arrays.items():
             if name.startswith("state:"):
@@ -73,6 +85,6 @@ class Worn:
                 states.setdefault(mechanism, {})[key] = value
         facts = {name.removeprefix("fact:"): float(value) for name, value in arrays.items() if name.startswith("fact:")}
         maps: dict[str, Any] = {name: (arrays[f"{name}_0"], arrays[f"{name}_1"]) for name in FIELDS}
-        begun = cls(**maps, number=int(number), time=time, seconds=seconds, factor=factor, error=error)
+        begun = cls(**maps, number=int(number), time=time, seconds=seconds, factor=factor, error=error, longest=longest)
         booked, mechanical = (volumes[0], volumes[1]), (volumes[2], volumes[3])
         return replace(begun, booked=booked, mechanical=mechanical, facts=facts, states=states)

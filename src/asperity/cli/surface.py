@@ -7,7 +7,7 @@ import typer
 
 from asperity import case, report, surface
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, OutPicture, Quiet, Unit, require_output
+from asperity.cli.options import AsJson, LateralUnit, OutPicture, Quiet, Unit, require_output
 from asperity.cli.show import Block, Row, known, show, table, written
 from asperity.errors import BadInput
 from asperity.quantities import select
@@ -21,7 +21,7 @@ def surface_command(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")],
     out: OutPicture = None,
     unit: Unit = None,
-    lateral_unit: Annotated[str | None, typer.Option(help="Unit of x and y, for a file that names none.")] = None,
+    lateral_unit: LateralUnit = None,
     pixel: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Distance of the heights of a bare matrix: '1.6 um'.")
     ] = None,

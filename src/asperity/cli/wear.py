@@ -5,25 +5,31 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import ageing, report
+from asperity import ageing, case, report, wearing
+from asperity import surface as surfaces
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
+    LateralUnit,
     OutFolder,
     Overrides,
     Page,
     Quiet,
     SurfaceFile,
+    Unit,
     Workers,
     chosen_case,
     require_output,
 )
-from asperity.cli.show import Block, columns, progress, show, table, written
+from asperity.cli.show import Block, columns, progress, show, span, table, written
+from asperity.errors import BadInput
 from asperity.processes import cores
 from asperity.quantities import quantity
 
 if TYPE_CHECKING:
     from asperity.ageing import WearHistory, WearProgress
+    from asperity.surface import MeasuredSurface
+    from asperity.wearing import FittedWear
 
 STARTS = "the start; after installation the first solve compiles the solver, up to a minute ..."
 CONTACT = (
@@ -35,17 +41,45 @@ OF_BODIES = ("overrollings", "worn_depth_m", "worn_depth_max_m", "worn_volume_m3
 
 @app.command()
 def wear(
-    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="A case; its [wear] says how it wears.")],
-    hours: Annotated[float, typer.Option(metavar="H", help="Hours of running.")],
+    path: Annotated[
+        Path | None, typer.Argument(metavar="[CASE.toml]", help="A case; its [wear] says how it wears.")
+    ] = None,
+    hours: Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")] = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     out: OutFolder = None,
     workers: Workers = None,
     page: Page = None,
+    fit: Annotated[
+        Path | None, typer.Option(metavar="TRACE", help="In place of a case: k from a test's friction record ...")
+    ] = None,
+    scar: Annotated[Path | None, typer.Option(metavar="PROFILE", help="... and a profile across its track.")] = None,
+    unit: Unit = None,
+    lateral_unit: LateralUnit = None,
+    load: Annotated[str | None, typer.Option(metavar="FORCE", help="Of the test, if its record has it not.")] = None,
+    track_radius: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Of the test, if its record has it not.")
+    ] = None,
+    second_load: Annotated[str | None, typer.Option(metavar="FORCE", help="Of a second test, to predict.")] = None,
+    second_distance: Annotated[str | None, typer.Option(metavar="LENGTH", help="Of a second test, to predict.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Let the contact wear: surfaces, load sharing, film and resonance over hours."""
+    """Let the contact wear: surfaces, load sharing, film and resonance over hours. Or fit k to a test, with --fit."""
+    if fit is not None or scar is not None:
+        if fit is None or scar is None or path is not None or hours is not None:
+            raise BadInput("--fit TRACE and --scar PROFILE go together, without a case or --hours; give those two")
+        amounts = {
+            "load": _stated("--load", "N", load),
+            "track_radius": _stated("--track-radius", "m", track_radius),
+            "second_load": _stated("--second-load", "N", second_load),
+            "second_distance": _stated("--second-distance", "m", second_distance),
+        }
+        fitted = _fit(fit, surfaces.read_surface(scar, unit=unit, lateral_unit=lateral_unit), **amounts)
+        show(fitted.verdict(), fitted.scalars, _fitted(fitted), as_json=as_json, quiet=quiet)
+        return
+    if path is None or hours is None:
+        raise BadInput("asperity wear takes a case and --hours, or --fit TRACE and --scar PROFILE; give either pair")
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
     with progress(path.name, STARTS, quiet=quiet) as display:
@@ -73,6 +107,48 @@ def wear(
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _stated(option: str, unit: str, text: str | None) -> float | None:
+    return None if text is None else case.read_amount(option, unit, text)
+
+
+def _fit(
+    record: Path,
+    profile: "MeasuredSurface",
+    *,
+    load: float | None,
+    track_radius: float | None,
+    second_load: float | None,
+    second_distance: float | None,
+) -> "FittedWear":
+    trace = wearing.read_friction_trace(record, load=load, track_radius=track_radius)
+    return wearing.fit_wear_coefficient(trace, profile, second_load=second_load, second_distance=second_distance)
+
+
+def _fitted(fitted: "FittedWear") -> Block:
+    """What was read from a test, and what follows."""
+    trace, scar = fitted.trace, fitted.scar
+    estimates = {
+        "wear_coefficient": fitted.k,
+        "energy_wear_coefficient": fitted.energy_coefficient,
+        "scar_volume_m3": fitted.volume,
+        "second_volume_m3": fitted.second_volume,
+    }
+    rows = [
+        (quantity(key).title, f"{quantity(key).number(one.median)}, {span(key, (one.low, one.high))}")
+        for key, one in estimates.items()
+    ]
+    bounds = quantity("wear_coefficient")
+    rows += [
+        ("k if what is piled up is foreign", bounds.text(fitted.k_all_lost)),
+        ("k if it is the disc's own", bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, nothing is lost"),
+        ("load, way, laps", f"{trace.load:.4g} N, {trace.distance:.4g} m, {trace.laps:.4g}"),
+        ("track", f"radius {surfaces.length_text(trace.track_radius)}, width {surfaces.length_text(scar.width)}"),
+        ("missing, piled up", f"{scar.missing * 1e12:.3g}, {scar.piled * 1e12:.3g} µm²"),
+        (quantity("friction_coefficient").title, quantity("friction_coefficient").text(trace.coefficient)),
+    ]
+    yield from table(rows, fitted.notes)
 
 
 def _contact(worn: "WearHistory") -> Block:

@@ -12,6 +12,8 @@ from asperity.errors import AsperityError, BadInput
 
 ROUND = 1e-10  # below which a weight, or a way over a sphere's radius, is none
 STEPS = 1000  # far more than a path takes
+WALK = 50  # steps towards the centres of many spheres at once
+PATHS_AT_ONCE = 20_000  # so that they take some 10 MB
 _HALF, _SIXTH = np.sqrt(0.5), np.sqrt(1.0 / 6.0)
 
 
@@ -41,9 +43,7 @@ def dang_van(stresses: Field, slope: float) -> float:
     """
     hydrostatic = stresses[:3].mean(axis=0)
     deviators = _as_vectors(stresses)
-    middle = 0.5 * (deviators.max(axis=2) + deviators.min(axis=2))
-    radius = np.sqrt(np.square(deviators - middle[:, :, None]).sum(axis=0)).max(axis=1)
-    bounds = _HALF * radius + slope * hydrostatic.max(axis=1)  # half Tresca's difference is at most |s|/sqrt 2
+    bounds = _bounds(deviators, hydrostatic, slope)
     largest = -np.inf
     for path in np.argsort(-bounds):
         if bounds[path] <= largest:
@@ -52,6 +52,61 @@ def dang_van(stresses: Field, slope: float) -> float:
         about = points - smallest_sphere(points)[0]
         largest = max(largest, float(np.max(_half_tresca(about) + slope * hydrostatic[path])))
     return largest
+
+
+def dang_van_of_each(stresses: Field, slope: float, *, above: float = -np.inf) -> Field:
+    """The measure of every path [Pa], shape (paths,), for as many as a surface has.
+
+    Like `dang_van` but for the spheres, whose centres are walked to, all paths at once: they are 1 % too large, or two,
+    at most. A path that cannot exceed `above` [Pa] is given a bound that does not either.
+    """
+    hydrostatic = stresses[:3].mean(axis=0)
+    deviators = _as_vectors(stresses)
+    measure = _bounds(deviators, hydrostatic, slope)
+    asked = np.flatnonzero(measure > above)
+    for part in np.array_split(asked, max(1, -(-asked.size // PATHS_AT_ONCE))):
+        points = np.moveaxis(deviators[:, part], 0, -1)
+        about = points - _centres(points)[:, None, :]
+        shear = _half_tresca(about.reshape(-1, 5)).reshape(about.shape[:2])
+        measure[part] = (shear + slope * hydrostatic[part]).max(axis=1)
+    return measure
+
+
+def _bounds(deviators: Field, hydrostatic: Field, slope: float) -> Field:
+    """What the measure of each path cannot exceed [Pa]: half Tresca's difference is at most |s|/sqrt 2."""
+    middle = 0.5 * (deviators.max(axis=2) + deviators.min(axis=2))
+    radius = np.sqrt(np.square(deviators - middle[:, :, None]).sum(axis=0)).max(axis=1)
+    return np.asarray(_HALF * radius + slope * hydrostatic.max(axis=1))
+
+
+def _centres(points: Field) -> Field:
+    """About the centres of the smallest spheres round paths of shape (paths, times, dimensions).
+
+    The middle of two points that are far apart is one where all others lie between. Else the centre goes ever shorter
+    ways towards the furthest point; the best of all places is kept. Source: M. Bădoiu, K. L. Clarkson (2003).
+    """
+    squares = np.square(points).sum(axis=2)
+    one, _ = _furthest(points, squares, points[:, 0])
+    other, apart = _furthest(points, squares, one)
+    best = 0.5 * (one + other)
+    _, least = _furthest(points, squares, best)
+    walking = np.flatnonzero(least > 0.25 * apart * (1.0 + ROUND) + np.finfo(float).tiny)
+    points, squares, centre, closest = points[walking], squares[walking], best[walking], least[walking]
+    kept = centre.copy()
+    for step in range(WALK):
+        furthest, distance = _furthest(points, squares, centre)
+        closer = distance < closest
+        kept[closer], closest[closer] = centre[closer], distance[closer]
+        centre += (furthest - centre) / (step + 3.0)
+    best[walking] = kept
+    return best
+
+
+def _furthest(points: Field, squares: Field, centre: Field) -> tuple[Field, Field]:
+    """Of each path the point that is furthest from its centre, and the squared distance."""
+    distances = squares - 2.0 * np.matmul(points, centre[:, :, None])[:, :, 0]
+    which, each = distances.argmax(axis=1), np.arange(len(points))
+    return points[each, which], distances[each, which] + np.square(centre).sum(axis=1)
 
 
 def _as_vectors(stresses: Field) -> Field:

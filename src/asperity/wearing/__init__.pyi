@@ -1,3 +1,13 @@
+from .debris import Mark as Mark
+from .debris import Ploughing as Ploughing
+from .fatigue import DangVanPits as DangVanPits
+from .fatigue import Pits as Pits
+from .fatigue import VonMisesPits as VonMisesPits
+from .fit import Estimate as Estimate
+from .fit import FittedWear as FittedWear
+from .fit import FrictionTrace as FrictionTrace
+from .fit import fit_wear_coefficient as fit_wear_coefficient
+from .fit import read_friction_trace as read_friction_trace
 from .jumps import Exposure as Exposure
 from .jumps import is_even as is_even
 from .jumps import longest_jump as longest_jump
@@ -19,6 +29,12 @@ from .model import Mechanism as Mechanism
 from .model import Passage as Passage
 from .model import Patch as Patch
 from .model import State as State
+from .scar import Scar as Scar
+from .scar import ScarAreas as ScarAreas
+from .scar import find_scar as find_scar
+from .scuffing import HotScuffing as HotScuffing
+from .scuffing import LoadedScuffing as LoadedScuffing
+from .scuffing import Scuffing as Scuffing
 from .settings import MECHANISMS as MECHANISMS
 from .settings import WearModel as WearModel
 from .tracks import Position as Position

@@ -6,6 +6,7 @@ its own state is kept with the run. A mechanism keeps nothing itself and draws f
 run that was killed goes on as if it had not been.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol
@@ -97,13 +98,15 @@ class Change:
     `heights_change` [m] is added to the body's heights (negative: taken off); `transferred` [m], 0 or more, is what of
     it goes over to the other body, on the body's own track: its volume is booked as the other's gain, all else that
     `heights_change` sums to as worn off (or, where positive, as stuck on). `state` comes back next time; equal arrays
-    must give equal answers. `facts` are numbers of this jump by name, SI: rows of the result hold them.
+    must give equal answers. `facts` are numbers of this jump by name, SI: rows of the result hold them. `longest` is
+    how many over-rollings of this body the next jump may take at most, so that what the mechanism changes is seen.
     """
 
     heights_change: Field
     state: State = field(default_factory=dict)
     facts: Mapping[str, float] = field(default_factory=dict)
     transferred: Field | None = None
+    longest: float = math.inf
 
 
 class Mechanism(Protocol):

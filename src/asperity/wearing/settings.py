@@ -4,10 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from asperity.errors import BadInput, require_positive
+from asperity.wearing.debris import PLOUGHING
+from asperity.wearing.fatigue import FATIGUE
 from asperity.wearing.laws import Coefficient, RemovalLaw
 from asperity.wearing.model import Mechanism
+from asperity.wearing.scuffing import SCUFFING
 
-MECHANISMS: dict[str, Mapping[str, type[Mechanism]]] = {}  # what roughens: by key of [wear], its laws by name
+MECHANISMS: dict[str, Mapping[str, type[Mechanism]]] = {  # what roughens: by key of [wear], its laws by name
+    "fatigue": FATIGUE,
+    "ploughing": PLOUGHING,
+    "scuffing": SCUFFING,
+}
 DECAY = 20.0  # of the shortest wave, over the step: a factor e at the usual 0.05
 
 

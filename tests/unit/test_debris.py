@@ -1,0 +1,148 @@
+"""Ploughing: a mark's volume and square, what is cut off and what stands beside it, and the roughness of many."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity import BadInput
+from asperity.grid import Grid
+from asperity.wearing.debris import Mark, Ploughing, dragged, film_inside, stamp
+from support.passages import hertz_patches, passage, track
+
+FINE = Grid((800, 400), (-100e-6, -50e-6), (100e-6, 50e-6), (False, True))
+
+
+@pytest.mark.parametrize("length", [0.0, 60e-6])
+@pytest.mark.parametrize("cutting", [0.0, 0.3, 1.0])
+def test_volume_and_square_of_a_mark_are_the_closed_forms(length, cutting):
+    mark = Mark.of(length, 12e-6, 1e-6, cutting)
+    groove, ridge = mark.heights(FINE.x[:, None], FINE.y[None, :])
+    cell = float(np.prod(FINE.spacing))
+    assert groove.sum() * cell == pytest.approx(mark.dug, rel=2e-3, abs=0.0)
+    assert ridge.sum() * cell == pytest.approx(mark.piled, rel=2e-3, abs=1e-30)
+    assert np.square(groove - ridge).sum() * cell == pytest.approx(mark.square, rel=2e-3, abs=0.0)
+    assert mark.piled == pytest.approx((1.0 - cutting) * mark.dug, rel=1e-12, abs=1e-30)
+
+
+def test_a_groove_is_two_thirds_of_width_times_depth_across():
+    mark = Mark.of(60e-6, 12e-6, 1e-6, 1.0)
+    across, _ = mark.heights(np.zeros(1), FINE.y)
+    assert np.trapezoid(across, FINE.y) == pytest.approx(2.0 / 3.0 * 12e-6 * 1e-6, rel=1e-3, abs=0.0)
+    assert across.max() == pytest.approx(1e-6, rel=1e-3, abs=0.0)
+
+
+def test_a_mark_lies_on_a_coarse_grid_as_on_a_fine_one():
+    """Cells hold their mean of it: its volume does not hang on where it lies, though it is a cell wide; ends meet."""
+    grid = track((64, 32))
+    mark = Mark.of(30e-6, 6e-6, 0.5e-6, 0.3)
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        dug, piled = np.zeros(grid.cells), np.zeros(grid.cells)
+        stamp(dug, piled, mark, tuple(rng.uniform(grid.lower, grid.upper)), grid)
+        assert dug.sum() * np.prod(grid.spacing) == pytest.approx(mark.dug, rel=0.1, abs=0.0)
+        assert piled.sum() * np.prod(grid.spacing) == pytest.approx(mark.piled, rel=0.1, abs=0.0)
+
+
+def ploughed(cutting, seed=0, concentration=1e14):
+    grid = track((96, 48))
+    ploughing = Ploughing(concentration=concentration, smallest=8e-6, largest=20e-6, cutting=cutting, sinking=0.2)
+    patches = hertz_patches(grid, 50e-6, 1e9, 4)
+    jump = passage(grid, patches, jump=20.0, rng=np.random.default_rng(seed))
+    return ploughing, jump, ploughing(jump)
+
+
+@pytest.mark.parametrize("cutting", [0.0, 0.3, 1.0])
+def test_what_is_not_cut_off_stands_beside_to_rounding(cutting):
+    _, jump, change = ploughed(cutting)
+    cell = float(np.prod(jump.grid.spacing))
+    assert change.facts["marks"] > 10
+    lost = -change.heights_change.sum() * cell
+    dug = change.facts["volume_m3"]
+    assert lost == pytest.approx(cutting * dug, abs=1e-12 * dug)
+
+
+def test_as_many_particles_come_as_the_oil_holds():
+    _, jump, _ = ploughed(0.3)
+    film = film_inside(jump)
+    assert film == pytest.approx(0.5e-6, rel=1e-9, abs=0.0)
+    expected = 1e14 * film * 20.0 * 400e-6 * 200e-6
+    counts = [ploughed(0.3, seed)[2].facts["marks"] for seed in range(40)]
+    assert np.mean(counts) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 40))
+
+
+def test_sizes_follow_the_power_law():
+    ploughing = Ploughing(concentration=1e9, smallest=4e-6, largest=40e-6, exponent=3.0)
+    sizes = ploughing.sizes((np.arange(20_000) + 0.5) / 20_000)
+    assert sizes.min() == pytest.approx(4e-6, rel=1e-3, abs=0.0)
+    assert sizes.max() < 40e-6
+    for size in (6e-6, 10e-6, 20e-6):
+        more = (size**-3.0 - 40e-6**-3.0) / (4e-6**-3.0 - 40e-6**-3.0)
+        assert np.mean(sizes > size) == pytest.approx(more, abs=1e-4)
+
+
+def test_particles_thinner_than_the_film_pass_through():
+    grid = track()
+    ploughing = Ploughing(concentration=1e14, smallest=1e-6, largest=2e-6)
+    change = ploughing(passage(grid, hertz_patches(grid, 50e-6, 1e9, 4, film=3e-6), jump=10.0))
+    assert change.facts["marks"] == 0.0
+    assert not change.heights_change.any()
+
+
+def test_roughness_of_many_marks_is_campbells():
+    """Mean and variance of shot noise: density times the integral of a mark, and of its square. All marks alike."""
+    grid = track((128, 64))
+    cutting, density = 0.4, 60.0 / float(np.prod(grid.extent))
+    mark = Mark.of(25e-6, 20e-6, 1e-6, cutting)
+    rng = np.random.default_rng(7)
+    means, squares = [], []
+    for _ in range(150):
+        dug, piled = np.zeros(grid.cells), np.zeros(grid.cells)
+        for place in rng.uniform(grid.lower, grid.upper, size=(rng.poisson(60.0), 2)):
+            stamp(dug, piled, mark, tuple(place), grid)
+        heights = piled - dug
+        means.append(heights.mean())
+        squares.append(np.mean(np.square(heights)))
+    mean = -density * cutting * mark.dug
+    variance = density * mark.square
+    assert np.mean(means) == pytest.approx(mean, rel=0.04, abs=0.0)
+    assert np.mean(squares) - np.mean(means) ** 2 - np.var(means) == pytest.approx(
+        variance - np.var(means), rel=0.05, abs=0.0
+    )
+
+
+def test_the_next_jump_ends_before_sq_has_risen_much():
+    """Campbell's rise of Sq squared by a tenth, of marks of nearly one size."""
+    grid = track()
+    ploughing = Ploughing(concentration=1e12, smallest=10e-6, largest=10.001e-6)
+    waves = 1e-6 * np.cos(0.2 * np.arange(64.0))[:, None] + np.zeros(grid.cells)
+    jump = passage(grid, hertz_patches(grid, 50e-6, 1e9, 4), jump=1e-6, heights=waves)
+    mark = ploughing.mark(10e-6, 0.5e-6, jump)
+    assert ploughing(jump).longest == pytest.approx(0.1 * np.var(waves) / (1e12 * 0.5e-6 * mark.square), rel=1e-3)
+    assert ploughing(replace(jump, heights=np.zeros(grid.cells))).longest == np.inf
+
+
+def test_without_sliding_a_mark_is_a_dent():
+    grid = track()
+    patches = hertz_patches(grid, 50e-6, 1e9, 2)
+    assert dragged(passage(grid, patches, sliding_speed=0.0)) == 0.0
+    assert dragged(passage(grid, patches, sliding_speed=0.4)) == pytest.approx(2 * 50e-6 * 0.4 / 1.6, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"concentration": 0.0}, "ploughing concentration must be positive"),
+        ({"concentration": 1e9, "cutting": 1.2}, "ploughing cutting must lie between 0 and 1"),
+        ({"concentration": 1e9, "sinking": 0.7}, r"ploughing sinking must lie between 0 and 0\.5"),
+        ({"concentration": 1e9, "largest": 1e-6}, "ploughing largest must exceed smallest"),
+    ],
+)
+def test_what_ploughing_refuses(wrong, said):
+    with pytest.raises(BadInput, match=said):
+        Ploughing(**wrong)
+
+
+def test_too_many_marks_are_refused_before_they_are_made():
+    with pytest.raises(BadInput, match="marks in one jump"):
+        ploughed(0.3, concentration=1e22)

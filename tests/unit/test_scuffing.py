@@ -1,0 +1,100 @@
+"""Scuffing: nothing below its limit, the closed threshold, and where the material goes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity import BadInput
+from asperity.rating import flash_rise
+from asperity.wearing.scuffing import HotScuffing, LoadedScuffing
+from support.passages import hertz_patches, passage, track
+
+P_MAX, MU = 1e9, 0.1
+
+
+def rubbed(**given):
+    grid = track()
+    patches = hertz_patches(grid, 50e-6, P_MAX, 4, friction=MU, asperities=1.0)
+    waves = 1e-4 * np.cos(0.1 * np.arange(grid.cells[0]))[:, None] + np.zeros(grid.cells)  # as rough as nothing matters
+    return passage(grid, patches, **({"removed": np.full(grid.cells, 1e-9), "heights": waves} | given))
+
+
+def test_below_the_limit_is_exactly_nothing():
+    change = LoadedScuffing(limit=1.0001 * MU * P_MAX**2)(rubbed())
+    assert not change.heights_change.any()
+    assert not change.transferred.any()
+    assert change.facts["load_share"] == 0.0
+
+
+def test_a_cell_scuffs_where_pressure_times_shear_passes_the_limit():
+    """μ p² > limit: of a Hertz pressure within x² < a² (1 - limit/(μ p_max²))."""
+    grid = track((400, 8))
+    (patch,) = hertz_patches(grid, 50e-6, P_MAX, 1, friction=MU, asperities=1.0)
+    passed = LoadedScuffing(limit=0.36 * MU * P_MAX**2).passed(patch)
+    assert np.array_equal(passed[:, 0], np.abs(grid.x) < 0.8 * 50e-6)
+
+
+def test_removal_jumps_by_the_factor_and_the_volume_is_shared():
+    """A load share s of a cell scuffs: (factor - 1) s of what the law removed; of it `transfer` goes over."""
+    jump = rubbed()
+    change = LoadedScuffing(limit=0.25 * MU * P_MAX**2, factor=1000.0, transfer=0.3)(jump)
+    load = sum(patch.asperity_pressure for patch in jump.patches)
+    hot = sum(np.where(patch.pressure > 0.5 * P_MAX, patch.asperity_pressure, 0.0) for patch in jump.patches)
+    expected = 999.0 * np.divide(hot, load, out=np.zeros_like(load), where=load > 0.0) * 1e-9
+    np.testing.assert_allclose(-change.heights_change, expected, rtol=1e-12)
+    np.testing.assert_array_equal(change.transferred, -0.3 * change.heights_change)
+    volume = -change.heights_change.sum() * float(np.prod(jump.grid.spacing))
+    assert change.facts["volume_m3"] == pytest.approx(volume, rel=1e-12, abs=0.0)
+    assert change.facts["load_share"] == pytest.approx(hot.sum() / load.sum(), rel=1e-12, abs=0.0)
+
+
+def test_scuffing_takes_a_tenth_of_sq_and_then_the_contact_is_asked_again():
+    scuffing = LoadedScuffing(limit=0.25 * MU * P_MAX**2)
+    slow, fast = (scuffing(rubbed(removed=np.full((64, 32), depth))) for depth in (1e-9, 1e-6))
+    sq = float(np.std(rubbed().heights))
+    assert -slow.heights_change.min() < 0.1 * sq
+    assert -fast.heights_change.min() == pytest.approx(0.1 * sq, rel=1e-9)
+    assert fast.longest == pytest.approx(slow.longest / 1000.0, rel=1e-9)
+    assert fast.longest / 1e5 == pytest.approx(0.1 * sq / (-slow.heights_change.min() * 1000.0), rel=1e-9)
+    assert LoadedScuffing(limit=1e30)(rubbed()).longest == np.inf
+
+
+def test_the_threshold_of_temperature_is_bloks():
+    """A friction just above the one at which Blok's rise is the limit scuffs, one just below does not."""
+    line_load, width, speeds = 0.5 * np.pi * 50e-6 * P_MAX, 50e-6, (2.0, 1.5)
+    threshold = 100.0 / flash_rise(1.0, line_load, width, speeds)
+    scuffing = HotScuffing(limit=100.0)
+    for friction, share in ((0.999 * threshold, False), (1.001 * threshold, True)):
+        rise = flash_rise(friction, line_load, width, speeds)
+        hot = [
+            replace(patch, temperature=rise * patch.pressure / patch.pressure.max())
+            for patch in hertz_patches(track((65, 8)), width, P_MAX, 1, asperities=1.0)
+        ]
+        assert scuffing.passed(hot[0]).any() == share
+
+
+def test_only_what_touches_scuffs():
+    grid = track()
+    (patch,) = hertz_patches(grid, 50e-6, P_MAX, 1, friction=MU, asperities=0.0)
+    hot = replace(patch, temperature=np.full(grid.cells, 1e3))
+    assert not HotScuffing(limit=100.0).passed(hot).any()
+    assert not LoadedScuffing(limit=1.0).passed(hot).any()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"limit": -5.0}, "scuffing limit must be positive"),
+        ({"limit": 100.0, "factor": 0.5}, "scuffing factor must be 1 or more"),
+        ({"limit": 100.0, "transfer": 1.5}, "scuffing transfer must lie between 0 and 1"),
+    ],
+)
+def test_what_scuffing_refuses(wrong, said):
+    with pytest.raises(BadInput, match=said):
+        HotScuffing(**wrong)
+
+
+def test_a_temperature_that_nobody_worked_out_is_asked_for():
+    with pytest.raises(BadInput, match="needs the flash temperature"):
+        HotScuffing(limit=100.0)(rubbed())
