@@ -23,6 +23,7 @@ FINE = 4.0  # points across a groove, at least: cells are divided for it
 FINEST = 16
 MOST_MARKS = 200_000  # in a jump
 RISE = 0.1  # of Sq squared, in a jump
+SMOOTH = 1e-7  # that Sq is taken to be at least for it [m]
 SHARES = 50  # of sizes, for their mean
 
 
@@ -137,8 +138,8 @@ class Ploughing(Parametric):
         sizes = self.sizes((np.arange(SHARES) + 0.5) / SHARES)
         squares = [self.mark(float(size), film, passage).square for size in sizes if size > film]
         rise = self.density(film) * sum(squares) / SHARES
-        now = float(np.var(passage.heights + change))
-        return RISE * now / rise if rise > 0.0 and now > 0.0 else np.inf
+        now = max(float(np.var(passage.heights + change)), SMOOTH**2)
+        return RISE * now / rise if rise > 0.0 else np.inf
 
     def density(self, film: float) -> float:
         """Particles that one over-rolling brings to an area [1/m^2]: those in the oil that the film holds."""
