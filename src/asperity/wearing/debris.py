@@ -22,8 +22,7 @@ RIDGE = 0.5  # width of the ridge on either side over the groove's own
 FINE = 4.0  # points across a groove, at least: cells are divided for it
 FINEST = 16
 MOST_MARKS = 200_000  # in a jump
-RISE = 0.1  # of Sq squared, in a jump
-SMOOTH = 1e-7  # that Sq is taken to be at least for it [m]
+RISE = 0.1  # of Sq squared, or of the film squared where that is more, in a jump
 SHARES = 50  # of sizes, for their mean
 
 
@@ -134,11 +133,11 @@ class Ploughing(Parametric):
         return Change(heights_change=change, facts=facts, longest=self._longest(passage, film, change))
 
     def _longest(self, passage: Passage, film: float, change: Field) -> float:
-        """Over-rollings in which marks raise the body's Sq by a set share."""
+        """Over-rollings in which marks raise the body's Sq squared by a set share, of the film's where that is more."""
         sizes = self.sizes((np.arange(SHARES) + 0.5) / SHARES)
         squares = [self.mark(float(size), film, passage).square for size in sizes if size > film]
         rise = self.density(film) * sum(squares) / SHARES
-        now = max(float(np.var(passage.heights + change)), SMOOTH**2)
+        now = max(float(np.var(passage.heights + change)), film**2)
         return RISE * now / rise if rise > 0.0 else np.inf
 
     def density(self, film: float) -> float:
