@@ -40,6 +40,7 @@ PARTS = (  # those first that the others' times are told against
     "damping",
     "damping_stages",
     "wearing",
+    "alarms",
     "motion_table",
 )
 ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors

@@ -44,7 +44,7 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     )  # fmt: skip
     said = json.loads(out)
     assert (code, err) == (3, "")
-    assert said["verdict"].startswith("ALARM: ")
+    assert said["verdict"].startswith("ALARM since sample-")
     assert len(said["recordings"]) == len(truth) == 24
     for row in said["recordings"]:
         assert set(row) >= KEYS
@@ -82,7 +82,7 @@ def test_damping_decides_where_it_is_asked_to(asp, rig):
     assert (
         by_damping["stages"]["kind"] == by_damping["stages_by"]["damping"]["kind"] == "no change"
     )  # of the rig's sphere
-    assert by_damping["alarm"]["level"] == "none"
+    assert by_damping["alarm"]["state"] == "none"
     out = asp("track", *series, "--stages-from", "both")[1]
     assert "stage by CRF and damping, which decides" in out
     assert "damping does not change" in out
@@ -104,7 +104,7 @@ def test_track_says_what_it_assumed_and_what_it_left_out(asp, rig):
         file["acceleration"][:] *= 1e-3
     Path("copy/sample-01-test-2.h5").write_bytes(b"not HDF5")
     code, out, _ = asp("track", "copy", "--method", "peak", "--out", "t.csv")
-    assert code in (0, 3)
+    assert code in (0, 3, 4)
     assert "band" in out
     assert "paper's contact, because neither a case nor a band was given" in out
     assert "machine was off" in out
@@ -121,7 +121,7 @@ def test_a_copy_is_named_and_too_few_places_have_no_stage(asp, rig, tmp_path):
     shutil.copy(file, few / "copy.h5")
     code, out, _ = asp("track", str(few), "--method", "peak", "--rate", "20 kHz", "--json")
     said = json.loads(out)
-    assert code == 0
+    assert code == 4  # cannot tell
     assert any("copy.h5" in note and "hold the same samples" in note for note in said["notes"])
     assert said["stages"]["probability"] == [None] * 4
     assert "± nan" not in asp("track", str(few), "--method", "peak")[1]
@@ -139,7 +139,7 @@ def test_recordings_without_a_resonance_cannot_tell(asp):
     for number in range(7):
         np.savez(f"noise-{number}.npz", acc=rng.standard_normal(40_000), fs=20e3, unit="m/s^2")
     code, out, _ = asp("track", *(f"noise-{number}.npz" for number in range(7)), "--case", "case.toml")
-    assert code == 0
+    assert code == 4
     assert out.startswith("These recordings cannot tell: no contact resonance found in 7 recordings")
 
 

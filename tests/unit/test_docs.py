@@ -53,7 +53,8 @@ EXCEPTIONS = {  # what is right but of none of these kinds
 OF_JSON = {  # what golden numbers do not show of `--json`
     "null": "of JSON itself",
     "seconds": "no two runs share it",
-    "alert": "a level that the golden series does not reach",
+    "alert": "a state that the golden series does not reach",
+    "blind": "a state that the golden series does not reach",
     "reason": "of a file that is refused",
     "pass": "of a history with flattening, and longer than the golden one",
     "ra_m": "of a profile",

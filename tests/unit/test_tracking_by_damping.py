@@ -51,10 +51,10 @@ def test_crf_sees_nothing_where_damping_sees_the_stage(track):
 def test_what_decides_has_labels_and_alarm(track, series):
     assert track.stages is track.stages_by["damping"]
     assert track.recordings[-1].label == "severe"
-    assert track.alarm.level in ("alert", "alarm")
+    assert track.alarm.state in ("alert", "alarm")
     plain = track_recordings(series, band_hz=(2e3, 4e3), x=PLACES, method="likelihood")
     assert plain.stages is plain.stages_by["crf"]
-    assert plain.alarm.level == "none"
+    assert plain.alarm.state == "none"
     assert {one.label for one in plain.recordings} == {"none"}
     rows = dict(track.stage_rows())
     assert set(rows) == {"stage by CRF", "stage by damping, which decides", "stage by CRF and damping"}
@@ -84,9 +84,10 @@ def test_a_method_without_a_width_determines_no_damping(series):
     track = track_recordings(series, band_hz=(2e3, 4e3), x=PLACES, method="peak", stages_from="both")
     assert {one.damping_reason for one in track.recordings} == {"the method peak fits no width"}
     assert track.stages.kind == "too few"
-    assert track.verdict().startswith("Not determined: ")
+    assert track.verdict().startswith("Cannot tell: none of the last 3 recordings show what decides")
+    assert "Not determined: " in track.verdict()
     assert np.isnan([one.severe_probability for one in track.recordings]).all()
-    assert track.alarm.verdict.startswith("No alarm, and none could be")
+    assert track.alarm.state == "cannot-tell"
     assert any("not determined of 12 of 12 resonances: the method peak" in note for note in track.notes)
     page = render_track_page(track)
     assert page.count("not determined</td>") >= 12

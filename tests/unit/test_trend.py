@@ -6,7 +6,7 @@ import pytest
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.coupling import VibrationModel, dry_full_load, oscillator
 from asperity.errors import BadInput
-from asperity.wear import RecordingFacts, asperity_load_share, comparability, trend_alarm
+from asperity.wear import RecordingFacts, asperity_load_share, comparability
 
 FACTS = RecordingFacts(name="a.csv", rate_hz=20e3, segment=20_000, window="hann", unit="m/s^2", duration_s=300.0)
 
@@ -73,36 +73,3 @@ def test_different_loads_and_speeds_are_told_apart():
     assert comparability([known, known]) == ()
     problems = comparability([known, replace(known, load_n=400.0, speed_hz=50.0)])
     assert [problem.split()[1] for problem in problems] == ["load", "speed"]
-
-
-def levels(*values, in_a_row=3):
-    return trend_alarm(np.array(values), alert=0.5, danger=0.9, in_a_row=in_a_row)
-
-
-def test_an_alarm_takes_a_row():
-    assert levels(0.95, 0.95, 0.1, 0.95, 0.95).level == "none"
-    raised = levels(0.1, 0.95, 0.95, 0.95)
-    assert (raised.level, raised.since) == ("alarm", 3)
-    assert raised.levels == ("none", "none", "none", "alarm")
-
-
-def test_a_row_of_both_levels_is_an_alert():
-    found = levels(0.6, 0.95, 0.6)
-    assert (found.level, found.since) == ("alert", 2)
-
-
-def test_an_alarm_is_lowered_by_a_row_too():
-    assert levels(0.95, 0.95, 0.95, 0.1, 0.1).level == "alarm"
-    assert levels(0.95, 0.95, 0.95, 0.6, 0.6, 0.6).level == "alert"
-    assert levels(0.95, 0.95, 0.95, 0.1, 0.1, 0.1).level == "none"
-
-
-def test_recordings_without_a_value_neither_raise_nor_lower():
-    assert levels(0.95, np.nan, 0.95, np.nan, 0.95).level == "alarm"
-    assert levels(0.95, 0.95, np.nan, np.nan).level == "none"
-
-
-@pytest.mark.parametrize("arguments", [{"alert": 0.9, "danger": 0.5}, {"alert": 0.5, "danger": 0.9, "in_a_row": 0}])
-def test_alarms_that_make_no_sense_are_refused(arguments):
-    with pytest.raises(BadInput):
-        trend_alarm(np.array([0.1]), **arguments)

@@ -25,7 +25,8 @@ PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda
 
 app = typer.Typer(
     help="Hears how a lubricated contact wears: film, load sharing of asperities and oil, contact resonance.",
-    epilog="Exit codes: 0 done, 2 bad input or usage, 3 done with an alarm, 1 anything else.",
+    epilog="Exit codes: 0 done, 2 bad input or usage, 1 anything else; of track and watch: 3 alarm, 4 cannot tell, "
+    "5 sensor or machine off.",
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

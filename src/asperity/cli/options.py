@@ -1,5 +1,6 @@
 """The options that commands share, each declared once; and what is made of them before the work begins."""
 
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
@@ -24,6 +25,15 @@ def _stage_source(text: str) -> str:
     """What stages are read from, refused before a file is."""
     require_choice("--stages-from", text, get_args(wear.StageSource))
     return text
+
+
+def _rate_of_alarms(text: str) -> float:
+    """Alarms a recording: a share such as 0.001 or 1/1000, or recordings for one alarm."""
+    try:
+        rate = float(Fraction(str(text)))
+    except (ValueError, ZeroDivisionError):
+        raise BadInput(f"--false-alarms must be a rate such as 0.001 or 1/1000, got {text!r}") from None
+    return 1.0 / rate if rate >= 1.0 else rate
 
 
 CaseOrRun = Annotated[Path, typer.Argument(metavar="CASE.toml|RUN.nc", help="A case file, or a kept run.")]
@@ -97,6 +107,20 @@ StagesFrom = Annotated[
         metavar="INDICATOR",
         parser=_stage_source,
         help="What decides stage and alarm: crf, damping or both; all are told.",
+    ),
+]
+FalseAlarms = Annotated[
+    float,
+    typer.Option(
+        metavar="RATE",
+        parser=_rate_of_alarms,
+        help="Alarms a recording without wear, such as 0.001 or 1/1000 (the same: 1000).",
+    ),
+]
+Acknowledge = Annotated[
+    str | None,
+    typer.Option(
+        metavar="RECORDING", help="Somebody has looked, up to this recording or 'last': begin anew behind it."
     ),
 ]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]

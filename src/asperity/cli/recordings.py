@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track
     from asperity.wear import SeriesMethod, StageSource
 
-ALARM = 3
+EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # of the alarm's state; the others end with 0
 IN_FULL = 4  # recordings that `check` shows with every fact
 
 
@@ -108,6 +108,8 @@ def track(
     shaft: options.Shaft = None,
     method: options.Method = None,
     stages_from: options.StagesFrom = "crf",
+    false_alarms: options.FalseAlarms = 1e-3,
+    acknowledge: options.Acknowledge = None,
     page: options.Page = None,
     out: Annotated[
         list[Path] | None, typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat.")
@@ -134,6 +136,8 @@ def track(
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
             stages_from=cast("StageSource", stages_from),
+            false_alarm_rate=false_alarms,
+            acknowledge=acknowledge,
             workers=workers or processes.cores(),
             progress=step,
         )
@@ -150,8 +154,7 @@ def track(
         as_json=as_json,
         quiet=quiet,
     )
-    if tracked.alarmed:
-        raise typer.Exit(ALARM)
+    _end(tracked)
 
 
 @app.command()
@@ -174,6 +177,8 @@ def watch(
     shaft: options.Shaft = None,
     method: options.Method = None,
     stages_from: options.StagesFrom = "crf",
+    false_alarms: options.FalseAlarms = 1e-3,
+    acknowledge: options.Acknowledge = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -182,7 +187,7 @@ def watch(
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     files.make_folder(kept)
-    alarmed = False
+    last: Track | None = None
     with _files_read("watching ...", quiet=quiet) as step:
         updates = tracking.watch_folder(
             folder,
@@ -197,6 +202,8 @@ def watch(
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
             stages_from=cast("StageSource", stages_from),
+            false_alarm_rate=false_alarms,
+            acknowledge=acknowledge,
             once=once,
             every_s=every,
             settle_s=settle,
@@ -205,7 +212,7 @@ def watch(
         )
         try:
             for update in updates:
-                alarmed = update.track is not None and update.track.alarmed
+                last = update.track
                 if update.track is not None:
                     _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / "report.html")
                 _show_update(update.new, update.track, update.waiting, kept, as_json=as_json, quiet=quiet)
@@ -213,8 +220,14 @@ def watch(
             if once:
                 raise
             print(f"stopped; what was heard is in {kept}, and the next watch goes on from there", file=sys.stderr)
-    if alarmed:
-        raise typer.Exit(ALARM)
+    _end(last)
+
+
+def _end(tracked: "Track | None") -> None:
+    """End with the code that the alarm's state has; without any recording nothing can be told."""
+    state = "cannot-tell" if tracked is None else tracked.alarm.state
+    if state in EXIT_CODES:
+        raise typer.Exit(EXIT_CODES[state])
 
 
 def _show_update(

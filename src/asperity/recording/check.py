@@ -26,7 +26,8 @@ USABLE_BAND = 0.4  # of the sampling rate: above, the anti-alias filter has cut
 class Quality:
     """What the samples of a recording are like.
 
-    `rms` (about the mean), `peak` (from the mean), `offset` in the recording's unit; `missing`, `clipped`, `stuck`
+    `rms` (about the mean), `peak` (from the mean), `offset` in the recording's unit; `kurtosis` is 3 for Gaussian
+    noise; `missing`, `clipped`, `stuck`
     shares of the samples, 0 to 1. `faults` are sentences for which it must not be used, `remarks` such that a reader
     of its numbers has to know.
     """
@@ -36,6 +37,7 @@ class Quality:
     rms: float
     peak: float
     offset: float
+    kurtosis: float
     missing: float
     gaps: int
     clipped: float
@@ -43,6 +45,11 @@ class Quality:
     off: bool
     faults: tuple[str, ...]
     remarks: tuple[str, ...]
+
+    @property
+    def crest(self) -> float:
+        """Peak over rms; nan where nothing moves."""
+        return self.peak / self.rms if self.rms > 0.0 else np.nan
 
     @property
     def usable(self) -> bool:
@@ -55,7 +62,7 @@ class Gauge:
 
     def __init__(self) -> None:
         self.samples = self.finite = self.gaps = self.clipped_low = self.clipped_high = self.stuck = 0
-        self.mean = self.squares = 0.0
+        self.mean = self.squares = self.cubes = self.fourths = 0.0  # sums of powers about the mean
         self.low, self.high = np.inf, -np.inf
         self.step: float | None = None
         self._last = np.zeros(0)
@@ -85,17 +92,35 @@ class Gauge:
         self.gaps += begins
         if not values.size:
             return
-        squares = float(np.einsum("i,i->", values, values)) - values.size * mean**2  # BLAS would wake its threads
-        if squares < 1e-6 * values.size * mean**2:  # an offset has eaten the digits
-            squares = float(np.sum((values - mean) ** 2))
-        both = self.finite + values.size
-        self.squares += squares + (mean - self.mean) ** 2 * self.finite * values.size / both
-        self.mean += (mean - self.mean) * values.size / both
-        self.finite = both
+        self._moments(values, mean)
         self._extremes(values)
         self._stand_still(values)
         if self.step is None:
             self.step = _converter_step(values[: 1 << 16])
+
+    def _moments(self, values: Field, mean: float) -> None:
+        """Joins the block's central moments to those before (Pébay, Sandia report SAND2008-6212)."""
+        centred = values - mean
+        square = centred**2
+        squares, cubes, fourths = (  # BLAS would wake its threads
+            float(np.einsum("i,i->", *pair)) for pair in ((centred, centred), (square, centred), (square, square))
+        )
+        before, here = self.finite, values.size
+        both, apart = before + here, mean - self.mean
+        self.fourths += (
+            fourths
+            + apart**4 * before * here * (before**2 - before * here + here**2) / both**3
+            + 6.0 * apart**2 * (before**2 * squares + here**2 * self.squares) / both**2
+            + 4.0 * apart * (before * cubes - here * self.cubes) / both
+        )
+        self.cubes += (
+            cubes
+            + apart**3 * before * here * (before - here) / both**2
+            + 3.0 * apart * (before * squares - here * self.squares) / both
+        )
+        self.squares += squares + apart**2 * before * here / both
+        self.mean += apart * here / both
+        self.finite = both
 
     def _extremes(self, values: Field) -> None:
         low, high = float(values.min()), float(values.max())
@@ -167,6 +192,7 @@ class Gauge:
             rms=rms,
             peak=max(self.high - self.mean, self.mean - self.low) if self.finite else 0.0,
             offset=self.mean,
+            kurtosis=self.finite * self.fourths / self.squares**2 if self.squares > 0.0 else np.nan,
             missing=missing,
             gaps=self.gaps,
             clipped=clipped,

@@ -7,9 +7,6 @@ from .model import TrackedRecording as TrackedRecording
 from .reading import Reading as Reading
 from .target import Target as Target
 from .target import search_target as search_target
-from .track import ALERT as ALERT
-from .track import DANGER as DANGER
-from .track import IN_A_ROW as IN_A_ROW
 from .track import track_recordings as track_recordings
 from .watch import Update as Update
 from .watch import watch_folder as watch_folder

@@ -18,7 +18,7 @@ from asperity.kept import netcdf_bytes
 from asperity.quantities import quantity
 from asperity.tracking.reading import Reading
 from asperity.tracking.target import Target
-from asperity.wear import IN_WORDS, Alarm, AlarmLevel, CleanSpectrum, Resonance, Stages, StageSource
+from asperity.wear import IN_WORDS, Alarm, AlarmState, CleanSpectrum, Resonance, Stages, StageSource
 
 if TYPE_CHECKING:
     import pandas
@@ -36,7 +36,8 @@ class TrackedRecording:
 
     `resonance` is not found, with its reason, for a recording that could not be used. `clr` and its 90 % interval are
     the contact model's reading of the CRF, nan without one. `damping_reason` says why the width of its line is no
-    damping ratio that can be followed; empty where it is one. `label` is the stage's name; `level` that of the alarm.
+    damping ratio that can be followed; empty where it is one. `label` is the stage's name; `state` the
+    alarm's after it.
     """
 
     file: str
@@ -52,7 +53,7 @@ class TrackedRecording:
     clr_interval: tuple[float, float] = (np.nan, np.nan)
     severe_probability: float = np.nan
     label: str = "none"
-    level: AlarmLevel = "none"
+    state: AlarmState = "none"
 
     @property
     def damping(self) -> tuple[float, float]:
@@ -82,12 +83,15 @@ class TrackedRecording:
             "clr_high": finite_or_none(self.clr_interval[1]),
             "severe_probability": finite_or_none(self.severe_probability),
             "label": self.label,
-            "level": self.level,
+            "state": self.state,
             "started": self.reading.started or None,
             "rate_hz": finite_or_none(self.reading.rate_hz),
             "unit": self.reading.unit or None,
             "duration_s": None if quality is None else quality.duration_s,
-            "rms": None if quality is None else finite_or_none(quality.rms),
+            **{
+                name: None if quality is None else finite_or_none(getattr(quality, name))
+                for name in ("rms", "crest", "kurtosis")
+            },
             "load_n": self.load_n,
             "speed_hz": self.speed_hz,
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
@@ -120,24 +124,30 @@ class Track:
         """In how many recordings a contact resonance was found."""
         return sum(recording.resonance.found for recording in self.recordings)
 
-    @property
-    def alarmed(self) -> bool:
-        """Whether the verdict is an alarm."""
-        return self.alarm.level == "alarm"
-
     def verdict(self) -> str:
         """One sentence: the stage with its confidence, or that these recordings cannot tell, and why."""
         total = len(self.recordings)
         several = f"{total} recordings" if total != 1 else "1 recording"
-        if self.stages is None:
-            reasons = [recording.resonance.reason for recording in self.recordings]
-            (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
-            reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
-            share = f"{count} of {total}: " if count < total else ""
-            return f"These recordings cannot tell: no contact resonance found in {several} ({share}{reason})."
-        level = {"alarm": "ALARM: ", "alert": "Alert: "}.get(self.alarm.level, "")
-        resonances = f"contact resonance found in {self.resonance_count} of {several}"
-        return f"{level}{self.stages.verdict.rstrip('.')}; {resonances}."
+        seen = self._without_resonance(several)
+        if self.stages is not None:
+            seen = f"{self.stages.verdict.rstrip('.')}; contact resonance found in {self.resonance_count} of {several}."
+        alarm = self.alarm
+        if alarm.state == "alarm":
+            first = Path(self.recordings[alarm.since or 0].file).name
+            return f"ALARM since {first}: {alarm.reason}. {seen}"
+        if alarm.state == "alert":
+            return f"Alert: {alarm.reason}. {seen}"
+        if alarm.state == "blind" or (alarm.state == "cannot-tell" and self.stages is not None):
+            return f"{alarm.verdict} {seen}"
+        return seen
+
+    def _without_resonance(self, several: str) -> str:
+        """That no contact resonance was found in several recordings, and the commonest reason."""
+        reasons = [recording.resonance.reason for recording in self.recordings]
+        (kind, count), *_ = Counter(map(_without_numbers, reasons)).most_common(1)
+        reason = next(reason for reason in reasons if _without_numbers(reason) == kind)
+        share = f"{count} of {len(reasons)}: " if count < len(reasons) else ""
+        return f"These recordings cannot tell: no contact resonance found in {several} ({share}{reason})."
 
     def stage_rows(self) -> list[tuple[str, str]]:
         """What CRF, damping and both say of the stage, the deciding one marked."""
@@ -163,7 +173,7 @@ class Track:
                 "evidence": {} if stages is None else {k: finite_or_none(v) for k, v in stages.evidence.items()},
             },
             "stages_by": {source: _in_json(stages) for source, stages in self.stages_by.items()},
-            "alarm": {"level": self.alarm.level, "verdict": self.alarm.verdict},
+            "alarm": self._alarm(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),
             "band_source": self.target.source,
@@ -172,6 +182,17 @@ class Track:
             "crfa_comparable": self.comparable,
             "problems": list(self.problems),
             "notes": list(self.notes),
+        }
+
+    def _alarm(self) -> dict[str, Any]:
+        alarm = self.alarm
+        return {
+            "state": alarm.state,
+            "since": None if alarm.since is None else self.recordings[alarm.since].file,
+            "false_alarm_rate": alarm.false_alarm_rate,
+            "reason": alarm.reason,
+            "raised_by": alarm.raised_by or None,
+            "verdict": alarm.verdict,
         }
 
     @property

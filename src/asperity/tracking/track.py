@@ -17,11 +17,13 @@ from asperity.case import Case
 from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
+from asperity.tracking.alarming import raise_alarm
 from asperity.tracking.files import Place, Table, read_table, recordings_in
 from asperity.tracking.model import Track, TrackedRecording
 from asperity.tracking.reading import WINDOW, Reading, common_spacing, read_spectra
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
+    FALSE_ALARMS,
     FEWEST_RECORDINGS,
     CleanSpectrum,
     Detector,
@@ -37,12 +39,10 @@ from asperity.wear import (
     remove_lines,
     series_resonances,
     split_stages,
-    trend_alarm,
 )
 
-ALERT, DANGER = 0.5, 0.9  # probability of severe wear
-IN_A_ROW = 3
-QUIET_SHARE = 0.05  # rms over the series' median, below which the machine was off
+QUIET_SHARE = 0.05  # rms over the usual one, below which the machine was off
+USUAL = 8  # recordings, the first, whose median rms is the usual one: later ones may be louder by wear
 MOST_TOGETHER = 400  # recordings separated at once: memory grows with their square, time with their cube
 SAME_LINES = 0.25  # of a line, by which the highest lines of two spectra may differ and still be laid on one another
 ALONE: SeriesMethod = "modes"  # where there are too few recordings for the joint separation
@@ -64,6 +64,8 @@ def track_recordings(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
+    false_alarm_rate: float = FALSE_ALARMS,
+    acknowledge: str | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Track:
@@ -82,6 +84,9 @@ def track_recordings(
         cannot tell whose resonance it shows
     detector : of `split_stages`
     stages_from : what decides stage and alarm: "crf", "damping" or "both". The other two are told all the same
+    false_alarm_rate : alarms a recording where nothing wears; 0.001 is one in 1000 recordings
+    acknowledge : name of the recording up to which somebody has looked at the machine, or "last": what came before
+        raises no alarm, and the baseline is learned anew behind it
     workers : processes that read at the same time
     progress : called with each file that was read
 
@@ -109,6 +114,8 @@ def track_recordings(
         method=method,
         detector=detector,
         stages_from=stages_from,
+        false_alarm_rate=false_alarm_rate,
+        acknowledge=acknowledge,
     )
 
 
@@ -122,6 +129,8 @@ def judge(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
+    false_alarm_rate: float = FALSE_ALARMS,
+    acknowledge: str | None = None,
 ) -> Track:
     """What recordings say together that have been read; otherwise as `track_recordings`."""
     require_choice("source of stages", stages_from, get_args(StageSource))
@@ -164,7 +173,7 @@ def judge(
                 speed_hz=place.speed_hz,
             )
         )
-    return _staged(tracked, x_name, target, chosen, (detector, stages_from), notes)
+    return _staged(tracked, x_name, target, chosen, (detector, stages_from), (false_alarm_rate, acknowledge), notes)
 
 
 def _staged(
@@ -173,6 +182,7 @@ def _staged(
     target: Target,
     method: SeriesMethod,
     staging: tuple[Detector, StageSource],
+    alarming: tuple[float, str | None],
     notes: list[str],
 ) -> Track:
     used = [recording for recording in tracked if recording.clean is not None]
@@ -193,7 +203,15 @@ def _staged(
         )
         severe = np.where(known, stages.probability, np.nan)
         labels = stages.labels
-    alarm = trend_alarm(severe, alert=ALERT, danger=DANGER, in_a_row=IN_A_ROW, thing="the probability of severe wear")
+    alarm = raise_alarm(
+        tracked,
+        staging[1],
+        stages,
+        lambda part: _stages_by(part, staging[0], "", comparable=comparable, sources=staging[1:]).get(staging[1]),
+        false_alarm_rate=alarming[0],
+        acknowledge=alarming[1],
+        unit=_unit_of(x_name),
+    )
     if target.full_load_crf_hz is not None:
         share = asperity_load_share(crf, crf_std, target.full_load_crf_hz)
         tracked = [
@@ -205,8 +223,8 @@ def _staged(
         notes.append(f"CRFA is not comparable with other series: its unit is {units}, not m/s^2. CRF is.")
     return Track(
         recordings=tuple(
-            replace(recording, severe_probability=float(probability), label=label, level=level)
-            for recording, probability, label, level in zip(tracked, severe, labels, alarm.levels, strict=True)
+            replace(recording, severe_probability=float(probability), label=label, state=state)
+            for recording, probability, label, state in zip(tracked, severe, labels, alarm.states, strict=True)
         ),
         x_name=x_name,
         target=target,
@@ -215,27 +233,33 @@ def _staged(
         stages_by=stages_by,
         alarm=alarm,
         comparable=comparable,
-        problems=comparability(
-            [
-                RecordingFacts(
-                    name=Path(recording.file).name,
-                    rate_hz=recording.reading.rate_hz,
-                    segment=_spectrum(recording.reading).segment,
-                    window=WINDOW,
-                    unit=recording.reading.unit,
-                    duration_s=_spectrum(recording.reading).duration_s,
-                    speed_hz=recording.speed_hz,
-                    load_n=recording.load_n,
-                )
-                for recording in used
-            ]
-        ),
+        problems=comparability([_facts_of(recording) for recording in used]),
         notes=(*notes, *_without_damping(tracked), *_copies(tracked)),
     )
 
 
+def _facts_of(recording: TrackedRecording) -> RecordingFacts:
+    """What makes a recording comparable with others."""
+    spectrum = _spectrum(recording.reading)
+    return RecordingFacts(
+        name=Path(recording.file).name,
+        rate_hz=recording.reading.rate_hz,
+        segment=spectrum.segment,
+        window=WINDOW,
+        unit=recording.reading.unit,
+        duration_s=spectrum.duration_s,
+        speed_hz=recording.speed_hz,
+        load_n=recording.load_n,
+    )
+
+
 def _stages_by(
-    tracked: Sequence[TrackedRecording], detector: Detector, unit: str, *, comparable: bool
+    tracked: Sequence[TrackedRecording],
+    detector: Detector,
+    unit: str,
+    *,
+    comparable: bool,
+    sources: Sequence[StageSource] = get_args(StageSource),
 ) -> dict[StageSource, Stages]:
     """The stage as CRF, damping and both tell it; nothing where no resonance was found."""
     if not any(recording.resonance.found for recording in tracked):
@@ -255,7 +279,7 @@ def _stages_by(
             detector=detector,
             unit=unit,
         )
-        for source in get_args(StageSource)
+        for source in sources
     }
 
 
@@ -319,18 +343,22 @@ def _places_in_time(readings: Sequence[Reading]) -> tuple[dict[str, Place], str]
 
 
 def _without_silence(series: list[Reading]) -> list[Reading]:
-    """Recordings far quieter than the series are off: of a machine at rest an accelerometer still hears the hall."""
+    """Recordings far quieter than the first ones are off: of a machine at rest an accelerometer still hears the hall.
+
+    Counted from the first, so that a machine which grows loud does not make its own past look silent.
+    """
     by_unit: dict[str, list[float]] = {}
     for reading in series:
-        if reading.usable and reading.quality is not None:
+        if reading.quality is not None and not reading.quality.off:
             by_unit.setdefault(reading.unit, []).append(reading.quality.rms)
-    usual = {unit: float(np.median(levels)) for unit, levels in by_unit.items()}
+    usual = {unit: float(np.median(levels[:USUAL])) for unit, levels in by_unit.items()}
     judged = []
     for reading in series:
-        if reading.usable and reading.quality is not None and reading.quality.rms < QUIET_SHARE * usual[reading.unit]:
-            share = 100.0 * reading.quality.rms / usual[reading.unit]
-            reason = f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of the series' median"
-            reading = replace(reading, reason=reason)
+        quality = reading.quality
+        if quality is not None and not quality.off and quality.rms < QUIET_SHARE * usual[reading.unit]:
+            share = 100.0 * quality.rms / usual[reading.unit]
+            reason = f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of what it was at first"
+            reading = replace(reading, reason=reason, quality=replace(quality, off=True))
         judged.append(reading)
     return judged
 

@@ -15,12 +15,14 @@ from asperity.errors import BadInput, UnreadableFile
 from asperity.files import make_folder
 from asperity.kept import read_json, write_json
 from asperity.recording import ReadOptions
-from asperity.tracking.files import read_table, recordings_in
+from asperity.tracking.alarm_log import LOG, AlarmLog
+from asperity.tracking.alarming import LAST
+from asperity.tracking.files import Place, read_table, recordings_in
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, common_spacing, load_reading, read_spectra, save_reading
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
-from asperity.wear import Detector, SeriesMethod, StageSource
+from asperity.wear import FALSE_ALARMS, Detector, SeriesMethod, StageSource
 
 MEMORY = "heard"  # folder beside the results, a file a recording
 SETTINGS = "watch.json"
@@ -53,6 +55,8 @@ def watch_folder(
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
     stages_from: StageSource = "crf",
+    false_alarm_rate: float = FALSE_ALARMS,
+    acknowledge: str | None = None,
     once: bool = False,
     every_s: float = 5.0,
     settle_s: float = 2.0,
@@ -67,6 +71,7 @@ def watch_folder(
     out : folder for what was read; made if need be. A later watch with the same `out` goes on from there
     every_s : seconds between two looks
     settle_s : seconds for which a file must have stayed unchanged before it is read: it may still be written
+    acknowledge : as `track_recordings`; kept in `out`, and every judgement with it: an alarm stands until then
     others : as `track_recordings`; a recording that is not in `table` yet waits until it is
 
     Raises
@@ -78,9 +83,16 @@ def watch_folder(
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     target = search_target(case, band_hz)
-    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
-    memory = _Memory(out, target, options)
-    judged = partial(judge, shaft_hz=shaft_hz, method=method, detector=detector, stages_from=stages_from)
+    memory = _Memory(out, target, ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale))
+    log = AlarmLog(out / LOG)
+    judging = partial(
+        judge,
+        shaft_hz=shaft_hz,
+        method=method,
+        detector=detector,
+        stages_from=stages_from,
+        false_alarm_rate=false_alarm_rate,
+    )
     first = True
     while True:
         present = _present(folder)
@@ -89,18 +101,34 @@ def watch_folder(
         new = memory.read(arrived, workers, progress)
         readings = [reading for path in present if (reading := memory.recall(path)) is not None]
         if new or first:
-            track, known, x_name = None, None, ""
-            if table is not None and readings:
-                places = read_table(table)
-                readings = [reading for reading in readings if Path(reading.file).name in places.places]
-                known, x_name = {reading.file: places.place(Path(reading.file)) for reading in readings}, places.x_name
-            if readings:
-                track = judged(readings, target, known, x_name)
+            placed, places, x_name = _placed(readings, table)
+            judged = partial(judging, placed, target, places, x_name)
+            track = _kept(judged, log, new, acknowledge if first else None) if placed else None
             yield Update(new=new, track=track, waiting=len(unread) - len(arrived))
         if once:
             return
         first = False
         sleep(every_s)
+
+
+def _placed(readings: list[Reading], table: str | Path | None) -> tuple[list[Reading], dict[str, Place] | None, str]:
+    """The recordings that the table knows by now, where they stand, and the name of x."""
+    if table is None or not readings:
+        return readings, None, ""
+    named = read_table(table)
+    known = [reading for reading in readings if Path(reading.file).name in named.places]
+    return known, {reading.file: named.place(Path(reading.file)) for reading in known}, named.x_name
+
+
+def _kept(judged: Callable[..., Track], log: AlarmLog, new: tuple[Reading, ...], acknowledge: str | None) -> Track:
+    """A judgement as the log leaves it, an acknowledgement taken first."""
+    track = judged(acknowledge=acknowledge)
+    names = {Path(recording.file).name for recording in track.recordings}
+    if acknowledge is not None:
+        log.acknowledge(track.recordings[-1].file if acknowledge == LAST else acknowledge)
+    if log.acknowledged in names:
+        track = judged(acknowledge=log.acknowledged)
+    return log.judged(track, [reading.file for reading in new])
 
 
 class _Memory:

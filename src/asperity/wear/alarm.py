@@ -1,175 +1,206 @@
-"""A series of recordings as one: whether it is one at all, what load share its CRF stands for, and when to warn.
+"""An alarm that judges once a recording, stays until it is acknowledged, and says how often it speaks without a cause.
 
-Knows neither files nor machines: what is known of each recording comes in as `RecordingFacts`.
+What is watched comes in as `Watched` series; what a recording's state is without any change, as `Sight`.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput
+from asperity.wear.sequential import FEWEST, Found, growth, knee, step, threshold
 
-SAME = 0.01  # relative difference of rate, speed or load up to which recordings count as alike
-INTERVAL = 1.6449  # standard deviations to either side: 90 %
-AlarmLevel = Literal["none", "alert", "alarm"]
-LEVELS: tuple[AlarmLevel, ...] = get_args(AlarmLevel)
+AlarmState = Literal["none", "alert", "alarm", "blind", "cannot-tell"]
+ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
+FALSE_ALARMS = 1e-3  # a recording
+ALERTS = 10.0  # false alerts for a false alarm
+CONTACT_SHARE = 0.8  # of the false alarms allowed, among the contact's indicators; the levels have the rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoadShare:
-    """CLR read off CRFs: the model's reading, not a measurement; above 1 where the CRF lies above that of full load.
-
-    `interval` is that of 90 %, lower and upper ends.
-    """
-
-    clr: Field
-    interval: tuple[Field, Field]
-
-
-def asperity_load_share(
-    crf_hz: Field | float,
-    crf_std_hz: Field | float,
-    full_load_crf_hz: float,
-    *,
-    full_load_std_hz: float = 0.0,
-) -> LoadShare:
-    """CLR = (CRF / CRF_full)^6 of a Hertz point spring, with the interval that both frequencies' errors leave.
+class Watched:
+    """A series that may raise the alarm.
 
     Parameters
     ----------
-    crf_hz, crf_std_hz : shape (recordings,) or one; nan stays nan
-    full_load_crf_hz, full_load_std_hz : resonance with all load on asperities, and how well it is known [Hz]
-
-    Raises
-    ------
-    BadInput
-        for a full-load resonance that is not positive, or a negative deviation.
-    """
-    require_positive("full-load resonance", full_load_crf_hz, "Hz")
-    std = np.asarray(crf_std_hz, dtype=float)
-    if full_load_std_hz < 0.0 or np.any(std < 0.0):
-        raise BadInput("deviations of CRF and of the full-load resonance must be 0 or more; give standard deviations")
-    ratio = np.asarray(crf_hz, dtype=float) / full_load_crf_hz
-    spread = INTERVAL * np.hypot(std / full_load_crf_hz, ratio * full_load_std_hz / full_load_crf_hz)
-    return LoadShare(
-        clr=np.asarray(ratio**6),
-        interval=(np.asarray(np.maximum(ratio - spread, 0.0) ** 6), np.asarray((ratio + spread) ** 6)),
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordingFacts:
-    """What is known of a recording and its spectrum; None for what is not known.
-
-    `name` to speak of it, `rate_hz`, `segment` [samples], `window`, `unit`, `duration_s`; `speed_hz` of the shaft and
-    `load_n` of the contact.
+    name : of the indicator, for sentences
+    values : shape (recordings,), nan where there is none
+    least : the change from which on it is worth acting, in units of `values`
+    contact : whether it is the contact's, whose severe stage is a rise that flattens; otherwise a level, which grows
+    in_words : a change of it, in words
     """
 
     name: str
-    rate_hz: float
-    segment: int
-    window: str
-    unit: str | None
-    duration_s: float
-    speed_hz: float | None = None
-    load_n: float | None = None
+    values: Field
+    least: float
+    contact: bool
+    in_words: Callable[[float], str]
 
 
-def comparability(series: Sequence[RecordingFacts]) -> tuple[str, ...]:
-    """What keeps recordings from being compared with one another, a sentence each; none when nothing does.
+class Sight(NamedTuple):
+    """Whether a recording lets one see: state "none", "blind" or "cannot-tell", and why."""
 
-    Rate, window, resolution and unit change CRFA, load and speed change CRF and CRFA themselves. A record length that
-    differs changes standard deviations only, and they say so.
-    """
-    problems = []
-    resolutions = [facts.rate_hz / facts.segment for facts in series]
-    numbers = (
-        ("sampling rate", "Hz", [facts.rate_hz for facts in series], "resample them, or track them apart"),
-        ("resolution", "Hz", resolutions, "take one segment length for all"),
-        ("load", "N", [facts.load_n for facts in series], "CRF follows the load: track each load by itself"),
-        ("speed", "Hz", [facts.speed_hz for facts in series], "CRFA follows the speed: track each speed by itself"),
-    )
-    for thing, unit, values, remedy in numbers:
-        known = [(value, facts.name) for value, facts in zip(values, series, strict=True) if value is not None]
-        if not known:
-            continue
-        low, high = min(known), max(known)
-        if high[0] - low[0] > SAME * abs(high[0]):
-            problems.append(
-                f"The {thing} differs between recordings, from {low[0]:g} {unit} ({low[1]}) to {high[0]:g} {unit} "
-                f"({high[1]}); {remedy}."
-            )
-        if len(known) < len(series):
-            silent = next(facts.name for value, facts in zip(values, series, strict=True) if value is None)
-            problems.append(f"The {thing} is known of {len(known)} of {len(series)} recordings, not of {silent}.")
-    for thing, words, remedy in (
-        ("unit", [facts.unit for facts in series], "convert them; until then CRFA is not comparable, CRF is"),
-        ("window", [facts.window for facts in series], "take one window for all"),
-    ):
-        seen = {word: facts.name for word, facts in zip(reversed(words), reversed(series), strict=True)}
-        if len(seen) > 1:
-            listed = ", ".join(f"{word or 'none'} ({name})" for word, name in reversed(seen.items()))
-            problems.append(f"The {thing} differs between recordings: {listed}; {remedy}.")
-    return tuple(problems)
+    state: AlarmState = "none"
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
-    """Where a two-level alarm stands at the end of a series, and when it was first raised.
+    """Where an alarm stands at the end of a series.
 
-    `levels` is the level at each recording; `since` the index of the recording that
-    completed the row behind the present level, None without one.
+    `states` are those after each recording; `since` is the index of the recording with which the present state began,
+    None for "none". `raised_by` names the indicator behind an alert or alarm. `reason` is a sentence without an end.
     """
 
-    level: AlarmLevel
-    levels: tuple[AlarmLevel, ...]
+    state: AlarmState
+    states: tuple[AlarmState, ...]
     since: int | None
-    verdict: str
+    false_alarm_rate: float
+    reason: str
+    raised_by: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """The state with its reason, one sentence."""
+        said = {"none": "No alarm", "cannot-tell": "Cannot tell"}.get(self.state, self.state.capitalize())
+        return f"{said}: {self.reason}."
+
+    def alerted(self, reason: str, raised_by: str) -> "Alarm":
+        """The same with an alert at its end, where nothing graver stands there."""
+        if self.state not in ("none", "cannot-tell"):
+            return self
+        states = (*self.states[:-1], "alert")
+        return replace(self, state="alert", states=states, since=len(states) - 1, reason=reason, raised_by=raised_by)
 
 
-def trend_alarm(values: Field, *, alert: float, danger: float, in_a_row: int = 3, thing: str = "the value") -> Alarm:
-    """Two levels, each raised by `in_a_row` recordings at or above it and lowered by as many below.
+def sequential_alarm(
+    x: Field,
+    watched: Sequence[Watched],
+    sights: Sequence[Sight],
+    *,
+    false_alarm_rate: float = FALSE_ALARMS,
+    confirmed: Callable[[int], bool] = lambda _: True,
+    acknowledged: int = 0,
+    unit: str = "",
+) -> Alarm:
+    """One decision a recording, each from what had been recorded by then.
 
     Parameters
     ----------
-    values : shape (recordings,), in the order they were made, such as the probability of severe wear; nan where there
-        is none: it neither raises nor lowers
-    alert, danger : thresholds of the two levels, "alert" and "alarm"
-    in_a_row : how many recordings it takes
-    thing : what the values are, for the sentence
+    x : shape (recordings,), rising; recordings at one x are repeats of one test and are averaged
+    watched : what may raise the alarm; the rate is shared out among them
+    sights : one a recording
+    false_alarm_rate : alarms without wear, a recording
+    confirmed : whether the stage detector finds the severe stage in the recordings up to this one; asked before an
+        alarm by the contact
+    acknowledged : how many recordings somebody has looked at; what comes behind them is judged by itself
+    unit : of x
 
     Raises
     ------
     BadInput
-        for thresholds that are not in order, or a row of fewer than 1.
+        for a rate that is none.
     """
-    if not alert < danger:
-        raise BadInput(f"the alert threshold must lie below that of the alarm, got {alert:g} and {danger:g}")
-    if in_a_row < 1:
-        raise BadInput(f"an alarm takes at least 1 recording in a row, got {in_a_row}")
-    values = np.asarray(values, dtype=float)
-    thresholds = np.array([alert, danger])
-    raised = np.zeros(2, dtype=bool)
-    raised_at, above, below = np.zeros((3, 2), dtype=int)
-    levels = []
-    for number, value in enumerate(values):
-        if np.isfinite(value):
-            reached = value >= thresholds
-            above, below = np.where(reached, above + 1, 0), np.where(reached, 0, below + 1)
-            raised_at[~raised & (above >= in_a_row)] = number
-            raised = (raised | (above >= in_a_row)) & (below < in_a_row)
-        levels.append(LEVELS[int(np.sum(raised))])
-    state, since = int(np.sum(raised)), None
-    verdict = f"No alarm: {thing} does not stand at {alert:g} or above by {in_a_row} recordings in a row."
-    if not np.isfinite(values).any():
-        verdict = f"No alarm, and none could be: {thing} is not determined of any recording."
-    if state > 0:
-        since = int(raised_at[state - 1])
-        verdict = (
-            f"{LEVELS[state].capitalize()}: {thing} was at {thresholds[state - 1]:g} or above {in_a_row} times in a "
-            f"row, last {values[np.isfinite(values)][-1]:.3g}."
+    if not 0.0 < false_alarm_rate < 0.1:
+        raise BadInput(
+            f"the rate of false alarms must lie between 0 and 0.1 a recording, got {false_alarm_rate:g}; 0.001 is one "
+            "in 1000 recordings"
         )
-    return Alarm(level=LEVELS[state], levels=tuple(levels), since=since, verdict=verdict)
+    states: list[AlarmState] = ["none"] * acknowledged
+    reason, raised_by = "", ""
+    for number in range(acknowledged, len(sights)):
+        if states and states[-1] == "alarm" and number > acknowledged:
+            states.append("alarm")
+            continue
+        found = [_looked_at(one, x, acknowledged, number) for one in watched]
+        state, reason, raised_by = _decided(watched, found, sights[number], false_alarm_rate, unit, number, confirmed)
+        states.append(state)
+    state = states[-1] if len(states) > acknowledged else "none"
+    if len(states) == acknowledged:
+        reason = f"all {acknowledged} recordings are acknowledged, and none has come since"
+    since = len(states)
+    while state != "none" and since > acknowledged and states[since - 1] == state:
+        since -= 1
+    return Alarm(
+        state=state,
+        states=tuple(states),
+        since=None if state == "none" else since,
+        false_alarm_rate=false_alarm_rate,
+        reason=reason,
+        raised_by=raised_by,
+    )
+
+
+class _Looked(NamedTuple):
+    """What an indicator shows up to a recording; `places` where it is known."""
+
+    change: Found
+    step: Found
+    places: int
+
+
+def _looked_at(one: Watched, x: Field, first: int, last: int) -> _Looked:
+    at, values = _places(x[first : last + 1], one.values[first : last + 1])
+    test = knee if one.contact else growth
+    return _Looked(test(at, values, least=one.least), step(at, values, least=one.least), at.size)
+
+
+def _places(x: Field, values: Field) -> tuple[Field, Field]:
+    """Repeats at one x averaged, and what is not known left out."""
+    known = np.isfinite(values)
+    if not known.any():
+        return x[:0], values[:0]
+    at, index = np.unique(x[known], return_inverse=True)
+    return at, np.bincount(index, values[known]) / np.bincount(index)
+
+
+def _shares(watched: Sequence[Watched], rate: float) -> list[float]:
+    """The rate of false alarms that each indicator has."""
+    many = sum(one.contact for one in watched)
+    kinds = {True: (CONTACT_SHARE, many), False: (1.0 - CONTACT_SHARE, len(watched) - many)}
+    alone = many in (0, len(watched))
+    return [rate * (1.0 if alone else kinds[one.contact][0]) / kinds[one.contact][1] for one in watched]
+
+
+def _decided(
+    watched: Sequence[Watched],
+    found: Sequence[_Looked],
+    sight: Sight,
+    rate: float,
+    unit: str,
+    number: int,
+    confirmed: Callable[[int], bool],
+) -> tuple[AlarmState, str, str]:
+    """State, reason, and who raised it."""
+    shares = _shares(watched, rate)
+    leaning = ("", "")
+    for one, looked, share in zip(watched, found, shares, strict=True):
+        where = f"{looked.change.at:.4g} {unit}".rstrip()
+        if looked.change.log_ratio < threshold(ALERTS * share):
+            continue
+        way = f"{one.name} {one.in_words(looked.change.change)}"
+        course = f"{way} until {where} and has flattened since" if one.contact else f"{way} since {where}"
+        if looked.change.log_ratio >= threshold(share) and (not one.contact or confirmed(number)):
+            return "alarm", course, one.name
+        leaning = (course, one.name)
+    if sight.state == "blind":
+        return "blind", sight.reason, ""
+    stepped = [
+        f"{one.name} {one.in_words(looked.step.change)} at once, at {looked.step.at:.4g} {unit}".rstrip()
+        for one, looked, share in zip(watched, found, shares, strict=True)
+        if looked.step.log_ratio >= threshold(share)
+    ]
+    if stepped:
+        causes = "load, gain, a moved sensor or damage: what it was these recordings do not say"
+        return "cannot-tell", f"{stepped[0]}, and holds since ({causes}; acknowledge it once it is known)", ""
+    if leaning[0]:
+        return "alert", f"{leaning[0]}, not yet beyond what chance does once in {1.0 / rate:.0f} recordings", leaning[1]
+    if sight.state != "none":
+        return sight.state, sight.reason, ""
+    places = min((looked.places for looked in found), default=0)
+    if places < FEWEST:
+        return "cannot-tell", f"the baseline is being learned, {places} of {FEWEST} places so far", ""
+    return "none", f"nothing beyond what chance does once in {1.0 / rate:.0f} recordings", ""

@@ -31,7 +31,7 @@ from asperity.wear.bends import (
 )
 
 Detector = Literal["bayesian"]
-StageKind = Literal["severe", "running-in", "no distinct stage", "no change", "disagree", "too few"]
+StageKind = Literal["severe", "steepening", "running-in", "no distinct stage", "no change", "disagree", "too few"]
 Indicator = Literal["crf", "damping"]
 StageSource = Literal["crf", "damping", "both"]
 
@@ -47,15 +47,17 @@ class Stages:
     Parameters
     ----------
     source : what it was read from
-    kind : "severe", asperities take load over, CRF rising or damping falling, and from `split` on at another pace: the
-        paper's normal and severe stage. "running-in", it goes the other way, and then does so at another pace. "no
+    kind : "severe", asperities take load over, CRF rising or damping falling, and from `split` on more slowly, as the
+        curve flattens: the paper's normal and severe stage. "steepening", from `split` on faster: wear that gathers
+        pace, and no severe stage yet. "running-in", it goes the other way, and then does so at another pace. "no
         distinct stage", it changes, but a smooth curve explains it as well. "no change". "disagree", CRF and damping
         change against each other: one of them, or both, is not the contact's. "too few" places to tell
     split, interval : the break, in units of x, and its 90 % interval; nan unless a stage was found
-    probability : shape (recordings,), of being in the severe stage; 0 where the break belongs to running-in, nan
-        where it cannot be told. Weighs the broken stick against the smooth curves, so that it stays below 1 where no
-        stage is distinct
-    labels : "normal", "severe" (probability 0.5 or more), "running-in", "steady" or "none", one a recording
+    probability : shape (recordings,), of being in the severe stage; 0 where the break belongs to running-in or the
+        curve steepens, nan where it cannot be told. Weighs the broken stick against the smooth curves, so that it
+        stays below 1 where no stage is distinct
+    labels : "normal", "severe" (probability 0.5 or more), "steady", "steepening", "running-in" or "none", one a
+        recording
     evidence : BIC of each model less that of the best; 0 is the best, 6 more is strong evidence against
     slopes : of CRF before and after the break [Hz per unit of x]; nan where CRF has none
     scatter_hz : standard deviation of CRF about the best model beyond the errors given [Hz]; nan without CRF
@@ -78,7 +80,7 @@ class Stages:
     @property
     def found(self) -> bool:
         """Whether there is a break to speak of."""
-        return self.kind in ("severe", "running-in")
+        return self.kind in ("severe", "steepening", "running-in")
 
 
 def split_stages(
@@ -206,7 +208,8 @@ def _bayesian(x: Field, x_std: Field, series: Sequence[_Series], crfa: Field | N
         for number, one in enumerate(series)
     ]
     signs = {course.sign for course in courses} - {0}
-    severe = after * outcome.share if 1 in signs else np.zeros(x.size)
+    flattens = all(course.flattens for course, stick in zip(courses, outcome.sticks, strict=True) if stick)
+    severe = after * (outcome.share if 1 in signs and flattens else 0.0)
     first, last = (start + reach * float(places.x[end]) for places, end in ((all_places[0], 0), (all_places[0], -1)))
     over = f"{first:.4g} to {last:.4g} {unit}".rstrip()
     thing = IN_WORDS[source]
@@ -232,13 +235,13 @@ def _bayesian(x: Field, x_std: Field, series: Sequence[_Series], crfa: Field | N
             f"{outcome.broken - outcome.smooth:+.1f} against it, {-STRONG_EVIDENCE:.0f} needed)."
         )
         return without("no distinct stage", verdict, outcome.evidence, severe, scatter)
-    rising = signs == {1}
-    names = ("normal", "severe") if rising else ("running-in", "steady")
+    kind: StageKind = "running-in" if signs != {1} else "severe" if flattens else "steepening"
+    lead, names = _NAMES[kind]
     low, split, high = (start + reach * place for place in (low, split, high))
-    where = f"{split:.4g} ({low:.4g} to {high:.4g}, 90 %)" + (f" {unit}" if unit else "")
+    where = f"{split:.4g} ({low:.4g} to {high:.4g}, 90 %) {unit}".rstrip()
     return Stages(
         source=source,
-        kind="severe" if rising else "running-in",
+        kind=kind,
         split=split,
         interval=(low, high),
         probability=severe,
@@ -247,9 +250,15 @@ def _bayesian(x: Field, x_std: Field, series: Sequence[_Series], crfa: Field | N
         slopes=courses[0].slopes if source != "damping" else (np.nan, np.nan),
         scatter_hz=scatter,
         damping=courses[-1].levels if source != "crf" else (np.nan, np.nan, np.nan),
-        verdict=f"{'Severe wear from' if rising else 'Running-in until'} {where}{_by(source, outcome.sticks)}: "
-        f"{', '.join(course.words for course in courses)}.",
+        verdict=f"{lead} {where}{_by(source, outcome.sticks)}: {', '.join(course.words for course in courses)}.",
     )
+
+
+_NAMES: dict[StageKind, tuple[str, tuple[str, str]]] = {
+    "severe": ("Severe wear from", ("normal", "severe")),
+    "steepening": ("Wear gathers pace from", ("steady", "steepening")),
+    "running-in": ("Running-in until", ("running-in", "steady")),
+}
 
 
 def _too_few(indicator: Indicator, places: int) -> str:
@@ -324,6 +333,7 @@ class _Course(NamedTuple):
     """How a series goes: 1 where asperities take load over, -1 where they hand it back, 0 where nothing changes."""
 
     sign: int
+    flattens: bool  # rises, and then does so more slowly
     mean: str
     way: str
     words: str
@@ -341,6 +351,7 @@ def _course(one: _Series, found: Compared, split: float, stick: bool, scale: tup
     ends = (split - places.x[0], places.x[-1] - split)
     rise = slopes[0] * ends[0] + slopes[1] * ends[1]
     changes = stick or found.bic[CONSTANT] - min(found.bic.values()) >= STRONG_EVIDENCE
+    flattens = bool(slopes[0] > 0.0 and slopes[1] < slopes[0])
     sign = (1 if rise > 0.0 else -1) if changes else 0
     mean, error = float(np.mean(places.y)), float(np.std(places.y, ddof=1))
     if one.indicator == "crf":
@@ -348,6 +359,7 @@ def _course(one: _Series, found: Compared, split: float, stick: bool, scale: tup
         first, behind = (f"{'rises' if slope > 0.0 else 'falls'} by {abs(slope) / reach:.3g}" for slope in slopes)
         return _Course(
             sign=sign,
+            flattens=flattens,
             mean=f"CRF holds at {mean:.0f} ± {error:.0f} Hz",
             way=f"CRF {'rises' if sign > 0 else 'falls'}",
             words=f"CRF {first}{per} before and {behind} after" if changes else "CRF does not change",
@@ -361,6 +373,7 @@ def _course(one: _Series, found: Compared, split: float, stick: bool, scale: tup
     on = "" if goes[0] == goes[1] else f"{goes[1]} "
     return _Course(
         sign=sign,
+        flattens=flattens,
         mean=f"damping holds at {np.exp(-mean):.3g} ± {error * np.exp(-mean):.2g}",
         way=f"damping {'falls' if sign > 0 else 'rises'}",
         words=f"damping {goes[0]} from {ratios[0]} to {ratios[1]} before and {on}to {ratios[2]} after"

@@ -23,7 +23,7 @@ from asperity.report.drawing import (
     plain_powers,
 )
 from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
-from asperity.tracking import ALERT, DANGER, Track, TrackedRecording
+from asperity.tracking import Track, TrackedRecording
 from asperity.wear import INTERVAL, Stages
 
 MOST_ROWS = 400  # of a waterfall; more recordings are thinned out
@@ -102,11 +102,9 @@ def _draw_severity(axes: Axes, track: Track) -> None:
     mark_split(axes, track.stages)
     severe = np.array([(recording.x, recording.severe_probability) for recording in track.recordings])
     axes.plot(*severe[np.isfinite(severe[:, 1])].T, "o", color=VERMILION, markersize=4)
-    for threshold, name in ((ALERT, "alert"), (DANGER, "alarm")):
-        axes.axhline(threshold, color=GREY, linewidth=0.8, linestyle=DASHED)
-        axes.annotate(
-            name, (1.0, threshold), xycoords=("axes fraction", "data"), fontsize=8, color=GREY, ha="right", va="bottom"
-        )
+    alarmed = [recording.x for recording in track.recordings if recording.state == "alarm"]
+    if alarmed:
+        axes.axvline(alarmed[0], color=VERMILION, linewidth=1.0, linestyle=DASHED, label="alarm raised")
     axes.set(ylim=(-0.05, 1.12), xlabel=x_label(track), ylabel="severe", yticks=(0.0, 0.5, 1.0))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from asperity.quantities import NO_VALUE, quantity
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, in_print, render, write_page
 from asperity.report.track import exhibits
-from asperity.tracking import ALERT, DANGER, IN_A_ROW, Track, TrackedRecording
+from asperity.tracking import Track, TrackedRecording
 from asperity.wear import IN_WORDS
 
 METHODS = {
@@ -59,9 +59,7 @@ def render_track_page(track: Track) -> str:
         decides=capitalised(IN_WORDS["crf" if track.stages is None else track.stages.source]),
         method_in_words=METHODS[track.method],
         resolution=_resolution(track),
-        alert=ALERT,
-        danger=DANGER,
-        in_a_row=IN_A_ROW,
+        false_alarms=f"{1.0 / track.alarm.false_alarm_rate:.0f}",
     )
 
 

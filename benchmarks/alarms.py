@@ -1,0 +1,190 @@
+"""How often the alarm speaks: series of indicators without wear, with the severe stage, and machines run to failure.
+
+Each series is judged after every one of its 40 recordings, as `watch` does. `python -m benchmarks.alarms` runs this
+part alone; `--fast` a tenth of it.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.tracking.alarming import CRF_LEAST, LEVEL_LEAST
+from asperity.wear import FALSE_ALARMS, Alarm, Sight, Watched, sequential_alarm, split_stages
+
+SERIES, RECORDINGS = 300, 40
+NUMBER = np.arange(float(RECORDINGS))
+CRF_HZ, RISE_HZ, AFTER = (
+    2921.93,
+    718.0,
+    0.18,
+)  # the paper's end, the rig's rise to its knee, slope behind it over before
+SCATTERS = (0.001, 0.003, 0.005, 0.01)  # of CRF, drawn one a series
+LEVEL_SCATTER = 0.1  # of the logarithm of the level: 0.9 dB
+CYCLES = (6.0, 8.0, 12.0, 24.0)  # recordings a day
+
+
+class Drawn(NamedTuple):
+    """CRF over its first value, logarithm of the level; the recording at which the severe stage begins, if it does."""
+
+    crf: np.ndarray
+    level: np.ndarray
+    begins: float = np.nan
+
+
+def remembered(rng: np.random.Generator, memory: float) -> np.ndarray:
+    """Scatter of size 1 of which each recording keeps a share."""
+    fresh = rng.standard_normal(RECORDINGS)
+    kept = np.empty(RECORDINGS)
+    kept[0] = fresh[0]
+    for number in range(1, RECORDINGS):
+        kept[number] = memory * kept[number - 1] + np.sqrt(1.0 - memory**2) * fresh[number]
+    return kept
+
+
+def drawn(
+    rng: np.random.Generator, course: np.ndarray | float = 1.0, level: np.ndarray | float = 0.0, memory: float = 0.0
+) -> Drawn:
+    """Courses of CRF and level with scatter on them."""
+    crf = course + rng.choice(SCATTERS) * remembered(rng, memory)
+    return Drawn(crf, level + LEVEL_SCATTER * remembered(rng, memory))
+
+
+def after(rng: np.random.Generator) -> np.ndarray:
+    """0 up to a recording drawn, 1 from it on."""
+    return np.asarray(rng.integers(5, 35) <= NUMBER, dtype=float)
+
+
+def daily(rng: np.random.Generator, size: float) -> Drawn:
+    phase = 2.0 * np.pi * (NUMBER / rng.choice(CYCLES) + rng.random())
+    return drawn(rng, 1.0 + size * np.sin(phase), 0.2 * np.sin(phase))
+
+
+def load_step(rng: np.random.Generator) -> Drawn:
+    there = after(rng)
+    return drawn(rng, 1.0 + rng.uniform(0.02, 0.12) * there, rng.uniform(0.0, 0.7) * there)
+
+
+def warm_up(rng: np.random.Generator) -> Drawn:
+    cold = np.exp(-NUMBER / rng.uniform(2.0, 8.0))
+    return drawn(rng, 1.0 - rng.uniform(0.02, 0.12) * cold, -0.5 * cold)
+
+
+def moved_sensor(rng: np.random.Generator) -> Drawn:
+    there = after(rng)
+    return drawn(rng, 1.0 + rng.uniform(-0.02, 0.02) * there, rng.uniform(-1.5, 1.5) * there)
+
+
+def drift_of_modes(rng: np.random.Generator) -> Drawn:
+    return drawn(rng, 1.0 + rng.uniform(-0.02, 0.02) * NUMBER / RECORDINGS, 0.3 * NUMBER / RECORDINGS)
+
+
+def saturating(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
+    left = np.exp(-NUMBER / rng.uniform(5.0, 40.0))
+    return drawn(rng, 1.0 - rng.uniform(0.05, 0.3) * left, memory=memory)
+
+
+def straight(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
+    return drawn(rng, 1.0 + rng.uniform(0.05, 0.3) * NUMBER / RECORDINGS, memory=memory)
+
+
+def hill(rng: np.random.Generator) -> Drawn:
+    return drawn(rng, 1.0 + 0.5 * NUMBER**2 / (NUMBER**2 + rng.uniform(5.0, 15.0) ** 2))
+
+
+def steepening(rng: np.random.Generator) -> Drawn:
+    return drawn(rng, 1.0 + 0.012 * np.maximum(NUMBER - rng.integers(10, 30), 0.0))
+
+
+WITHOUT_WEAR: dict[str, Callable[[np.random.Generator], Drawn]] = {
+    "white scatter": drawn,
+    "scatter that remembers 0.7": lambda rng: drawn(rng, memory=0.7),
+    "scatter that remembers 0.9": lambda rng: drawn(rng, memory=0.9),
+    "daily cycle of 1 %": lambda rng: daily(rng, 0.01),
+    "daily cycle of 2 %": lambda rng: daily(rng, 0.02),
+    "load step, CRF by 2 to 12 %, not given": load_step,
+    "warm-up, CRF by 2 to 12 %": warm_up,
+    "moved sensor, level by up to 13 dB": moved_sensor,
+    "drift of modes, 2 %": drift_of_modes,
+    "gain change, up to 20 dB": lambda rng: drawn(rng, level=rng.uniform(-2.3, 2.3) * after(rng)),
+    "saturating trend, 5 to 30 %": saturating,
+    "straight trend, 5 to 30 %": straight,
+    "flat, then rising": steepening,
+    "saturating trend, scatter remembers 0.7": lambda rng: saturating(rng, 0.7),
+    "straight trend, scatter remembers 0.7": lambda rng: straight(rng, 0.7),
+    "Hill curve, 50 %": hill,
+}
+
+
+def knee(rng: np.random.Generator, scatter_hz: float, memory: float = 0.0) -> Drawn:
+    """The rig's course of CRF over recordings, its knee drawn among the 12th to the 24th."""
+    begins = float(rng.integers(12, 25))
+    pace = RISE_HZ / begins
+    course = CRF_HZ + np.where(begins > NUMBER, pace * NUMBER, RISE_HZ + AFTER * pace * (NUMBER - begins))
+    return Drawn((course + scatter_hz * remembered(rng, memory)) / CRF_HZ, 0.1 * remembered(rng, 0.0), begins)
+
+
+KNEES: dict[str, Callable[[np.random.Generator], Drawn]] = {
+    "knee, CRF to 5 Hz": lambda rng: knee(rng, 5.0),
+    "knee, CRF to 15 Hz": lambda rng: knee(rng, 15.0),
+    "knee, CRF to 15 Hz, scatter remembers 0.7": lambda rng: knee(rng, 15.0, 0.7),
+    "knee, CRF to 30 Hz": lambda rng: knee(rng, 30.0),
+}
+
+
+def to_failure(rng: np.random.Generator) -> Drawn:
+    """Level only: steady, then up 15 to 25 times until the end, faster and faster; no contact resonance."""
+    begins = rng.integers(15, 30)
+    grown = np.maximum(NUMBER - begins, 0.0) / (RECORDINGS - 1 - begins)
+    level = np.log(rng.uniform(15.0, 25.0)) * grown ** rng.uniform(1.0, 2.0)
+    return Drawn(np.full(RECORDINGS, np.nan), level + LEVEL_SCATTER * remembered(rng, 0.5), float(begins))
+
+
+def judged(one: Drawn) -> Alarm:
+    """The alarm as `track` raises it, its stage asked for before an alarm by CRF."""
+    crf = Watched(name="CRF", values=one.crf, least=CRF_LEAST, contact=True, in_words=str)
+    level = Watched(name="level", values=one.level, least=LEVEL_LEAST, contact=False, in_words=str)
+
+    def severe(number: int) -> bool:
+        return split_stages(NUMBER[: number + 1], CRF_HZ * one.crf[: number + 1]).kind == "severe"
+
+    sight = Sight() if np.isfinite(one.crf).any() else Sight("cannot-tell", "no contact resonance")
+    watched = [crf, level] if np.isfinite(one.crf).any() else [level]
+    return sequential_alarm(NUMBER, watched, [sight] * RECORDINGS, confirmed=severe)
+
+
+def lines(*, fast: bool = False) -> Iterator[str]:
+    """Markdown, a line at a time; `fast` takes a tenth of the series."""
+    series = SERIES // (10 if fast else 1)
+    yield f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in {1.0 / FALSE_ALARMS:.0f}\n"
+    yield "| nothing wears | ever an alarm | ever an alert | ever cannot tell, behind the baseline |"
+    yield "|---|---|---|---|"
+    for name, draw in WITHOUT_WEAR.items():
+        states = [judged(draw(np.random.default_rng([11, number]))).states[8:] for number in range(series)]
+        shares = [100.0 * np.mean([kind in one for one in states]) for kind in ("alarm", "alert", "cannot-tell")]
+        yield f"| {name} | {' | '.join(f'{share:.1f} %' for share in shares)} |"
+    yield "\n| the severe stage begins | found | too early | recordings until then, median | 90 % within |"
+    yield "|---|---|---|---|---|"
+    for name, draw in (KNEES | {"level alone, up 15 to 25 times by the end": to_failure}).items():
+        yield f"| {name} | {found_row(draw, series)} |"
+
+
+def found_row(draw: Callable[[np.random.Generator], Drawn], series: int) -> str:
+    """Shares found and found too early, and delays from the beginning of the stage."""
+    delays = []
+    for number in range(series):
+        one = draw(np.random.default_rng([12, number]))
+        states = judged(one).states
+        delays.append(states.index("alarm") - one.begins if "alarm" in states else np.inf)
+    late = np.array(delays)
+    found, early = 100.0 * np.mean(np.isfinite(late)), 100.0 * np.mean(late < 0.0)
+    within = np.sort(late)[int(np.ceil(0.9 * late.size)) - 1]
+    return f"{found:.1f} % | {early:.1f} % | {np.median(late):.0f} | {within:.0f}"
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(prog="python -m benchmarks.alarms", description=__doc__)
+    arguments.add_argument("--fast", action="store_true", help="a tenth of the series")
+    for line in lines(fast=arguments.parse_args().fast):
+        print(line, flush=True)

@@ -1,0 +1,146 @@
+"""What of a series is watched, and what a recording lets one see: from tracked recordings to their alarm.
+
+The test is left to `asperity.wear`; which indicators it is given, and from which change on it counts, is said here.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.errors import BadInput
+from asperity.tracking.model import TrackedRecording
+from asperity.wear import Alarm, Sight, Stages, StageSource, Watched, sequential_alarm
+
+CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
+DAMPING_LEAST = 0.2  # of its logarithm
+LEVEL_LEAST = float(np.log(2.0))  # 6 dB, which ISO 13373-1 takes for a change worth looking into
+BASELINE = 8  # recordings by which a CRF is counted from 1
+UNSEEN = 3  # recordings without a resonance, from which on nobody sees the contact
+LAST = "last"
+
+
+def raise_alarm(
+    tracked: Sequence[TrackedRecording],
+    source: StageSource,
+    stages: Stages | None,
+    stages_of: Callable[[Sequence[TrackedRecording]], Stages | None],
+    *,
+    false_alarm_rate: float,
+    acknowledge: str | None = None,
+    unit: str = "",
+) -> Alarm:
+    """The alarm of a series, in agreement with its stages.
+
+    Parameters
+    ----------
+    source : which indicators of the contact decide
+    stages, stages_of : of the whole series, and how to have them of a part
+    false_alarm_rate : alarms without wear, a recording
+    acknowledge : the recording up to which somebody has looked, by its name; "last" for all
+
+    Raises
+    ------
+    BadInput
+        for a recording that is not there, or a rate that is none.
+    """
+    contact = _of_the_contact(tracked, source)
+    alarm = sequential_alarm(
+        np.array([one.x for one in tracked]),
+        [*contact, *_levels(tracked)],
+        _sights(tracked, contact),
+        false_alarm_rate=false_alarm_rate,
+        confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
+        acknowledged=_acknowledged(tracked, acknowledge),
+        unit=unit,
+    )
+    if stages is not None and stages.kind == "severe" and acknowledge is None:
+        chance = f"not yet beyond what chance does once in {1.0 / false_alarm_rate:.0f} recordings"
+        return alarm.alerted(f"a severe stage is found, {chance}", source)
+    return alarm
+
+
+def _severe(stages: Stages | None) -> bool:
+    return stages is not None and stages.kind == "severe"
+
+
+def _of_the_contact(tracked: Sequence[TrackedRecording], source: StageSource) -> list[Watched]:
+    crf = np.array([one.resonance.crf_hz for one in tracked])
+    ratio = np.array([one.damping[0] for one in tracked])
+    if source == "both" and not (np.isfinite(crf).any() and np.isfinite(ratio).any()):
+        return []
+    watched = []
+    if source != "damping" and np.isfinite(crf).any():
+        usual = float(np.median(crf[np.isfinite(crf)][:BASELINE]))
+        watched.append(Watched(name="CRF", values=crf / usual, least=CRF_LEAST, contact=True, in_words=_moved))
+    if source != "crf" and np.isfinite(ratio).any():
+        watched.append(
+            Watched(
+                name="damping",
+                values=-np.log(ratio),
+                least=DAMPING_LEAST,
+                contact=True,
+                in_words=lambda by: _times(-by),
+            )
+        )
+    return watched
+
+
+def _levels(tracked: Sequence[TrackedRecording]) -> list[Watched]:
+    """Level and kurtosis of every recording of a running machine in the unit that most have."""
+    units = Counter(one.reading.unit for one in tracked if one.reading.quality is not None)
+    if not units:
+        return []
+    (usual, _), *_ = units.most_common(1)
+
+    def logarithms(name: str) -> Field:
+        values = np.full(len(tracked), np.nan)
+        for number, one in enumerate(tracked):
+            quality = one.reading.quality
+            if quality is not None and not quality.off and one.reading.unit == usual and getattr(quality, name) > 0.0:
+                values[number] = np.log(getattr(quality, name))
+        return values
+
+    return [
+        Watched(name=words, values=values, least=LEVEL_LEAST, contact=False, in_words=_times)
+        for words, values in (("the level (rms)", logarithms("rms")), ("kurtosis", logarithms("kurtosis")))
+        if np.isfinite(values).any()
+    ]
+
+
+def _moved(by: float) -> str:
+    return f"{'rose' if by > 0.0 else 'fell'} by {abs(100.0 * by):.3g} %"
+
+
+def _times(by: float) -> str:
+    return f"{'rose' if by > 0.0 else 'fell'} to {np.exp(by):.3g} times what it was"
+
+
+def _sights(tracked: Sequence[TrackedRecording], contact: Sequence[Watched]) -> list[Sight]:
+    """What each recording lets one see of the machine."""
+    seen = np.any([np.zeros(len(tracked), dtype=bool), *(np.isfinite(one.values) for one in contact)], axis=0)
+    sights = []
+    for number, recording in enumerate(tracked):
+        name, quality, reason = Path(recording.file).name, recording.reading.quality, recording.resonance.reason
+        if quality is not None and quality.off:
+            sights.append(Sight("blind", f"{name}: {recording.reading.reason}"))
+        elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
+            sights.append(Sight())
+        else:
+            last = "recording shows" if number == 0 else f"{min(number + 1, UNSEEN)} recordings show"
+            sights.append(Sight("cannot-tell", f"none of the last {last} what decides ({reason or 'not determined'})"))
+    return sights
+
+
+def _acknowledged(tracked: Sequence[TrackedRecording], name: str | None) -> int:
+    """How many recordings, from the first on, somebody has looked at."""
+    if name is None:
+        return 0
+    if name == LAST:
+        return len(tracked)
+    for number, one in enumerate(tracked, 1):
+        if name in (one.file, Path(one.file).name):
+            return number
+    raise BadInput(f"{name} is not among the {len(tracked)} recordings; acknowledge one of them, or {LAST}")

@@ -1,0 +1,124 @@
+"""The alarm of `asperity track` and `watch` as a user meets it: states, exit codes, levels, log, acknowledgement."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+STEADY, LOUD = 12, 24
+
+
+def snapshots(folder, levels, seconds=0.1, first=0):
+    """Noise of a machine without a contact resonance, as a logger keeps it: a tenth of a second each."""
+    Path(folder).mkdir(exist_ok=True)
+    for number, level in enumerate(levels, first):
+        rng = np.random.default_rng(number)
+        values = level * rng.standard_normal(round(seconds * 20e3))
+        np.savez(Path(folder) / f"s-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
+
+
+def failing():
+    """Steady, then up twenty times."""
+    grown = np.exp(np.log(20.0) * np.arange(LOUD) / (LOUD - 1))
+    return np.concatenate([np.ones(STEADY), grown]) * (
+        1.0 + 0.05 * np.random.default_rng(9).standard_normal(STEADY + LOUD)
+    )
+
+
+def test_a_level_that_grows_alarms_and_claims_no_resonance(asp):
+    snapshots("in", failing())
+    code, out, _ = asp("track", "in", "--json")
+    said = json.loads(out)
+    assert code == 3
+    assert said["alarm"]["state"] == "alarm"
+    assert said["alarm"]["raised_by"] == "the level (rms)"
+    assert said["alarm"]["false_alarm_rate"] == 1e-3
+    assert STEADY < [row["state"] for row in said["recordings"]].index("alarm") < STEADY + LOUD - 5
+    assert said["verdict"].startswith("ALARM since s-")
+    assert "no contact resonance found in 36 recordings" in said["verdict"]
+    assert not any("off" in row["reason"] for row in said["recordings"])  # the quiet ones were healthy
+    for row in said["recordings"]:
+        assert row["kurtosis"] == pytest.approx(3.0, abs=0.4)  # of Gaussian noise
+        assert row["crest"] == pytest.approx(3.8, abs=1.2)
+
+
+def test_a_machine_that_is_off_is_not_healthy(asp):
+    snapshots("in", [1.0] * 12 + [0.02])
+    code, out, _ = asp("track", "in", "--json")
+    said = json.loads(out)
+    assert (code, said["alarm"]["state"]) == (5, "blind")
+    assert said["alarm"]["since"].endswith("s-012.npz")
+    assert "machine was off, or the sensor disconnected: rms is 2 %" in said["verdict"]
+
+
+def test_a_machine_that_was_off_before_it_ran_is_told_by_its_first_run(asp):
+    snapshots("in", [0.02, 0.02] + [1.0] * 8)
+    states = [row["reason"] for row in json.loads(asp("track", "in", "--json")[1])["recordings"]]
+    assert ["machine was off" in reason for reason in states] == [True, True] + [False] * 8
+
+
+def test_a_watch_keeps_its_alarm_until_it_is_acknowledged(asp):
+    rates = ("--false-alarms", "1/1000", "--json", "--once", "--settle", "0")
+    levels = failing()
+    snapshots("in", levels)
+    code, out, _ = asp("watch", "in", *rates)
+    assert code == 3
+    since = json.loads(out)["alarm"]["since"]
+    for number in range(STEADY, levels.size):  # what raised it is gone; the alarm is not
+        Path(f"in/s-{number:03}.npz").unlink()
+    code, out, _ = asp("watch", "in", *rates)
+    assert code == 3
+    assert "raised before and not acknowledged" in json.loads(out)["verdict"]
+    code, out, _ = asp("watch", "in", *rates, "--acknowledge", "last")
+    assert (code, json.loads(out)["alarm"]["state"]) == (0, "none")
+    snapshots("in", levels[:3], first=STEADY)
+    code, out, _ = asp("watch", "in", *rates)
+    assert (code, json.loads(out)["alarm"]["state"]) == (4, "cannot-tell")  # the baseline is learned anew
+    with Path("in/asperity-watch/alarms.jsonl").open() as file:
+        log = [json.loads(line) for line in file]
+    assert [entry.get("state", "acknowledged") for entry in log] == [
+        "alarm",
+        "alarm",
+        "acknowledged",
+        "none",
+        "cannot-tell",
+    ]
+    assert log[0]["since"] == since
+    assert log[2]["acknowledged"] == "s-011.npz"
+    assert all(entry["time"] for entry in log)
+
+
+def test_a_log_cut_short_by_a_crash_goes_on(asp):
+    snapshots("in", failing())
+    assert asp("watch", "in", "--once", "--settle", "0")[0] == 3
+    log = Path("in/asperity-watch/alarms.jsonl")
+    log.write_bytes(log.read_bytes() + b'{"time": "20')
+    for number in range(STEADY, STEADY + LOUD):
+        Path(f"in/s-{number:03}.npz").unlink()
+    assert asp("watch", "in", "--once", "--settle", "0")[0] == 3
+    assert len(log.read_text().splitlines()) == 3
+    assert json.loads(log.read_text().splitlines()[2])["state"] == "alarm"
+
+
+def test_an_empty_folder_is_not_healthy(asp):
+    Path("in").mkdir()
+    code, out, _ = asp("watch", "in", "--once")
+    assert code == 4
+    assert out.startswith("Nothing to judge yet")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--false-alarms", "often"), "must be a rate such as 0.001 or 1/1000, got 'often'"),
+        (("--false-alarms", "0.5"), "must lie between 0 and 0.1 a recording, got 0.5"),
+        (("--false-alarms", "-1"), "must lie between 0 and 0.1 a recording, got -1"),
+        (("--acknowledge", "s-999.npz"), "s-999.npz is not among the 3 recordings"),
+    ],
+)
+def test_a_rate_or_a_recording_that_is_none_is_refused(asp, arguments, said):
+    snapshots("in", [1.0] * 3)
+    code, out, err = asp("track", "in", *arguments)
+    assert (code, out) == (2, "")
+    assert said in err

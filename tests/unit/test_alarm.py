@@ -1,0 +1,168 @@
+"""The sequential alarm on series of indicators whose truth is known."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.wear import Sight, Watched, sequential_alarm
+from asperity.wear.sequential import growth, knee, step, threshold
+
+NUMBER = np.arange(40.0)
+PER_THOUSAND = threshold(1e-3)
+
+
+def knee_at(place, scatter, seed, after=0.18):
+    """The paper's rise of CRF, 2922 to 3640 Hz, and its slower one behind, over its first value."""
+    pace = 718.0 / place
+    course = 2922.0 + np.where(place > NUMBER, pace * NUMBER, 718.0 + after * pace * (NUMBER - place))
+    return (course + scatter * np.random.default_rng(seed).standard_normal(NUMBER.size)) / 2922.0
+
+
+def first(test, values, least, above=PER_THOUSAND):
+    """After how many recordings a test speaks first, judged after each."""
+    for count in range(1, values.size + 1):
+        if test(NUMBER[:count], values[:count], least=least).log_ratio > above:
+            return count
+    return None
+
+
+def watched(values, contact=True, least=0.05):
+    return Watched(
+        name="CRF", values=np.asarray(values), least=least, contact=contact, in_words=lambda by: f"by {by:.2f}"
+    )
+
+
+def judged(values, sights=None, **choices):
+    values = np.asarray(values)
+    seen = sights or [Sight()] * values.size
+    return sequential_alarm(np.arange(float(values.size)), [watched(values)], seen, **choices)
+
+
+@pytest.mark.parametrize("place", [12, 18, 24])
+def test_a_knee_is_found_soon_and_where_it_is(place):
+    values = knee_at(place, 5.0, place)
+    count = first(knee, values, 0.05)
+    assert place < count <= place + 5
+    found = knee(NUMBER[:count], values[:count], least=0.05)
+    assert found.at == pytest.approx(place, abs=2.0)
+    assert found.change == pytest.approx(718.0 / 2922.0, abs=0.04)
+
+
+def scatter(seed, size=0.004):
+    return size * np.random.default_rng(seed).standard_normal(NUMBER.size)
+
+
+HEALTHY = {
+    "level": np.ones(40),
+    "daily cycle of 2 %": 1.0 + 0.02 * np.sin(NUMBER * 2.0 * np.pi / 24.0),
+    "load step": 1.0 + 0.08 * (NUMBER >= 15),
+    "warm-up": 1.0 - 0.1 * np.exp(-NUMBER / 4.0),
+    "straight": 1.0 + 0.2 * NUMBER / 40.0,
+    "saturating": 1.25 - 0.25 * np.exp(-NUMBER / 15.0),
+    "rising ever faster": 1.0 + 0.25 * (NUMBER / 40.0) ** 3,
+    "flat, then rising": 1.0 + 0.01 * np.maximum(NUMBER - 20.0, 0.0),
+    "falling, then flat": 1.2 - 0.01 * np.minimum(NUMBER, 20.0),
+}
+
+
+@pytest.mark.parametrize("name", HEALTHY)
+def test_what_is_no_knee_raises_nothing_after_any_recording(name):
+    assert first(knee, HEALTHY[name] + scatter(3), 0.05) is None
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
+def test_the_evidence_of_a_knee_does_not_depend_on_the_unit_of_x(unit):
+    values = knee_at(18, 5.0, 1)[:24]
+    one, other = knee(NUMBER[:24], values, least=0.05), knee(7.0 * unit + NUMBER[:24] * unit, values, least=0.05)
+    assert other.log_ratio == pytest.approx(one.log_ratio, rel=1e-4)
+    assert (other.at - 7.0 * unit) / unit == pytest.approx(one.at, rel=1e-4)
+
+
+def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
+    """Slow twin: with independent scatter alone, n/2 ln of the ratio of the squares left by two straight fits."""
+    values = knee_at(10, 20.0, 5)[:20]
+    at = NUMBER[:20]
+
+    def left(columns):
+        design = np.stack([np.ones(20), *columns], axis=1)
+        return float(np.sum((values - design @ np.linalg.lstsq(design, values, rcond=None)[0]) ** 2))
+
+    from asperity.wear import sequential
+
+    hinges = np.maximum(at - np.arange(3.0, 18.0)[:, None], 0.0)
+    own = sequential._gains(values, hinges, beside=at)[list(sequential.MEMORY).index(0.0)]
+    straight = sequential._gains(values, at[None])[list(sequential.MEMORY).index(0.0)]
+    twin = [10.0 * np.log(left([at]) / left([at, hinge])) for hinge in hinges]
+    assert own - straight == pytest.approx(twin, rel=1e-6)
+
+
+def test_a_level_that_grows_is_told_from_one_that_steps():
+    growing = np.log(np.where(NUMBER < 25, 1.0, np.exp(0.15 * (NUMBER - 25)))) + scatter(1, 0.05)
+    stepping = np.log(3.0) * (NUMBER >= 20) + scatter(2, 0.05)
+    assert 25 < first(growth, growing, np.log(2.0)) <= 34
+    assert first(growth, stepping, np.log(2.0)) is None
+    assert first(step, stepping, np.log(2.0)) in range(22, 26)
+    assert first(step, scatter(3, 0.05), np.log(2.0)) is None
+
+
+def test_an_alarm_stays_until_it_is_acknowledged_and_then_learns_anew():
+    values = knee_at(15, 5.0, 2)
+    alarm = judged(values)
+    raised = alarm.states.index("alarm")
+    assert (alarm.state, alarm.since, alarm.raised_by) == ("alarm", raised, "CRF")
+    assert set(alarm.states[raised:]) == {"alarm"}
+    assert "has flattened since" in alarm.reason
+    after = judged(values, acknowledged=raised + 1)
+    assert after.states[raised + 1] == "cannot-tell"
+    assert "alarm" not in after.states
+    assert after.state == "none"
+    everything = judged(values, acknowledged=40)
+    assert (everything.state, everything.since) == ("none", None)
+    assert "all 40 recordings are acknowledged" in everything.reason
+
+
+def test_an_alarm_by_the_contact_asks_the_stage():
+    values = knee_at(15, 5.0, 2)
+    asked = []
+    alarm = judged(values, confirmed=lambda number: asked.append(number) or False)
+    assert asked
+    assert set(alarm.states) == {"cannot-tell", "none", "alert"}
+
+
+def test_what_nobody_can_see_is_said_and_is_not_healthy():
+    level = 1.0 + scatter(4)
+    off = [Sight()] * 39 + [Sight("blind", "the machine was off")]
+    assert judged(level, off).state == "blind"
+    assert judged(level, off).since == 39
+    unseen = [Sight()] * 38 + [Sight("cannot-tell", "nothing heard")] * 2
+    assert (judged(level, unseen).state, judged(level, unseen).since) == ("cannot-tell", 38)
+    assert judged(level[:5]).state == "cannot-tell"
+    assert "5 of 8 places" in judged(level[:5]).reason
+    assert judged(level).state == "none"
+
+
+def test_a_step_of_load_or_gain_is_not_told_from_damage():
+    alarm = judged(HEALTHY["load step"] + scatter(5))
+    assert alarm.state == "cannot-tell"
+    assert "at once, at 15" in alarm.reason
+    assert "alarm" not in alarm.states
+    assert judged(HEALTHY["load step"] + scatter(5), acknowledged=15).state == "none"
+
+
+def test_a_smaller_rate_of_false_alarms_takes_longer():
+    values = knee_at(15, 15.0, 3)
+    delays = [judged(values, false_alarm_rate=rate).states.index("alarm") for rate in (1e-1 - 1e-9, 1e-3, 1e-5)]
+    assert delays[0] < delays[1] < delays[2]
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, 0.5, np.nan])
+def test_a_rate_that_is_none_is_refused(rate):
+    with pytest.raises(BadInput, match="rate of false alarms"):
+        judged(np.ones(3), false_alarm_rate=rate)
+
+
+def test_repeats_of_one_test_are_one_place():
+    repeated = np.repeat(NUMBER[:4], 5)
+    values = 1.0 + 0.1 * repeated
+    alarm = sequential_alarm(repeated, [watched(values)], [Sight()] * 20)
+    assert "4 of 8 places" in alarm.reason
