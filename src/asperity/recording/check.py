@@ -17,6 +17,7 @@ STEPS_OF_NOISE = 1.5  # standard deviation in steps of the converter, below whic
 CLIPPED_RUN = 3  # equal extreme samples in a row that make clipping
 CLIPPED_SHARE = 1e-3  # from which CRFA is off
 STUCK = 50  # equal samples in a row that make a stuck stretch
+MOST_STUCK = 0.5  # of the samples, from which the rest is no recording
 OFFSET = 3.0  # mean over standard deviation, from which the offset eats the converter's range
 PIECES = 16  # half-power widths that a record must hold in time for its line to be told from chance
 USABLE_BAND = 0.4  # of the sampling rate: above, the anti-alias filter has cut
@@ -45,6 +46,11 @@ class Quality:
     off: bool
     faults: tuple[str, ...]
     remarks: tuple[str, ...]
+
+    @property
+    def dead(self) -> bool:
+        """Whether nothing of the machine is heard: it is off, or the sensor stands still."""
+        return self.off or self.stuck > MOST_STUCK
 
     @property
     def crest(self) -> float:
@@ -166,6 +172,8 @@ class Gauge:
                 f"sampled too slowly: {recording.rate_hz:g} Hz, where a band up to {band_hz[1]:.0f} Hz needs "
                 f"{ceil(band_hz[1] / USABLE_BAND)} Hz"
             )
+        if not off and self.stuck > MOST_STUCK * self.finite:
+            faults.append(f"it stands still for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?")
         missing = (self.samples - self.finite) / max(self.samples, 1)
         if missing > 0.5 and self.finite >= 2:
             faults.append(f"{100 * missing:.0f} % of its samples are missing")
@@ -177,7 +185,7 @@ class Gauge:
             if clipped > 0.0:
                 worth = "CRFA is too low" if clipped > CLIPPED_SHARE else "hardly matters"
                 remarks.append(f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {worth}")
-            if self.stuck:
+            if 0 < self.stuck <= MOST_STUCK * self.finite:
                 remarks.append(f"stands still for {100 * self.stuck / self.finite:.2g} % of the time: samples lost?")
             if rms > 0.0 and abs(self.mean) > OFFSET * rms:
                 remarks.append(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +70,9 @@ def whole_rate(rate: float, rounding: float) -> float:
 
 
 def parse_time(value: Any) -> datetime | None:
-    """A time as files write it; None for what is none."""
+    """A time as files write it, in UTC where it states its zone; None for what is none."""
     if isinstance(value, datetime):
-        return value.replace(tzinfo=None)
+        return _in_utc(value)
     if isinstance(value, np.datetime64):
         seconds = value.astype("datetime64[us]").astype(object)
         return seconds if isinstance(seconds, datetime) else None
@@ -83,9 +83,14 @@ def parse_time(value: Any) -> datetime | None:
         except ValueError:
             continue
     try:
-        return datetime.fromisoformat(text).replace(tzinfo=None)
-    except ValueError:
+        return _in_utc(datetime.fromisoformat(text))
+    except (ValueError, OverflowError):
         return None
+
+
+def _in_utc(time: datetime) -> datetime:
+    """Without its zone: across a change of clocks local times stand still or jump."""
+    return time if time.tzinfo is None else time.astimezone(UTC).replace(tzinfo=None)
 
 
 _TIMES = (

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.errors import UnreadableFile
 from asperity.recording.common import columns, facts_in, numeric, refused_as
 from asperity.recording.model import Channel, Contents
 
@@ -52,15 +53,25 @@ def _channels(
             yield from _channels(path, member, inner, around, notes, seen)
         elif isinstance(member, h5py.Dataset) and numeric(member) and member.size is not None and member.size > 64:
             facts = facts_in(path.name, around | dict(member.attrs))
-            yield from columns(inner, _OnDisk(path, member.name, member.shape), notes, **facts)
+            packed = _packing(member, "scale_factor", 1.0), _packing(member, "add_offset", 0.0)
+            yield from columns(inner, _OnDisk(path, member.name, member.shape, packed), notes, **facts)
+
+
+def _packing(member: Any, name: str, usual: float) -> float:
+    """An attribute by which values were packed into integers (CF conventions 8.1)."""
+    value = np.asarray(member.attrs.get(name, usual)).reshape(-1)
+    if value.size != 1 or value.dtype.kind not in "iuf" or not np.isfinite(value[0]):
+        raise UnreadableFile(f"{member.name} states {name} = {value}, which is no number; export it again")
+    return float(value[0])
 
 
 class _OnDisk:
     """A data set whose file is opened at its first slice and closed after its last."""
 
-    def __init__(self, path: Path, name: str, shape: tuple[int, ...]) -> None:
+    def __init__(self, path: Path, name: str, shape: tuple[int, ...], packed: tuple[float, float]) -> None:
         self.path, self.name, self.shape = path, name, shape
         self._along = int(np.argmax(shape))
+        self._packed = packed
         self._file: Any = None
 
     def __getitem__(self, where: Any) -> Any:
@@ -69,6 +80,8 @@ class _OnDisk:
         if self._file is None:
             self._file = h5py.File(self.path, "r")
         values = self._file[self.name][where]
+        if self._packed != (1.0, 0.0):
+            values = np.asarray(values, dtype=np.float64) * self._packed[0] + self._packed[1]
         ends = where if isinstance(where, tuple) else (where,)
         if ends[self._along].stop >= self.shape[self._along]:
             self._file.close()

@@ -43,6 +43,7 @@ class Channel:
     blocks: Callable[[int], Iterator[Field]]
     samples: int | None = None
     rate_hz: float | None = None
+    rate_doubt: float = 0.0  # relative standard deviation of the rate, where times state it
     rate_source: str = "file"
     rate_hint: str = ""  # what to say beside "states no sampling rate"
     unit: str | None = None
@@ -108,6 +109,11 @@ class OpenRecording:
     def notes(self) -> tuple[str, ...]:
         """What is wrong with the file, in a sentence each: what was seen so far."""
         return tuple(dict.fromkeys((*self.first_notes, *self.later_notes)))
+
+    @property
+    def rate_doubt(self) -> float:
+        """Relative standard deviation of the rate: that of the file's times, where they state it."""
+        return self.channel.rate_doubt if self.facts["rate"].source == self.channel.rate_source else 0.0
 
     @property
     def samples(self) -> int | None:

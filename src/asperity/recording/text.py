@@ -20,7 +20,7 @@ from asperity.dialect import MISSING, Dialect, sniff_dialect
 from asperity.errors import UnreadableFile
 from asperity.recording.common import MOST_CHANNELS, facts_in, parse_time
 from asperity.recording.model import Channel, Contents
-from asperity.recording.timing import is_time, timed
+from asperity.recording.timing import Filling, clock_of, is_time, timed
 from asperity.recording.units import known_unit, name_and_unit
 
 SUFFIXES = {"", "txt", "csv", "tsv", "asc", "dat", "lvm", "prn"}
@@ -31,6 +31,7 @@ _WORTH_PANDAS = 1 << 20  # bytes of rows, below which they are read line by line
 _LONGEST_HEADER = 400  # lines
 _MOST_BLOCKS = 64
 _FEWEST_ROWS = 8  # of a block; fewer are a table in a header
+_SAME_RATE = 1e-3  # relative, up to which header and times agree
 _GAP = 1.5  # steps between two times, from which samples are missing
 
 
@@ -211,13 +212,13 @@ def _started(header: list[str]) -> datetime | None:
 # The rows ------------------------------------------------------------------------------------------------------------
 
 
-def _parsed(chunk: bytes, table: _Table, column: int | None = None) -> Field | None:
+def _parsed(chunk: bytes, table: _Table, picked: tuple[int, ...] | None = None) -> Field | None:
     """The numbers of whole lines by pandas, (rows, columns); None where a line holds something else."""
     import pandas
 
     if not chunk.strip():
-        return np.empty((0, table.columns if column is None else 1))
-    wanted: Any = range(table.columns) if column is None else [column]
+        return np.empty((0, table.columns if picked is None else len(picked)))
+    wanted: Any = range(table.columns) if picked is None else picked
     first = chunk.lstrip(b"\r\n").split(b"\n", 1)[0].rstrip(b" \r")
     ended = table.dialect.separator is not None and first.endswith(table.dialect.separator.encode())
     try:
@@ -236,10 +237,10 @@ def _parsed(chunk: bytes, table: _Table, column: int | None = None) -> Field | N
         )
     except (ValueError, pandas.errors.ParserError, OverflowError):
         return None
-    return frame.to_numpy()
+    return frame[list(wanted)].to_numpy()
 
 
-def _tables(stream: BinaryIO, table: _Table, column: int | None = None) -> Iterator[Field]:
+def _tables(stream: BinaryIO, table: _Table, picked: tuple[int, ...] | None = None) -> Iterator[Field]:
     """The rows of a block, chunk by chunk, until lines follow that are no rows; where those begin goes to `end`."""
     stream.seek(table.offset)
     at, rest = table.offset, b""
@@ -250,9 +251,9 @@ def _tables(stream: BinaryIO, table: _Table, column: int | None = None) -> Itera
         chunk, rest = chunk[:cut], chunk[cut:]
         if len(rest) > _CHUNK:
             return  # no line is as long as that
-        rows = None if table.stamped or len(chunk) < _WORTH_PANDAS else _parsed(chunk, table, column)
+        rows = None if table.stamped or len(chunk) < _WORTH_PANDAS else _parsed(chunk, table, picked)
         if rows is None:
-            rows, ended = _line_by_line(chunk, table, at, column)
+            rows, ended = _line_by_line(chunk, table, at, picked)
             yield rows
             if ended is not None:
                 table.end = ended
@@ -264,7 +265,7 @@ def _tables(stream: BinaryIO, table: _Table, column: int | None = None) -> Itera
             return
 
 
-def _line_by_line(chunk: bytes, table: _Table, at: int, column: int | None) -> tuple[Field, int | None]:
+def _line_by_line(chunk: bytes, table: _Table, at: int, picked: tuple[int, ...] | None) -> tuple[Field, int | None]:
     """Rows up to two lines in a row that are none; a single odd line is a missing row. And where it ended, if so."""
     rows: list[list[float]] = []
     waiting: int | None = None  # where an odd line began
@@ -276,9 +277,9 @@ def _line_by_line(chunk: bytes, table: _Table, at: int, column: int | None) -> t
             if table.stamped and values and values[0] is None:
                 stamp = parse_time(fields[0].strip().strip('"'))
                 if stamp is not None:
-                    values[0] = 0.0
-                    if column is None:  # a large file's are too many to keep
+                    if picked is None:  # a large file's are too many to keep
                         table.stamps.append(stamp)
+                    values[0] = (stamp - table.stamps[0]).total_seconds()
             good = [value for value in values if value is not None]
             if len(values) == table.columns and good:
                 if waiting is not None:
@@ -288,16 +289,16 @@ def _line_by_line(chunk: bytes, table: _Table, at: int, column: int | None) -> t
                 table.odd += len(good) < len(values)
                 rows.append([np.nan if value is None else value for value in values])
             elif waiting is not None:
-                return _picked(rows, table, column), waiting
+                return _picked(rows, table, picked), waiting
             else:
                 waiting = at
         at += len(line)
-    return _picked(rows, table, column), None
+    return _picked(rows, table, picked), None
 
 
-def _picked(rows: list[list[float]], table: _Table, column: int | None) -> Field:
+def _picked(rows: list[list[float]], table: _Table, picked: tuple[int, ...] | None) -> Field:
     array = np.array(rows, dtype=np.float64).reshape(-1, table.columns)
-    return array if column is None else array[:, column : column + 1]
+    return array if picked is None else array[:, list(picked)]
 
 
 # Channels ------------------------------------------------------------------------------------------------------------
@@ -314,8 +315,6 @@ def _channels(
     if clock_at is not None:
         name, unit = table.names[clock_at], table.units[clock_at]
         times = rows[:, clock_at]
-        if table.stamps:
-            times = np.array([(stamp - table.stamps[0]).total_seconds() for stamp in table.stamps])
         clock = timed(name, "s" if table.stamped else unit, times)
         if open_bytes is None and "rate_hz" in clock and times.size == rows.shape[0]:
             spread = _onto_grid(times, prefix, notes)
@@ -326,6 +325,11 @@ def _channels(
     facts = facts_in(path.name, table.declared)
     if table.started is not None:
         facts["started"] = table.started
+    if "rate_hz" in clock and "rate_hz" in facts and abs(facts["rate_hz"] / clock["rate_hz"] - 1.0) > _SAME_RATE:
+        stated = (
+            f"its header states {facts['rate_hz']:g} Hz ({facts['rate_source']}), its times {clock['rate_hz']:g} Hz"
+        )
+        notes.append(f"{prefix}{stated}; the times are taken")
     facts = clock | facts if "rate_hz" not in clock else facts | clock
     names = _unique(table.names)
     for k in range(table.columns):
@@ -336,7 +340,9 @@ def _channels(
             values = spread(rows[:, k])
             yield Channel(name=prefix + names[k], blocks=partial(_pieces, values), samples=values.size, **known)
         else:
-            yield Channel(name=prefix + names[k], blocks=partial(_streamed, open_bytes, table, k, notes), **known)
+            at = None if "rate_hz" not in clock else clock_at
+            blocks = partial(_streamed, open_bytes, table, (k, at), notes)
+            yield Channel(name=prefix + names[k], blocks=blocks, **known)
 
 
 def _unique(names: list[str]) -> list[str]:
@@ -349,11 +355,21 @@ def _pieces(values: Field, size: int) -> Iterator[Field]:
 
 
 def _streamed(
-    open_bytes: Callable[[], BinaryIO], table: _Table, column: int, notes: list[str], size: int
+    open_bytes: Callable[[], BinaryIO], table: _Table, place: tuple[int, int | None], notes: list[str], size: int
 ) -> Iterator[Field]:
+    """A column of a large file, on the grid of its column of times where that is one."""
+    column, clock_at = place
+    filling: Filling | None = None
+    if clock_at is not None:
+        assert table.rows is not None  # its first ones
+        clock = clock_of(table.rows[:, clock_at])
+        filling = Filling(clock) if clock is not None and clock.even else None
     with open_bytes() as stream:
-        for rows in _tables(stream, table, column):
-            yield from _pieces(rows[:, 0], size)
+        for rows in _tables(stream, table, (column,) if clock_at is None else (column, clock_at)):
+            values = rows[:, 0] if filling is None else filling.spread(rows[:, 1], rows[:, 0])
+            yield from _pieces(values, size)
+    if filling is not None and filling.note:
+        notes.append(filling.note)
     if table.end is not None:
         notes.append("another block of rows follows, which was not read; split the file")
 
@@ -364,6 +380,13 @@ def _as_they_are(values: Field) -> Field:
 
 def _onto_grid(times: Field, prefix: str, notes: list[str]) -> Callable[[Field], Field]:
     """Puts rows where their times say, leaving gaps where samples are missing."""
+    clock = clock_of(times)
+    if clock is not None and clock.even:
+        filling = Filling(clock)
+        filling.spread(times, times)
+        if filling.note:
+            notes.append(prefix + filling.note)
+        return lambda values: Filling(clock).spread(times, values)
     known = np.flatnonzero(np.isfinite(times))
     steps = np.diff(times[known])
     step = float(np.median(steps))

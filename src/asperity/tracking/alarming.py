@@ -99,7 +99,7 @@ def _levels(tracked: Sequence[TrackedRecording]) -> list[Watched]:
         values = np.full(len(tracked), np.nan)
         for number, one in enumerate(tracked):
             quality = one.reading.quality
-            if quality is not None and not quality.off and one.reading.unit == usual and getattr(quality, name) > 0.0:
+            if quality is not None and not quality.dead and one.reading.unit == usual and getattr(quality, name) > 0.0:
                 values[number] = np.log(getattr(quality, name))
         return values
 
@@ -124,7 +124,7 @@ def _sights(tracked: Sequence[TrackedRecording], contact: Sequence[Watched]) -> 
     sights = []
     for number, recording in enumerate(tracked):
         name, quality, reason = Path(recording.file).name, recording.reading.quality, recording.resonance.reason
-        if quality is not None and quality.off:
+        if quality is not None and quality.dead:
             sights.append(Sight("blind", f"{name}: {recording.reading.reason}"))
         elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
             sights.append(Sight())

@@ -28,7 +28,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table of places by file name; `x_name` is the heading of its column of x."""
+    """A table of places by file, as it names them, with or without folders; `x_name` heads its column of x."""
 
     name: str
     x_name: str
@@ -42,10 +42,39 @@ class Table:
         BadInput
             for a recording that is not in the table.
         """
-        place = self.places.get(path.name) or self.places.get(path.stem)
-        if place is None:
+        row = self.row(path)
+        if row is None:
             raise BadInput(f"{self.name} has no row for {path.name}; add one, or leave that recording out")
-        return place
+        return self.places[row]
+
+    def row(self, path: Path) -> str | None:
+        """How the table names a recording: by the most of its path; None where it does not."""
+        parts = path.absolute().parts
+        for last in (path.name, path.stem):
+            for first in range(len(parts)):
+                name = "/".join((*parts[first:-1], last))
+                if name in self.places:
+                    return name
+        return None
+
+    def placed(self, paths: Sequence[Path]) -> dict[str, Place]:
+        """Where each recording stands, by its path.
+
+        Raises
+        ------
+        BadInput
+            as `place`, and where one row is that of several recordings.
+        """
+        by_row: dict[str, list[Path]] = {}
+        for path in paths:
+            by_row.setdefault(self.row(path) or "", []).append(path)
+        for row, several in by_row.items():
+            if row and len(several) > 1:
+                raise BadInput(
+                    f"{self.name} has one row {row} for {len(several)} recordings, {several[0]} and {several[1]} among "
+                    "them; name them there with their folders"
+                )
+        return {str(path): self.place(path) for path in paths}
 
 
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
@@ -120,7 +149,10 @@ def read_table(path: str | Path) -> Table:
         )
         if x is None:
             raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
-        places[Path(name).name] = Place(x=x, x_std=x_std, load_n=load_n, speed_hz=speed_hz)
+        key = Path(name.replace("\\", "/")).as_posix()
+        if key in places:
+            raise BadInput(f"{path}, line {number}: {name} has a row already; leave one of the two out")
+        places[key] = Place(x=x, x_std=x_std, load_n=load_n, speed_hz=speed_hz)
     return Table(name=path.name, x_name=x_name, places=places)
 
 

@@ -35,13 +35,15 @@ WORTH_A_POOL = 32 << 20  # bytes in all; starting processes takes a second
 class Reading:
     """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
-    `facts` are texts by name, each with its source; `started` is in ISO form or empty.
+    `rate_doubt` is the relative standard deviation of the rate. `facts` are texts by name, each with its source;
+    `started` is in ISO form or empty.
     """
 
     file: str
     spectrum: Spectrum | None = None
     quality: Quality | None = None
     rate_hz: float = np.nan
+    rate_doubt: float = 0.0
     unit: str = ""
     facts: dict[str, tuple[str, str]] = field(default_factory=dict)
     started: str = ""
@@ -67,6 +69,7 @@ def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: 
     known = Reading(
         file=str(path),
         rate_hz=opened.rate_hz,
+        rate_doubt=opened.rate_doubt,
         unit=opened.unit,
         facts={name: (_text(fact.value), fact.source) for name, fact in opened.facts.items()},
         started=opened.started.isoformat() if opened.started else "",

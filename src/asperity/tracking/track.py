@@ -160,6 +160,8 @@ def judge(
         place = places[reading.file]
         clean, found = used.get(number, (None, None))
         resonance = found or no_resonance(reading.reason, target.band_hz, chosen)
+        clocked = float(np.hypot(resonance.crf_std, reading.rate_doubt * resonance.crf_hz))  # a rate off is a CRF off
+        resonance = replace(resonance, crf_std=clocked)
         tracked.append(
             TrackedRecording(
                 file=reading.file,
@@ -327,7 +329,7 @@ def _stated_places(
             raise BadInput(f"x needs one value for each of {len(files)} recordings, got {len(x)}")
         return "x", {str(file): Place(x=float(value)) for file, value in zip(files, x, strict=True)}
     if table is not None:
-        return table.x_name, {str(file): table.place(file) for file in files}
+        return table.x_name, table.placed(files)
     return "", None
 
 

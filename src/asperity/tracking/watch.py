@@ -116,8 +116,8 @@ def _placed(readings: list[Reading], table: str | Path | None) -> tuple[list[Rea
     if table is None or not readings:
         return readings, None, ""
     named = read_table(table)
-    known = [reading for reading in readings if Path(reading.file).name in named.places]
-    return known, {reading.file: named.place(Path(reading.file)) for reading in known}, named.x_name
+    known = [reading for reading in readings if named.row(Path(reading.file)) is not None]
+    return known, named.placed([Path(reading.file) for reading in known]), named.x_name
 
 
 def _kept(judged: Callable[..., Track], log: AlarmLog, new: tuple[Reading, ...], acknowledge: str | None) -> Track:

@@ -1,0 +1,109 @@
+"""Rates from columns of times that are printed with few digits, and the gaps in them."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from asperity.errors import UnreadableFile
+from asperity.recording import open_recording
+from asperity.recording import text as text_reader
+from asperity.recording.timing import Filling, clock_of, timed
+
+RATES = (2560, 8192, 10_240, 12_800, 20_000, 25_600, 44_100, 48_000, 51_200)
+
+
+@pytest.mark.parametrize("digits", [5, 6, 9])
+@pytest.mark.parametrize("rate", RATES)
+def test_the_whole_slope_tells_the_rate(rate, digits):
+    times = np.round(3.0 + np.arange(rate) / rate, digits)
+    whole = timed("t", "s", times)
+    assert whole["rate_hz"] == rate
+    assert whole["rate_doubt"] < 2.5e-5
+    assert timed("t", "s", np.delete(times, slice(1000, 1400)))["rate_hz"] == rate
+
+
+def test_a_rate_that_no_converter_has_is_known_as_well_as_its_times_say():
+    times = np.round(np.arange(6000) / 11_937.4, 5)  # half a second
+    found = timed("t", "s", times)
+    assert abs(found["rate_hz"] / 11_937.4 - 1.0) < found["rate_doubt"] < 4e-5
+
+
+def test_gaps_are_found_behind_coarse_times():
+    times = np.round(np.arange(44_100) / 44_100.0, 5)
+    kept = np.delete(np.arange(44_100), np.r_[500:501, 20_000:23_000])
+    filling = Filling(clock_of(times[kept]))
+    whole = np.concatenate([filling.spread(times[part], part.astype(float)) for part in np.array_split(kept, 7)])
+    assert whole.size == 44_100
+    assert np.flatnonzero(np.isnan(whole)).tolist() == [500, *range(20_000, 23_000)]
+    assert np.array_equal(whole[~np.isnan(whole)], kept)
+    assert filling.note == "2 gaps in its times: 3001 samples are missing"
+    full = Filling(clock_of(times))
+    assert full.spread(times, times).size == 44_100
+    assert full.note == ""
+
+
+def test_times_with_next_to_nothing_between_gaps_are_refused():
+    times = np.concatenate([np.arange(100.0), 1e9 + np.arange(100.0)])
+    with pytest.raises(UnreadableFile, match="split the recording"):
+        Filling(clock_of(np.arange(200.0))).spread(times, times)
+
+
+def rows(rate, gap):
+    number = np.delete(np.arange(3 * rate), slice(*gap)) if gap else np.arange(3 * rate)
+    times = np.round(number / rate, 5)
+    return times, np.random.default_rng(1).standard_normal(times.size)
+
+
+def csv(path, times, values):
+    path.write_text(
+        "time [s],acc [m/s^2]\n" + "".join(f"{t:.5f},{v:.6f}\n" for t, v in zip(times, values, strict=True))
+    )
+    return path
+
+
+def parquet(path, times, values, dates=False):
+    import pandas
+
+    column = pandas.to_datetime(times, unit="s", origin="2026-10-25") if dates else times
+    pandas.DataFrame({"time" if dates else "time [s]": column, "acc [m/s^2]": values}).to_parquet(path)
+    return path
+
+
+@pytest.mark.parametrize("write", [csv, parquet, partial(parquet, dates=True)], ids=["csv", "parquet", "dates"])
+@pytest.mark.parametrize("large", [False, True])
+def test_a_gap_is_a_gap_in_every_file_with_times(tmp_path, monkeypatch, write, large):
+    if large:
+        monkeypatch.setattr(text_reader, "_LARGE", 1000)
+        monkeypatch.setattr(text_reader, "_CHUNK", 40_000)
+    whole = rows(12_800, None)
+    holed = rows(12_800, (9000, 9400))
+    for name, (times, values), missing in (("a", whole, 0), ("b", holed, 400)):
+        opened = open_recording(write(tmp_path / f"{name}.dat", times, values))
+        assert opened.rate_hz == 12_800
+        read = opened.read()
+        assert read.values.size == 38_400
+        assert int(np.isnan(read.values).sum()) == missing
+        assert np.allclose(read.values[~np.isnan(read.values)], values, atol=1e-6)
+        assert any("1 gap in its times: 400 samples are missing" in note for note in read.notes) == (missing > 0)
+
+
+def test_what_a_rate_is_in_doubt_by_crf_is_too():
+    from dataclasses import replace
+
+    from asperity.paper import simulate_rig
+    from asperity.tracking.reading import Reading
+    from asperity.tracking.target import search_target
+    from asperity.tracking.track import judge
+
+    rig = simulate_rig(samples=6, repeats=1, duration_s=10.0)
+    sure = [
+        Reading(file=f"{k}", spectrum=one.spectrum(20_000), rate_hz=20e3, unit="m/s^2")
+        for k, one in enumerate(rig.recordings)
+    ]
+    target = search_target(None, rig.band_hz)
+    known, doubted = (
+        judge([replace(one, rate_doubt=doubt) for one in sure], target).recordings[0].resonance for doubt in (0.0, 0.01)
+    )
+    assert known.found
+    assert doubted.crf_std == pytest.approx(np.hypot(known.crf_std, 0.01 * known.crf_hz))
