@@ -105,7 +105,7 @@ def heard_of(track: Track, waiting: int = 0) -> Heard:
     frequency, levels = _waterfall(ears)
     return Heard(
         verdict=track.verdict(),
-        alarm=track.alarm.level,
+        alarm=track.alarm.state,
         rows=tuple(recording.row() | {"file": Path(recording.file).name} for recording in track.recordings),
         x_name=track.x_name,
         band_hz=track.target.band_hz,
