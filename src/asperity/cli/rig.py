@@ -86,7 +86,7 @@ def rig(
     )
 
 
-def _rows(made: paper.Rig, out: Path) -> list[Row]:
+def _rows(made: "paper.Rig", out: Path) -> list[Row]:
     shafts = " and ".join(f"{speed:g}" for speed in made.shaft_hz)
     beside = f"{made.disturbance.snr_db:g} dB, {made.disturbance.modes} structural modes, shafts at {shafts} Hz, mains"
     return [
