@@ -96,6 +96,37 @@ def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
     assert own - straight == pytest.approx(twin, rel=1e-6)
 
 
+@pytest.mark.parametrize("memory", [-0.3, 0.7, 0.9])
+def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memory):
+    """Slow twin: generalised least squares with the dense covariance, its determinant by its own factors."""
+    from scipy.linalg import toeplitz
+
+    from asperity.wear import sequential
+
+    values = knee_at(10, 20.0, 6)[:20]
+    rows = sequential._saturating(NUMBER[:20])[::7]
+    covariance = toeplitz(memory ** np.arange(20.0))
+    inverse = np.linalg.inv(covariance)
+
+    def likelihood(row):
+        design = np.stack([np.ones(20), row], axis=1)
+        fitted = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ values)
+        off = values - design @ fitted
+        return -10.0 * np.log(off @ inverse @ off) - 0.5 * np.linalg.slogdet(covariance)[1]
+
+    own = sequential._gains(values, rows)[list(sequential.MEMORY).index(memory)]
+    assert own == pytest.approx([likelihood(row) for row in rows], abs=1e-6)
+
+
+def test_an_alarm_stays_though_what_raised_it_is_gone():
+    values = np.concatenate([knee_at(12, 5.0, 2)[:20], 1.0 + scatter(7)[:20]])
+    count = judged(values).states.index("alarm") + 1
+    assert knee(NUMBER, values, least=0.05).log_ratio < PER_THOUSAND
+    assert count < 20
+    assert set(judged(values).states[count:]) == {"alarm"}
+    assert judged(values, acknowledged=20).state != "alarm"
+
+
 def test_a_level_that_grows_is_told_from_one_that_steps():
     growing = np.log(np.where(NUMBER < 25, 1.0, np.exp(0.15 * (NUMBER - 25)))) + scatter(1, 0.05)
     stepping = np.log(3.0) * (NUMBER >= 20) + scatter(2, 0.05)

@@ -5,6 +5,7 @@ Each question is a likelihood ratio of two families of courses, both with scatte
 equations and how often each speaks without a cause.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -144,6 +145,7 @@ def _saturating(along: Field) -> Field:
     return np.concatenate([np.exp(-along / lengths), 1.0 / (1.0 + along / lengths)])
 
 
+@lru_cache(maxsize=2)  # a long series is judged by as many places each time
 def _jumps(places: int) -> Field:
     """From one level to another, at once or over a few recordings, (steps, places)."""
     number = np.arange(places)
@@ -178,6 +180,7 @@ class _White(NamedTuple):
         return np.asarray(white - (white @ self.constant)[..., None] * self.constant)
 
 
+@lru_cache(maxsize=2)
 def _whites(places: int) -> list[_White]:
     ones = [_whitened(memory, np.ones(places)) for memory in MEMORY]
     return [_White(one / np.sqrt(one @ one), float(memory)) for one, memory in zip(ones, MEMORY, strict=True)]
