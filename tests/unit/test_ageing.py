@@ -171,6 +171,12 @@ def test_the_interval_of_k_is_another_clock(unbroken):
     assert run_wear(case({"wear.flattening": True}), hours=1e-4).with_k("sq_m") is None
 
 
+def test_a_law_of_film_defects_runs_with_its_own_values():
+    """The bare metal's k, at which Archard's law asks for thousands of jumps: few of its sites are bare."""
+    defects = {"wear.law": "film-defect", "wear.k": "severe"}
+    assert len(run_wear(case(defects), hours=10.0).table) < 20
+
+
 def test_flattening_is_kept_apart_from_what_is_lost():
     soft = {"wear.flattening": True, "material.hardness": "1 GPa", "wear.k": "0 1/Pa"}
     worn = run_wear(case(soft), hours=0.01)

@@ -113,9 +113,8 @@ def test_a_jump_is_no_longer_than_what_roughens_allows(solved):
     """Of both bodies the one that passes more often decides, at its own rate; without what roughens nobody does."""
     model = ageing("ploughing")
     worn = jumped(model, solved)
-    rates = tuple(np.zeros(field.shape) for field in worn.worn)
     assert 0.0 < worn.longest < SECONDS
-    assert model.seconds(worn, rates) == worn.longest
+    assert model.seconds(worn, solved) == worn.longest < ageing().seconds(worn, solved)
     assert jumped(ageing(), solved).longest == math.inf
 
 

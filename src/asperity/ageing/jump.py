@@ -80,23 +80,37 @@ class Ageing:
         )
         return first, second
 
-    @cached_property
-    def exposures(self) -> tuple[Exposure, Exposure]:
-        """How each body meets the contact."""
-        conditions, per_archard = self.case.conditions, 1.0
-        if conditions.sliding_speed > 0.0 and any(one.k for one in self.model.coefficients):
-            per_archard = self.model.law.equal_to_archard(1.0, self.case.boundary_friction)
+    def exposures(self, at: Sequence[tuple[Position, Solved]] = ()) -> tuple[Exposure, Exposure]:
+        """How each body meets the contact, solved at those positions; none: one as cold as its surroundings."""
+        conditions = self.case.conditions
         first, second = (
             Exposure(
-                k=coefficient.k / per_archard,
+                k=coefficient.k * self._acting(at, which),
                 body=body,
                 overrolling=rate,
                 width=2.0 * conditions.hertz.half_widths[0],
                 sliding_speed=conditions.sliding_speed,
             )
-            for coefficient, body, rate in zip(self.model.coefficients, self.bodies, self.overrolling, strict=True)
+            for which, coefficient, body, rate in zip(
+                BODIES, self.model.coefficients, self.bodies, self.overrolling, strict=True
+            )
         )
         return first, second
+
+    def _acting(self, at: Sequence[tuple[Position, Solved]], body: int) -> float:
+        """What the law makes of pressure times sliding, at most: 1 by Archard's, the share of defects by theirs."""
+        cold = Rubbing(
+            pressure=np.ones(1),
+            shear=np.full(1, self.case.boundary_friction),
+            sliding_speed=self.case.conditions.sliding_speed,
+            temperature=np.full(1, self.case.thermal.ambient),
+        )
+        worst = 0.0
+        for rubbing in [self.rubbing(solved, body) for _, solved in at] or [cold]:
+            by_archard = rubbing.pressure * rubbing.sliding_speed
+            rubs = by_archard > 0.0
+            worst = max(worst, float(np.max(self.model.law(rubbing)[rubs] / by_archard[rubs], initial=0.0)))
+        return worst
 
     @cached_property
     def patches(self) -> int:
@@ -188,7 +202,7 @@ class Ageing:
             on_track(self.model.law(self.rubbing(solved, body)), surface.grid.cells, position, body)
             for position, solved in at
         ]
-        passages = self.exposures[body].passages(surface.grid.extent[0])
+        passages = self.exposures()[body].passages(surface.grid.extent[0])
         rate = self.model.coefficients[body].k * passages * np.mean(laid, axis=0)
         if self.bodies[body].speed != 0.0 and is_even(surface.heights - worn.lowered(body)):
             rate = np.broadcast_to(rate.mean(axis=0), rate.shape).copy()  # each point of it meets every position
@@ -200,12 +214,13 @@ class Ageing:
         sums = [float(self.model.law(self.rubbing(solved, body)).sum()) for _, solved in at]
         return self.model.coefficients[body].k * float(np.mean(sums)) * dx * dy * self.width / grid.extent[1]
 
-    def seconds(self, worn: Worn, rates: tuple[Field, Field]) -> float:
-        """How long the jump may be."""
+    def seconds(self, worn: Worn, at: Sequence[tuple[Position, Solved]]) -> float:
+        """How long the jump from the contacts at those positions may be."""
+        rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
         conditions, grid = self.case.conditions, self.surfaces.grid
         height = self.model.step * self.height(math.hypot(*(surface.sq for surface in self.levelled(worn))))
         modulus = conditions.pair.reduced_modulus
-        longest = worn.factor * longest_jump(self.exposures, rates, height, self.model.decay, grid.spacing, modulus)
+        longest = worn.factor * longest_jump(self.exposures(at), rates, height, self.model.decay, grid.spacing, modulus)
         if self.model.removal_alone:
             return longest
         slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
@@ -215,7 +230,8 @@ class Ageing:
     def jumped(self, worn: Worn, at: Sequence[tuple[Position, Solved]], seconds: float) -> Worn:
         """Both bodies after a jump of so many seconds from the contacts at those positions."""
         rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
-        removed = self._removed(rates, seconds)
+        exposures = self.exposures(at)
+        removed = self._removed(rates, seconds, exposures)
         booked = tuple(worn.booked[body] + self.booked(at, body) * seconds for body in BODIES)
         lost = worn.worn[0] + removed[0], worn.worn[1] + removed[1]
         after = replace(
@@ -230,16 +246,18 @@ class Ageing:
             longest=math.inf,
             facts={},
         )
-        after = self._controlled(worn, after, removed)
+        after = self._controlled(worn, after, removed, exposures)
         for place, name in enumerate(self.model.mechanisms):
             for body in BODIES:
                 after = self._roughened(worn, after, at, removed[body], name, (body, place))
         return after
 
-    def _removed(self, rates: tuple[Field, Field], seconds: float) -> tuple[Field, Field]:
+    def _removed(
+        self, rates: tuple[Field, Field], seconds: float, exposures: tuple[Exposure, Exposure]
+    ) -> tuple[Field, Field]:
         modulus, tracks = self.case.conditions.pair.reduced_modulus, (self.surfaces.first, self.surfaces.second)
         first, second = (
-            taken_off(rates[body], seconds, self.exposures[body], tracks[body].grid, modulus) for body in BODIES
+            taken_off(rates[body], seconds, exposures[body], tracks[body].grid, modulus) for body in BODIES
         )
         return first, second
 
@@ -266,11 +284,15 @@ class Ageing:
         )
         return first, second
 
-    def _controlled(self, worn: Worn, after: Worn, removed: tuple[Field, Field]) -> Worn:
+    def _controlled(
+        self, worn: Worn, after: Worn, removed: tuple[Field, Field], exposures: tuple[Exposure, Exposure]
+    ) -> Worn:
         """The length of the next jump, by how far this one and the one before differ from one of both together."""
         if worn.seconds == 0.0:
             return after
-        once, twice = self._removed(worn.rates, worn.seconds), self._removed(worn.rates, worn.seconds + after.seconds)
+        once, twice = (
+            self._removed(worn.rates, seconds, exposures) for seconds in (worn.seconds, worn.seconds + after.seconds)
+        )
         levels = self.levelled(replace(worn, worn=after.worn))
         now = math.hypot(*(surface.sq for surface in levels))
         at_once = math.hypot(

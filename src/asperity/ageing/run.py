@@ -93,8 +93,7 @@ def _go_on(
         if at_end:
             keeper.finish(worn)
             return computed
-        rates = ageing.rate(worn, at, 0), ageing.rate(worn, at, 1)
-        seconds = ageing.seconds(worn, rates)
+        seconds = ageing.seconds(worn, at)
         at_end = worn.time + seconds >= end * (1.0 - SAME)
         if at_end:
             seconds = end - worn.time
@@ -142,7 +141,7 @@ def _require_affordable(ageing: Ageing, end: float) -> None:
     """Refuse wear so fast that its shortest waves ask for more jumps than anybody can wait for."""
     nothing, grid = (ageing.surfaces.first.heights * 0.0,) * 2, ageing.case.grid
     modulus = ageing.case.conditions.pair.reduced_modulus
-    longest = longest_jump(ageing.exposures, nothing, 1.0, ageing.model.decay, grid.spacing, modulus)
+    longest = longest_jump(ageing.exposures(), nothing, 1.0, ageing.model.decay, grid.spacing, modulus)
     jumps = 1.0 if math.isinf(longest) else max(1.0, end / longest)
     require_affordable(
         f"wear of {end / HOUR:.6g} h in {jumps:.4g} jumps",

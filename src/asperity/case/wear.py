@@ -46,7 +46,9 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughe
 
         def coefficient(stated: Any) -> Coefficient:
             if not isinstance(stated, str):
-                return Coefficient.stated(plain(stated), self.scatter)
+                known = Coefficient.stated(plain(stated), self.scatter)
+                law.equal_to_archard(known.k, boundary_friction if known.k else 1.0)  # which refuses what cannot wear
+                return known
             middle = Coefficient.of_class(stated, conditions.hardness)  # type: ignore[arg-type]
             return Coefficient(law.equal_to_archard(middle.k, boundary_friction), middle.low, middle.high)
 

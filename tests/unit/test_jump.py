@@ -1,0 +1,106 @@
+"""What bounds a jump and what is worn in it, of contacts made up: nothing is solved."""
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity import BadInput, load_case
+from asperity.ageing.contact import Solved
+from asperity.ageing.jump import Ageing
+from asperity.ageing.worn import Worn
+from asperity.ehl import ContactState
+from asperity.wearing import Position
+from asperity.wearing.laws import GAS_CONSTANT
+
+CASE = """
+[contact]
+geometry = "line"
+radius = "5.4 mm"
+length = "10 mm"
+load = "500 N"
+entrainment_speed = "1.91 m/s"
+slip = 0.2
+[material]
+youngs_modulus = "200 GPa"
+poisson_ratio = 0.3
+hardness = "2 GPa"
+[lubricant]
+viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
+density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
+rheology = { law = "newtonian" }
+[surface]
+kind = "gaussian"
+sq = "1 um"
+correlation_length = ["30 um", "30 um"]
+seed = 7
+[grid]
+cells = [32, 16]
+x = [-2.2, 1.9]
+y = [-1.0, 1.0]
+[wear]
+k = "1e-14 1/Pa"
+overrolling = ["50 Hz", "5 Hz"]
+patches = 4
+"""
+STATE = ContactState(
+    clr=0.5, car=0.1, car_domain=0.1, capped_oil_load_ratio=0.0, h_min=0.0, h_central=0.0, h_mean=0.0, p_max=1e9,
+    contact_slope=None, sq=1e-6, lambda_ratio=None, reynolds_residual=0.0, load_error=0.0, mass_flux_imbalance=0.0,
+)  # fmt: skip
+
+
+def ageing(overrides: dict[str, object] | None = None) -> Ageing:
+    case = load_case(CASE, name="case.toml").with_overrides(overrides or {})
+    assert case.wear is not None
+    return Ageing(case, case.wear, case.moving_surfaces())
+
+
+def rubbed(model: Ageing, rise: float = 0.0, touching: float = 1.0) -> list[tuple[Position, Solved]]:
+    """Hertz's pressure at one position, borne by asperities to a share, on surfaces hotter than ambient by `rise`."""
+    grid, hertz = model.case.grid, model.case.conditions.hertz
+    half_widths = [*hertz.half_widths, math.inf][:2]
+    off = (grid.x[:, None] / half_widths[0]) ** 2 + (grid.y / half_widths[1]) ** 2
+    pressure = hertz.p_max * np.sqrt(np.maximum(1.0 - off, 0.0))
+    solved = Solved(
+        pressure=pressure,
+        asperity_pressure=touching * pressure,
+        shear=model.case.boundary_friction * pressure,
+        film=np.full(grid.cells, 1e-7),
+        overlap=None,
+        temperatures=(np.full(grid.cells, rise), np.full(grid.cells, rise)),
+        state=STATE,
+        friction_coefficient=0.1,
+        flash_temperature=rise,
+        at_edge=False,
+    )
+    return [(Position(0, 0), solved)]
+
+
+def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
+    """Bare metal all over wears as by Archard; with a share ψ of defects all takes 1/ψ as long."""
+    defects = {"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}}
+    archard, film = ageing(), ageing(defects)
+    new = Worn.begin(film.surfaces)
+    bare = archard.seconds(new, rubbed(archard))
+    assert film.seconds(new, rubbed(film, rise=1e9)) == pytest.approx(bare, rel=1e-9, abs=0.0)
+    conditions = film.case.conditions
+    crossing = 3e-10 / (3e-12 * conditions.sliding_speed)
+    hot = 4.9e4 / (GAS_CONSTANT * math.log(crossing / 1e-5))  # where 1e-5 of the sites are bare
+    rise = hot - film.case.thermal.ambient
+    assert film.seconds(new, rubbed(film, rise)) == pytest.approx(1e5 * bare, rel=1e-4, abs=0.0)
+    cold = film.exposures()[0].k / 1e-14
+    assert cold == pytest.approx(crossing * math.exp(-4.9e4 / GAS_CONSTANT / film.case.thermal.ambient), rel=1e-4)
+
+
+def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
+    """A cold film wears a hundred thousandth, and z with it: next to nothing is spread, where bare metal would be."""
+    film = ageing({"wear.law": {"law": "film-defect", "heat": "49 kJ/mol"}})
+    new, at = Worn.begin(film.surfaces), rubbed(film, 0.0)
+    seconds = 1e-3 * film.seconds(new, at)
+    lost = film.jumped(new, at, seconds).worn[0]
+    np.testing.assert_allclose(lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max())
+
+
+def test_a_law_of_friction_without_friction_is_refused():
+    with pytest.raises(BadInput, match="boundary friction of 0"):
+        ageing({"wear.law": "energy", "material.boundary_friction": 0.0})
