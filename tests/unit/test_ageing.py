@@ -125,6 +125,18 @@ def test_more_hours_go_on_as_if_they_had_been_asked_for_at_first(unbroken, tmp_p
         run_wear(case(), hours=0.1, out=tmp_path / "worn")
 
 
+def test_fewer_hours_than_are_kept_are_refused_and_nothing_is_lost(tmp_path):
+    """Between the last jump but one and the end too."""
+    kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")
+    files = [path for path in (tmp_path / "worn").rglob("*") if path.is_file() and path.name != store.LOCK]
+    before = [path.read_bytes() for path in files]
+    last = float(kept.table["hours"].iloc[-2])
+    with pytest.raises(BadInput, match=r"holds 0.5 h of wear, got 0.\d+ h"):
+        run_wear(case(), hours=0.5 * (last + 0.5), out=tmp_path / "worn")
+    assert [path.read_bytes() for path in files] == before
+    same(load_wear(tmp_path / "worn"), kept)
+
+
 def test_processes_change_nothing(unbroken):
     same(run_wear(case(), hours=HOURS, workers=2), unbroken)
 

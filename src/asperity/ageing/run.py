@@ -79,9 +79,10 @@ def _go_on(
     """Jump to the end, from where the history is; the number of jumps taken."""
     if keeper.end is not None and abs(keeper.end.time - end) <= SAME * end:
         return 0
-    if keeper.worn.time >= end * (1.0 - SAME):
+    held = max(one.time for one in (keeper.worn, keeper.end) if one is not None)
+    if held >= end * (1.0 - SAME):
         raise BadInput(
-            f"{keeper.folder} holds {keeper.worn.time / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; ask for as many "
+            f"{keeper.folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; ask for as many "
             "or more, or name a new folder"
         )
     worn, at_end, computed = keeper.worn, False, 0
