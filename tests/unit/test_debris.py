@@ -71,6 +71,26 @@ def test_as_many_particles_come_as_the_oil_holds():
     assert np.mean(counts) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 40))
 
 
+def test_a_ball_is_struck_only_on_its_track():
+    """Beside the track nothing presses a particle in: marks lie on it, as many as its area asks for, at any width."""
+    expected = 1e14 * 0.5e-6 * 20.0 * 400e-6 * 100e-6
+    for cells, width in ((48, 200e-6), (96, 400e-6)):
+        grid = Grid((96, cells), (-200e-6, -0.5 * width), (200e-6, 0.5 * width), (False, False))
+        wide = hertz_patches(grid, 50e-6, 1e9, 4)
+        round_ones = [
+            replace(patch, pressure=patch.pressure * np.sqrt(np.maximum(1.0 - (grid.y / 50e-6) ** 2, 0.0)))
+            for patch in wide
+        ]
+        ploughing = Ploughing(concentration=1e14, smallest=8e-6, largest=20e-6, sinking=0.2)
+        marks = []
+        for seed in range(10):
+            change = ploughing(passage(grid, round_ones, jump=20.0, rng=np.random.default_rng(seed)))
+            marks.append(change.facts["marks"])
+            widest = ploughing.mark(20e-6, 0.5e-6, passage(grid, round_ones)).reach
+            assert not change.heights_change[:, np.abs(grid.y) > 50e-6 + widest + grid.spacing[1]].any()
+        assert np.mean(marks) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 10))
+
+
 def test_sizes_follow_the_power_law():
     ploughing = Ploughing(concentration=1e9, smallest=4e-6, largest=40e-6, exponent=3.0)
     sizes = ploughing.sizes((np.arange(20_000) + 0.5) / 20_000)

@@ -23,6 +23,7 @@ FINE = 4.0  # points across a groove, at least: cells are divided for it
 FINEST = 16
 MOST_MARKS = 200_000  # in a jump
 RISE = 0.1  # of Sq squared, or of the film squared where that is more, in a jump
+TRACE = 0.01  # of the largest load on a line along rolling: what lies beyond is beside the track
 SHARES = 50  # of sizes, for their mean
 
 
@@ -106,7 +107,9 @@ class Ploughing(Parametric):
     def __call__(self, passage: Passage) -> Change:
         """The marks of the jump."""
         film = film_inside(passage)
-        expected = self.density(film) * passage.jump * float(np.prod(passage.grid.extent))
+        on_track = track(passage)
+        lower, upper = ends(passage.grid, on_track)
+        expected = self.density(film) * passage.jump * float(np.prod(np.subtract(upper, lower)))
         if expected > MOST_MARKS:
             raise BadInput(
                 f"ploughing would make {expected:.3g} marks in one jump, got a concentration of "
@@ -116,7 +119,7 @@ class Ploughing(Parametric):
         rng = passage.rng
         count = int(rng.poisson(expected))
         sizes = self.sizes(rng.uniform(size=count))
-        places = rng.uniform(passage.grid.lower, passage.grid.upper, size=(count, 2))
+        places = rng.uniform(lower, upper, size=(count, 2))
         made = 0
         for size, (x, y) in zip(sizes, places, strict=True):
             if size > film:
@@ -130,15 +133,16 @@ class Ploughing(Parametric):
             dug *= self.cutting
         facts = {"marks": float(made), "volume_m3": float(dug.sum()) * cell}
         change = piled - dug
-        return Change(heights_change=change, facts=facts, longest=self._longest(passage, film, change))
+        return Change(heights_change=change, facts=facts, longest=self._longest(passage, film, change[:, on_track]))
 
     def _longest(self, passage: Passage, film: float, change: Field) -> float:
         """Over-rollings in which marks raise the body's Sq squared by a set share, of the film's where that is more."""
         sizes = self.sizes((np.arange(SHARES) + 0.5) / SHARES)
         squares = [self.mark(float(size), film, passage).square for size in sizes if size > film]
         rise = self.density(film) * sum(squares) / SHARES
-        now = max(float(np.var(passage.heights + change)), film**2)
-        return RISE * now / rise if rise > 0.0 else np.inf
+        if rise <= 0.0:
+            return np.inf
+        return RISE * max(float(np.var(passage.heights[:, track(passage)] + change)), film**2) / rise
 
     def density(self, film: float) -> float:
         """Particles that one over-rolling brings to an area [1/m^2]: those in the oil that the film holds."""
@@ -161,6 +165,25 @@ def dragged(passage: Passage) -> float:
     speed = abs(passage.material.speed)
     way = 2.0 * passage.half_width * passage.sliding_speed / speed if speed > 0.0 else np.inf
     return float(min(way, 0.5 * passage.grid.extent[0]))
+
+
+def track(passage: Passage) -> slice:
+    """Cells across rolling that the contact reaches: all of an endless one, else what is pressed by more than a trace.
+
+    Of a solved point contact oil presses a little on all of its domain.
+    """
+    if passage.grid.periodic[1]:
+        return slice(0, passage.grid.cells[1])
+    borne = np.sum([patch.pressure.sum(axis=0) for patch in passage.patches], axis=0)
+    pressed = np.flatnonzero(borne > TRACE * borne.max())
+    return slice(int(pressed[0]), int(pressed[-1]) + 1) if pressed.size else slice(0, 0)
+
+
+def ends(grid: Grid, on_track: slice) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lower and upper corner of a track of those cells [m]."""
+    (left, low), (right, high), step = grid.lower, grid.upper, grid.spacing[1]
+    whole = on_track == slice(0, grid.cells[1])
+    return (left, low if whole else low + on_track.start * step), (right, high if whole else low + on_track.stop * step)
 
 
 def film_inside(passage: Passage) -> float:
