@@ -1,6 +1,7 @@
 """What bounds a jump and what is worn in it, of contacts made up: nothing is solved."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from asperity import BadInput, load_case
 from asperity.ageing.contact import Solved
 from asperity.ageing.jump import Ageing
+from asperity.ageing.rows import of_body
+from asperity.ageing.run import _row
 from asperity.ageing.worn import Worn
 from asperity.ehl import ContactState
 from asperity.wearing import Position
@@ -99,6 +102,81 @@ def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
     seconds = 1e-3 * film.seconds(new, at)
     lost = film.jumped(new, at, seconds).worn[0]
     np.testing.assert_allclose(lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max())
+
+
+BALL = {"lubricant": "none", "material.hardness": "none", "contact.load": "10 N", "wear.patches": 1}
+
+
+def ball(overrides: dict[str, object], wide: float = 1.8, cells: int = 24) -> Ageing:
+    text = (
+        CASE.replace('length = "10 mm"\n', "")
+        .replace('"line"', '"point"')
+        .replace("y = [-1.0, 1.0]", "y = [-1.8, 1.8]")
+    )
+    grid = {"grid.x": [-1.8, 1.8], "grid.y": [-wide, wide], "grid.cells": [24, cells]}
+    case = load_case(text, name="ball.toml").with_overrides(BALL | grid | overrides)
+    assert case.wear is not None
+    return Ageing(case, case.wear, case.moving_surfaces())
+
+
+def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
+    """Worn depth is the volume over the Hertz zone's width and the way round; beside it nothing counts for Sq."""
+    rows = []
+    for wide, cells in ((1.8, 24), (3.6, 48)):
+        model = ball({"surface": "flat"}, wide, cells)
+        new, at = Worn.begin(model.surfaces), rubbed(model)
+        worn = model.jumped(new, at, model.seconds(new, at))
+        rows.append(_row(model, worn, rubbed(model), 0))
+        for body in (0, 1):
+            width = 2.0 * model.case.conditions.hertz.half_widths[1]
+            over_all = model.volume(worn.worn[body], body) / model.perimeter(body) / width
+            assert rows[-1][of_body("worn_depth_m", body)] == pytest.approx(over_all, rel=0.15, abs=0.0)
+            assert model.levelled(worn)[body].grid.extent[1] == pytest.approx(width, rel=0.15, abs=0.0)
+    assert rows[0]["worn_depth_1_m"] == pytest.approx(rows[1]["worn_depth_1_m"], rel=2e-3, abs=0.0)
+    assert rows[0]["worn_depth_max_2_m"] == pytest.approx(rows[1]["worn_depth_max_2_m"], rel=2e-3, abs=0.0)
+
+
+def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
+    model = ball({"surface": "flat"}, 3.6, 48)
+    new = Worn.begin(model.surfaces)
+    y, a = model.surfaces.grid.y, model.case.conditions.hertz.half_widths[1]
+    groove = np.broadcast_to(1e-6 * np.maximum(1.0 - (y / (2.0 * a)) ** 2, 0.0), model.surfaces.first.grid.cells)
+    for worn in (replace(new, worn=(groove, new.worn[1])), replace(new, worn=(new.worn[0], groove))):
+        for body in (0, 1):
+            along, across = model.track(worn, body)
+            assert along == slice(None)
+            np.testing.assert_array_equal(np.abs(y) < 2.0 * a, np.isin(np.arange(48), np.arange(48)[across]))
+
+
+def test_a_standing_bodys_scar_is_no_roughness():
+    """A smooth ball at rest, worn to a flat: its Sq is 0; its mean depth is the cap's over the square about it."""
+    model = ball({"surface": "flat", "contact.slip": 2.0})
+    (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
+    new, grid = Worn.begin(model.surfaces), model.surfaces.grid
+    a = model.case.conditions.hertz.half_widths[0]
+    cap = 2e-6 * np.maximum(1.0 - (grid.x[:, None] / a) ** 2 - (grid.y / a) ** 2, 0.0)
+    maps = [0.0 * cap, 0.0 * cap]
+    maps[still] = cap
+    worn = replace(new, worn=(maps[0], maps[1]))
+    row = _row(model, worn, rubbed(model), 0)
+    assert row[of_body("sq_m", still)] == 0.0
+    assert row["sq_m"] == 0.0
+    assert row[of_body("worn_depth_m", still)] == pytest.approx(2e-6 * math.pi / 8.0, rel=0.1, abs=0.0)
+
+
+@pytest.mark.parametrize("geometry", ["ball", "roller"])
+def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geometry):
+    standing = {"contact.slip": 2.0, "motion.rough": "second"}
+    model = ball(standing | {"grid.cells": [96, 96]}) if geometry == "ball" else ageing(standing)
+    (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
+    assert model.surfaces.rough[still]
+    new, grid, half_widths = Worn.begin(model.surfaces), model.surfaces.grid, model.case.conditions.hertz.half_widths
+    across = (grid.y / half_widths[1]) ** 2 if geometry == "ball" else 0.0 * grid.y
+    cap = 5e-6 * np.maximum(1.0 - (grid.x[:, None] / half_widths[0]) ** 2 - across, 0.0)
+    maps = [0.0 * cap, 0.0 * cap]
+    maps[still] = cap
+    before = model.levelled(new)[still].sq
+    assert model.levelled(replace(new, worn=(maps[0], maps[1])))[still].sq == pytest.approx(before, rel=0.05, abs=0.0)
 
 
 def test_a_law_of_friction_without_friction_is_refused():

@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from asperity.ageing.contact import PositionSolver, Solved
 from asperity.ageing.worn import Worn
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import BadInput
+from asperity.grid import FEWEST_CELLS, Grid
 from asperity.surface import MovingSurfaces, Surface
 from asperity.wearing import (
     Body,
@@ -39,6 +41,8 @@ FEWEST_PATCHES = 4
 LEAST_HEIGHT = 0.1  # of a smooth contact's approach a^2/(2R): what a jump's step is a share of where Sq is less
 WORST_ERROR = 1e-3  # of Sq, by which a jump of twice the length may differ from two
 SHORTER, LONGER, SHORTEST = 0.7, 1.2, 1.0 / 64.0  # factors on the length of jumps
+TRACE = 0.01  # of the deepest profile: what has lost less lies beside the track
+GAUSS = math.sqrt(0.5 * math.log(2.0)) / math.pi  # deviation of ISO 16610-61's filter over its cut-off
 BODIES = (0, 1)
 
 
@@ -146,20 +150,47 @@ class Ageing:
         """Both tracks as they are now."""
         return self.surfaces.lowered(worn.lowered(0), worn.lowered(1))
 
+    def track(self, worn: Worn, body: int) -> tuple[slice, slice]:
+        """Cells of a body's track that the contact reaches: the Hertz zone, or more where the scar has grown beyond.
+
+        All along rolling of a body that moves, and all across of an endless contact.
+        """
+        along = across = slice(None)
+        grid, half_widths = self.surfaces.grid, self.case.conditions.hertz.half_widths
+        if self.bodies[body].speed == 0.0:
+            along = _reached(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
+        if not self.case.conditions.endless:
+            both = worn.worn[0].mean(axis=0) + worn.worn[1].mean(axis=0)[::-1]
+            across = _reached(both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1])
+        return along, across
+
     def levelled(self, worn: Worn) -> tuple[Surface, Surface]:
-        """Both tracks' roughness: without the form that wear has given the profile across a bounded contact's track."""
+        """Both tracks' roughness where the contact reaches them, without the form that wear has given them."""
         now = self.worn_surfaces(worn)
         first, second = (
-            Surface(surface.heights + self._form(worn, body), surface.grid)
+            _part(Surface(surface.heights + self._form(worn, body), surface.grid), self.track(worn, body))
             for body, surface in enumerate((now.first, now.second))
         )
         return first, second
 
     def _form(self, worn: Worn, body: int) -> Field:
-        lowered = worn.lowered(body)
-        if self.case.conditions.endless or self.bodies[body].speed == 0.0:
+        """Of a groove its mean profile, along what is alike; of a standing body's bounded scar its long waves.
+
+        Where no body was rough all of such a scar is form.
+        """
+        lowered, endless = worn.lowered(body), self.case.conditions.endless
+        moves = self.bodies[body].speed != 0.0
+        if endless and moves:
             return np.zeros_like(lowered)
-        return np.broadcast_to(lowered.mean(axis=0), lowered.shape)
+        if endless or moves:
+            return np.broadcast_to(lowered.mean(axis=0 if moves else 1, keepdims=True), lowered.shape)
+        scar = worn.worn[body] + worn.flattened[body]
+        if not any(self.surfaces.rough):
+            return np.asarray(scar)
+        half_width, spacing = self.case.conditions.hertz.half_widths[0], self.surfaces.grid.spacing
+        return np.asarray(
+            scipy.ndimage.gaussian_filter(scar, [GAUSS * half_width / step for step in spacing], mode="nearest")
+        )
 
     def positions(self, worn: Worn) -> tuple[Position, ...]:
         """Where the contact is solved in this jump."""
@@ -295,8 +326,12 @@ class Ageing:
         )
         levels = self.levelled(replace(worn, worn=after.worn))
         now = math.hypot(*(surface.sq for surface in levels))
+        tracks = [self.track(after, body) for body in BODIES]
         at_once = math.hypot(
-            *(float(np.std(levels[body].heights + once[body] + removed[body] - twice[body])) for body in BODIES)
+            *(
+                float(np.std(levels[body].heights + (once[body] + removed[body] - twice[body])[tracks[body]]))
+                for body in BODIES
+            )
         )
         error = abs(at_once - now) / self.height(now)
         change = SHORTER if error > WORST_ERROR else LONGER if error < WORST_ERROR / 3.0 else 1.0
@@ -375,3 +410,27 @@ class Ageing:
             film=laid(solved.film, math.inf),
             temperature=temperature,
         )
+
+
+def _reached(depth: Field, places: Field, half_width: float) -> slice:
+    """Cells of the Hertz zone, and of what is worn by more than a trace; as many as a surface has at least."""
+    inside = np.flatnonzero((np.abs(places) <= half_width) | (depth > TRACE * depth.max()))
+    first, last = (int(inside[0]), int(inside[-1])) if inside.size else (places.size // 2, places.size // 2)
+    short = max(FEWEST_CELLS - (last - first + 1), 0)
+    first = min(max(first - (short + 1) // 2, 0), places.size - FEWEST_CELLS)
+    return slice(first, max(last + (short + 1) // 2 + 1, first + FEWEST_CELLS))
+
+
+def _part(surface: Surface, cells: tuple[slice, slice]) -> Surface:
+    """The part of a surface on those cells."""
+    heights, grid = surface.heights[cells], surface.grid
+    if heights.shape == grid.cells:
+        return surface
+    starts = [part.start or 0 for part in cells]
+    lower = [low + start * step for low, start, step in zip(grid.lower, starts, grid.spacing, strict=True)]
+    upper = [low + count * step for low, count, step in zip(lower, heights.shape, grid.spacing, strict=True)]
+    repeats = [repeat and part == slice(None) for repeat, part in zip(grid.periodic, cells, strict=True)]
+    part = Grid(
+        (heights.shape[0], heights.shape[1]), (lower[0], lower[1]), (upper[0], upper[1]), (repeats[0], repeats[1])
+    )
+    return Surface(heights, part)

@@ -46,9 +46,16 @@ def of_body(key: str, body: int) -> str:
 
 
 def roughness(surfaces: tuple[Surface, Surface]) -> Row:
-    """Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body, and of both as they lie on one another at first."""
+    """Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body, and of both as they lie on one another at first.
+
+    Where one has less of a track, as it stands still, it is repeated along the other's.
+    """
     first, second = surfaces
-    both = Surface(first.heights + second.heights[:, ::-1], first.grid)
+    longer = max(surfaces, key=lambda surface: surface.grid.cells[0]).grid
+    both = Surface(
+        np.resize(first.heights, longer.cells) + np.resize(second.heights, longer.cells)[:, ::-1],
+        longer,
+    )
     row: Row = {}
     for surface, name in ((first, 0), (second, 1), (both, None)):
         parameters = height_parameters(surface)

@@ -125,13 +125,13 @@ def _row(ageing: Ageing, worn: Worn, at: At, failed: int) -> Row:
     rough = roughness(ageing.levelled(worn))
     row: Row = {"jump": worn.number, "hours": worn.time / HOUR}
     for body in BODIES:
-        depth = worn.worn[body] - worn.changed[body]
+        depth, track = worn.worn[body] - worn.changed[body], ageing.track(worn, body)
         row |= {
             of_body("overrollings", body): worn.time * ageing.overrolling[body],
-            of_body("worn_depth_m", body): float(depth.mean()),
+            of_body("worn_depth_m", body): float(depth[track].mean()),
             of_body("worn_depth_max_m", body): float(depth.max()),
             of_body("worn_volume_m3", body): ageing.volume(depth, body),
-            of_body("flattened_m", body): float(worn.flattened[body].mean()),
+            of_body("flattened_m", body): float(worn.flattened[body][track].mean()),
         }
     row |= rough
     row |= contact_row(ageing.case, [one for _, one in at], float(rough["sq_m"]))
