@@ -203,11 +203,15 @@ class Ageing:
         count = self.patches if first or second else 1
         return positions(cells, (first, second), count, worn.number, self.seed)
 
-    def height(self, sq: float) -> float:
-        """What steps and errors are counted against [m]: Sq, on smooth bodies a share of their approach."""
-        conditions = self.case.conditions
+    def height(self, worn: Worn) -> float:
+        """What steps and errors are counted against [m]: Sq; of smooth bodies their scars', or a share of the approach.
+
+        Of rough ones the scar's form is left out.
+        """
+        conditions, now = self.case.conditions, self.worn_surfaces(worn)
+        bodies = self.levelled(worn) if any(self.surfaces.rough) else (now.first, now.second)
         approach = conditions.hertz.half_widths[0] ** 2 / (2.0 * conditions.radius_along_rolling)
-        return max(sq, LEAST_HEIGHT * approach)
+        return max(math.hypot(*(surface.sq for surface in bodies)), LEAST_HEIGHT * approach)
 
     # What is taken off -----------------------------------------------------------------------------------------------
 
@@ -249,7 +253,7 @@ class Ageing:
         """How long the jump from the contacts at those positions may be."""
         rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
         conditions, grid = self.case.conditions, self.surfaces.grid
-        height = self.model.step * self.height(math.hypot(*(surface.sq for surface in self.levelled(worn))))
+        height = self.model.step * self.height(worn)
         modulus = conditions.pair.reduced_modulus
         longest = worn.factor * longest_jump(self.exposures(at), rates, height, self.model.decay, grid.spacing, modulus)
         if self.model.removal_alone:
@@ -333,7 +337,7 @@ class Ageing:
                 for body in BODIES
             )
         )
-        error = abs(at_once - now) / self.height(now)
+        error = abs(at_once - now) / self.height(replace(worn, worn=after.worn))
         change = SHORTER if error > WORST_ERROR else LONGER if error < WORST_ERROR / 3.0 else 1.0
         factor = min(1.0, max(SHORTEST, change * after.factor))
         return replace(after, factor=factor, error=after.error + error)
