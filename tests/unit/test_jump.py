@@ -4,10 +4,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pandas
 import pytest
 
 from asperity import BadInput, load_case
 from asperity.ageing.contact import Solved
+from asperity.ageing.history import WearHistory, of_energy
 from asperity.ageing.jump import Ageing
 from asperity.ageing.rows import of_body
 from asperity.ageing.run import _row
@@ -177,6 +179,27 @@ def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geome
     maps[still] = cap
     before = model.levelled(new)[still].sq
     assert model.levelled(replace(new, worn=(maps[0], maps[1])))[still].sq == pytest.approx(before, rel=0.05, abs=0.0)
+
+
+@pytest.mark.parametrize("touching", [1.0, 0.6])
+def test_the_energy_law_counts_the_friction_work_of_the_load_between_solids(touching):
+    """V = α f_b F_a s, and not α times all friction of touching cells, which counts the oil's pressure in them too."""
+    model = ageing({"wear.law": "energy", "wear.k": "1e-13 1/Pa"})
+    at, conditions = rubbed(model, touching=touching), model.case.conditions
+    (dx, dy), (_, solved) = model.surfaces.grid.spacing, at[0]
+    load = solved.pressure.sum() * dx * dy * model.width / model.surfaces.grid.extent[1]
+    assert load == pytest.approx(500.0, rel=0.02)
+    expected = 1e-13 * 0.15 * touching * load * conditions.sliding_speed
+    new = Worn.begin(model.surfaces)
+    assert model.booked(at, 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
+    assert model.volume(model.rate(new, at, 0), 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
+    ended = WearHistory(ageing=model, table=pandas.DataFrame([{"solid_load_ratio": touching, "clr": 1.0}]), worn=new)
+    assert of_energy(ended) == (
+        "The energy law counts the friction work of the load between solids: "
+        f"at the end {touching:.3g} of what touching "
+        "cells rub with, oil in them counted."
+    )
+    assert of_energy(replace(ended, ageing=ageing())) is None
 
 
 def test_a_law_of_friction_without_friction_is_refused():

@@ -21,6 +21,7 @@ from asperity.paper import Moment
 from asperity.quantities import quantity
 from asperity.surface import MovingSurfaces
 from asperity.wear import Stages, split_stages
+from asperity.wearing import DissipatedEnergy
 
 HOUR = 3600.0
 MOST_PLACES = 60  # that stages are read from
@@ -234,7 +235,21 @@ class WearHistory:
             notes.append(f"{self.failed} contacts could not be solved and were left out of the means of their jumps.")
         if self.case.conditions.sliding_speed == 0.0:
             notes.append("Without sliding nothing is worn off.")
+        counted = of_energy(self)
+        notes += [] if counted is None else [counted]
         acting = [name for name in ("fatigue", "ploughing", "scuffing") if name in model.mechanisms]
         acting += ["flattening"] if model.flattening else []
         notes.append(f"Besides removal: {', '.join(acting)}." if acting else "Nothing but removal acts.")
         return tuple(notes)
+
+
+def of_energy(history: WearHistory) -> str | None:
+    """What friction work the energy law counts, as a sentence; None of another law, and where nothing touches."""
+    last = history.table.iloc[-1]
+    if not isinstance(history.ageing.model.law, DissipatedEnergy) or not last["clr"] > 0.0:
+        return None
+    share = float(last["solid_load_ratio"] / last["clr"])
+    return (
+        f"The energy law counts the friction work of the load between solids: at the end {share:.3g} of what touching "
+        "cells rub with, oil in them counted."
+    )

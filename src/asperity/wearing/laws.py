@@ -77,7 +77,9 @@ class Archard(Parametric):
 class DissipatedEnergy(Parametric):
     """Wear in proportion to the friction work of the asperities: dw/dt = k τ_a |u_s|, k in m^3/J.
 
-    1 mm^3/J is 1e-9 m^3/J. Source: S. Fouvry, T. Liskiewicz, Ph. Kapsa, S. Hannel, E. Sauger, Wear 255 (2003) 287;
+    τ_a is the boundary friction times the asperities' pressure. Friction and heat of a contact count it on all pressure
+    of touching cells, the oil's in them too: that work is the law's only where the contact is dry. 1 mm^3/J is
+    1e-9 m^3/J. Source: S. Fouvry, T. Liskiewicz, Ph. Kapsa, S. Hannel, E. Sauger, Wear 255 (2003) 287;
     A. Ramalho, J. C. Miranda, Wear 260 (2006) 361.
     """
 
