@@ -9,7 +9,7 @@ import pytest
 
 from asperity import BadInput, load_case
 from asperity.ageing.contact import Solved
-from asperity.ageing.history import WearHistory, of_energy
+from asperity.ageing.history import WearHistory, of_energy, of_grooves
 from asperity.ageing.jump import Ageing
 from asperity.ageing.rows import of_body
 from asperity.ageing.run import _row
@@ -200,6 +200,23 @@ def test_the_energy_law_counts_the_friction_work_of_the_load_between_solids(touc
         "cells rub with, oil in them counted."
     )
     assert of_energy(replace(ended, ageing=ageing())) is None
+
+
+def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
+    model = ageing({"motion.rough": "second"})
+    said = of_grooves(model)
+    tracks = model.perimeter(1) / model.surfaces.second.grid.extent[0]
+    assert tracks > 100.0
+    assert said is not None
+    assert f"one track of {tracks:.0f} all round" in said
+    for other in (
+        ageing({"motion.rough": "both"}),
+        ageing({"surface": "flat"}),
+        ageing({"motion.rough": "second", "wear.k": ["0 1/Pa", "1e-16 1/Pa"]}),
+        ageing({"motion.rough": "second", "contact.slip": -2.0}),
+        ball({"motion.rough": "second"}),
+    ):
+        assert of_grooves(other) is None
 
 
 def test_a_law_of_friction_without_friction_is_refused():

@@ -235,8 +235,7 @@ class WearHistory:
             notes.append(f"{self.failed} contacts could not be solved and were left out of the means of their jumps.")
         if self.case.conditions.sliding_speed == 0.0:
             notes.append("Without sliding nothing is worn off.")
-        counted = of_energy(self)
-        notes += [] if counted is None else [counted]
+        notes += [one for one in (of_energy(self), of_grooves(ageing)) if one is not None]
         acting = [name for name in ("fatigue", "ploughing", "scuffing") if name in model.mechanisms]
         acting += ["flattening"] if model.flattening else []
         notes.append(f"Besides removal: {', '.join(acting)}." if acting else "Nothing but removal acts.")
@@ -252,4 +251,19 @@ def of_energy(history: WearHistory) -> str | None:
     return (
         f"The energy law counts the friction work of the load between solids: at the end {share:.3g} of what touching "
         "cells rub with, oil in them counted."
+    )
+
+
+def of_grooves(ageing: Ageing) -> str | None:
+    """How little of its partner a smooth moving body meets in an endless contact; None where that does no harm."""
+    rough, speeds = ageing.surfaces.rough, ageing.case.conditions.surface_speeds
+    if not ageing.case.conditions.endless or sum(rough) != 1 or 0.0 in speeds:
+        return None
+    smooth = rough.index(False)
+    if ageing.model.coefficients[smooth].k == 0.0:
+        return None
+    tracks = ageing.perimeter(1 - smooth) / ageing.surfaces.first.grid.extent[0]
+    return (
+        f"The {('first', 'second')[smooth]} body is smooth and meets one track of {tracks:.0f} all round its partner, "
+        "again and again: its grooves, largest depth and Sq are that track's doing; its mean depth is not."
     )
