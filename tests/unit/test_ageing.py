@@ -232,8 +232,18 @@ def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
 
 def test_contacts_that_cannot_be_solved_stop_it_with_a_reason(tmp_path):
     few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6}
+    with pytest.raises(NotConverged, match=r"4 of 4 contacts .*; raise solver.tolerance or solver.max_iterations$"):
+        run_wear(case(few), hours=1.0)
     with pytest.raises(NotConverged, match=r"4 of 4 contacts could not be solved after 0 h: contact not solved"):
         run_wear(case(few), hours=1.0, out=tmp_path / "worn")
+
+
+def test_a_standing_body_that_cannot_be_solved_is_told_what_helps():
+    """It has one position, solved from nothing: going on would fail in the same way."""
+    few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6, "contact.slip": 2.0}
+    few |= {"motion.rough": "second"}
+    with pytest.raises(NotConverged, match=r"1 of 1 contacts .*; raise solver.tolerance or solver.max_iterations, .*"):
+        run_wear(case(few), hours=1.0)
 
 
 def test_a_contact_that_outgrows_its_grid_is_stopped():

@@ -112,7 +112,12 @@ def look(ageing: Ageing, worn: Worn, solve: Crew) -> tuple[At, Row]:
     failures = [one.reason for one in outcomes if isinstance(one, Failed)]
     if len(at) < max(1, (len(places) + 1) // 2):
         when = f"after {worn.time / HOUR:.4g} h"
-        raise NotConverged(None, f"{len(failures)} of {len(places)} contacts could not be solved {when}: {failures[0]}")
+        remedy = "raise solver.tolerance or solver.max_iterations"
+        if len(places) == 1:  # there is no other to take the mean of
+            remedy += ", or let the rough body be the one that moves (motion.rough, or a slip of the other sign)"
+        raise NotConverged(
+            None, f"{len(failures)} of {len(places)} contacts could not be solved {when}: {failures[0]}; {remedy}"
+        )
     if any(one.at_edge for _, one in at):
         raise AsperityError(
             f"the contact has grown as wide as its grid after {worn.time / HOUR:.4g} h; state a wider grid.y, in "
