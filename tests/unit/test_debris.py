@@ -91,6 +91,15 @@ def test_a_ball_is_struck_only_on_its_track():
         assert np.mean(marks) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 10))
 
 
+def test_a_jump_brings_one_mark_at_least():
+    """However smooth the body and thin the film: shorter ones would bring nothing and never end."""
+    grid = track()
+    ploughing = Ploughing(concentration=1e9, smallest=8e-6, largest=20e-6)
+    jump = passage(grid, hertz_patches(grid, 50e-6, 1e9, 4, film=1e-10), jump=1.0)
+    one = 1.0 / (1e9 * 1e-10 * 400e-6 * 200e-6)
+    assert ploughing(jump).longest == pytest.approx(one, rel=1e-9, abs=0.0)
+
+
 def test_sizes_follow_the_power_law():
     ploughing = Ploughing(concentration=1e9, smallest=4e-6, largest=40e-6, exponent=3.0)
     sizes = ploughing.sizes((np.arange(20_000) + 0.5) / 20_000)

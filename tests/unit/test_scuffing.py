@@ -60,6 +60,15 @@ def test_scuffing_takes_a_tenth_of_sq_and_then_the_contact_is_asked_again():
     assert LoadedScuffing(limit=1e30)(rubbed()).longest == np.inf
 
 
+def test_a_smooth_bodys_jumps_are_counted_against_the_film():
+    """It has no Sq of its own, but is as far from its partner as the film is thick; where there is none, 10 nm."""
+    scuffing = LoadedScuffing(limit=0.25 * MU * P_MAX**2)
+    smooth = rubbed(heights=np.zeros(track().cells), removed=np.full(track().cells, 1e-6))
+    assert -scuffing(smooth).heights_change.min() == pytest.approx(0.1 * 0.5e-6, rel=1e-9, abs=0.0)
+    dry = replace(smooth, patches=tuple(replace(patch, film=np.zeros_like(patch.film)) for patch in smooth.patches))
+    assert -scuffing(dry).heights_change.min() == pytest.approx(0.1 * 1e-8, rel=1e-9, abs=0.0)
+
+
 def test_the_threshold_of_temperature_is_bloks():
     """A friction just above the one at which Blok's rise is the limit scuffs, one just below does not."""
     line_load, width, speeds = 0.5 * np.pi * 50e-6 * P_MAX, 50e-6, (2.0, 1.5)

@@ -136,13 +136,15 @@ class Ploughing(Parametric):
         return Change(heights_change=change, facts=facts, longest=self._longest(passage, film, change[:, on_track]))
 
     def _longest(self, passage: Passage, film: float, change: Field) -> float:
-        """Over-rollings in which marks raise the body's Sq squared by a set share, of the film's where that is more."""
+        """Over-rollings that raise Sq squared by a set share, of the film's where that is more; for one mark at least."""
         sizes = self.sizes((np.arange(SHARES) + 0.5) / SHARES)
         squares = [self.mark(float(size), film, passage).square for size in sizes if size > film]
         rise = self.density(film) * sum(squares) / SHARES
         if rise <= 0.0:
             return np.inf
-        return RISE * max(float(np.var(passage.heights[:, track(passage)] + change)), film**2) / rise
+        lower, upper = ends(passage.grid, track(passage))
+        one = 1.0 / (self.density(film) * float(np.prod(np.subtract(upper, lower))) * len(squares) / SHARES)
+        return max(one, RISE * max(float(np.var(passage.heights[:, track(passage)] + change)), film**2) / rise)
 
     def density(self, film: float) -> float:
         """Particles that one over-rolling brings to an area [1/m^2]: those in the oil that the film holds."""

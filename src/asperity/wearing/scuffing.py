@@ -12,20 +12,21 @@ import numpy as np
 from asperity.arrays import Mask
 from asperity.errors import BadInput
 from asperity.quantities import Parameter, Parametric
+from asperity.wearing.debris import film_inside
 from asperity.wearing.model import Change, Passage, Patch
 
-STEP = 0.1  # of a body's Sq, that scuffing takes in a jump at most
-LEAST = 1e-8  # that Sq is taken to be at least for it [m]
+STEP = 0.1  # of a body's Sq or film, that scuffing takes in a jump at most
+LEAST = 1e-8  # that Sq, or the film where it is more, is taken to be at least for it [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scuffing(Parametric):
     """Removal times `factor` where a limit is passed, which subclasses tell.
 
-    Once it has taken a tenth of the body's Sq anywhere the contact is another: in that jump it takes no more, and the
-    next is no longer than it would take for as much. `transfer` is the share of what scuffing takes off that sticks to
-    the other body. Removal is taken to be in proportion to the asperity pressure: a cell's share of scuffed load is the
-    share of its removal that jumps.
+    Once it has taken a tenth of the body's Sq (of the film, where that is more) anywhere the contact is another: in
+    that jump it takes no more, and the next is no longer than it would take for as much. `transfer` is the share of
+    what scuffing takes off that sticks to the other body. Removal is taken to be in proportion to the asperity
+    pressure: a cell's share of scuffed load is the share of its removal that jumps.
     """
 
     needs_temperature: ClassVar[bool] = False
@@ -49,7 +50,7 @@ class Scuffing(Parametric):
             scuffed += np.where(self.passed(patch), patch.asperity_pressure, 0.0)
         share = np.divide(scuffed, load, out=np.zeros_like(load), where=load > 0.0)
         taken = (self.factor - 1.0) * share * passage.removed
-        most = STEP * max(float(np.std(passage.heights)), LEAST)
+        most = STEP * max(float(np.std(passage.heights)), film_inside(passage), LEAST)
         deepest = float(taken.max())
         taken *= min(1.0, most / deepest) if deepest > 0.0 else 1.0
         facts = {
