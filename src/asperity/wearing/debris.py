@@ -136,7 +136,7 @@ class Ploughing(Parametric):
         return Change(heights_change=change, facts=facts, longest=self._longest(passage, film, change[:, on_track]))
 
     def _longest(self, passage: Passage, film: float, change: Field) -> float:
-        """Over-rollings that raise Sq squared by a set share, of the film's where that is more; for one mark at least."""
+        """Over-rollings that raise Sq squared by a set share, the film's where that is more; one mark at least."""
         sizes = self.sizes((np.arange(SHARES) + 0.5) / SHARES)
         squares = [self.mark(float(size), film, passage).square for size in sizes if size > film]
         rise = self.density(film) * sum(squares) / SHARES
