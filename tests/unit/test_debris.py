@@ -7,7 +7,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.grid import Grid
-from asperity.wearing.debris import Mark, Ploughing, dragged, film_inside, stamp
+from asperity.wearing.debris import Mark, Ploughing, dragged, stamp
 from support.passages import hertz_patches, passage, track
 
 FINE = Grid((800, 400), (-100e-6, -50e-6), (100e-6, 50e-6), (False, True))
@@ -64,7 +64,7 @@ def test_what_is_not_cut_off_stands_beside_to_rounding(cutting):
 
 def test_as_many_particles_come_as_the_oil_holds():
     _, jump, _ = ploughed(0.3)
-    film = film_inside(jump)
+    film = jump.film_inside
     assert film == pytest.approx(0.5e-6, rel=1e-9, abs=0.0)
     expected = 1e14 * film * 20.0 * 400e-6 * 200e-6
     counts = [ploughed(0.3, seed)[2].facts["marks"] for seed in range(40)]

@@ -106,7 +106,7 @@ class Ploughing(Parametric):
 
     def __call__(self, passage: Passage) -> Change:
         """The marks of the jump."""
-        film = film_inside(passage)
+        film = passage.film_inside
         on_track = track(passage)
         lower, upper = ends(passage.grid, on_track)
         expected = self.density(film) * passage.jump * float(np.prod(np.subtract(upper, lower)))
@@ -186,13 +186,6 @@ def ends(grid: Grid, on_track: slice) -> tuple[tuple[float, float], tuple[float,
     (left, low), (right, high), step = grid.lower, grid.upper, grid.spacing[1]
     whole = on_track == slice(0, grid.cells[1])
     return (left, low if whole else low + on_track.start * step), (right, high if whole else low + on_track.stop * step)
-
-
-def film_inside(passage: Passage) -> float:
-    """Film that the pressure rests on: its mean over all positions, weighted with the pressure [m]."""
-    pressed = [(patch.pressure[patch.pressure > 0.0], patch.film[patch.pressure > 0.0]) for patch in passage.patches]
-    load = sum(float(pressure.sum()) for pressure, _ in pressed)
-    return sum(float(pressure @ film) for pressure, film in pressed) / load if load > 0.0 else 0.0
 
 
 def stamp(dug: Field, piled: Field, mark: Mark, at: tuple[float, float], grid: Grid) -> None:

@@ -90,6 +90,13 @@ class Passage:
         """A point's asperity pressure, averaged over all positions of the track [Pa]."""
         return np.asarray(np.mean([patch.asperity_pressure for patch in self.patches], axis=0))
 
+    @property
+    def film_inside(self) -> float:
+        """Film that the pressure rests on: its mean over all positions, weighted with the pressure [m]."""
+        pressed = [(patch.pressure[patch.pressure > 0.0], patch.film[patch.pressure > 0.0]) for patch in self.patches]
+        load = sum(float(pressure.sum()) for pressure, _ in pressed)
+        return sum(float(pressure @ film) for pressure, film in pressed) / load if load > 0.0 else 0.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Change:

@@ -12,7 +12,6 @@ import numpy as np
 from asperity.arrays import Mask
 from asperity.errors import BadInput
 from asperity.quantities import Parameter, Parametric
-from asperity.wearing.debris import film_inside
 from asperity.wearing.model import Change, Passage, Patch
 
 STEP = 0.1  # of a body's Sq or film, that scuffing takes in a jump at most
@@ -50,7 +49,7 @@ class Scuffing(Parametric):
             scuffed += np.where(self.passed(patch), patch.asperity_pressure, 0.0)
         share = np.divide(scuffed, load, out=np.zeros_like(load), where=load > 0.0)
         taken = (self.factor - 1.0) * share * passage.removed
-        most = STEP * max(float(np.std(passage.heights)), film_inside(passage), LEAST)
+        most = STEP * max(float(np.std(passage.heights)), passage.film_inside, LEAST)
         deepest = float(taken.max())
         taken *= min(1.0, most / deepest) if deepest > 0.0 else 1.0
         facts = {
