@@ -56,7 +56,7 @@ def commanded(*arguments: str) -> str | None:
         except SystemExit as end:
             code = end.code or 0
     text = said.getvalue()
-    if code not in (0, 1, 2, 3):
+    if code not in (0, 1, 2, 3, 4, 5):
         return f"ends with {code}"
     if _CONTROL.search(text) or _CONTROL.search(out.getvalue()):
         return "control characters on the terminal"

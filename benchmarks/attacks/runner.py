@@ -33,7 +33,7 @@ class Outcome:
         found = []
         if self.code is None:
             found.append("hangs")
-        elif self.code not in (0, 1, 2, 3):
+        elif self.code not in (0, 1, 2, 3, 4, 5):
             found.append(f"ends with {self.code}")
         if "Traceback" in self.said or "Traceback" in self.out:
             found.append("traceback")

@@ -33,6 +33,9 @@ class Server:
             )  # fmt: skip
         said = self.process.stdout.readline()
         found = re.search(r"http://\S+/", said)
+        if not found:
+            self.process.kill()
+            self.process.communicate()
         assert found, f"{said}{self.log.read_text('utf-8')}"
         self.url = found[0]
 

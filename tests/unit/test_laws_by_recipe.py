@@ -92,7 +92,7 @@ def test_a_law_by_the_recipe_goes_from_case_to_report(tmp_path):
     [
         ({"lubricant.viscosity.z": "0.6 m"}, "lubricant.viscosity.z must be a valid number"),
         ({"lubricant.viscosity.p_ref": 196e6}, 'p_ref must be a pressure such as "2 GPa", got the bare number'),
-        ({"lubricant.viscosity.energy": "3 m"}, 'energy must be a quantity in J/mol such as "1 J/mol", got "3 m"'),
+        ({"lubricant.viscosity.energy": "3 m"}, 'energy must be a molar energy such as "49 kJ/mol", got "3 m"'),
         ({"lubricant.viscosity.law": "made-dawn"}, 'did you mean "made-up"?'),
     ],
 )
