@@ -114,31 +114,34 @@ def lines(*, fast: bool) -> Iterator[str]:
     if path is None:
         raise SystemExit("the live page is measured in chromium; apt-get install chromium")
     yield "## The live page\n"
-    with tempfile.TemporaryDirectory() as folder, _server(Path(folder)) as (url, process), sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        page = browser.new_page()
-        page.goto(f"{url}contact")
-        _solved(page)
-        yield "| seconds by the clock | median | 95 % | longest |"
-        yield "|---|---|---|---|"
-        contents = []
-        for _ in range(3 if fast else 8):
-            began = time.perf_counter()
-            visit = browser.new_page()
-            visit.goto(f"{url}contact")
-            visit.get_by_role("textbox", name="Load, F").wait_for()
-            contents.append(time.perf_counter() - began)
-            visit.close()
-        yield _row("first content", contents)
-        for cells in (128, 256):
-            page.goto(f"{url}contact?grid.cells={cells}+x+{cells}")
+    with tempfile.TemporaryDirectory() as folder, _server(Path(folder)) as (url, process):
+        with sync_playwright() as driver:
+            browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+            page = browser.new_page()
+            page.goto(f"{url}contact")
             _solved(page)
-            first, whole = _steps(page, steps, cells)
-            yield _row(f"a knob to new maps, {cells} x {cells}, coarse", first)
-            yield _row(f"a knob to the full answer, {cells} x {cells}", whole)
-        yield _row(f"a knob to the full answer, 128 x 128, {USERS} users at once", _crowd(browser, url, steps // 4))
-        yield _row("a recording of 300 MB dropped, to its verdict", [_drop(browser, url, Path(folder), fast=fast)])
-        browser.close()
+            yield "| seconds by the clock | median | 95 % | longest |"
+            yield "|---|---|---|---|"
+            contents = []
+            for _ in range(3 if fast else 8):
+                began = time.perf_counter()
+                visit = browser.new_page()
+                visit.goto(f"{url}contact")
+                visit.get_by_role("textbox", name="Load, F").wait_for()
+                contents.append(time.perf_counter() - began)
+                visit.close()
+            yield _row("first content", contents)
+            for cells in (128, 256):
+                page.goto(f"{url}contact?grid.cells={cells}+x+{cells}")
+                _solved(page)
+                first, whole = _steps(page, steps, cells)
+                yield _row(f"a knob to new maps, {cells} x {cells}, coarse", first)
+                yield _row(f"a knob to the full answer, {cells} x {cells}", whole)
+            yield _row(f"a knob to the full answer, 128 x 128, {USERS} users at once", _crowd(browser, url, steps // 4))
+            size = RECORDING // (10 if fast else 1)
+            name = f"a recording of {size * 8 / 1e6:.0f} MB dropped, to its verdict"
+            yield _row(name, [_drop(browser, url, Path(folder), size)])
+            browser.close()
         before, after = _memory(url, process, 20 if fast else SESSIONS)
         yield ""
         yield (
@@ -163,9 +166,9 @@ def _crowd(browser: Any, url: str, count: int) -> list[float]:
     return seconds
 
 
-def _drop(browser: Any, url: str, folder: Path, *, fast: bool) -> float:
+def _drop(browser: Any, url: str, folder: Path, size: int) -> float:
     """Seconds from dropping a large recording to what is said of it."""
-    np.save(folder / "long.npy", np.random.default_rng(0).standard_normal(RECORDING // (10 if fast else 1)))
+    np.save(folder / "long.npy", np.random.default_rng(0).standard_normal(size))
     page = browser.new_page()
     page.goto(f"{url}recordings")
     for name, text in (("Sampling rate", "50 kHz"), ("Unit of the values", "m/s^2")):
