@@ -41,10 +41,10 @@ $(READY): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (once; a minute or two) ..."
 	@if command -v uv >/dev/null 2>&1; then \
 	  uv venv --quiet --clear --python "$(PYTHON)" $(VENV) && \
-	  uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[recordings,study,page]' --group dev; \
+	  uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[recordings,study,page,infer,monitor]' --group dev --group docs; \
 	else \
 	  $(PYTHON) -m venv --clear $(VENV) && \
 	  $(BIN)/python -m pip install --quiet --constraint constraints.txt 'pip>=25.1' && \
-	  $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[recordings,study,page]' --group dev; \
+	  $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[recordings,study,page,infer,monitor]' --group dev --group docs; \
 	fi
 	@touch $(READY)
