@@ -356,6 +356,17 @@ def test_motion_from_rest_draws_oil_in_step_by_step():
     assert (np.diff(clr) < -0.02).all()
 
 
+@pytest.mark.parametrize(
+    ("speeds", "first"), [((1.91, 1.91), True), ((3.82, 0.0), True), ((3.82, 0.0), False)], ids=["one", "two", "none"]
+)
+def test_a_step_begins_where_roughness_has_carried_its_contacts(speeds, first):
+    """Cells a step: from the cell before, or of a body that slides from another one, it takes twice as many steps."""
+    rolling = contact(hardness=CAP, surface_speeds=speeds)
+    surfaces = MovingSurfaces.one_rough(rough(ON, 1e-6, correlation_length=40e-6), speeds, first=first)
+    taken = islice(moving_contact(rolling, barus(), surfaces, options=OPTIONS), 1, 4)
+    assert max(snapshot.solution.convergence.iterations for snapshot in taken) <= 14
+
+
 def test_a_bad_step_is_marked():
     few = replace(OPTIONS, max_iterations=3)
     surface = rough(ON, 1.5e-6, correlation_length=40e-6)

@@ -25,6 +25,7 @@ from asperity.kernels.stencils import Far, Stencil
 
 LEFT = 0.1  # share to which the linearised equations are left ...
 LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
+LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... where no oil may be lost, from so little left on: that has to be met far closer
 OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
 MOST_KRYLOV_STEPS = 60
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
@@ -210,6 +211,8 @@ def newton_step(balance: MixedBalance) -> Pressures:
 
     wanted = joined(wet, closed, float(weight * missing))
     left = LEFT_SMOOTH if linear.follows_wedge else LEFT
+    if problem.conserve and balance.residual_rms < NEAR:
+        left = LEFT_NEAR
     solved = gmres(product, precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
     d_oil, d_closed = split(solved)
     d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)

@@ -145,6 +145,7 @@ class _Contact:
         self.shares = [float(one) / max(sum(surfaces.rough), 1) for one in surfaces.rough]  # of what is flattened
         self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # on smooth bodies, the accurate wedge
         self.followed = rough and time_step == 1.0
+        self.moved = _cells_moved(surfaces, self.seconds)
 
     def start(self, *, standing: bool) -> Snapshot:
         """Time 0, from a contact that has always been as it is, or from one at rest."""
@@ -176,9 +177,7 @@ class _Contact:
         surface = surfaces.at(number * self.seconds)
         whole = self._problem(surface, self._past(memory))
         problem = _on_one_line(whole) if self.one_line else whole
-        lines = problem.cells[1]
-        unknowns = Pressures(memory["oil"][:, :lines], memory["pressure"][:, :lines], float(memory["approach"]))
-        search, step, attempt = self._search(problem, unknowns)
+        search, step, attempt = self._search(problem, self._carried(memory, problem))
         solution = search.solution(
             step,
             surface,
@@ -199,6 +198,20 @@ class _Contact:
         kept = {"content_before": memory["content"]}
         kept |= {name: memory[name] for name in _LOWERED if self.flattening}
         return self._snapshot(number, solution, balance, step.approach, kept, surfaces)
+
+    def _carried(self, memory: Memory, problem: Problem) -> Pressures:
+        """Where a step begins: what stood in each cell a step before, or it gone on with the roughness by whole cells.
+
+        Asperities take their contacts, cavities and shut-in oil with them, and Newton's steps would move each border of
+        these by a cell or two at a time; the smooth bodies' own pressure stays. What leaves less is the start.
+        """
+        (nx, lines), approach = problem.cells, float(memory["approach"])
+        starts = []
+        for cells in dict.fromkeys((self.moved, 0)):
+            before = np.clip(np.arange(nx) - cells, 0, nx - 1)
+            oil, pressure = (memory[name][before, :lines] for name in ("oil", "pressure"))
+            starts.append(Pressures(oil, pressure, approach))
+        return min(starts, key=lambda start: self._balance(problem, start).residual_rms)
 
     def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, str]:
         """The step's way to its solution, and by which attempt."""
@@ -285,6 +298,12 @@ class _Contact:
             track_sq=track_sq,
             memory=memory,
         )
+
+
+def _cells_moved(surfaces: MovingSurfaces, seconds: float) -> int:
+    """How many cells roughness goes in a step, the mean of both bodies' where both are rough."""
+    speeds = [speed for speed, rough in zip(surfaces.speeds, surfaces.rough, strict=True) if rough]
+    return round(sum(speeds) / max(len(speeds), 1) * seconds / surfaces.grid.spacing[0])
 
 
 def _oil(balance: Balance | MixedBalance) -> Field:
