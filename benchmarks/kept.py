@@ -53,19 +53,40 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
 
 
 def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
-    """Numbers that moved by more than a tenth, with the first cell of their row and the head of their column."""
+    """Numbers that moved by more than a tenth, with the first cell of their row and the head of their column.
+
+    Of a table with other rows than the last, those that both have.
+    """
     if before is None:
         yield f"{name}: new"
         return
-    if [len(row) for row in before] != [len(row) for row in now]:
+    pairs = list(zip(before, now, strict=False))
+    if len(before) != len(now) and len(now[0]) > 1:
+        old_rows, rows = _by_name(before[1:], now[1:])
+        pairs = [(before[0], now[0]), *((old_rows[key], rows[key]) for key in rows if key in old_rows)]
+        yield f"{name}: {len(before) - 1} rows are now {len(now) - 1}, {len(pairs) - 1} of them as before"
+    elif len(before) != len(now):
         yield f"{name}: has another shape"
         return
-    for old_row, row in zip(before[1:], now[1:], strict=True):
+    if any(len(old) != len(new) for old, new in pairs):
+        yield f"{name}: has another shape"
+        return
+    for old_row, row in pairs[1:]:
         for head, old, new in zip(now[0], old_row, row, strict=True):
-            pairs = zip(NUMBER.findall(old), NUMBER.findall(new), strict=False)
-            moved = [f"{a} is now {b}" for a, b in pairs if _moved(*(float(n.replace("−", "-")) for n in (a, b)))]
+            numbers = zip(NUMBER.findall(old), NUMBER.findall(new), strict=False)
+            moved = [f"{a} is now {b}" for a, b in numbers if _moved(*(float(n.replace("−", "-")) for n in (a, b)))]
             if moved or NUMBER.sub("", old) != NUMBER.sub("", new):
                 yield f"{name}: {row[0][:60]}, {head}: {'; '.join(moved) or f'{old[:60]!r} is now {new[:60]!r}'}"
+
+
+def _by_name(*tables: Table) -> list[dict[tuple[str, ...], list[str]]]:
+    """Rows by as few of their first cells as tell those of each table apart."""
+    widths = range(1, max((len(row) for table in tables for row in table), default=1) + 1)
+    for width in widths:
+        named = [{tuple(row[:width]): row for row in table} for table in tables]
+        if all(len(rows) == len(table) for rows, table in zip(named, tables, strict=True)):
+            break
+    return named
 
 
 def _moved(old: float, new: float) -> bool:

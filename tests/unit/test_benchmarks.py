@@ -1,8 +1,11 @@
 """What benchmarks keep: csv that the page includes, and what changed since."""
 
+import importlib
+
 import pytest
 from benchmarks import kept
-from benchmarks.__main__ import PARTS, TIMES
+from benchmarks.__main__ import ABREAST, ALONE, PARTS, TIMES, WHOLE
+from benchmarks.unfinished import Unfinished
 
 LINES = [
     "## Cost\n",
@@ -37,7 +40,14 @@ def test_two_tables_have_a_file_each_and_one_that_is_gone_leaves_none(tmp_path):
         ("2.0 ± 0.1", "2.0 ± 0.2", ["cost.csv: 512, time [s]: 0.1 is now 0.2"]),
         ("0.50", "failed", ["cost.csv: 256, time [s]: '0.50' is now 'failed'"]),
         ("Median 0.48 s.", "Median 0.96 s.", ["cost-said.csv: Median 0.96 s., said: 0.48 is now 0.96"]),
-        ("| 256 | 0.50 |\n", "", ["cost.csv: has another shape"]),
+        ("| 256 | 0.50 |\n", "", ["cost.csv: 2 rows are now 1, 1 of them as before"]),
+        (
+            "| 256 | 0.50 |\n| 512 | 2.0 ± 0.1 |",
+            "| 512 | 3.0 ± 0.1 |",
+            ["cost.csv: 2 rows are now 1, 1 of them as before", "cost.csv: 512, time [s]: 2.0 is now 3.0"],
+        ),
+        ("| 512 | 2.0 ± 0.1 |", "| 512 | 2.0 | 0.1 |", ["cost.csv: has another shape"]),
+        ("\nMedian 0.48 s.", "", ["cost-said.csv: has another shape"]),
     ],
 )
 def test_what_moved_by_more_than_a_tenth_is_told(tmp_path, old, new, told):
@@ -49,3 +59,24 @@ def test_what_moved_by_more_than_a_tenth_is_told(tmp_path, old, new, told):
 
 def test_the_page_of_the_docs_includes_the_files_as_they_are():
     assert kept.PAGE.read_text("utf-8") == kept.page(parts=(*PARTS, TIMES))
+
+
+def test_a_run_that_was_cut_off_goes_on_after_the_parts_that_ended(tmp_path):
+    where = {"whole": False, "file": tmp_path / "build" / "run.json"}
+    run = Unfinished.of(["one", "two", "three"], afresh=False, **where)
+    run.end("two", 3.5, "", ["two.csv: new"])
+    again = Unfinished.of(["one", "two", "three"], afresh=False, **where)
+    assert again.left == ["one", "three"]
+    assert again.began == run.began
+    assert again.done == {"two": (3.5, "", ["two.csv: new"])}
+    assert Unfinished.of(["one", "two", "three"], afresh=True, **where).left == ["one", "two", "three"]
+    assert Unfinished.of(["one", "two"], afresh=False, **where).left == ["one", "two"]
+    assert Unfinished.of(["one", "two", "three"], afresh=False, **(where | {"whole": True})).done == {}
+    again.forget()
+    assert Unfinished.of(["one", "two", "three"], afresh=False, **where).done == {}
+
+
+def test_every_part_is_one_that_can_be_run():
+    assert len(set(PARTS)) == len(ALONE) + len(ABREAST)
+    assert set(WHOLE) < set(PARTS)
+    assert all(callable(importlib.import_module(f"benchmarks.{part}").lines) for part in PARTS)

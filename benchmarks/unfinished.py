@@ -1,0 +1,52 @@
+"""A run of the benchmarks that may be cut off: which parts have ended, kept beside what it builds."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+FILE = Path("build/benchmarks.json")
+
+Ended = tuple[float, str, list[str]]  # seconds, what kept the part from its end, what changed against the last
+
+
+@dataclass
+class Unfinished:
+    """The parts of a run, and what became of those that have ended."""
+
+    parts: tuple[str, ...]
+    whole: bool
+    began: str
+    file: Path | None  # where it is kept; None where it is not
+    done: dict[str, Ended] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, parts: Sequence[str], *, whole: bool, afresh: bool, file: Path | None) -> "Unfinished":
+        """The run that was cut off, of these parts in this size; or a new one."""
+        new = cls(tuple(parts), whole, f"{datetime.now():%Y-%m-%d %H:%M}", file)
+        if afresh or file is None or not file.is_file():
+            return new
+        last = json.loads(file.read_text("utf-8"))
+        if (tuple(last["parts"]), last["whole"]) != (new.parts, whole):
+            return new
+        return cls(new.parts, whole, last["began"], file, {part: tuple(how) for part, how in last["done"].items()})
+
+    @property
+    def left(self) -> list[str]:
+        """Parts that have not ended, in order."""
+        return [part for part in self.parts if part not in self.done]
+
+    def end(self, part: str, seconds: float, trouble: str, changed: list[str]) -> None:
+        """Remember how a part has ended."""
+        self.done[part] = seconds, trouble, changed
+        if self.file is None:
+            return
+        self.file.parent.mkdir(exist_ok=True)
+        kept = {"parts": self.parts, "whole": self.whole, "began": self.began, "done": self.done}
+        self.file.write_text(json.dumps(kept), "utf-8")
+
+    def forget(self) -> None:
+        """What has come to its end is no more gone on with."""
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)
