@@ -11,9 +11,10 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from itertools import chain
 from time import perf_counter
 from typing import NamedTuple
 
@@ -39,18 +40,17 @@ ALONE = (  # whose times are their result: nothing runs beside them; those first
     "rollers",
     "bounded",
 )
-ABREAST = (  # what is counted, one on each processor; the longest first
-    "wearing",
-    "motion_table",
-    "damping_stages",
-    "robustness",
-    "intervals",
-    "alarms",
-    "indicators",
-    "damping",
-    "vibration",
+ABREAST = (  # what is counted, on each processor one of these, each one part or some that need what another keeps
+    ("wearing",),
+    ("damping", "damping_stages"),
+    ("intervals",),
+    ("indicators",),
+    ("alarms",),
+    ("motion_table",),
+    ("robustness",),
+    ("vibration",),
 )
-PARTS = (*ALONE, *ABREAST)
+PARTS = (*ALONE, *chain.from_iterable(ABREAST))
 WHOLE = ("first_call", "stress", "surfaces", "rollers")  # short enough as they are, whatever is asked
 ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors
 TIMES = "times"  # the part that says how long the others took
@@ -112,10 +112,14 @@ def _measure(asked: Asked, run: Unfinished) -> None:
             run.end(part, perf_counter() - began, trouble, changed)
             print(f"{part}: {trouble}\n" if trouble else printed, flush=True)
 
-    for part in [part for part in run.left if part in ALONE]:
-        measure(part)
+    def in_turn(parts: Iterable[str]) -> None:
+        for part in parts:
+            measure(part)
+
+    left = run.left
+    in_turn(part for part in left if part in ALONE)
     with ThreadPoolExecutor(max(1, min(2, os.cpu_count() or 1))) as pool:
-        for _ in pool.map(measure, [part for part in run.left if part in ABREAST]):
+        for _ in pool.map(in_turn, [[part for part in row if part in left] for row in ABREAST]):
             pass
 
 

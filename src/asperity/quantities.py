@@ -223,7 +223,8 @@ class Parameter:
         return f"{value * _FACTORS.get(display, 1.0):.4g} {display}".rstrip()
 
 
-def parameters(law: type) -> dict[str, Parameter]:
+@cache  # every case of a study and every surface asks a dozen laws, and hints are evaluated each time
+def parameters(law: type) -> Mapping[str, Parameter]:
     """The fields of a law by name, each with its unit and symbol; a field that states none is a plain number."""
     hints = get_type_hints(law, include_extras=True)
     marks = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(law)}
