@@ -149,7 +149,8 @@ def _columns(table: "pyarrow.Table") -> dict[str, Any]:
     held: dict[str, Any] = {"": [told, table.column_names]}
     for name, column in zip(table.column_names, table.columns, strict=True):
         kind = column.type
-        held[f"type of {name}"] = str(kind)
+        # a list's items are called otherwise by the file than by what was written
+        held[f"type of {name}"] = f"list of {kind.value_type}" if pyarrow.types.is_list(kind) else str(kind)
         if pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
             held[f"where {name}"] = column.is_valid().to_numpy()
             held[f"values of {name}"] = column.fill_null(0).to_numpy()

@@ -73,6 +73,14 @@ def test_a_flipped_bit_in_a_table_gives_the_same_table_or_a_refusal(tmp_path, se
     assert refused > 20
 
 
+def test_a_table_of_lists_comes_back(tmp_path):
+    """As a study of the vibration model alone has, of its bands: parquet calls a list's items by a name of its own."""
+    table = pyarrow.table({"band_hz": [[2e3, 4e3], None, [1e3, 2e3]], "names": [["a"], [], ["b"]]})
+    write_table(tmp_path / "table.parquet", table, "this case")
+    back = read_table(tmp_path / "table.parquet", "this case", "delete it")
+    assert back.to_pydict() == table.to_pydict()
+
+
 def test_a_table_of_another_case_is_refused(tmp_path):
     write_table(tmp_path / "table.parquet", TABLE, "another case")
     with pytest.raises(UnreadableFile, match="another case than its folder"):
