@@ -1,9 +1,11 @@
 """What benchmarks keep: csv that the page includes, and what changed since."""
 
 import importlib
+from functools import partial
 
 import pytest
-from benchmarks import kept
+from benchmarks import __main__ as bench_main
+from benchmarks import kept, unfinished
 from benchmarks.__main__ import PARTS, TIMES, WHOLE
 from benchmarks.unfinished import Unfinished
 
@@ -80,3 +82,72 @@ def test_every_part_is_one_that_can_be_run():
     assert len(set(PARTS)) == len(PARTS)
     assert set(WHOLE) < set(PARTS)
     assert all(callable(importlib.import_module(f"benchmarks.{part}").lines) for part in PARTS)
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch, capsys):
+    """The command on two timed parts and a row of two counted ones, none of which is run; what it prints, its code."""
+    ran: list[str] = []
+    troubles: dict[str, str] = {}
+
+    def run(part, *, whole, **_):
+        ran.append(f"{part} {whole}")
+        return "| cells |\n|---|\n| 1 |", troubles.get(part, "")
+
+    monkeypatch.setattr(bench_main, "ALONE", ("a", "b"))
+    monkeypatch.setattr(bench_main, "ABREAST", (("c", "d"),))
+    monkeypatch.setattr(bench_main, "PARTS", ("a", "b", "c", "d"))
+    monkeypatch.setattr(bench_main, "_run", run)
+    monkeypatch.setattr(unfinished, "FILE", tmp_path / "run.json")
+    monkeypatch.setattr(kept, "PAGE", tmp_path / "benchmarks.md")
+    monkeypatch.setattr(kept, "keep", partial(kept.keep, folder=tmp_path))
+
+    def command(*words):
+        monkeypatch.setattr("sys.argv", ["benchmarks", *words])
+        with pytest.raises(SystemExit) as end:
+            bench_main.main()
+        return capsys.readouterr().out, end.value.code
+
+    return command, ran, troubles
+
+
+def test_all_parts_run_once_and_the_next_run_starts_anew(bench):
+    command, ran, _ = bench
+    printed, code = command()
+    assert (ran, code) == (["a False", "b False", "c False", "d False"], 0)
+    assert "a.csv: new" in printed
+    printed, _ = command("--whole")
+    assert ran[4:] == ["a True", "b True", "c True", "d True"]
+    assert "a.csv" not in printed  # the same as the last
+
+
+def test_out_of_time_goes_on_with_what_is_left(bench, monkeypatch):
+    command, ran, _ = bench
+    clock = iter([0.0, 0.0, 1.0, *[1e6] * 9])  # all of the time has gone once the first part has ended
+    monkeypatch.setattr(bench_main, "perf_counter", lambda: next(clock))
+    printed, code = command("--minutes", "1")
+    assert (ran, code) == (["a False"], 1)
+    assert "Out of time before b, c, d" in printed
+
+
+def test_a_part_that_fails_is_named_and_the_others_run(bench):
+    command, ran, troubles = bench
+    troubles["b"] = "failed with exit code 1"
+    printed, code = command()
+    assert (len(ran), code) == (4, 1)
+    assert "| b | 0 | failed with exit code 1 |" in printed
+    assert "b.csv" not in printed
+
+
+def test_named_parts_run_alone_and_leave_a_cut_off_run_as_it_is(bench):
+    command, ran, _ = bench
+    unfinished.FILE.write_text('{"parts": ["a", "b", "c", "d"], "whole": false, "began": "then", "done": {}}')
+    command("d")
+    assert ran == ["d False"]
+    run = Unfinished.of(["a", "b", "c", "d"], whole=False, afresh=False, file=unfinished.FILE)
+    assert run.began == "then"
+    run.end("a", 2.0, "", [])
+    printed, _ = command()
+    assert ran[1:] == ["b False", "c False", "d False"]
+    assert "Going on with the run of then, after a" in printed
+    assert "| a | 2 | measured |" in printed
