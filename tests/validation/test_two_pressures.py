@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
-from asperity.ehl import Options, contact_state, solve_contact
+from asperity.ehl import Options, contact_state, solve_contact, starts
 from asperity.ehl.dry import dry_contact
 from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.mixed_iterate import newton
@@ -16,6 +16,7 @@ from asperity.ehl.mixed_solve import MixedSearch
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import carried_share
+from asperity.ehl.starts import dry_start
 from asperity.ehl.state import balance_of
 from asperity.grid import Grid
 from asperity.kernels.reynolds import LUBRICATED, TOUCHING
@@ -85,6 +86,26 @@ def test_what_oil_changed_on_a_coarse_grid_is_granted_to_the_finer_one():
     assert steps[len(levels)] < 0.7 * steps[1]
     at_once, climbed = (search.figures[-1].clr for search in searches.values())
     assert climbed == pytest.approx(at_once, abs=0.002)
+
+
+@pytest.mark.parametrize("sq", [1e-6, 4e-6])
+def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
+    """The answer from Hertz's pressure, without its conjugate gradients, which a cap that holds most cells defeats."""
+    fine, coarse = grid_levels(contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED))[:2]
+    alone = dry_start(fine)
+    total, approach = dry_start(coarse)
+    monkeypatch.setattr(starts, "dry_contact", None)
+    followed = dry_start(fine, Pressures(np.zeros_like(total), total, approach + coarse.contact_gap))
+    assert followed[1] == pytest.approx(alone[1], abs=0.01)
+    assert np.sqrt(np.mean((followed[0] - alone[0]) ** 2)) < 0.02 * np.sqrt(np.mean(alone[0] ** 2))
+
+
+def test_a_cell_in_deep_overlap_is_not_freed_again_and_again():
+    """One cell of this surface went round between the cap and the oil, for seventy steps on the finest grid."""
+    surface = gaussian_surface(grid((256, 256)), sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
+    case = load_case(PAPER)
+    solution = solve_contact(case.conditions, case.lubricant, surface, options=MIXED)
+    assert sum(step.cells == (256, 256) for step in solution.convergence.history) < 30
 
 
 def hard_ball():

@@ -155,16 +155,16 @@ def evaluate(problem: Problem, unknowns: Pressures, *, second_order: bool, freed
 
     So are lifted ones, and the unknowns are changed where that takes it.
     """
-    return _evaluate(problem, unknowns, second_order, freed, may_lift=True)
+    gap = problem.undeformed + problem.deflection(unknowns.total)
+    gap += unknowns.approach
+    return _evaluate(problem, unknowns, gap, second_order, freed, may_lift=True)
 
 
 def _evaluate(
-    problem: Problem, unknowns: Pressures, second_order: bool, freed: Mask | None, *, may_lift: bool
+    problem: Problem, unknowns: Pressures, gap: Field, second_order: bool, freed: Mask | None, *, may_lift: bool
 ) -> MixedBalance:
     signed, pressure, approach = unknowns
     assert problem.lubricant is not None
-    gap = problem.undeformed + problem.deflection(pressure)
-    gap += approach
     contact_scale = 1.0 / problem.softness
     touching = (gap - problem.contact_gap) * contact_scale
     oil = np.clip(signed, 0.0, problem.p_cap)
@@ -185,7 +185,7 @@ def _evaluate(
     if may_lift and np.any(lifted & (borne > 0.0)):
         freed = lifted if freed is None else freed | lifted
         unknowns = Pressures(np.where(lifted & (borne > 0.0), pressure, signed), pressure, approach)
-        return _evaluate(problem, unknowns, second_order, freed, may_lift=False)
+        return _evaluate(problem, unknowns, gap, second_order, freed, may_lift=False)
     free |= lifted & (borne <= 0.0)
     if freed is not None:
         free |= freed

@@ -11,6 +11,7 @@ from asperity.ehl.limit import StepLimit
 from asperity.ehl.mixed import FREE, MixedBalance, Pressures, evaluate
 from asperity.ehl.mixed_linear import newton_step
 from asperity.ehl.problem import Problem
+from asperity.kernels.reynolds import CAPPED
 
 PATIENCE, PROGRESS = 8, 0.9  # steps without progress, after which halves are taken, or whole ones again
 LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
@@ -22,7 +23,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     """Yield the start and then where each Newton step leads.
 
     A closed cell whose oil would come to bear more than the total takes the total for its oil's pressure, and is free
-    in the next step: the oil lifts the bodies apart.
+    in the next step: the oil lifts the bodies apart. Not one that the cap decides.
     """
     wanted_mean = problem.load / (unknowns.total.size * problem.spacing[0] * problem.spacing[1])
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
@@ -49,12 +50,13 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         oil = np.clip(signed, 0.0, problem.p_cap)
         total = np.clip(unknowns.total + share * limit.limited(step.total, unknowns.total, 0.0), 0.0, problem.p_cap)
         total = np.where(free, oil, total)
-        freed = ~free & (oil > total)
+        overborne = ~free & (oil > total)
+        freed = overborne & (balance.solid != CAPPED)  # in deep overlap it would be pressed shut and freed in turn
         turned_back = step.approach * approach_before < 0.0 and abs(step.approach) > 0.5 * furthest
         furthest = 0.5 * furthest if turned_back else min(1.2 * furthest, most)
         approach_before = step.approach
         approach = unknowns.approach + share * float(np.clip(step.approach, -furthest, furthest))
-        unknowns = Pressures(np.where(freed, total, signed), total, approach)
+        unknowns = Pressures(np.where(overborne, total, signed), total, approach)
 
 
 def _moved(balance: MixedBalance, step: Field) -> Field:

@@ -40,7 +40,6 @@ MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
 MOST_AT_ONCE = 40
-MOST_BACK = 20  # steps from the second-order wedge's solution to the first-order one
 MOST_NEAR = 12  # steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
 BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
 LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
@@ -172,7 +171,8 @@ class MixedSearch(Search):
                 steps = newton(problem, _reached(step), second_order=True)
                 step = self.run(problem, steps, tolerance, soon, stray=STRAY)
             if self.settled(tolerance):
-                self.by_first_order = self._figures(_back_to_first_order(problem, step))
+                if not coarsely:
+                    self.by_first_order = self._figures(_towards_first_order(problem, step))
                 return step
         return self.finish(problem, unknowns, coarsely=coarsely, last=last)
 
@@ -306,9 +306,9 @@ class MixedSearch(Search):
         What oil changed on a grid is granted to the dry contact of the next finer one.
         """
         self.figures, self.smooth = [], False
-        before: Lubricated | None = None
+        before, dry = None, None
         for problem in reversed(levels):
-            total, approach = dry_start(problem)
+            total, approach = dry_start(problem, dry)
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
             start = dry if before is None else before.granted(dry, problem.p_cap)
@@ -371,12 +371,9 @@ def _kept_for(problem: Problem, length: float, content: Field) -> Past:
     return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
 
 
-def _back_to_first_order(problem: Problem, step: Step) -> Step:
-    """From the second-order wedge's solution to the first-order one, met roughly."""
-    back = step
-    for back in islice(newton(problem, _reached(step), second_order=False), MOST_BACK + 1):
-        if back.number > 0 and back.balance.residual_rms < ROUGHLY:
-            break
+def _towards_first_order(problem: Problem, step: Step) -> Step:
+    """A step from the second-order wedge's solution: about nine tenths of the way to the first-order one."""
+    *_, back = islice(newton(problem, _reached(step), second_order=False), 2)
     return back
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.ehl.dry import dry_contact
-from asperity.ehl.iterate import newton
+from asperity.ehl.iterate import Step, newton
 from asperity.ehl.locally import smoothed
 from asperity.ehl.mixed import Pressures
 from asperity.ehl.problem import Problem
@@ -32,18 +32,31 @@ class Lubricated(NamedTuple):
         return Pressures(oil, total, dry.approach + self.wet.approach - self.dry.approach)
 
 
-def dry_start(problem: Problem) -> tuple[Field, float]:
-    """Pressure and approach without oil: by conjugate gradients, and by Newton's steps where the cap is too busy."""
+def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field, float]:
+    """Pressure and approach without oil, by Newton's steps from those on a `coarser` grid.
+
+    From Hertz's pressure, or where that led nowhere, by conjugate gradients, and by Newton's steps where the cap is too
+    busy for these.
+    """
     dry = replace(problem, lubricant=None, contact_gap=0.0)
-    pressure = problem.form.hertz(problem.x, problem.y)
-    pressure, approach, met = dry_contact(dry, pressure, most_steps=MOST_GRADIENTS)
+    if coarser is not None:
+        step, met = _settled(dry, interpolated(coarser.total, problem.cells), coarser.approach - problem.contact_gap)
+        if met:
+            return step.balance.pressure, step.approach
+    pressure, approach, met = dry_contact(dry, problem.form.hertz(problem.x, problem.y), most_steps=MOST_GRADIENTS)
     if not met:
-        for step in newton(dry, pressure, approach):
-            left = max(step.balance.residual_rms, abs(step.balance.load_error))
-            if left < COARSE_TOLERANCE or step.number == MOST_DRY:
-                break
+        step, _ = _settled(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
     return pressure, approach
+
+
+def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
+    """Where Newton's steps lead, and whether that is near enough for a start."""
+    for step in newton(dry, pressure, approach):
+        left = max(step.balance.residual_rms, abs(step.balance.load_error))
+        if left < COARSE_TOLERANCE or step.number == MOST_DRY:
+            break
+    return step, left < COARSE_TOLERANCE
 
 
 def handed_up(problem: Problem, unknowns: Pressures) -> Pressures:
