@@ -76,6 +76,11 @@ def film(page):
     )
 
 
+def opacity(page):
+    """How opaque the film map is shown."""
+    return page.locator(".block.film .bk-Column").first.evaluate("element => getComputedStyle(element).opacity")
+
+
 def turn(page, name, text):
     box = page.get_by_role("textbox", name=name)
     box.fill(text)
@@ -114,10 +119,10 @@ def test_a_wrong_value_is_named_beside_its_knob(visit):
     sentence.wait_for()
     below, above = sentence.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
-    assert page.locator(".bk-Figure").first.evaluate("element => getComputedStyle(element).opacity") != "1"
+    assert opacity(page) != "1"
     turn(page, "Composite roughness, Sq", "1 um")
     sentence.wait_for(state="hidden")
-    assert page.locator(".bk-Figure").first.evaluate("element => getComputedStyle(element).opacity") == "1"
+    assert opacity(page) == "1"
 
 
 def test_a_pinned_contact_is_compared_with(visit):

@@ -131,7 +131,7 @@ def test_a_coarse_answer_comes_first_and_the_full_one_after_it():
     assert coarse.gap.shape == (48, 32)
     assert full.gap.shape == (96, 64)
     assert coarse.row["clr"] == pytest.approx(full.row["clr"], abs=0.15)
-    assert all(tile.doubt in ("coarse, without error bar", "") for tile in coarse.tiles)
+    assert all(tile.doubt in ("coarse answer", "") for tile in coarse.tiles)
 
 
 def test_a_coarse_answer_goes_on_from_the_one_before():
@@ -158,6 +158,24 @@ def test_a_coarse_answer_is_the_averaged_surfaces():
     alone = Surface(heights, coarse.solution.grid)
     solved = solve_contact(case.conditions, case.lubricant, alone, options=Options(tolerance=1e-3, max_iterations=40))
     assert coarse.answer.row["clr"] == pytest.approx(contact_state(solved).clr)
+
+
+def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monkeypatch):
+    case = papers_case().with_overrides({**MUTE, "grid.cells": [128, 128]})
+    assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (64, 64)
+    monkeypatch.setattr(work, "COLD_STEPS", 2)
+    monkeypatch.setattr(work, "COARSER", 48 * 48)
+    monkeypatch.setattr(work, "COARSE", 80 * 80)
+    assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (32, 32)
+    monkeypatch.setattr(work, "COARSER_STEPS", 2)
+    assert work.solve_coarsely(NOBODY, case, None) == work.Coarse(None, None)
+
+
+def test_cells_that_are_too_few_only_for_a_coarse_answer_refuse_nothing():
+    desk, _, _ = desk_of({**MUTE, "grid.x": [-9.0, 3.0], "grid.cells": [96, 64]})
+    desk.solve()
+    assert work.solve_coarsely(NOBODY, desk.settings.case, None) == work.Coarse(None, None)
+    assert desk.status.startswith("Solved on 96 × 64 cells")
 
 
 def test_a_contact_on_few_cells_has_no_coarse_answer():

@@ -116,7 +116,7 @@ class Answer(Picture):
         if value is None:
             return ""
         if self.coarse:
-            return "coarse, without error bar"
+            return "coarse answer"
         if entry.ends[0] in self.row:
             low, high = (self.row.get(end) for end in entry.ends)
             if low is None or high is None or not self.determined:

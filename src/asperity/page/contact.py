@@ -5,12 +5,15 @@ from pathlib import Path
 from typing import Any
 
 from bokeh.models import Column
+from panel.io import hold
 
+from asperity.case import Case
 from asperity.page import take
 from asperity.page.answer import Answer
 from asperity.page.desk import Desk
-from asperity.page.figures import Cut, Maps, Spectrum, Trail
+from asperity.page.figures import SPECTRUM_HEIGHT, TRAIL_HEIGHT, Spectrum, Trail
 from asperity.page.jobs import Queue, Workshop
+from asperity.page.pictures import OLD, Pictures, place
 from asperity.page.settings import Settings
 from asperity.page.uploads import Drop
 from asperity.page.widgets import (
@@ -30,7 +33,6 @@ from asperity.page.work import Refused, ReportWriter, make_report, open_surface
 from asperity.quantities import quantity
 
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
-OLD = ":host { opacity: .55; }"
 
 
 class ContactView:
@@ -57,14 +59,18 @@ class ContactView:
         self._workshop, self._deliver = workshop, deliver
         self.desk = Desk(settings, Queue(workshop, deliver), self.draw)
         self._side = Queue(workshop, deliver)
-        self.maps = Maps(self._cut_at)
-        self.cut, self.spectrum, self.trail = Cut(self.maps), Spectrum(), Trail(self._again)
+        self.pictures = Pictures()
+        self.hearing, self.share, self.pitch = place(SPECTRUM_HEIGHT), place(TRAIL_HEIGHT), place(TRAIL_HEIGHT)
+        self._spectrum: Spectrum | None = None
+        self._trail: Trail | None = None
+        self._unmade = [*self.pictures.steps(), self._make_spectrum, self._make_trail]
         self.status, self.verdict, self.notes, self.said = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
         self.handout = Handout()
         self.knobs: dict[str, KnobWidget] = {}
+        self._built: Case | None = None
         self.knob_column = Column(sizing_mode="stretch_width")
-        self._cut_y, self._more = 0.0, False
+        self._more = False
         self._drawn: tuple[Answer, Answer | None] | None = None
         self.drop = Drop(
             limit=SURFACE_LIMIT, arrived=self._surface_came, refused=self._say, several=False,
@@ -85,8 +91,18 @@ class ContactView:
             return
         self._say(*self.desk.go_to(query))
 
+    def furnish(self) -> None:
+        """Make the next figure and ask for the one after it; between them others are served."""
+        if self._unmade:
+            with hold(freeze=True):
+                self._unmade.pop(0)()
+            self._deliver(self.furnish)
+        else:
+            self.draw()
+
     def close(self) -> None:
         """Give back what the session took."""
+        self._unmade.clear()
         self.desk.close()
         self._side.close()
         self.drop.close()
@@ -94,13 +110,18 @@ class ContactView:
     # What is shown ---------------------------------------------------------------------------------------------------
 
     def draw(self) -> None:
-        """Draw the desk as it is now."""
+        """Draw the desk as it is now, in one message to the browser."""
+        with hold():
+            self._draw()
+
+    def _draw(self) -> None:
         desk = self.desk
         if desk.settings.opened is not self._built:
             self._build_knobs()
         warming = "" if self._workshop.is_warm else "Warming up: the solver is loaded, and compiled the first time. "
         kind = "alarm" if desk.problem or (desk.answer is not None and not desk.answer.converged) else "soft"
-        self.status.text = sentences([f"{warming}{desk.status}"], kind)
+        status = desk.status if desk.stale or not self._unmade else "Drawing ..."
+        self.status.text = sentences([f"{warming}{status}"], kind)
         for key, widget in self.knobs.items():
             refusal = desk.refusals.get(key)
             widget.show(refusal.text if refusal else desk.settings.text(key), refusal.sentence if refusal else "")
@@ -113,29 +134,40 @@ class ContactView:
         self.pin.label = "Unpin" if desk.pinned is not None else "Pin to compare"
 
     def _draw_answer(self, answer: Answer, pinned: Answer | None) -> None:
-        self.maps.show(answer, pinned)
-        self._draw_cut()
+        self.pictures.show(answer, pinned)
         if answer.coarse:
             return
         self.verdict.text = sentences([answer.verdict], "" if answer.converged else "alarm")
         self.notes.text = sentences(answer.notes, "soft")
-        self.spectrum.show(answer.sound, None if pinned is None else pinned.sound, _heard(answer))
-        self.trail.show(self.desk.trail)
+        self._draw_spectrum()
+        self._draw_trail()
         self._set_address(self.desk.settings.address)
 
-    def _draw_cut(self) -> None:
-        answer = self.desk.answer
-        if answer is not None:
-            self._cut_y = float(answer.y[answer.line(self._cut_y)])
-            self.maps.cut(self._cut_y)
-            self.cut.show(answer, self.desk.pinned, self._cut_y)
+    def _make_spectrum(self) -> None:
+        self._spectrum = Spectrum()
+        self.hearing.children = [self._spectrum.figure]
+        self._draw_spectrum()
+
+    def _make_trail(self) -> None:
+        self._trail = Trail(self._again)
+        self.share.children, self.pitch.children = [self._trail.share], [self._trail.pitch]
+        self._draw_trail()
+
+    def _draw_spectrum(self) -> None:
+        answer, pinned = self.desk.answer, self.desk.pinned
+        if self._spectrum is not None and answer is not None and not answer.coarse:
+            self._spectrum.show(answer.sound, None if pinned is None else pinned.sound, _heard(answer))
+
+    def _draw_trail(self) -> None:
+        if self._trail is not None:
+            self._trail.show(self.desk.trail)
 
     def _mark(self, old: bool) -> None:
         """Mark a picture that is not of the knobs as they are set."""
         sheets = [OLD] if old else []
-        for shown in (self.maps.film, self.maps.pressure, self.cut.pressure, self.cut.film, self.spectrum.figure):
-            if shown.stylesheets != sheets:
-                shown.stylesheets = sheets
+        self.pictures.mark(sheets)
+        if self.hearing.stylesheets != sheets:
+            self.hearing.stylesheets = sheets
 
     def _say(self, *lines: str) -> None:
         self.said.text = sentences(lines, "alarm")
@@ -143,16 +175,20 @@ class ContactView:
     # What is turned --------------------------------------------------------------------------------------------------
 
     def _build_knobs(self) -> None:
-        """A widget for every knob of the opened case, under the headings of their groups."""
-        self._built = self.desk.settings.opened
-        self.knobs = {key: KnobWidget(knob, self._turned) for key, knob in self.desk.settings.knobs.items()}
+        """A widget for every knob of the opened case that is shown, under the headings of their groups."""
+        if self.desk.settings.opened is not self._built:
+            self._built = self.desk.settings.opened
+            self.knobs.clear()
         children: list[Any] = []
         group = ""
-        for widget in self.knobs.values():
-            if widget.knob.more and not self._more:
+        for key, knob in self.desk.settings.knobs.items():
+            if knob.more and not self._more:
                 continue
-            if widget.knob.group != group:
-                group = widget.knob.group
+            if key not in self.knobs:
+                self.knobs[key] = KnobWidget(knob, self._turned)
+            widget = self.knobs[key]
+            if knob.group != group:
+                group = knob.group
                 heading = text_block("h3 { font-size: .95rem; margin: 12px 0 2px; }")
                 heading.text = f"<h3>{group}</h3>"
                 children.append(heading)
@@ -168,10 +204,6 @@ class ContactView:
         self.more.label = "Fewer knobs" if self._more else "More knobs"
         self._build_knobs()
         self.draw()
-
-    def _cut_at(self, y: float) -> None:
-        self._cut_y = y / quantity("y_m").factor
-        self._draw_cut()
 
     def _again(self, number: int) -> None:
         """Go back to a setting that was tried."""
@@ -238,13 +270,13 @@ def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         "said": view.said,
         "tiles": view.tiles,
         "take": view.take,
-        "film": view.maps.film,
-        "pressure": view.maps.pressure,
-        "change": view.maps.change,
-        "cut": Column(view.cut.pressure, view.cut.film, sizing_mode="stretch_width"),
-        "spectrum": view.spectrum.figure,
-        "share": view.trail.share,
-        "pitch": view.trail.pitch,
+        "film": view.pictures.film,
+        "pressure": view.pictures.pressure,
+        "change": view.pictures.change,
+        "cut": Column(view.pictures.cut_pressure, view.pictures.cut_film, sizing_mode="stretch_width"),
+        "spectrum": view.hearing,
+        "share": view.share,
+        "pitch": view.pitch,
         "notes": view.notes,
         "handout": view.handout.model,
     }

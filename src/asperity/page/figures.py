@@ -31,7 +31,7 @@ FILMS = Viridis256[:208]  # without its yellow, which is that of contact
 CHANGES = interp_palette(RdBu11, 256)  # thinner is blue, thicker red
 CONTACT, CAVITY = (0xF7, 0xDC, 0x4A), (0x5B, 0x6B, 0x86)
 TYPE = "#74818f"  # of keys and colour bars, which take no ink from the style sheet: legible on light and on dark
-HEIGHT = 300
+HEIGHT, CUT_HEIGHT, SPECTRUM_HEIGHT, TRAIL_HEIGHT = 300, 250, 480, 240
 SHAPES, BESIDE = (0.9, 2.0), 0.8  # widths of maps over their heights; of that, what axes and colour bar leave
 
 
@@ -78,14 +78,13 @@ class Maps:
     """Film and pressure of a contact on the same axes, with linked cursors, and where the cut runs."""
 
     def __init__(self, cut_at: Callable[[float], None]) -> None:
+        self._cut_at = cut_at
         self.x, self.y = Range1d(), Range1d()
         self.across, self.along = (Span(dimension=way, line_dash="dotted") for way in ("width", "height"))
         self.film = self._map("Film thickness, contact and cavitation", FILMS, "gap")
         self.pressure = self._map("Pressure", Inferno256, "pressure")
-        self.change = self._map("Film less the pinned film", CHANGES, "gap")
-        self.change.visible = False
-        for made in (self.film, self.pressure, self.change):
-            made.on_event(Tap, lambda event: cut_at(event.y))
+        self.change: Any = None  # until something is pinned
+        self.compares = False
 
     def _map(self, title: str, palette: Sequence[str], key: str) -> Any:
         made = plain_figure("x_m", "y_m", label=title, title=title, x_range=self.x, y_range=self.y, min_height=HEIGHT)
@@ -107,16 +106,20 @@ class Maps:
         made.add_layout(bar, "below")
         unit = quantity(key).display
         made.add_tools(HoverTool(renderers=[image], tooltips=[(quantity(key).short, f"@image{{0.000}} {unit}")]))
+        made.on_event(Tap, lambda event: self._cut_at(event.y))
         made.tags = [{"mapper": mapper, "source": source, "over": over, "zone": zone, "cut": cut}]
         return made
 
     def show(self, answer: Picture, pinned: Picture | None) -> None:
-        """Draw an answer, and how its film differs from a pinned one on the same cells."""
+        """Draw an answer, and how its film differs from a pinned one if that is on the same cells: `compares`."""
         (x0, x1), (y0, y1) = ((shown("x_m", end) for end in ends) for ends in answer.extent)
         self.x.update(start=x0, end=x1, reset_start=x0, reset_end=x1)
         self.y.update(start=y0, end=y1, reset_start=y0, reset_end=y1)
+        self.compares = pinned is not None and pinned.gap.shape == answer.gap.shape
+        if self.compares and self.change is None:
+            self.change = self._map("Film less the pinned film", CHANGES, "gap")
         shape = BESIDE * min(max(float((x1 - x0) / (y1 - y0)), SHAPES[0]), SHAPES[1])
-        for made in (self.film, self.pressure, self.change):
+        for made in self._made():
             made.aspect_ratio = shape
         place = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
         marks = _marks(answer)
@@ -124,18 +127,19 @@ class Maps:
         largest = max(float(answer.pressure.max()), answer.hertz_pressure)
         self._fill(self.pressure, shown("pressure", answer.pressure), (0.0, shown("pressure", largest)), place, None)
         zone = _hertz_outline(answer, (y0, y1))
-        for made in (self.film, self.pressure, self.change):
+        for made in self._made():
             made.tags[0]["zone"].data = zone
-        comparable = pinned is not None and pinned.gap.shape == answer.gap.shape
-        self.change.visible = comparable
-        if comparable and pinned is not None:
+        if self.compares and pinned is not None:
             change = shown("gap", answer.gap - pinned.gap)
             reach = float(np.percentile(np.abs(change), 98.0)) or 1.0
             self._fill(self.change, change, (-reach, reach), place, None)
 
+    def _made(self) -> list[Any]:
+        return [self.film, self.pressure, *([] if self.change is None else [self.change])]
+
     def cut(self, y: float) -> None:
         """Mark where the cut runs [m]."""
-        for made in (self.film, self.pressure, self.change):
+        for made in self._made():
             made.tags[0]["cut"].location = float(shown("y_m", y))
 
     @staticmethod
@@ -173,9 +177,9 @@ class Cut:
 
     def __init__(self, maps: Maps) -> None:
         label = "Cut along rolling: pressure with Hertz's pressure"
-        self.pressure = plain_figure("", "pressure", label=label, title="Cut", height=250, x_range=maps.x)
+        self.pressure = plain_figure("", "pressure", label=label, title="Cut", height=CUT_HEIGHT, x_range=maps.x)
         self.film = plain_figure(
-            "x_m", "gap", label="Cut along rolling: film", title="Film in the cut", height=250, x_range=maps.x
+            "x_m", "gap", label="Cut along rolling: film", title="Film in the cut", height=CUT_HEIGHT, x_range=maps.x
         )
         for made in (self.pressure, self.film):
             made.add_tools(CrosshairTool(overlay=[Span(dimension="width", line_dash="dotted"), maps.along]))
@@ -225,7 +229,7 @@ class Spectrum:
     def __init__(self) -> None:
         self.figure = plain_figure(
             "frequency_hz", "acceleration_density", label="Spectrum with the fitted resonance", title="Spectrum",
-            y_axis_type="log", height=480,
+            y_axis_type="log", height=SPECTRUM_HEIGHT,
         )  # fmt: skip
         self.band = BoxAnnotation(left=0, right=0, fill_alpha=0.12, fill_color=BLUE, line_alpha=0)
         self.deviation = BoxAnnotation(left=0, right=0, fill_alpha=0.35, fill_color=BLUE, line_alpha=0, visible=False)
@@ -273,7 +277,7 @@ class Trail:
         self.source.selected.on_change("indices", lambda _name, _old, new: chosen(new[0]) if new else None)
 
     def _plane(self, x: str, y: str, across: str, up: str, label: str) -> Any:
-        made = plain_figure(x, y, label=label, title=label, height=240, tapped=True)
+        made = plain_figure(x, y, label=label, title=label, height=TRAIL_HEIGHT, tapped=True)
         made.scatter(across, up, source=self.source, size=10, color=BLUE, alpha="alpha")
         made.scatter(across, up, source=self.last, size=15, line_color=VERMILION, fill_alpha=0, line_width=2)
         return made

@@ -6,9 +6,10 @@ from typing import Any
 
 from bokeh.models import Column, ColumnDataSource, Range1d, Slider, Span
 
-from asperity.page.figures import BLUE, VERMILION, Cut, Maps, plain_figure, shown
+from asperity.page.figures import BLUE, VERMILION, plain_figure, shown
 from asperity.page.jobs import Queue, Workshop
 from asperity.page.looking import Moved, open_history
+from asperity.page.pictures import Pictures
 from asperity.page.widgets import BAR, LOOK, button, sentences, text_block
 from asperity.page.work import Refused
 from asperity.quantities import quantity
@@ -24,7 +25,6 @@ class HistoryView:
         self._queue = Queue(workshop, deliver)
         self.moved: Moved | None = None
         self.playing = False
-        self._cut_y = 0.0
         self.status, self.verdict, self.notes = (text_block() for _ in range(3))
         self.step = Slider(
             title="", start=0, end=1, step=1, value=0, bar_color=BAR, sizing_mode="stretch_width", show_value=False,
@@ -32,8 +32,7 @@ class HistoryView:
         )  # fmt: skip
         self.step.on_change("value", lambda _name, _old, new: self._show(int(new)))
         self.play = button("Play", self._toggle)
-        self.maps = Maps(self._cut_at)
-        self.cut = Cut(self.maps)
+        self.pictures = Pictures()
         self.curves = Column(sizing_mode="stretch_width")
         self._now: list[Span] = []
 
@@ -92,24 +91,19 @@ class HistoryView:
         at = moved.times[place] * MICROSECONDS
         told = f"Step {moved.numbers[place]}, {at:.4g} µs, map {place + 1} of {len(moved.pictures)}"
         self.status.text = sentences([told], "soft")
-        self.maps.show(moved.pictures[place], None)
+        self.pictures.make()
+        self.pictures.show(moved.pictures[place])
         for mark in self._now:
             mark.location = at
-        self._cut_at(float(shown("y_m", self._cut_y)))
-
-    def _cut_at(self, y: float) -> None:
-        if self.moved is not None and self.moved.pictures:
-            picture = self.moved.pictures[min(int(self.step.value), len(self.moved.pictures) - 1)]
-            self._cut_y = float(picture.y[picture.line(y / quantity("y_m").factor)])
-            self.maps.cut(self._cut_y)
-            self.cut.show(picture, None, self._cut_y)
 
 
 def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The parts of the page by name, and the sections that they stand in."""
     parts = {
-        "step": view.step, "play": view.play, "status": view.status, "verdict": view.verdict, "film": view.maps.film,
-        "pressure": view.maps.pressure, "cutpressure": view.cut.pressure, "cutfilm": view.cut.film,
+        "step": view.step, "play": view.play, "status": view.status, "verdict": view.verdict,
+        "film": view.pictures.film,
+        "pressure": view.pictures.pressure, "cutpressure": view.pictures.cut_pressure,
+        "cutfilm": view.pictures.cut_film,
         "curves": view.curves, "notes": view.notes,
     }  # fmt: skip
     key = (("touching", "asperity contact"), ("ruptured", "no pressure"), ("hertz", "Hertz zone"))

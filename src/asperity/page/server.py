@@ -98,6 +98,7 @@ class House:
         view = contact.ContactView(Settings(self.opened.case), self.workshop, _deliver(), _address(), self.write_report)
         parts, sections = contact.layout(view)
         view.begin(_query(), self.opened.answer)
+        _document().on_event("document_ready", lambda _event: view.furnish())
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections)
 
@@ -135,10 +136,14 @@ class House:
         return {name: made[name] for name, _ in self.places}
 
     def _page(self, here: str, heading: str, parts: dict[str, Any], sections: list[dict[str, Any]]) -> Any:
-        page = panel.Template(self.template, location=True)
-        for name, part in parts.items():
-            shown = panel.pane.Bokeh(part, sizing_mode="stretch_width") if isinstance(part, UIElement) else part
-            page.add_panel(name, shown)
+        page, document = panel.Template(self.template, location=True), _document()
+        with document.models.freeze():  # the models are counted once, and not after every part
+            for name, part in parts.items():
+                if isinstance(part, UIElement):
+                    part.name = name
+                    document.add_root(part)
+                else:
+                    page.add_panel(name, part)
         for section in sections:
             section["blocks"] = [{**_BLOCK, **block} for block in section["blocks"]]
         told = {"heading": heading, "here": here, "places": self.places, "sections": sections, "style": self.style}

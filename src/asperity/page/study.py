@@ -9,10 +9,10 @@ from bokeh.models import Band, BasicTicker, ColumnDataSource, Select
 from markupsafe import Markup
 
 from asperity.case import Case
-from asperity.page.answer import Answer
-from asperity.page.figures import BLUE, VERMILION, Cut, Maps, plain_figure, shown
+from asperity.page.figures import BLUE, VERMILION, plain_figure, shown
 from asperity.page.jobs import Queue, Workshop
 from asperity.page.looking import Swept, open_study, solve_row
+from asperity.page.pictures import Pictures
 from asperity.page.settings import Settings
 from asperity.page.widgets import LOOK, MAP_KEY, TILE_STYLES, sentences, text_block, tiles
 from asperity.page.work import Refused
@@ -30,8 +30,6 @@ class StudyView:
         self._queue = Queue(workshop, deliver)
         self.swept: Swept | None = None
         self._rows: list[int] = []
-        self._cut_y = 0.0
-        self._answer: Answer | None = None
         self.status, self.verdict, self.notes, self.chosen, self.way = (text_block() for _ in range(5))
         self.tiles = text_block(TILE_STYLES)
         look: dict[str, Any] = {"sizing_mode": "stretch_width", "stylesheets": [LOOK], "margin": (0, 0, 6, 0)}
@@ -48,8 +46,7 @@ class StudyView:
         band = Band(base="x", lower="low", upper="high", source=self._means, fill_color=VERMILION, fill_alpha=0.18)
         self.figure.add_layout(band)
         self._points.selected.on_change("indices", lambda _name, _old, new: self._pick(new))
-        self.maps = Maps(self._cut_at)
-        self.cut = Cut(self.maps)
+        self.pictures = Pictures()
 
     def begin(self) -> None:
         """Read the study."""
@@ -59,7 +56,7 @@ class StudyView:
     def close(self) -> None:
         """Give back what the session took."""
         self._queue.close()
-        self.swept = self._answer = None
+        self.swept = None
 
     def _read(self, result: Any) -> None:
         if isinstance(result, Refused):
@@ -116,11 +113,10 @@ class StudyView:
         if isinstance(result, Refused) or self.swept is None:
             self.chosen.text = sentences([result.sentence], "alarm")
             return
-        self._answer = result
         self.chosen.text = sentences([f"{self._words(row)}: {result.verdict}"])
         self.tiles.text = tiles(result.tiles, result, None, old=False)
-        self.maps.show(result, None)
-        self._cut_at(float(shown("y_m", self._cut_y)))
+        self.pictures.make()
+        self.pictures.show(result)
         link = Markup('<p><a href="contact?{}">Turn its knobs</a></p>')
         self.way.text = link.format(self._address(row))
 
@@ -140,19 +136,14 @@ class StudyView:
         changed = {} if self.swept is None else self.swept.changed[row]
         return ", ".join(f"{key} {as_written(value)}" for key, value in changed.items()) or "its case"
 
-    def _cut_at(self, y: float) -> None:
-        if self._answer is not None:
-            self._cut_y = float(self._answer.y[self._answer.line(y / quantity("y_m").factor)])
-            self.maps.cut(self._cut_y)
-            self.cut.show(self._answer, None, self._cut_y)
-
 
 def layout(view: StudyView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The parts of the page by name, and the sections that they stand in."""
     parts = {
         "across": view.across, "up": view.up, "point": view.point, "status": view.status, "verdict": view.verdict,
-        "curve": view.figure, "chosen": view.chosen, "way": view.way, "tiles": view.tiles, "film": view.maps.film,
-        "pressure": view.maps.pressure, "cutpressure": view.cut.pressure, "cutfilm": view.cut.film, "notes": view.notes,
+        "curve": view.figure, "chosen": view.chosen, "way": view.way, "tiles": view.tiles, "film": view.pictures.film,
+        "pressure": view.pictures.pressure, "cutpressure": view.pictures.cut_pressure,
+        "cutfilm": view.pictures.cut_film, "notes": view.notes,
     }  # fmt: skip
     choices = [{"names": [name]} for name in ("across", "up", "point")]
     shown_parts = [

@@ -3,6 +3,8 @@
 A worker asks between steps of the solver whether its answer is still wanted, and stops where a newer one is.
 """
 
+import itertools
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
 from asperity.ehl import ContactSolution, Iteration, solve_contact
-from asperity.errors import AsperityError
+from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.page.answer import Answer, answer_of, coarse_answer
 from asperity.page.settings import require_few
@@ -27,7 +29,8 @@ from asperity.surface import Surface
 ReportWriter = Callable[[Sequence[Run], Path], Path]  # `asperity.report.write_report`, which the command line hands in
 
 COARSE = 64 * 64  # cells, at most, of a coarse answer
-COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS = 1e-3, 12, 40
+COARSER = 32 * 32  # cells, at most, where those are not solved in the steps that they are given
+COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS, COARSER_STEPS = 1e-3, 14, 30, 50
 ALIKE = 0.9  # correlation with the roughness before, from which on its solution is the nearer start
 LONGEST_S = 60.0  # that a contact is worked on
 
@@ -57,6 +60,10 @@ class _TooLong(Exception):
     """Raised between two steps of the solver, where it has taken longer than anybody waits."""
 
 
+class _TooMany(Exception):
+    """Raised between two steps of the solver, where it has taken as many as it was given."""
+
+
 @dataclass(frozen=True)
 class Coarse:
     """A coarse answer, and the solution that the next one starts from; neither where it could not be had in time."""
@@ -76,11 +83,13 @@ def set_up(newest: Any) -> None:
     threadpool_limits(1)
 
 
-def _hook(ticket: Ticket, seconds: float) -> Callable[[Iteration], None]:
+def _hook(ticket: Ticket, seconds: float, steps: float = math.inf) -> Callable[[Iteration], None]:
     """What the solver calls after every step."""
-    end = time.monotonic() + seconds
+    end, taken = time.monotonic() + seconds, itertools.count(1)
 
     def asked(step: Iteration) -> None:  # noqa: ARG001 - only that there was one
+        if next(taken) > steps:
+            raise _TooMany
         if _newest is not None and ticket.slot >= 0 and _newest[ticket.slot] != ticket.number:
             raise _Unwanted
         if time.monotonic() > end:
@@ -121,27 +130,43 @@ def solve_fully(ticket: Ticket, case: Case) -> Answer:
 
 
 def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) -> Coarse:
-    """The same contact on fewer cells, from the coarse solution before; nothing where the grid is so coarse itself."""
+    """The same contact on fewer cells, from the coarse solution before; nothing where the grid is so coarse itself.
+
+    An attempt that takes more than its steps makes room for the next: without a start, then on fewer cells still.
+    """
     began = time.perf_counter()
     require_few(case.source, case.grid.cells)
-    surface = _coarser(case.surface())
-    if surface is None:
-        return Coarse(None, None)
-    for beginning in (start, None) if start is not None and _alike(start.surface, surface) else (None,):
-        steps = COLD_STEPS if beginning is None else WARM_STEPS
-        tolerance = max(COARSE_TOLERANCE, case.options.tolerance)
+    whole = case.surface()
+    surface, coarser = _coarser(whole, COARSE), _coarser(whole, COARSER)
+    attempts = [(surface, None, COLD_STEPS), (coarser, None, COARSER_STEPS)]
+    if start is not None and surface is not None and _alike(start.surface, surface):
+        attempts.insert(0, (surface, start, WARM_STEPS))
+    for cells, beginning, steps in attempts:
+        if surface is None or cells is None:
+            continue
+        solution = _attempt(ticket, case, cells, beginning, steps)
+        if solution is not None:
+            return Coarse(coarse_answer(solution, case.text, time.perf_counter() - began), solution)
+    return Coarse(None, None)
+
+
+def _attempt(
+    ticket: Ticket, case: Case, surface: Surface, start: ContactSolution | None, steps: int
+) -> ContactSolution | None:
+    """A coarse solution in at most so many steps of the solver; None where that, or so few cells, are not enough."""
+    try:
         solution = solve_contact(
             case.conditions,
             case.lubricant,
             surface,
-            options=replace(case.options, tolerance=tolerance, max_iterations=steps),
-            start=beginning,
+            options=replace(case.options, tolerance=max(COARSE_TOLERANCE, case.options.tolerance)),
+            start=start,
             strict=False,
-            progress=_hook(ticket, LONGEST_S),
+            progress=_hook(ticket, LONGEST_S, steps),
         )
-        if solution.convergence.converged:
-            return Coarse(coarse_answer(solution, case.text, time.perf_counter() - began), solution)
-    return Coarse(None, None)
+    except (_TooMany, BadInput):  # what the contact is refused for on its own cells is said when it is solved on them
+        return None
+    return solution if solution.convergence.converged else None
 
 
 def _alike(before: Surface, surface: Surface) -> bool:
@@ -153,11 +178,11 @@ def _alike(before: Surface, surface: Surface) -> bool:
     return bool(np.corrcoef(before.heights.ravel(), surface.heights.ravel())[0, 1] > ALIKE)
 
 
-def _coarser(surface: Surface) -> Surface | None:
+def _coarser(surface: Surface, most: int) -> Surface | None:
     """The surface on cells put together two by two until there are few, each with their mean, as the solver does it."""
     grid, together = surface.grid, 1
     nx, ny = grid.cells
-    while (nx // together) * (ny // together) > COARSE and nx % (2 * together) == ny % (2 * together) == 0:
+    while (nx // together) * (ny // together) > most and nx % (2 * together) == ny % (2 * together) == 0:
         together *= 2
     if together == 1:
         return None
