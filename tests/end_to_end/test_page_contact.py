@@ -104,11 +104,17 @@ def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
     assert page.get_by_role("textbox", name="Load, F").input_value() == "800 N"
 
 
-def test_a_slider_turns_by_the_keyboard(visit):
+def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
     page = visit.solved()
-    page.get_by_role("group", name="Load, F, slider").locator(".noUi-handle").focus()
+    handles = page.get_by_role("slider").all()
+    assert len(handles) == 10
+    assert all(handle.get_attribute("aria-label") for handle in handles)
+    assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "500 N"
+    assert "- slider:" not in page.locator("body").aria_snapshot()  # one without a name
+    page.get_by_role("slider", name="Load, F").focus()
     page.keyboard.press("ArrowRight")
     page.wait_for_function("() => location.search.includes('contact.load=530')")
+    assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "530 N"
     assert page.get_by_role("textbox", name="Load, F").input_value() == "530 N"
 
 
@@ -154,6 +160,23 @@ def test_a_dropped_surface_is_solved(visit, ring):
     page.wait_for_function("() => location.search.includes('dropped=ring.x3p')")
     assert tile(page).inner_text() != clr
     assert page.get_by_role("textbox", name="Composite roughness, Sq").count() == 0
+    turn(page, "Load, F", "700 N")
+    page.wait_for_function("() => location.search.includes('contact.load=700')")
+    clr, link = tile(page).inner_text(), page.url
+    page.close()
+    visit.page = visit.context.new_page()
+    page = visit.solved(link.removeprefix(visit.server.url))  # as long as the server runs
+    assert tile(page).inner_text() == clr
+    assert page.get_by_text("dropped surface").count() == 0
+
+
+def test_a_law_is_chosen(visit):
+    page = visit.solved()
+    page.get_by_role("button", name="More knobs").click()
+    page.get_by_label("Viscosity law").select_option("roelands")
+    page.wait_for_function("() => location.search.includes('lubricant.viscosity.law=roelands')")
+    page.get_by_label("Contact model").select_option("paper")
+    page.wait_for_function("() => location.search.includes('model=paper')")
 
 
 def test_a_damaged_file_is_refused_in_a_sentence(visit, ring, tmp_path):

@@ -1,6 +1,7 @@
 """A contact without its widgets: answered twice, marked while it is old, compared, tried again, taken away."""
 
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -16,7 +17,8 @@ from asperity.page import take, work
 from asperity.page.answer import NOT_DETERMINED, RUPTURED, TILES, TOUCHING, answer_of, difference
 from asperity.page.desk import Desk
 from asperity.page.opening import open_page
-from asperity.page.settings import Settings
+from asperity.page.settings import Settings, held_in
+from asperity.page.shelf import Shelf
 from asperity.page.work import Refused, Ticket, told
 from asperity.paper import papers_case
 from asperity.report import write_report
@@ -279,14 +281,39 @@ def test_a_desk_that_closes_holds_nothing():
 def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
     heights = np.random.default_rng(5).standard_normal((400, 400)) * 1e-6
     x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=2e-6)
-    case, steps = work.open_surface(NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p")
+    case, held, steps = work.open_surface(NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p")
     assert case.contents.surface.name == "ring.x3p"
     assert steps[0] == "Measured surface ring.x3p:"
+    assert held_in(f"held={held}") == held
     assert len(steps) > 3
     text = take.case_text(case)
     assert "# ring.x3p lies beside this file." in text
     assert str(tmp_path) not in text
     assert load_case(text, folder=tmp_path).surface().sq == case.surface().sq
+
+
+def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monkeypatch):
+    rng = np.random.default_rng(5)
+    session, other, shelf = tmp_path / "one", tmp_path / "other", Shelf()
+    session.mkdir(), other.mkdir()
+    keys = []
+    for number in range(3):
+        folder = session / str(number)
+        folder.mkdir()
+        x3pio.write(str(folder / "ring.x3p"), rng.standard_normal((300, 300)) * 1e-6, x_scale=2e-6, y_scale=2e-6)
+        case, key, _ = work.open_surface(NOBODY, papers_case().with_overrides(MUTE), folder / "ring.x3p")
+        keys.append(key)
+        monkeypatch.setattr("asperity.page.shelf.MOST_HELD", 2)
+        shelf.put(key, case)
+    assert len(set(keys)) == 3
+    assert shelf.lend(keys[0], other) is None
+    shutil.rmtree(session)  # the session that dropped it has gone
+    lent = shelf.lend(keys[2], other)
+    assert lent.text == case.text
+    assert lent.folder.parent == other
+    shelf.close()
+    assert lent.surface().sq > 0.0  # whose session goes on
+    assert shelf.lend(keys[2], other) is None
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"<script>", bytes(range(256)) * 20])

@@ -14,10 +14,12 @@ from asperity.page.desk import Desk
 from asperity.page.figures import SPECTRUM_HEIGHT, TRAIL_HEIGHT, Spectrum, Trail
 from asperity.page.jobs import Queue, Workshop
 from asperity.page.pictures import OLD, Pictures, place
-from asperity.page.settings import Settings
+from asperity.page.settings import Settings, held_in
+from asperity.page.shelf import Shelf
 from asperity.page.uploads import Drop
 from asperity.page.widgets import (
     DROP,
+    INHERIT,
     LOOK,
     MAP_KEY,
     TILE_STYLES,
@@ -32,6 +34,7 @@ from asperity.page.widgets import (
 from asperity.page.work import Refused, ReportWriter, make_report, open_surface
 from asperity.quantities import quantity
 
+HELD_SO_LONG = "The address brings it back as long as this server runs."
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
 
 
@@ -45,6 +48,7 @@ class ContactView:
     deliver : calls a function under the document's lock
     set_address : puts a query into the browser's address
     write_report : makes a run's page
+    shelf : holds surfaces that are dropped
     """
 
     def __init__(
@@ -54,7 +58,9 @@ class ContactView:
         deliver: Callable[[Callable[[], None]], None],
         set_address: Callable[[str], None],
         write_report: ReportWriter,
+        shelf: Shelf,
     ) -> None:
+        self._shelf = shelf
         self._set_address, self._write_report = set_address, write_report
         self._workshop, self._deliver = workshop, deliver
         self.desk = Desk(settings, Queue(workshop, deliver), self.draw)
@@ -69,7 +75,7 @@ class ContactView:
         self.handout = Handout()
         self.knobs: dict[str, KnobWidget] = {}
         self._built: Case | None = None
-        self.knob_column = Column(sizing_mode="stretch_width")
+        self.knob_column = Column(sizing_mode="stretch_width", stylesheets=[INHERIT])
         self._more = False
         self._drawn: tuple[Answer, Answer | None] | None = None
         self.drop = Drop(
@@ -87,8 +93,13 @@ class ContactView:
     def begin(self, query: str, answer: Answer | None = None) -> None:
         """Solve what the address says, or show what is solved already."""
         if answer is not None and not query:
-            self.desk.open(self.desk.settings.opened, answer)
+            self.desk.open(self.desk.settings, answer)
             return
+        held = held_in(query)
+        case = self._shelf.lend(held, self.drop.folder) if held else None
+        if case is not None:
+            self.desk.settings = Settings(case, dropped=case.contents.surface.name, held=held)
+            self._build_knobs()
         self._say(*self.desk.go_to(query))
 
     def furnish(self) -> None:
@@ -227,9 +238,10 @@ class ContactView:
         if isinstance(result, Refused):
             self._say(result.sentence)
             return
-        case, steps = result
-        self.said.text = sentences(steps, "soft")
-        self.desk.open(case, dropped=case.contents.surface.name)
+        case, held, steps = result
+        self._shelf.put(held, case)
+        self.said.text = sentences((*steps, HELD_SO_LONG), "soft")
+        self.desk.open(Settings(case, dropped=case.contents.surface.name, held=held))
 
     def _give_case(self) -> None:
         self.handout.give(take.CASE_FILE, "application/toml", take.case_text(self.desk.settings.case))

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from asperity.case import Case
 from asperity.ehl import ContactSolution
 from asperity.page.answer import Answer
 from asperity.page.jobs import Queue
@@ -107,9 +106,9 @@ class Desk:
             self.refusals.clear()
             self.solve()
 
-    def open(self, case: Case, answer: Answer | None = None, dropped: str = "") -> None:
+    def open(self, settings: Settings, answer: Answer | None = None) -> None:
         """Begin with another case, such as one with a dropped surface; `answer` where it is solved already."""
-        self.settings, self._start = Settings(case, dropped=dropped), None
+        self.settings, self._start = settings, None
         self.refusals.clear()
         if answer is None:
             self.solve()

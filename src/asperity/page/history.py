@@ -28,7 +28,7 @@ class HistoryView:
         self.status, self.verdict, self.notes = (text_block() for _ in range(3))
         self.step = Slider(
             title="", start=0, end=1, step=1, value=0, bar_color=BAR, sizing_mode="stretch_width", show_value=False,
-            stylesheets=[LOOK], margin=(0, 12, 6, 12), html_attributes={"role": "group", "aria-label": "Step, slider"},
+            stylesheets=[LOOK], margin=(0, 12, 6, 12), tags=["Step", "0"],
         )  # fmt: skip
         self.step.on_change("value", lambda _name, _old, new: self._show(int(new)))
         self.play = button("Play", self._toggle)
@@ -89,6 +89,7 @@ class HistoryView:
         if moved is None or not 0 <= place < len(moved.pictures):
             return
         at = moved.times[place] * MICROSECONDS
+        self.step.tags = ["Step", str(moved.numbers[place])]
         told = f"Step {moved.numbers[place]}, {at:.4g} µs, map {place + 1} of {len(moved.pictures)}"
         self.status.text = sentences([told], "soft")
         self.pictures.make()

@@ -21,6 +21,7 @@ from asperity.page import contact, history, recordings, study
 from asperity.page.jobs import Workshop
 from asperity.page.opening import Opened
 from asperity.page.settings import Settings
+from asperity.page.shelf import Shelf
 from asperity.page.work import ReportWriter
 
 HERE = "127.0.0.1"
@@ -86,6 +87,7 @@ class House:
 
     def __init__(self, opened: Opened, workshop: Workshop, write_report: ReportWriter) -> None:
         self.opened, self.workshop, self.write_report = opened, workshop, write_report
+        self.shelf = Shelf()
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.page").joinpath("page.html.j2").read_text("utf-8")
         self.style = files("asperity.page").joinpath("style.css").read_text("utf-8")
@@ -93,9 +95,15 @@ class House:
         if opened.kind in ("study", "history"):
             self.places.append((opened.kind, opened.kind.capitalize()))
 
+    def close(self) -> None:
+        """Let go of what was dropped."""
+        self.shelf.close()
+
     def contact(self) -> Any:
         """The page of a contact, for one visit."""
-        view = contact.ContactView(Settings(self.opened.case), self.workshop, _deliver(), _address(), self.write_report)
+        view = contact.ContactView(
+            Settings(self.opened.case), self.workshop, _deliver(), _address(), self.write_report, self.shelf
+        )
         parts, sections = contact.layout(view)
         view.begin(_query(), self.opened.answer)
         _document().on_event("document_ready", lambda _event: view.furnish())
@@ -230,9 +238,9 @@ def serve_page(
     password = password_for(listen)
     port = require_free(listen, port)
     workshop = Workshop()
+    house = House(opened, workshop, write_report)
     try:
         workshop.warm()
-        house = House(opened, workshop, write_report)
         guarded: dict[str, Any] = {}
         if (
             password is not None
@@ -261,3 +269,4 @@ def serve_page(
         server.io_loop.start()
     finally:
         workshop.close()
+        house.close()

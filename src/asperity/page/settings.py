@@ -18,7 +18,7 @@ from asperity.page.knobs import LONGEST, Knob, knobs_of, overrides
 
 MOST_CELLS = 512 * 512  # that the page solves: more belongs on the command line
 MOST_PAIRS = 100  # in an address
-CASE, DROPPED = "case", "dropped"  # keys of an address: which case it was made with, the name of a dropped surface
+CASE, DROPPED, HELD = "case", "dropped", "held"  # in an address: of which case, a dropped surface's name and its key
 
 
 class Refusal(NamedTuple):
@@ -43,12 +43,13 @@ class Settings:
     """A case and what was turned.
 
     `opened` is the case as it was given; `changes` are texts by the keys of knobs; `dropped` is the name of a surface
-    that was dropped, which no address carries.
+    that was dropped, `held` what the server holds it by.
     """
 
     opened: Case
     changes: Mapping[str, str] = field(default_factory=dict)
     dropped: str = ""
+    held: str = ""
 
     @cached_property
     def case(self) -> Case:
@@ -90,19 +91,19 @@ class Settings:
     @property
     def address(self) -> str:
         """The query that brings these settings back, without its question mark; empty where nothing was turned."""
-        dropped = {DROPPED: self.dropped} if self.dropped else {}
+        dropped = {DROPPED: self.dropped, HELD: self.held} if self.dropped else {}
         return urlencode({CASE: self.fingerprint, **dropped, **self.changes}) if self.changes or dropped else ""
 
     def from_address(self, query: str) -> "tuple[Settings, list[str]]":
         """The opened case with what an address says, and a sentence for each part of it that was left out."""
         notes: list[str] = []
         pairs = parse_qsl(query.lstrip("?")[:20_000], max_num_fields=None)[:MOST_PAIRS]
-        settings = Settings(self.opened)
+        settings = replace(self, changes={})
         gone = next((text for key, text in pairs if key == DROPPED), "")
-        if gone:
-            notes.append(f"The link was made with the dropped surface {gone[:80]}, which no link carries.")
+        if gone and held_in(query) != self.held:
+            notes.append(f"The link was made with the dropped surface {gone[:80]}, held no more; drop it again.")
         for key, text in pairs:
-            if key in (CASE, DROPPED):
+            if key in (CASE, DROPPED, HELD):
                 if key == CASE and text != self.fingerprint and not gone:
                     notes.append("The link was made with another case; what it turned is turned here.")
             elif key not in self.knobs:
@@ -112,6 +113,12 @@ class Settings:
             else:
                 notes.append(f"Of the link is left out: {turned.sentence}.")
         return settings, notes
+
+
+def held_in(query: str) -> str:
+    """What an address says that a dropped surface is held by; empty where it says nothing that could be."""
+    given = dict(parse_qsl(query.lstrip("?")[:20_000])).get(HELD, "")
+    return given if re.fullmatch(r"[0-9a-f]{32}", given) else ""
 
 
 def _named(key: str) -> str:

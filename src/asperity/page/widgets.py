@@ -17,14 +17,20 @@ LOOK = """
 .bk-input:focus { border-color: var(--accent); box-shadow: none; outline: 2px solid var(--accent); }
 .bk-input-group label, label { color: var(--ink); font-size: .88rem; }
 .bk-btn { color: var(--ink); background: var(--wash); border: 1px solid var(--line); border-radius: 4px; }
+.bk-btn:hover:enabled, .bk-btn:active { color: var(--ink); background: var(--line); border-color: var(--soft); }
+.bk-description > .bk-icon { background-color: var(--soft); }
+select:not([multiple]).bk-input { background: var(--paper) var(--arrow) right .5em center / 8px 6px no-repeat; }
 .bk-btn:focus-visible, .noUi-handle:focus-visible { outline: 2px solid var(--accent); }
 .noUi-target { background: var(--wash); border-color: var(--line); } .noUi-connect { background: var(--accent); }
 .noUi-handle { background: var(--paper); border: 2px solid var(--accent); box-shadow: none; }
 """
+INHERIT = ":host { font: inherit; }"  # of what only holds others
 BAR = "#5b9fd4"
 MAP_KEY = (("touching", "asperity contact"), ("ruptured", "cavitated"), ("hertz", "Hertz zone"))
 DROP = """
 :host { color: var(--ink); }
+.filepond--root.bk-input.bk-input { color: var(--ink); background: none; border: 0; }
+.filepond--root .filepond--drop-label.filepond--drop-label { color: var(--ink); background: none; }
 .filepond--panel-root { background: var(--wash); border: 1px dashed var(--soft); }
 .filepond--drop-label, .filepond--drop-label label { color: var(--ink); font-size: .88rem; }
 """
@@ -86,7 +92,7 @@ class KnobWidget:
 
     def __init__(self, knob: Knob, turned: Callable[[str, str], None]) -> None:
         self.knob, self._turned, self._quiet = knob, turned, False
-        title = f"{knob.quantity.title[:1].upper()}{knob.quantity.title[1:]}"
+        title = knob.title
         self.slider: Slider | None = None
         self.wrong = text_block()
         self.wrong.html_attributes = {"role": "alert"}
@@ -97,19 +103,18 @@ class KnobWidget:
             self.text.on_change("value", self._typed)
             parts = [self.text]
         else:
-            self.text = TextInput(
-                title=title, value=knob.text, description=knob.quantity.meaning or None, **self._look()
-            )
+            self.text = TextInput(title=title, value=knob.text, description=knob.meaning or None, **self._look())
             self.text.on_change("value", self._typed)
             first, last = knob.positions
             self.slider = Slider(
                 title="", show_value=False, bar_color=BAR, start=first, end=last, step=1, value=self._place(knob.text),
-                sizing_mode="stretch_width", stylesheets=[LOOK], margin=(0, 12, 6, 12),
-                html_attributes={"role": "group", "aria-label": f"{title}, slider"},
+                sizing_mode="stretch_width", stylesheets=[LOOK], margin=(0, 12, 6, 12), tags=[title, knob.text],
             )  # fmt: skip
             self.slider.on_change("value", self._slid)
             parts = [self.text, self.slider]
-        self.model = Column(*parts, self.wrong, sizing_mode="stretch_width", margin=(0, 0, 4, 0), spacing=2)
+        self.model = Column(
+            *parts, self.wrong, sizing_mode="stretch_width", margin=(0, 0, 4, 0), spacing=2, stylesheets=[INHERIT]
+        )
 
     @staticmethod
     def _look() -> dict[str, Any]:
@@ -127,8 +132,12 @@ class KnobWidget:
                 self.text.options = [*self.text.options, text]
             self.text.value = text
         place = self.knob.position(text) if self.slider is not None else None
-        if self.slider is not None and place is not None and self.slider.value != place:
-            self.slider.value = place
+        if self.slider is not None and place is not None:
+            if self.slider.value != place:
+                self.slider.value = place
+            told = [self.slider.tags[0], text]
+            if self.slider.tags != told:
+                self.slider.tags = told
         self._quiet = False
         self.wrong.visible = bool(refusal)
         self.wrong.text = sentences([f"{refusal.rstrip('.')}."] if refusal else [], "alarm")
@@ -152,7 +161,7 @@ def button(words: str, pressed: Callable[[], None]) -> Button:
 
 def button_row(*buttons: Any) -> Row:
     """Buttons beside one another, in as many lines as they need."""
-    return Row(*buttons, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
+    return Row(*buttons, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}, stylesheets=[INHERIT])
 
 
 class Handout:

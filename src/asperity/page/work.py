@@ -3,6 +3,7 @@
 A worker asks between steps of the solver whether its answer is still wanted, and stops where a newer one is.
 """
 
+import hashlib
 import itertools
 import math
 import time
@@ -138,6 +139,7 @@ def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) ->
     require_few(case.source, case.grid.cells)
     whole = case.surface()
     surface, coarser = _coarser(whole, COARSE), _coarser(whole, COARSER)
+    attempts: list[tuple[Surface | None, ContactSolution | None, int]]
     attempts = [(surface, None, COLD_STEPS), (coarser, None, COARSER_STEPS)]
     if start is not None and surface is not None and _alike(start.surface, surface):
         attempts.insert(0, (surface, start, WARM_STEPS))
@@ -204,9 +206,12 @@ def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:
         return write([run], Path(folder) / "report.html").read_text("utf-8")
 
 
-def open_surface(ticket: Ticket, case: Case, path: Path) -> tuple[Case, tuple[str, ...]]:  # noqa: ARG001
-    """The case with a dropped surface in place of its own, and what was done to it."""
+def open_surface(ticket: Ticket, case: Case, path: Path) -> tuple[Case, str, tuple[str, ...]]:  # noqa: ARG001
+    """The case with a dropped surface in place of its own, what it is held by, and what was done to it."""
     moved = replace(case, folder=path.parent, stored=None, stored_notes=())
     changed = moved.with_overrides({"surface": {"file": path.name}})
     require_few(changed.source, changed.grid.cells)
-    return changed, (f"Measured surface {path.name}:", *changed.surface_notes)
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
+    digest.update(changed.text.encode())
+    return changed, digest.hexdigest()[:32], (f"Measured surface {path.name}:", *changed.surface_notes)
