@@ -225,6 +225,15 @@ def test_a_contact_that_is_not_solved_says_so(monkeypatch):
     assert desk.stale
 
 
+def test_values_beyond_all_reckoning_are_a_sentence():
+    def divided(ticket):  # noqa: ARG001
+        return 1 / 0
+
+    refused = told(divided, NOBODY)
+    assert isinstance(refused, Refused)
+    assert refused.sentence.startswith("The values lie too far from any contact to be reckoned with (division by zero)")
+
+
 def test_a_contact_that_its_grid_cannot_carry_says_so():
     desk, _, _ = desk_of()
     desk.turn("surface.correlation_length.0", "3 um")

@@ -128,6 +128,8 @@ def test_a_link_of_a_dropped_surface_is_of_one_that_is_held(settings):
     dropped = Settings(settings.opened, dropped="ring.x3p", held="0" * 32)
     _, notes = settings.from_address(dropped.address)
     assert notes == ["The link was made with the dropped surface ring.x3p, held no more; drop it again."]
+    _, notes = settings.from_address("dropped=x&held=../../../etc")
+    assert notes == ["The link was made with the dropped surface x, held no more; drop it again."]
     back, notes = dropped.from_address(dropped.turned("contact.load", "700 N").address)
     assert notes == []
     assert (back.dropped, back.held, back.changes) == ("ring.x3p", "0" * 32, {"contact.load": "700 N"})

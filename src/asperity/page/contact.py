@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from bokeh.models import Column
-from panel.io import hold
 
 from asperity.case import Case
 from asperity.page import take
@@ -105,8 +104,7 @@ class ContactView:
     def furnish(self) -> None:
         """Make the next figure and ask for the one after it; between them others are served."""
         if self._unmade:
-            with hold(freeze=True):
-                self._unmade.pop(0)()
+            self._unmade.pop(0)()
             self._deliver(self.furnish)
         else:
             self.draw()
@@ -121,11 +119,7 @@ class ContactView:
     # What is shown ---------------------------------------------------------------------------------------------------
 
     def draw(self) -> None:
-        """Draw the desk as it is now, in one message to the browser."""
-        with hold():
-            self._draw()
-
-    def _draw(self) -> None:
+        """Draw the desk as it is now."""
         desk = self.desk
         if desk.settings.opened is not self._built:
             self._build_knobs()

@@ -100,7 +100,7 @@ class Settings:
         pairs = parse_qsl(query.lstrip("?")[:20_000], max_num_fields=None)[:MOST_PAIRS]
         settings = replace(self, changes={})
         gone = next((text for key, text in pairs if key == DROPPED), "")
-        if gone and held_in(query) != self.held:
+        if gone and (not self.held or held_in(query) != self.held):
             notes.append(f"The link was made with the dropped surface {gone[:80]}, held no more; drop it again.")
         for key, text in pairs:
             if key in (CASE, DROPPED, HELD):

@@ -110,6 +110,8 @@ def told(work: Callable[..., Any], *arguments: Any) -> Any:
         return Refused(f"{spent}; asperity solve takes as long as it needs.")
     except AsperityError as refusal:
         return Refused(f"{str(refusal).rstrip('.')}.")
+    except (ArithmeticError, np.linalg.LinAlgError) as failure:
+        return Refused(f"The values lie too far from any contact to be reckoned with ({failure}); turn them back.")
     except MemoryError:
         return Refused("There is not memory enough for that; ask for less.")
 
