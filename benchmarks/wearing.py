@@ -1,35 +1,100 @@
-"""Wear in time: what it takes, kills, what jumps, grids and patches do to it, plateaus, a measured surface, rings."""
+"""Wear in time: what it takes, kills, what jumps, grids and positions do to it, intervals, plateaus, rings.
 
+Histories are kept in build/wearing and go on where they were stopped, as long as the code that wears is the same: each
+call does what its time allows and says what is left.
+"""
+
+import hashlib
+import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from asperity import load_case, run_wear
-from asperity.ageing import WearHistory, load_wear
+from asperity.ageing import Ageing, Solved, WearHistory, WearProgress, load_wear
+from asperity.ageing.rows import load_share
 from asperity.case import Case
+from asperity.surface.read import surface_topography
+from asperity.wearing import positions, seen
 
 ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "build" / "wearing"
+WEARS = ("ageing", "wearing", "ehl", "kernels", "surface", "lubricant")  # rooms that decide a history
 EXAMPLE = ROOT / "examples" / "wear.toml"
 MEASURED = ROOT.parent / "shared" / "data" / "surfaces" / "milled_1.opd"
 KILLS, HOURS_KILLED = 10, 3.0
+ENOUGH = 0.85  # of the time that a part has, that is spent on histories
+MANY = 56  # positions whose mean stands for the mean
+SEEDS = 20
+
+Overrides = dict[str, object]
 
 
-def case(overrides: dict[str, object] | None = None) -> Case:
-    return load_case(EXAMPLE).with_overrides(overrides or {})
+class OutOfTime(Exception):
+    """A history that has to wait for the next call."""
 
 
-def worn(hours: float, overrides: dict[str, object] | None = None) -> tuple[WearHistory, float]:
-    """A history and the processor time that it took."""
-    began = time.process_time()
-    history = run_wear(case(overrides), hours=hours)
-    return history, time.process_time() - began
+class Plan(NamedTuple):
+    """A history that is wanted: its folder's name, its hours, and what its case differs in from the example."""
+
+    name: str
+    hours: float
+    overrides: Overrides
+
+
+class Shelf:
+    """Histories as they are kept, and time to go on with them."""
+
+    def __init__(self, seconds: float) -> None:
+        self.end = time.perf_counter() + ENOUGH * seconds
+        self.folder = KEPT / stamp()
+        self.left: list[str] = []
+
+    def worn(self, plan: Plan) -> tuple[WearHistory, float] | None:
+        """A history and the processor time that it took in all; None where time runs out on the way."""
+        folder = self.folder / plan.name
+        clock, began = folder.with_suffix(".json"), time.process_time()
+        spent = float(json.loads(clock.read_text("utf-8"))) if clock.is_file() else 0.0
+
+        def told(_: WearProgress) -> None:
+            clock.write_text(json.dumps(spent + time.process_time() - began), "utf-8")
+            if time.perf_counter() > self.end:
+                raise OutOfTime
+
+        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            history = run_wear(case(plan.overrides), hours=plan.hours, out=folder, progress=told)
+        except OutOfTime:
+            self.left.append(plan.name)
+            return None
+        return history, float(json.loads(clock.read_text("utf-8")))
+
+    def all(self, plans: Sequence[Plan]) -> Iterator[tuple[Plan, WearHistory, float]]:
+        """Those of them that are there, or that time allows."""
+        for plan in plans:
+            if (made := self.worn(plan)) is not None:
+                yield plan, *made
+
+
+def stamp() -> str:
+    """The code that wears, as a digest: histories of other code are not gone on with."""
+    digest = hashlib.sha256()
+    for room in WEARS:
+        for path in sorted((ROOT / "src" / "asperity" / room).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def case(overrides: Overrides) -> Case:
+    return load_case(EXAMPLE).with_overrides(overrides)
 
 
 def coefficients(k: float) -> list[str]:
@@ -43,15 +108,33 @@ def row(history: WearHistory, *keys: str) -> str:
     return " | ".join(f"{first[key]:.4g} to {last[key]:.4g}" for key in keys)
 
 
-def speed() -> Iterator[str]:
-    history, seconds = worn(1e7 / 56.25 / 3600.0, {"grid.cells": [128, 128]})
+def solved_at(history: WearHistory, count: int, seed: int) -> list[Solved]:
+    """The contact at the history's end, at so many positions."""
+    ageing: Ageing = history.ageing
+    surfaces = history.after
+    cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
+    places = positions(cells, ageing.surfaces.rough, count, 0, seed)
+    return [one for place in places if isinstance(one := ageing.solver(seen(surfaces, place)), Solved)]
+
+
+def end_means(history: WearHistory) -> str:
+    """CLR and the solids' load of the worn surfaces over many positions, which a jump's own have not the number for."""
+    found = solved_at(history, 4 * history.ageing.patches, 99)
+    clr = np.mean([one.state.clr for one in found])
+    return f"{clr:.4f} | {np.mean([one.asperity_pressure.sum() / one.pressure.sum() for one in found]):.4f}"
+
+
+def speed(shelf: Shelf) -> Iterator[str]:
     yield "\n## 1e7 over-rollings of the roller at 128 x 128 cells\n"
-    yield "| jumps | positions | processor time [s] | sq_m | clr | volume error | jump error |"
-    yield "|---|---|---|---|---|---|---|"
-    yield (
-        f"| {len(history.table) - 1} | {history.ageing.patches} | {seconds:.0f} | {row(history, 'sq_m', 'clr')} | "
-        f"{history.volume_error:.1e} | {history.worn.error:.1e} |"
-    )
+    yield "| hours | jumps | positions | processor time [s] | a jump [s] | sq_m | clr | volume error | jump error |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    whole = 1e7 / 56.25 / 3600.0
+    for _, history, seconds in shelf.all([Plan("speed", whole, {"grid.cells": [128, 128]})]):
+        jumps = len(history.table) - 1
+        yield (
+            f"| {history.hours:.1f} | {jumps} | {history.ageing.patches} | {seconds:.0f} | {seconds / jumps:.2f} | "
+            f"{row(history, 'sq_m', 'clr')} | {history.volume_error:.1e} | {history.worn.error:.1e} |"
+        )
 
 
 def kills() -> Iterator[str]:
@@ -74,80 +157,134 @@ def kills() -> Iterator[str]:
     yield f"\nKilled {KILLS} times at random moments: {'the same to the last bit' if same else 'DIFFERENT'}.\n"
 
 
-def halving(*, fast: bool) -> Iterator[str]:
-    yield "\n## Half the jump\n"
-    yield "| cells | quantity | jump | half of it | difference [%] | jumps | half of it |"
-    yield "|---|---|---|---|---|---|---|"
-    for cells in (64,) if fast else (64, 128):
-        grid = {"grid.cells": [cells, cells]}
-        whole, half = (worn(4.0, {**grid, "wear.step": step})[0] for step in (0.05, 0.025))
-        for key in ("sq_m", "clr", "solid_load_ratio"):
-            one, two = (float(history.table[key].iloc[-1]) for history in (whole, half))
-            counts = f"{len(whole.table) - 1} | {len(half.table) - 1}"
-            yield f"| {cells} | {key} | {one:.5g} | {two:.5g} | {100.0 * (two / one - 1.0):+.2f} | {counts} |"
-
-
-def grids(*, fast: bool) -> Iterator[str]:
-    keys = ("sq_m", "spk_m", "clr", "solid_load_ratio", "worn_depth_2_m")
-    yield "\n## Grids, 2 h\n"
-    yield f"| cells | {' | '.join(keys)} | jumps | processor time [s] |"
-    yield "|---|---|---|---|---|---|---|---|"
-    for cells in (64, 128) if fast else (64, 128, 256):
-        history, seconds = worn(2.0, {"grid.cells": [cells, cells]})
-        yield f"| {cells} | {row(history, *keys)} | {len(history.table) - 1} | {seconds:.0f} |"
-
-
-def patches() -> Iterator[str]:
-    keys = ("sq_m", "clr", "worn_depth_2_m")
-    yield "\n## Positions a jump, 4 h\n"
-    yield f"| positions | {' | '.join(keys)} |"
-    yield "|---|---|---|---|"
-    for count in (4, 7, 14, 28):
-        yield f"| {count} | {row(worn(4.0, {'wear.patches': count})[0], *keys)} |"
-
-
-def plateau(*, fast: bool) -> Iterator[str]:
-    """Removal alone, as long in k times time."""
-    keys = ("sq_m", "ssk", "spk_m", "svk_m")
-    yield "\n## Removal alone: three roughnesses, three coefficients\n"
-    yield f"| sq | k of the ring [1/Pa] | hours | {' | '.join(keys)} | clr at quarters of the time | jumps |"
+def jumps(shelf: Shelf) -> Iterator[str]:
+    yield "\n## Half the jump, and fewer or more positions, 4 h\n"
+    yield "| cells | step | positions | jumps | sq_m | spk_m | clr of many positions | load between solids | seconds |"
     yield "|---|---|---|---|---|---|---|---|---|"
-    for sq in ("1 um",) if fast else ("0.5 um", "1 um", "2 um"):
-        for k, hours in ((3e-17, 200.0), (1e-16, 60.0), (3e-16, 20.0)):
-            history = worn(hours, {"surface.sq": sq, "wear.k": coefficients(k)})[0]
-            shares = [history.at(quarter * hours)["clr"] for quarter in (0.0, 0.25, 0.5, 0.75, 1.0)]
-            told = ", ".join(f"{clr:.3f}" for clr in shares)
-            yield f"| {sq} | {k:g} | {hours:g} | {row(history, *keys)} | {told} | {len(history.table) - 1} |"
+    ways = [(64, 0.05, 7), (64, 0.025, 7), (64, 0.05, 4), (64, 0.05, 14), (128, 0.05, 7), (128, 0.025, 7)]
+    plans = [
+        Plan(
+            f"jumps-{cells}-{step}-{count}", 4.0, {"grid.cells": [cells] * 2, "wear.step": step, "wear.patches": count}
+        )
+        for cells, step, count in ways
+    ]
+    for plan, history, seconds in shelf.all(plans):
+        _, cells, step, count = plan.name.split("-")
+        last = history.table.iloc[-1]
+        yield (
+            f"| {cells} | {step} | {count} | {len(history.table) - 1} | {last['sq_m']:.6g} | {last['spk_m']:.5g} | "
+            f"{end_means(history)} | {seconds:.0f} |"
+        )
 
 
-def measured() -> Iterator[str]:
+def grids(shelf: Shelf) -> Iterator[str]:
+    keys = ("sq_m", "spk_m", "worn_depth_2_m")
+    yield "\n## Grids, 2 h\n"
+    yield f"| cells | {' | '.join(keys)} | clr of many positions | load between solids | jumps | processor time [s] |"
+    yield "|---|---|---|---|---|---|---|---|"
+    plans = [Plan(f"grid-{cells}", 2.0, {"grid.cells": [cells] * 2}) for cells in (64, 128, 256)]
+    for plan, history, seconds in shelf.all(plans):
+        count = len(history.table) - 1
+        cells = plan.name.removeprefix("grid-")
+        yield f"| {cells} | {row(history, *keys)} | {end_means(history)} | {count} | {seconds:.0f} |"
+
+
+def intervals() -> Iterator[str]:
+    """How often the interval over a jump's positions holds: new surfaces of several seeds."""
+    one_more, mean, of_mean, widths, all_others = 0, 0, 0, [], 0
+    for seed in range(SEEDS):
+        new = run_wear(case({"surface.seed": seed, "grid.cells": [48, 48]}), hours=1e-9)
+        few, many = solved_at(new, new.ageing.patches, seed), solved_at(new, MANY, 1000 + seed)
+        shares, others = ([one.state.clr for one in found] for found in (few, many))
+        share = load_share(few)
+        low, high = share.interval or (0.0, 1.0)
+        widths.append(high - low)
+        one_more += sum(low <= other <= high for other in others)
+        all_others += len(others)
+        mean += low <= float(np.mean(others)) <= high
+        off = float(np.std(shares, ddof=1)) / np.sqrt(len(shares))
+        of_mean += abs(float(np.mean(shares)) - float(np.mean(others))) <= 1.9432 * off
+    yield f"\n## The interval of CLR over a jump's positions, {SEEDS} surfaces\n"
+    yield "| what it should hold | how often it does [%] | asked [%] |"
+    yield "|---|---|---|"
+    yield f"| CLR at a further position (`clr_low`, `clr_high`) | {100 * one_more / all_others:.0f} | 90 |"
+    yield f"| the mean of {MANY} positions, by the same | {100 * mean / SEEDS:.0f} | 90 or more |"
+    yield f"| the mean of {MANY} positions, by Student's t of the jump's mean | {100 * of_mean / SEEDS:.0f} | 90 |"
+    yield f"\nThe interval is {np.mean(widths):.3f} wide on average.\n"
+
+
+PLATEAUS = tuple(
+    (sq, k, hours) for sq in ("0.5 um", "1 um", "2 um") for k, hours in ((3e-17, 200.0), (1e-16, 60.0), (3e-16, 20.0))
+)
+TIMES_K = (0.0, 1e-16, 3e-16, 1e-15, 3e-15, 6e-15)  # k of the ring times hours, at which a plateau's curves are told
+
+
+def plateau_plan(sq: str, k: float, hours: float) -> Plan:
+    overrides: Overrides = {"surface.sq": sq, "wear.k": coefficients(k), "grid.cells": [48, 48]}
+    return Plan(f"plateau-{sq.replace(' ', '')}-{k:g}", hours, overrides)
+
+
+def plateau(shelf: Shelf) -> Iterator[str]:
+    """Removal alone, as long in k times time."""
+    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio")
+    yield "\n## Removal alone: three roughnesses, three coefficients (48 x 48 cells)\n"
+    yield f"| sq | k of the ring [1/Pa] | hours | k times hours | {' | '.join(keys)} | jumps |"
+    yield f"|---|---|---|---|{'---|' * len(keys)}---|"
+    plans = [plateau_plan(*one) for one in PLATEAUS]
+    for (sq, k, hours), (_, history, _) in zip(PLATEAUS, shelf.all(plans), strict=False):
+        for turned in TIMES_K:
+            if turned <= k * hours * (1.0 + 1e-9):
+                moment = history.at(min(turned / k, hours))
+                told = " | ".join(f"{moment[key]:.4g}" for key in keys)
+                yield f"| {sq} | {k:g} | {turned / k:g} | {turned:g} | {told} | {len(history.table) - 1} |"
+
+
+def measured(shelf: Shelf) -> Iterator[str]:
+    """A measured surface: parameters as reported, and as SurfaceTopography finds them in the written files."""
     if not MEASURED.is_file():
         yield f"\n{MEASURED.name} is not at hand.\n"
         return
-    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr")
+    keys = {"sq_m": "sq", "ssk": "ssk", "spk_m": "spk", "svk_m": "svk"}
     surface = {"file": os.path.relpath(MEASURED, EXAMPLE.parent), "fit": "tile"}
-    yield "\n## A measured surface, 10 h\n"
-    yield f"| file | {' | '.join(keys)} |"
-    yield "|---|---|---|---|---|---|"
-    yield f"| {MEASURED.name} | {row(worn(10.0, {'surface': surface})[0], *keys)} |"
+    yield "\n## A measured surface, 10 h at 128 x 128 cells\n"
+    yield f"| {MEASURED.name} | {' | '.join(keys)} | Sq by SurfaceTopography | Ssk from its heights |"
+    yield f"|---|{'---|' * len(keys)}---|---|"
+    for _, history, _ in shelf.all([Plan("measured", 10.0, {"surface": surface, "grid.cells": [128, 128]})]):
+        for name, when in ((-2, "new"), (-1, "after")):
+            line = history.table.iloc[0 if when == "new" else -1]
+            theirs = surface_topography().open_topography(str(history.files[name])).topography()
+            heights = theirs.heights() - np.mean(theirs.heights())
+            sq = float(theirs.rms_height_from_area())
+            told = " | ".join(f"{line[f'{key[:-2]}_2_m' if key.endswith('_m') else f'{key}_2']:.6g}" for key in keys)
+            yield f"| {when} | {told} | {sq:.6g} | {np.mean(heights**3) / sq**3:.6g} |"
+        yield f"\nIn {len(history.table) - 1} jumps.\n"
 
 
-def rings() -> Iterator[str]:
+PAPERS: Overrides = {
+    "surface.sq": "0.54 um", "grid.cells": [64, 32], "grid.x": [-3.0, 1.6], "wear.patches": 5,
+}  # fmt: skip
+
+
+def rings(shelf: Shelf) -> Iterator[str]:
     keys = ("sq_m", "clr", "crf_hz", "worn_depth_2_m")
-    yield "\n## The paper's first ring for ten hours: 0.87 um are printed then\n"
+    yield "\n## The paper's first ring for ten hours, removal alone: 0.87 um are printed then\n"
     yield f"| k of the ring [1/Pa] | {' | '.join(keys)} |"
     yield "|---|---|---|---|---|"
     for k in (1e-17, 1e-16, 1e-15):
-        yield f"| {k:g} | {row(worn(10.0, {'surface.sq': '0.54 um', 'wear.k': coefficients(k)})[0], *keys)} |"
+        for _, history, _ in shelf.all([Plan(f"ring-{k:g}", 10.0, {**PAPERS, "wear.k": coefficients(k)})]):
+            yield f"| {k:g} | {row(history, *keys)} |"
 
 
-def lines(*, fast: bool) -> Iterator[str]:
+def lines(*, fast: bool, seconds: float) -> Iterator[str]:
+    shelf = Shelf(seconds)
     if not fast:
-        yield from speed()
-    yield from kills()
-    yield from halving(fast=fast)
-    yield from grids(fast=fast)
-    yield from patches()
-    yield from plateau(fast=fast)
-    yield from measured()
-    yield from rings()
+        yield from kills()
+        yield from intervals()
+    yield from jumps(shelf)
+    yield from grids(shelf)
+    yield from plateau(shelf)
+    yield from measured(shelf)
+    yield from rings(shelf)
+    yield from speed(shelf)
+    if shelf.left:
+        yield f"\nNot at their end for want of time; the same command goes on with them: {', '.join(shelf.left)}.\n"

@@ -38,6 +38,9 @@ def test_json_holds_the_contract(asp, worn_case):
     assert [Path(name).is_file() for name in said["surfaces"]] == [True] * 4
     page = (worn_case / "w.html").read_text("utf-8")
     assert "A contact that wears" in page
+    shown = json.loads(page.split('id="data">')[1].split("</script>")[0])
+    assert len(shown["frames"]) == len(shown["words"]) == said["jumps"] + 1  # fewer than are thinned out
+    assert shown["words"][-1].startswith("after 1 h, at ")
     again = json.loads(asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--json", *COARSE)[1])
     assert again["computed"] == 0
     assert {key: again[key] for key in ("sq_m", "clr", "crf_hz")} == {

@@ -5,53 +5,25 @@ import signal
 import subprocess
 import sys
 import time
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pandas
 import pytest
 
-from asperity import load_case, read_surface, run_wear
-from asperity.ageing import WearHistory, WearProgress, load_wear, of_body, store
+from asperity import read_surface, run_wear
+from asperity.ageing import WearHistory, WearProgress, frames, load_wear, of_body, store
+from asperity.ageing.frames import is_kept
+from asperity.ageing.worn import Worn
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.kept import read_sealed, write_sealed
 from asperity.paper import simulate_rig, write_rig
 from asperity.surface import height_parameters
 from asperity.surface.read import surface_topography
+from asperity.wearing import seen
+from support.wearing import CASE, FEW, POINT, worn_case
 
-CASE = """
-[contact]
-geometry = "line"
-radius = "5.4 mm"
-length = "10 mm"
-load = "500 N"
-entrainment_speed = "1.91 m/s"
-slip = 0.2
-[material]
-youngs_modulus = "200 GPa"
-poisson_ratio = 0.3
-hardness = "2 GPa"
-[lubricant]
-viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
-density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
-rheology = { law = "newtonian" }
-[surface]
-kind = "gaussian"
-sq = "1 um"
-correlation_length = ["30 um", "30 um"]
-seed = 7
-[grid]
-cells = [32, 16]
-x = [-2.2, 1.9]
-y = [-1.0, 1.0]
-[vibration]
-mass = "0.1 kg"
-damping_ratio = 0.02
-[wear]
-k = "1e-16 1/Pa"
-overrolling = ["50 Hz", "5 Hz"]
-patches = 4
-step = 0.1
-"""
 HOURS = 2.0
 
 
@@ -60,7 +32,7 @@ class Stop(Exception):
 
 
 def case(overrides: dict[str, object] | None = None):
-    return load_case(CASE, name="case.toml").with_overrides(overrides or {})
+    return worn_case({**FEW, "wear.step": 0.1, **(overrides or {})})
 
 
 def same(one: WearHistory, other: WearHistory) -> None:
@@ -96,7 +68,7 @@ def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(unbroken, tm
 
 
 def test_killed_by_the_system_it_goes_on_to_the_same(unbroken, tmp_path):
-    (tmp_path / "case.toml").write_text(CASE, "utf-8")
+    (tmp_path / "case.toml").write_text(CASE + "patches = 4\nstep = 0.1\n", "utf-8")
     command = [
         sys.executable,
         "-m",
@@ -247,14 +219,9 @@ def test_a_standing_body_that_cannot_be_solved_is_told_what_helps():
 
 
 def test_a_contact_that_outgrows_its_grid_is_stopped():
-    text = (
-        CASE.replace('length = "10 mm"\n', "")
-        .replace('"line"', '"point"')
-        .replace("y = [-1.0, 1.0]", "y = [-1.6, 1.6]")
-    )
-    narrow = {"contact.load": "60 N", "lubricant": "none", "surface": "flat"}
+    narrow = {"contact.load": "60 N", "lubricant": "none", "surface": "flat", "grid.y": [-1.6, 1.6]}
     with pytest.raises(AsperityError, match=r"as wide as its grid after .* h; state a wider grid.y"):
-        run_wear(load_case(text, name="case.toml").with_overrides(narrow), hours=10.0)
+        run_wear(worn_case(FEW | narrow, POINT), hours=10.0)
 
 
 def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
@@ -271,3 +238,77 @@ def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
     assert table["hours"].tolist() == [0.0, 0.0, HOURS, HOURS]
     assert table.columns[1] == "hours"  # which `asperity track` takes for x
     assert len(unbroken.moments()) == 12
+
+
+def test_a_longer_run_that_is_killed_leaves_the_shorter_one_as_it_was(tmp_path, monkeypatch):
+    """Its rows, its end and the surfaces' files hang together; the longer run's own rows are not among them."""
+    monkeypatch.setattr(store, "KEPT_EVERY_S", 0.0)
+    short = run_wear(case(), hours=0.5, out=tmp_path / "worn")
+    last = int(short.table["jump"].iloc[-1])
+    files = [path.read_bytes() for path in short.files]
+
+    def stop(progress: WearProgress) -> None:
+        if progress.row["jump"] == last + 2:
+            raise Stop
+
+    with pytest.raises(Stop):
+        run_wear(case(), hours=HOURS, out=tmp_path / "worn", progress=stop)
+    again = load_wear(tmp_path / "worn")
+    same(again, short)
+    assert [path.read_bytes() for path in again.files] == files
+    assert again.table["hours"].iloc[-1] == 0.5
+
+
+def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypatch):
+    """By its number; and where that was forgotten, by what its files hold."""
+    with monkeypatch.context() as before:
+        before.setattr(store, "FORMAT", store.FORMAT - 1)
+        run_wear(case(), hours=0.05, out=tmp_path / "old")
+    for opened in (lambda: load_wear(tmp_path / "old"), lambda: run_wear(case(), hours=0.1, out=tmp_path / "old")):
+        with pytest.raises(UnreadableFile, match="not a wear's manifest that this asperity can read; choose another"):
+            opened()
+    run_wear(case(), hours=0.05, out=tmp_path / "worn")
+    for name in (store.MEMORY, store.END):
+        shutil.copytree(tmp_path / "worn", tmp_path / name)
+        with np.load(BytesIO(read_sealed(tmp_path / "worn" / name, ""))) as packed:
+            arrays = {key: packed[key] for key in packed.files}
+        arrays["numbers"] = arrays["numbers"][:5]
+        shorter = BytesIO()
+        np.savez(shorter, **arrays)
+        write_sealed(tmp_path / name / name, shorter.getvalue())
+        with pytest.raises(UnreadableFile, match="is damaged, or of another asperity; wear the case in another folder"):
+            run_wear(case(), hours=0.1, out=tmp_path / name)
+
+
+def test_the_layout_has_a_number_of_its_own():
+    """What is kept of a jump, by name; where this changes, store.FORMAT counts up."""
+    kept = Worn.begin(case().moving_surfaces()).arrays()
+    names = {"worn", "flattened", "changed", "rates"}
+    assert set(kept) == {f"{name}_{body}" for name in names for body in (0, 1)} | {"numbers"}
+    assert (store.FORMAT, kept["numbers"].size) == (2, 9)
+
+
+def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
+    jumps = len(unbroken.table) - 1
+    numbers = [frame.number for frame in unbroken.frames]
+    assert numbers[0] == 0
+    assert numbers[-1] == jumps
+    assert len(numbers) <= frames.MOST + 1
+    assert all(is_kept(number, jumps) for number in numbers[:-1])
+    assert [frame.hours for frame in unbroken.frames] == [unbroken.table["hours"][number] for number in numbers]
+    first = unbroken.frames[0]
+    seen_first = unbroken.ageing.solver(seen(unbroken.before, first.position))
+    np.testing.assert_array_equal(first.pressure, seen_first.pressure.astype(np.float32))
+    np.testing.assert_array_equal(first.in_contact, seen_first.asperity_pressure > 0.0)
+    kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")
+    for one, other in zip(kept.frames, load_wear(tmp_path / "worn").frames, strict=True):
+        assert (one.number, one.hours, one.position) == (other.number, other.hours, other.position)
+        np.testing.assert_array_equal(one.gap, other.gap)
+
+
+def test_frames_are_few_however_many_jumps_there_are():
+    for latest in (0, 23, 24, 47, 48, 1000):
+        kept = [number for number in range(latest + 1) if is_kept(number, latest)]
+        assert kept[0] == 0
+        assert frames.MOST // 2 <= len(kept) <= frames.MOST or latest < frames.MOST
+        assert set(kept) <= {number for number in range(latest + 1) if is_kept(number, max(0, latest - 1))} | {latest}

@@ -367,11 +367,11 @@ def test_a_picture_shows_what_the_step_has(history):
 
     from PIL import Image
 
-    from asperity.report.motion.exhibits import frame_picture, ranges
+    from asperity.report.moving import frame_picture, ranges
     from asperity.report.style import CONTACT_COLOUR
 
     frame = history.frames[1]
-    packed, (width, height) = frame_picture(frame, ranges(history))
+    packed, (width, height) = frame_picture(frame, ranges(history.case, history.frames))
     pixels = np.asarray(Image.open(BytesIO(packed)).convert("RGB"))
     assert pixels.shape == (3 * height, width, 3)
     yellow = np.array([int(CONTACT_COLOUR[k : k + 2], 16) for k in (1, 3, 5)])

@@ -7,47 +7,19 @@ import numpy as np
 import pandas
 import pytest
 
-from asperity import BadInput, load_case
+from asperity import BadInput
 from asperity.ageing.contact import Solved
-from asperity.ageing.history import WearHistory, of_energy, of_grooves
 from asperity.ageing.jump import Ageing
-from asperity.ageing.rows import of_body
+from asperity.ageing.notes import of_energy, of_few_jumps, of_grooves, of_radii, of_standing
+from asperity.ageing.rows import of_body, roughness
 from asperity.ageing.run import _row
 from asperity.ageing.worn import Worn
 from asperity.ehl import ContactState
+from asperity.surface import Surface
 from asperity.wearing import Position
 from asperity.wearing.laws import GAS_CONSTANT
+from support.wearing import DRY, FEW, POINT, worn_case
 
-CASE = """
-[contact]
-geometry = "line"
-radius = "5.4 mm"
-length = "10 mm"
-load = "500 N"
-entrainment_speed = "1.91 m/s"
-slip = 0.2
-[material]
-youngs_modulus = "200 GPa"
-poisson_ratio = 0.3
-hardness = "2 GPa"
-[lubricant]
-viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
-density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
-rheology = { law = "newtonian" }
-[surface]
-kind = "gaussian"
-sq = "1 um"
-correlation_length = ["30 um", "30 um"]
-seed = 7
-[grid]
-cells = [32, 16]
-x = [-2.2, 1.9]
-y = [-1.0, 1.0]
-[wear]
-k = "1e-14 1/Pa"
-overrolling = ["50 Hz", "5 Hz"]
-patches = 4
-"""
 STATE = ContactState(
     clr=0.5, car=0.1, car_domain=0.1, capped_oil_load_ratio=0.0, h_min=0.0, h_central=0.0, h_mean=0.0, p_max=1e9,
     contact_slope=None, sq=1e-6, lambda_ratio=None, reynolds_residual=0.0, load_error=0.0, mass_flux_imbalance=0.0,
@@ -55,7 +27,7 @@ STATE = ContactState(
 
 
 def ageing(overrides: dict[str, object] | None = None) -> Ageing:
-    case = load_case(CASE, name="case.toml").with_overrides(overrides or {})
+    case = worn_case({**FEW, "wear.k": "1e-14 1/Pa", **(overrides or {})})
     assert case.wear is not None
     return Ageing(case, case.wear, case.moving_surfaces())
 
@@ -106,17 +78,12 @@ def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
     np.testing.assert_allclose(lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max())
 
 
-BALL = {"lubricant": "none", "material.hardness": "none", "contact.load": "10 N", "wear.patches": 1}
+BALL = {**DRY, "contact.load": "10 N", "wear.k": "1e-14 1/Pa", "wear.patches": 1}
 
 
 def ball(overrides: dict[str, object], wide: float = 1.8, cells: int = 24) -> Ageing:
-    text = (
-        CASE.replace('length = "10 mm"\n', "")
-        .replace('"line"', '"point"')
-        .replace("y = [-1.0, 1.0]", "y = [-1.8, 1.8]")
-    )
     grid = {"grid.x": [-1.8, 1.8], "grid.y": [-wide, wide], "grid.cells": [24, cells]}
-    case = load_case(text, name="ball.toml").with_overrides(BALL | grid | overrides)
+    case = worn_case(BALL | grid | overrides, POINT)
     assert case.wear is not None
     return Ageing(case, case.wear, case.moving_surfaces())
 
@@ -193,13 +160,13 @@ def test_the_energy_law_counts_the_friction_work_of_the_load_between_solids(touc
     new = Worn.begin(model.surfaces)
     assert model.booked(at, 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert model.volume(model.rate(new, at, 0), 0) == pytest.approx(expected, rel=1e-9, abs=0.0)
-    ended = WearHistory(ageing=model, table=pandas.DataFrame([{"solid_load_ratio": touching, "clr": 1.0}]), worn=new)
-    assert of_energy(ended) == (
+    ended = pandas.DataFrame([{"solid_load_ratio": touching, "clr": 1.0}])
+    assert of_energy(model, ended) == (
         "The energy law counts the friction work of the load between solids: "
         f"at the end {touching:.3g} of what touching "
         "cells rub with, oil in them counted."
     )
-    assert of_energy(replace(ended, ageing=ageing())) is None
+    assert of_energy(ageing(), ended) is None
 
 
 def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
@@ -217,6 +184,68 @@ def test_a_smooth_bodys_grooves_are_said_to_be_the_tracks():
         ball({"motion.rough": "second"}),
     ):
         assert of_grooves(other) is None
+
+
+def test_rates_that_make_other_bodies_than_the_contacts_are_said():
+    """A roller of 12 mm on a ring of 108 mm turning as the example's do, and the pair the wrong way round."""
+    radii, speeds = (6e-3, 54e-3), ageing().case.conditions.surface_speeds
+    assert 1.0 / (1.0 / radii[0] + 1.0 / radii[1]) == pytest.approx(5.4e-3)
+    rates = [speed / (2.0 * math.pi * radius) for speed, radius in zip(speeds, radii, strict=True)]
+    right, wrong = ([f"{rate!r} Hz" for rate in order] for order in (rates, rates[::-1]))
+    assert of_radii(ageing({"wear.overrolling": right})) is None
+    said = of_radii(ageing({"wear.overrolling": wrong}))
+    assert said is not None
+    assert "which outside one another do not give the contact's 5.4 mm" in said
+    assert of_radii(ageing({"wear.overrolling": "none"})) is None
+    assert of_radii(ageing({"contact.slip": 2.0})) is None
+
+
+def test_a_body_shorter_than_the_contact_is_refused():
+    with pytest.raises(BadInput, match=r"overrolling of 1e\+07 Hz at .* is a body .* round, less than the contact"):
+        ageing({"wear.overrolling": "1e7 Hz"})
+
+
+def test_a_standing_body_is_said_to_be_spared():
+    pits = {"wear.fatigue": {"law": "von-mises", "limit": "700 MPa"}}
+    said = of_standing(ageing(pits | {"contact.slip": 2.0}))
+    assert said is not None
+    assert said.endswith("stands still: fatigue spare it.")
+    assert of_standing(ageing(pits)) is None
+    assert of_standing(ageing({"contact.slip": 2.0})) is None
+
+
+def test_few_jumps_are_said():
+    model = ageing()
+    new = Worn.begin(model.surfaces)
+    assert of_few_jumps(model, 5, new) is None
+    said = of_few_jumps(model, 4, new)
+    assert said is not None
+    assert said.startswith("In 4 jumps of 4 positions")
+    assert of_few_jumps(ageing({"surface": "flat"}), 4, new) is None
+
+
+def test_what_is_smooth_to_rounding_has_no_shape():
+    model = ageing({"surface": "flat"})
+    grid = model.surfaces.first.grid
+    noise = np.random.default_rng(1).standard_normal(grid.cells)
+    row = roughness((Surface(1e-20 * noise, grid), Surface(1e-8 * noise, grid)))
+    assert math.isnan(row["ssk_1"])
+    assert math.isnan(row["sku_1"])
+    assert row["sku_2"] == pytest.approx(3.0, rel=0.3)
+
+
+def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened():
+    """Of rates that jump from one place to another, Sq of two jumps and of one of both together differ."""
+    model = ageing({"wear.step": 0.5})
+    new = Worn.begin(model.surfaces)
+    at = rubbed(model)
+    assert model.seconds(new, at) == pytest.approx(0.5 * 10.0 * ageing().seconds(new, at) / 0.5, rel=1e-9, abs=0.0)
+    other = [(Position(20, 20), at[0][1])]
+    free = model.seconds(replace(new, number=1), other) / 0.5
+    after = model.jumped(new, at, model.seconds(new, at))
+    longest = model.seconds(after, other)
+    assert longest < 0.99 * free
+    assert model.jumped(after, other, longest).error <= 1e-3 < model.jumped(after, other, free).error
 
 
 def test_a_law_of_friction_without_friction_is_refused():

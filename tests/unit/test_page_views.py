@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 
+from asperity.ageing import run_wear
 from asperity.history import run_history
 from asperity.page.answer import RUPTURED, TOUCHING
 from asperity.page.hearing import Stated, hear_files, hear_folder
@@ -16,6 +17,7 @@ from asperity.signals import Signal
 from asperity.study import load_study, plan_study, run_study
 from asperity.tracking import track_recordings
 from asperity.vibration import ContactOscillator, acceleration, white_noise
+from support.wearing import FEW, worn_case
 
 NOBODY = Ticket(-1, 0)
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um", "vibration": "none"}
@@ -103,11 +105,24 @@ def test_a_history_is_shown_by_its_steps_and_maps(tmp_path):
     moved = open_history(NOBODY, tmp_path / "moving")
     assert moved.verdict == kept.verdict()
     np.testing.assert_array_equal(moved.curves["clr"], kept.table["clr"])
-    assert moved.numbers == tuple(frame.number for frame in kept.frames)
+    assert moved.names == tuple(f"Step {frame.number}" for frame in kept.frames)
+    assert moved.clock == "time_s"
     for picture, frame in zip(moved.pictures, kept.frames, strict=True):
         np.testing.assert_array_equal(picture.cells == TOUCHING, frame.in_contact)
         assert not (picture.pressure[picture.cells == RUPTURED] > 0.0).any()
     assert open_page(tmp_path / "moving").kind == "history"
+
+
+def test_a_contact_that_wears_is_shown_by_its_hours_and_maps(tmp_path):
+    kept = run_wear(worn_case(FEW), hours=0.2, out=tmp_path / "worn")
+    moved = open_history(NOBODY, tmp_path / "worn")
+    assert (moved.verdict, moved.clock) == (kept.verdict(), "hours")
+    np.testing.assert_array_equal(moved.curves["sq_m"], kept.table["sq_m"])
+    np.testing.assert_array_equal(moved.time, kept.table["hours"])
+    assert moved.times == tuple(frame.hours for frame in kept.frames)
+    for picture, frame in zip(moved.pictures, kept.frames, strict=True):
+        np.testing.assert_array_equal(picture.cells == TOUCHING, frame.in_contact)
+    assert open_page(tmp_path / "worn").kind == "history"
 
 
 def test_a_folder_that_is_damaged_is_a_sentence(study, tmp_path):

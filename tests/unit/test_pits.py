@@ -7,6 +7,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.ehl import stress_below
+from asperity.grid import Grid
 from asperity.rating import dang_van, dang_van_of_each
 from asperity.wearing.fatigue import DangVanPits, VonMisesPits, broken_out, layers, soon, stress_path, sunk
 from support.passages import hertz_patches, passage, track
@@ -117,6 +118,19 @@ def test_below_the_limit_nothing_is_ever_damaged():
     assert above.heights_change.any()
 
 
+@pytest.mark.parametrize("shape", [(2.0, 1.0), (1.0, 1.0), (1.0, 3.0)])
+def test_a_pit_of_any_layer_has_the_volume_of_its_bowl_whatever_the_cells(shape):
+    """The shallowest too, whose bowl is narrower than a cell is long."""
+    grid = Grid((40, 40), (0.0, 0.0), (40e-6 * shape[0], 40e-6 * shape[1]), (True, True))
+    depths = layers(grid, 8e-6)
+    for layer, depth in enumerate(depths):
+        failed = np.zeros((depths.size, *grid.cells), dtype=bool)
+        failed[layer, 20, 20] = True
+        pits, _ = broken_out(np.zeros(failed.shape), depths, failed, grid, 3.0)
+        volume = float(pits.sum() * np.prod(grid.spacing))
+        assert volume == pytest.approx(np.pi / 8.0 * (3.0 * depth) ** 2 * depth, rel=1e-9, abs=0.0)
+
+
 def test_a_pit_has_the_volume_of_its_bowl_and_is_booked():
     """π/8 W² D, on a grid that shows it; what the heights lose is what the facts say."""
     grid = track((400, 400), (200e-6, 200e-6))
@@ -126,8 +140,8 @@ def test_a_pit_has_the_volume_of_its_bowl_and_is_booked():
     damage = np.where(failed, 1.5, 0.2)
     pits, left = broken_out(damage, depths, failed, grid, 3.0)
     deep = depths[6]
-    assert pits.max() == deep
-    assert pits.sum() * 0.5e-6**2 == pytest.approx(np.pi / 8.0 * (3.0 * deep) ** 2 * deep, rel=0.01, abs=0.0)
+    assert pits.max() == pytest.approx(deep, rel=1e-3, abs=0.0)
+    assert pits.sum() * 0.5e-6**2 == pytest.approx(np.pi / 8.0 * (3.0 * deep) ** 2 * deep, rel=1e-9, abs=0.0)
     assert left.max() < 1.0
     change = miner(1, 1e9)[0]
     volume = -change.heights_change.sum() * float(np.prod(track((64, 8)).spacing))
@@ -135,12 +149,14 @@ def test_a_pit_has_the_volume_of_its_bowl_and_is_booked():
 
 
 def test_layers_that_failed_are_gone_and_the_ones_below_come_up():
-    grid = track((8, 8))
+    grid = track((16, 16), (0.8e-6, 0.8e-6))  # cells that are far smaller than a pit
     depths = np.array([1e-6, 2e-6, 4e-6])
-    damage = np.broadcast_to(np.array([1.2, 0.4, 0.1])[:, None, None], (3, 8, 8)).copy()
+    damage = np.broadcast_to(np.array([1.2, 0.4, 0.1])[:, None, None], (3, 16, 16)).copy()
     pits, left = broken_out(damage, depths, damage >= 1.0, grid, 3.0)
-    np.testing.assert_allclose(pits, 1e-6)
-    np.testing.assert_allclose(left[:, 0, 0], [0.4, 0.25, 0.075])  # what was at 2, 3 and 5 um; at 8 um it is new
+    np.testing.assert_allclose(pits, 1e-6, rtol=1e-3)
+    np.testing.assert_allclose(
+        left[:, 0, 0], [0.4, 0.25, 0.075], rtol=1e-3
+    )  # what was at 2, 3 and 5 um; at 8 um it is new
 
 
 def test_what_is_worn_off_brings_up_what_lay_deeper():

@@ -5,46 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from asperity import BadInput, load_case
+from asperity import BadInput
 from asperity.ageing.jump import Ageing
 from asperity.ageing.worn import Worn
 from asperity.wearing import seen
+from support.wearing import worn_case
 
-CASE = """
-[contact]
-geometry = "line"
-radius = "5.4 mm"
-length = "10 mm"
-load = "500 N"
-entrainment_speed = "1.91 m/s"
-slip = 0.2
-[material]
-youngs_modulus = "200 GPa"
-poisson_ratio = 0.3
-hardness = "2 GPa"
-[lubricant]
-viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
-density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
-rheology = { law = "newtonian" }
-[surface]
-kind = "gaussian"
-sq = "1 um"
-correlation_length = ["30 um", "30 um"]
-seed = 7
-[grid]
-cells = [32, 16]
-x = [-2.2, 1.9]
-y = [-1.0, 1.0]
-[motion]
-rough = "second"
-[vibration]
-mass = "0.1 kg"
-damping_ratio = 0.02
-[wear]
-k = "1e-17 1/Pa"
-overrolling = ["50 Hz", "5 Hz"]
-patches = 3
-"""
+GENTLE = {"motion.rough": "second", "wear.k": "1e-17 1/Pa", "wear.patches": 3}
 WAYS = {
     "fatigue": {"law": "von-mises", "limit": "700 MPa", "cycles": 1e4},
     "ploughing": {"law": "debris", "concentration": "3e11 1/m^3"},
@@ -54,7 +21,7 @@ SECONDS = 100.0
 
 
 def ageing(*ways):
-    case = load_case(CASE, name="case.toml").with_overrides({f"wear.{way}": WAYS[way] for way in ways})
+    case = worn_case(GENTLE | {f"wear.{way}": WAYS[way] for way in ways})
     assert case.wear is not None
     return Ageing(case, case.wear, case.moving_surfaces())
 
@@ -129,4 +96,4 @@ def test_a_jump_is_no_longer_than_what_roughens_allows(solved):
 )
 def test_what_a_case_may_not_state(way, said):
     with pytest.raises(BadInput, match=said):
-        load_case(CASE, name="case.toml").with_overrides({"wear.fatigue": way}).wear  # noqa: B018
+        worn_case(GENTLE | {"wear.fatigue": way}).wear  # noqa: B018

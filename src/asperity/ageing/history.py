@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pandas
 
+from asperity.ageing.frames import Frame
 from asperity.ageing.jump import BODIES, Ageing
+from asperity.ageing.notes import told
 from asperity.ageing.rows import of_body, state_of_row
 from asperity.ageing.worn import Worn
 from asperity.arrays import finite_or_none
@@ -21,7 +23,6 @@ from asperity.paper import Moment
 from asperity.quantities import quantity
 from asperity.surface import MovingSurfaces
 from asperity.wear import Stages, split_stages
-from asperity.wearing import DissipatedEnergy
 
 HOUR = 3600.0
 MOST_PLACES = 60  # that stages are read from
@@ -34,14 +35,15 @@ class WearHistory:
 
     `table` has a row a jump, the contact at its beginning, and one for the end; `docs/quantities.md` describes its
     columns, of which `..._1_m` and so on are one body's. `before` and `worn` are the tracks at first, and what they
-    have come to; `seconds` what computing took this time, of `computed` jumps; `failed` how many positions of all
-    jumps could not be solved and were left out of means; `folder` where it is kept, `path` of its table and `files` of
-    its surfaces.
+    have come to; `frames` the contact at one position of some jumps and of the end; `seconds` what computing took this
+    time, of `computed` jumps; `failed` how many positions of all jumps could not be solved and were left out of means;
+    `folder` where it is kept, `path` of its table and `files` of its surfaces.
     """
 
     ageing: Ageing
     table: pandas.DataFrame
     worn: Worn
+    frames: tuple[Frame, ...] = ()
     folder: Path | None = None
     path: Path | None = None
     files: tuple[Path, ...] = ()
@@ -235,35 +237,8 @@ class WearHistory:
             notes.append(f"{self.failed} contacts could not be solved and were left out of the means of their jumps.")
         if self.case.conditions.sliding_speed == 0.0:
             notes.append("Without sliding nothing is worn off.")
-        notes += [one for one in (of_energy(self), of_grooves(ageing)) if one is not None]
+        notes += told(ageing, self.table, self.worn)
         acting = [name for name in ("fatigue", "ploughing", "scuffing") if name in model.mechanisms]
         acting += ["flattening"] if model.flattening else []
         notes.append(f"Besides removal: {', '.join(acting)}." if acting else "Nothing but removal acts.")
         return tuple(notes)
-
-
-def of_energy(history: WearHistory) -> str | None:
-    """What friction work the energy law counts, as a sentence; None of another law, and where nothing touches."""
-    last = history.table.iloc[-1]
-    if not isinstance(history.ageing.model.law, DissipatedEnergy) or not last["clr"] > 0.0:
-        return None
-    share = float(last["solid_load_ratio"] / last["clr"])
-    return (
-        f"The energy law counts the friction work of the load between solids: at the end {share:.3g} of what touching "
-        "cells rub with, oil in them counted."
-    )
-
-
-def of_grooves(ageing: Ageing) -> str | None:
-    """How little of its partner a smooth moving body meets in an endless contact; None where that does no harm."""
-    rough, speeds = ageing.surfaces.rough, ageing.case.conditions.surface_speeds
-    if not ageing.case.conditions.endless or sum(rough) != 1 or 0.0 in speeds:
-        return None
-    smooth = rough.index(False)
-    if ageing.model.coefficients[smooth].k == 0.0:
-        return None
-    tracks = ageing.perimeter(1 - smooth) / ageing.surfaces.first.grid.extent[0]
-    return (
-        f"The {('first', 'second')[smooth]} body is smooth and meets one track of {tracks:.0f} all round its partner, "
-        "again and again: its grooves, largest depth and Sq are that track's doing; its mean depth is not."
-    )

@@ -13,11 +13,11 @@ import numpy as np
 import scipy
 
 from asperity.ageing.contact import PositionSolver, Solved
+from asperity.ageing.reach import part_of, reached
 from asperity.ageing.worn import Worn
 from asperity.arrays import Field
 from asperity.case import Case
 from asperity.errors import BadInput
-from asperity.grid import FEWEST_CELLS, Grid
 from asperity.surface import MovingSurfaces, Surface
 from asperity.wearing import (
     Body,
@@ -39,9 +39,8 @@ from asperity.wearing import (
 
 FEWEST_PATCHES = 4
 LEAST_HEIGHT = 0.1  # of a smooth contact's approach a^2/(2R): what a jump's step is a share of where Sq is less
-WORST_ERROR = 1e-3  # of Sq, by which a jump of twice the length may differ from two
-SHORTER, LONGER, SHORTEST = 0.7, 1.2, 1.0 / 64.0  # factors on the length of jumps
-TRACE = 0.01  # of the deepest profile: what has lost less lies beside the track
+WORST_ERROR = 1e-3  # of Sq, by which this jump and the one before may differ from one of both together
+FIRST, SHORTER, SHORTEST = 0.5, 0.7, 1.0 / 64.0  # of the longest jump: the first, with none before it; and in steps
 GAUSS = math.sqrt(0.5 * math.log(2.0)) / math.pi  # deviation of ISO 16610-61's filter over its cut-off
 BODIES = (0, 1)
 
@@ -158,17 +157,17 @@ class Ageing:
         along = across = slice(None)
         grid, half_widths = self.surfaces.grid, self.case.conditions.hertz.half_widths
         if self.bodies[body].speed == 0.0:
-            along = _reached(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
+            along = reached(worn.worn[body].mean(axis=1), grid.x, half_widths[0])
         if not self.case.conditions.endless:
             both = worn.worn[0].mean(axis=0) + worn.worn[1].mean(axis=0)[::-1]
-            across = _reached(both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1])
+            across = reached(both + both[::-1], 0.5 * (grid.y - grid.y[::-1]), half_widths[1])
         return along, across
 
     def levelled(self, worn: Worn) -> tuple[Surface, Surface]:
         """Both tracks' roughness where the contact reaches them, without the form that wear has given them."""
         now = self.worn_surfaces(worn)
         first, second = (
-            _part(Surface(surface.heights + self._form(worn, body), surface.grid), self.track(worn, body))
+            part_of(Surface(surface.heights + self._form(worn, body), surface.grid), self.track(worn, body))
             for body, surface in enumerate((now.first, now.second))
         )
         return first, second
@@ -252,15 +251,30 @@ class Ageing:
     def seconds(self, worn: Worn, at: Sequence[tuple[Position, Solved]]) -> float:
         """How long the jump from the contacts at those positions may be."""
         rates = self.rate(worn, at, 0), self.rate(worn, at, 1)
-        conditions, grid = self.case.conditions, self.surfaces.grid
+        exposures, spacing = self.exposures(at), self.surfaces.grid.spacing
         height = self.model.step * self.height(worn)
-        modulus = conditions.pair.reduced_modulus
-        longest = worn.factor * longest_jump(self.exposures(at), rates, height, self.model.decay, grid.spacing, modulus)
-        if self.model.removal_alone:
+        modulus = self.case.conditions.pair.reduced_modulus
+        longest = longest_jump(exposures, rates, height, self.model.decay, spacing, modulus)
+        if not self.model.removal_alone:
+            slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
+            settled = max(worn.time, 1.0 / slowest)  # what settles at once is looked at often at first
+            longest = min(longest, worn.longest, settled)
+        return self._within_error(worn, rates, exposures, longest)
+
+    def _within_error(
+        self, worn: Worn, rates: tuple[Field, Field], exposures: tuple[Exposure, Exposure], longest: float
+    ) -> float:
+        """The longest jump that differs little enough from the one before going on; nothing is solved for it."""
+        if math.isinf(longest):
             return longest
-        slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
-        settled = max(worn.time, 1.0 / slowest)  # what settles at once is looked at often at first
-        return min(longest, worn.longest, settled)
+        if worn.seconds == 0.0:
+            return FIRST * longest
+        seconds = longest
+        while seconds > SHORTEST * longest:
+            if self._error(worn, self._removed(rates, seconds, exposures), exposures, seconds) <= WORST_ERROR:
+                break
+            seconds *= SHORTER
+        return seconds
 
     def jumped(self, worn: Worn, at: Sequence[tuple[Position, Solved]], seconds: float) -> Worn:
         """Both bodies after a jump of so many seconds from the contacts at those positions."""
@@ -276,12 +290,12 @@ class Ageing:
             worn=lost,
             flattened=self._flattened(worn, at),
             booked=(booked[0], booked[1]),
+            error=worn.error + self._error(worn, removed, exposures, seconds),
             rates=rates,
             seconds=seconds,
             longest=math.inf,
             facts={},
         )
-        after = self._controlled(worn, after, removed, exposures)
         for place, name in enumerate(self.model.mechanisms):
             for body in BODIES:
                 after = self._roughened(worn, after, at, removed[body], name, (body, place))
@@ -319,28 +333,23 @@ class Ageing:
         )
         return first, second
 
-    def _controlled(
-        self, worn: Worn, after: Worn, removed: tuple[Field, Field], exposures: tuple[Exposure, Exposure]
-    ) -> Worn:
-        """The length of the next jump, by how far this one and the one before differ from one of both together."""
+    def _error(
+        self, worn: Worn, removed: tuple[Field, Field], exposures: tuple[Exposure, Exposure], seconds: float
+    ) -> float:
+        """How far what this jump takes off and the one before differ in Sq from one of both together, relative."""
         if worn.seconds == 0.0:
-            return after
-        once, twice = (
-            self._removed(worn.rates, seconds, exposures) for seconds in (worn.seconds, worn.seconds + after.seconds)
-        )
-        levels = self.levelled(replace(worn, worn=after.worn))
+            return 0.0
+        once, twice = (self._removed(worn.rates, long, exposures) for long in (worn.seconds, worn.seconds + seconds))
+        after = replace(worn, worn=(worn.worn[0] + removed[0], worn.worn[1] + removed[1]))
+        levels, tracks = self.levelled(after), [self.track(after, body) for body in BODIES]
         now = math.hypot(*(surface.sq for surface in levels))
-        tracks = [self.track(after, body) for body in BODIES]
         at_once = math.hypot(
             *(
                 float(np.std(levels[body].heights + (once[body] + removed[body] - twice[body])[tracks[body]]))
                 for body in BODIES
             )
         )
-        error = abs(at_once - now) / self.height(replace(worn, worn=after.worn))
-        change = SHORTER if error > WORST_ERROR else LONGER if error < WORST_ERROR / 3.0 else 1.0
-        factor = min(1.0, max(SHORTEST, change * after.factor))
-        return replace(after, factor=factor, error=after.error + error)
+        return abs(at_once - now) / self.height(after)
 
     # What roughens ---------------------------------------------------------------------------------------------------
 
@@ -374,16 +383,16 @@ class Ageing:
             state=after.states.get(label, {}),
         )
         change = self.model.mechanisms[name](passage)
-        return self._booked_change(after, change, body, label, at[0][0])
+        return self._booked_change(after, change, body, label, [place for place, _ in at])
 
-    def _booked_change(self, after: Worn, change: Change, body: int, label: str, position: Position) -> Worn:
+    def _booked_change(self, after: Worn, change: Change, body: int, label: str, places: Sequence[Position]) -> Worn:
         changed, mechanical = list(after.changed), list(after.mechanical)
         changed[body] = changed[body] + change.heights_change
         mechanical[body] -= self.volume(change.heights_change, body)
         if change.transferred is not None and change.transferred.any():
             other = 1 - body
             thinner = self.perimeter(body) / self.perimeter(other)
-            given = thinner * across(change.transferred, position, body)
+            given = thinner * np.mean([across(change.transferred, place, body) for place in places], axis=0)
             changed[other] = changed[other] + given
             mechanical[other] -= self.volume(given, other)
         states: dict[str, State] = {**after.states, label: change.state}
@@ -414,27 +423,3 @@ class Ageing:
             film=laid(solved.film, math.inf),
             temperature=temperature,
         )
-
-
-def _reached(depth: Field, places: Field, half_width: float) -> slice:
-    """Cells of the Hertz zone, and of what is worn by more than a trace; as many as a surface has at least."""
-    inside = np.flatnonzero((np.abs(places) <= half_width) | (depth > TRACE * depth.max()))
-    first, last = (int(inside[0]), int(inside[-1])) if inside.size else (places.size // 2, places.size // 2)
-    short = max(FEWEST_CELLS - (last - first + 1), 0)
-    first = min(max(first - (short + 1) // 2, 0), places.size - FEWEST_CELLS)
-    return slice(first, max(last + (short + 1) // 2 + 1, first + FEWEST_CELLS))
-
-
-def _part(surface: Surface, cells: tuple[slice, slice]) -> Surface:
-    """The part of a surface on those cells."""
-    heights, grid = surface.heights[cells], surface.grid
-    if heights.shape == grid.cells:
-        return surface
-    starts = [part.start or 0 for part in cells]
-    lower = [low + start * step for low, start, step in zip(grid.lower, starts, grid.spacing, strict=True)]
-    upper = [low + count * step for low, count, step in zip(lower, heights.shape, grid.spacing, strict=True)]
-    repeats = [repeat and part == slice(None) for repeat, part in zip(grid.periodic, cells, strict=True)]
-    part = Grid(
-        (heights.shape[0], heights.shape[1]), (lower[0], lower[1]), (upper[0], upper[1]), (repeats[0], repeats[1])
-    )
-    return Surface(heights, part)

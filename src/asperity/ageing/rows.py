@@ -16,6 +16,8 @@ from asperity.surface import Surface, height_parameters
 
 Row = dict[str, float | int]
 
+LEAST_SQ = 1e-15  # [m] below which heights are rounding, and have no shape
+
 ROUGHNESS = {  # column: field of HeightParameters
     "sq_m": "sq",
     "sa_m": "sa",
@@ -48,7 +50,8 @@ def of_body(key: str, body: int) -> str:
 def roughness(surfaces: tuple[Surface, Surface]) -> Row:
     """Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body, and of both as they lie on one another at first.
 
-    Where one has less of a track, as it stands still, it is repeated along the other's.
+    Where one has less of a track, as it stands still, it is repeated along the other's. What is smooth to rounding has
+    no skewness.
     """
     first, second = surfaces
     longer = max(surfaces, key=lambda surface: surface.grid.cells[0]).grid
@@ -59,8 +62,10 @@ def roughness(surfaces: tuple[Surface, Surface]) -> Row:
     row: Row = {}
     for surface, name in ((first, 0), (second, 1), (both, None)):
         parameters = height_parameters(surface)
+        rough = parameters.sq > LEAST_SQ
         for key, field in ROUGHNESS.items():
-            row[key if name is None else of_body(key, name)] = float(getattr(parameters, field))
+            known = rough or key not in ("ssk", "sku")
+            row[key if name is None else of_body(key, name)] = float(getattr(parameters, field)) if known else math.nan
     return row
 
 

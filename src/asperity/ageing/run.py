@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from asperity.ageing.contact import Crew, Failed, Solved, crew
+from asperity.ageing.frames import Frame
 from asperity.ageing.history import HOUR, WearHistory
 from asperity.ageing.jump import BODIES, Ageing
 from asperity.ageing.rows import Row, contact_row, of_body, roughness
@@ -77,9 +78,9 @@ def _go_on(
     ageing: Ageing, keeper: Keeper, solve: Crew, end: float, progress: Callable[[WearProgress], None] | None
 ) -> int:
     """Jump to the end, from where the history is; the number of jumps taken."""
-    if keeper.end is not None and abs(keeper.end.time - end) <= SAME * end:
+    if keeper.end is not None and abs(keeper.end.worn.time - end) <= SAME * end:
         return 0
-    held = max(one.time for one in (keeper.worn, keeper.end) if one is not None)
+    held = max(keeper.worn.time, 0.0 if keeper.end is None else keeper.end.worn.time)
     if held >= end * (1.0 - SAME):
         raise BadInput(
             f"{keeper.folder} holds {held / HOUR:.6g} h of wear, got {end / HOUR:.6g} h; ask for as many "
@@ -88,11 +89,13 @@ def _go_on(
     worn, at_end, computed = keeper.worn, False, 0
     while True:
         at, row = look(ageing, worn, solve)
-        keeper.row(row, worn.number)
+        frame = Frame.of(worn.number, worn.time / HOUR, at)
+        if not at_end:
+            keeper.take(row, frame)
         if progress is not None:
             progress(WearProgress(worn.time / HOUR, end / HOUR, row))
         if at_end:
-            keeper.finish(worn)
+            keeper.finish(worn, row, frame)
             return computed
         seconds = ageing.seconds(worn, at)
         at_end = worn.time + seconds >= end * (1.0 - SAME)

@@ -1,25 +1,28 @@
-"""A wear history on disk: manifest, rows, what the next jump needs, the end, and surfaces before and after.
+"""A wear history on disk: manifest, rows, what the next jump needs, frames, the end, surfaces before and after.
 
 A run that is killed at any moment goes on from the last jump kept and gives, bit for bit, what it would have given; one
 that is over goes on to more hours as if it had been asked for them at first. So what the next jump needs is kept before
-the last jump, which the end cuts short, and the end apart from it.
+the last jump, which the end cuts short, and the end apart from it with a row and a frame of its own: a longer run that
+is killed on its way leaves it as it was.
 """
 
 import hashlib
 import json
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import filelock
 import numpy as np
+import numpy.typing as npt
 import pandas
 import pyarrow
 
+from asperity.ageing.frames import Frame, is_kept
 from asperity.ageing.history import WearHistory
 from asperity.ageing.jump import Ageing
 from asperity.ageing.rows import Row
@@ -41,10 +44,34 @@ from asperity.kept import (
 )
 from asperity.surface import MovingSurfaces, write_surface
 
-FORMAT = 1  # counts up when a reader of the format before could not read the folder
-TABLE, MEMORY, END, SURFACES, LOCK = "wear.parquet", "memory.npz", "end.npz", "surfaces", ".lock"
+FORMAT = 2  # counts up when a reader of the format before could not read the folder
+TABLE, MEMORY, END, LOCK = "wear.parquet", "memory.npz", "end.npz", ".lock"
+SURFACES, FRAMES = "surfaces", "frames"
 KEPT_EVERY_S = 2.0  # what a crash may cost
 IDENTITY, REMEDY = "identity", "wear the case in another folder"
+T = TypeVar("T")
+
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+class End(NamedTuple):
+    """Where a history ends: what it has come to, its last row and its last frame."""
+
+    worn: Worn
+    row: Row
+    frame: Frame
+
+    def arrays(self) -> Arrays:
+        """As arrays by name."""
+        frame = {f"frame:{name}": value for name, value in self.frame.arrays().items()}
+        return {**self.worn.arrays(), **frame, "row": np.array(json.dumps(self.row))}
+
+    @classmethod
+    def of_arrays(cls, arrays: Arrays) -> "End":
+        """What `arrays` made."""
+        frame = {name.removeprefix("frame:"): value for name, value in arrays.items() if name.startswith("frame:")}
+        return cls(Worn.of_arrays(arrays), json.loads(str(arrays["row"])), Frame.of_arrays(frame))
 
 
 class Keeper:
@@ -53,58 +80,83 @@ class Keeper:
     def __init__(self, ageing: Ageing, folder: Path | None, identity: str = "") -> None:
         self.ageing, self.folder, self.identity = ageing, folder, identity
         self.rows: list[Row] = []
+        self.frames: dict[int, Frame] = {}
         self.worn = Worn.begin(ageing.surfaces)
-        self.end: Worn | None = None
+        self.end: End | None = None
         self.kept_at = time.monotonic()
         if folder is None:
             return
-        self.end = _read_worn(folder / END, identity)
-        worn = _read_worn(folder / MEMORY, identity)
+        self.end = _read(folder / END, identity, End.of_arrays)
+        worn = _read(folder / MEMORY, identity, Worn.of_arrays)
         if worn is not None:
             self.worn, self.rows = worn, _rows(folder, identity)
             if len(self.rows) < worn.number:
                 raise UnreadableFile(f"{folder / TABLE} ends before {folder / MEMORY}; start another folder")
+            self.frames = _frames(folder, identity, worn.number)
 
-    def row(self, row: Row, number: int) -> None:
-        """Take the row of that jump, in place of one that was taken before."""
-        self.rows = [*self.rows[:number], row]
+    def take(self, row: Row, frame: Frame) -> None:
+        """Take the row of a jump, in place of one that was taken before, and its frame; some of those before go."""
+        self.rows = [*self.rows[: frame.number], row]
+        self.frames[frame.number] = frame
+        gone = [number for number in self.frames if not is_kept(number, frame.number)]
+        for number in gone:
+            del self.frames[number]
+        if self.folder is None:
+            return
+        for number in gone:
+            _frame_file(self.folder, number).unlink(missing_ok=True)
+        if frame.number in self.frames:
+            write_sealed(_frame_file(self.folder, frame.number), _packed(frame.arrays(), self.identity))
 
     def keep(self, worn: Worn, *, at_once: bool = False) -> None:
         """Keep what the next jump needs, from time to time."""
         self.worn = worn
         if self.folder is not None and (at_once or time.monotonic() - self.kept_at > KEPT_EVERY_S):
             self._write_rows(self.folder)
-            write_sealed(self.folder / MEMORY, _packed(worn, self.identity))
+            write_sealed(self.folder / MEMORY, _packed(worn.arrays(), self.identity))
             self.kept_at = time.monotonic()
 
     def _write_rows(self, folder: Path) -> None:
         table = pyarrow.Table.from_pandas(pandas.DataFrame(self.rows), preserve_index=False)
         write_table(folder / TABLE, table.replace_schema_metadata({"case": self.ageing.case.text}), self.identity)
 
-    def finish(self, worn: Worn) -> None:
+    def finish(self, worn: Worn, row: Row, frame: Frame) -> None:
         """Keep the end, and the surfaces as they are then."""
-        self.end = worn
+        self.end = End(worn, row, frame)
+        self.rows = [*self.rows[: worn.number], row]
         if self.folder is None:
             return
         self.keep(self.worn, at_once=True)
+        (self.folder / END).unlink(missing_ok=True)  # that of fewer hours, whose surfaces are about to go
         after = self.ageing.worn_surfaces(worn)
         for name, surfaces in (("before", self.ageing.surfaces), ("after", after)):
             _write_both(surfaces, self.folder / SURFACES, name)
-        write_sealed(self.folder / END, _packed(worn, self.identity))
+        write_sealed(self.folder / END, _packed(self.end.arrays(), self.identity))
 
     def history(self, seconds: float, computed: int) -> WearHistory:
         """All of it."""
         assert self.end is not None
-        return WearHistory(
-            ageing=self.ageing,
-            table=pandas.DataFrame(self.rows[: self.end.number + 1]),
-            worn=self.end,
-            folder=self.folder,
-            path=None if self.folder is None else self.folder / TABLE,
-            files=() if self.folder is None else surface_files(self.folder),
-            seconds=seconds,
-            computed=computed,
+        return _history(
+            self.ageing, self.end, self.rows, self.frames, folder=self.folder, seconds=seconds, computed=computed
         )
+
+
+def _history(
+    ageing: Ageing, end: End, rows: list[Row], frames: Mapping[int, Frame], *, folder: Path | None, **told: Any
+) -> WearHistory:
+    """Up to the end, whatever a longer run has left beyond it."""
+    number = end.worn.number
+    before = [frames[one] for one in sorted(frames) if one < number and is_kept(one, number)]
+    return WearHistory(
+        ageing=ageing,
+        table=pandas.DataFrame([*rows[:number], end.row]),
+        worn=end.worn,
+        frames=(*before, end.frame),
+        folder=folder,
+        path=None if folder is None else folder / TABLE,
+        files=() if folder is None else surface_files(folder),
+        **told,
+    )
 
 
 def surface_files(folder: Path) -> tuple[Path, ...]:
@@ -132,20 +184,13 @@ def load_wear(folder: str | Path) -> WearHistory:
     home = (folder / manifest["case_folder"]).resolve()
     case = load_case(manifest["case"], folder=home, name=manifest["source"])
     identity: str = manifest["digest"]
-    end = _read_worn(folder / END, identity)
+    end = _read(folder / END, identity, End.of_arrays)
     if end is None:
         raise UnreadableFile(f"{folder} holds a wear history that has not come to its end; run asperity wear again")
     assert case.wear is not None
     ageing = Ageing(case, case.wear, case.moving_surfaces())
-    return WearHistory(
-        ageing=ageing,
-        table=pandas.DataFrame(_rows(folder, identity)[: end.number + 1]),
-        worn=end,
-        folder=folder,
-        path=folder / TABLE,
-        files=surface_files(folder),
-        remarks=version_notes(manifest["versions"]),
-    )
+    rows, frames = _rows(folder, identity), _frames(folder, identity, end.worn.number)
+    return _history(ageing, end, rows, frames, folder=folder, remarks=version_notes(manifest["versions"]))
 
 
 def is_wear(folder: Path) -> bool:
@@ -178,11 +223,12 @@ def open_keeper(ageing: Ageing, folder: Path | None) -> Iterator[Keeper]:
             raise BadInput(f"{folder} holds the wear of another case than {case.source}; {remedy}")
     elif folder.exists() and not all(map(_just_begun, folder.iterdir())):
         raise BadInput(f"{folder} is not empty and holds no wear history; name a new folder")
-    make_folder(folder / SURFACES)
+    for inside in (SURFACES, FRAMES):
+        make_folder(folder / inside)
     require_writable(manifest)
     try:
         with filelock.FileLock(folder / LOCK, timeout=0):
-            for left in (*folder.glob(".*.part"), *(folder / SURFACES).glob(".*.part")):
+            for left in (path for place in (".", SURFACES, FRAMES) for path in (folder / place).glob(".*.part")):
                 left.unlink(missing_ok=True)
             write_json(manifest, _manifest(case, digest, folder))
             yield Keeper(ageing, folder, digest)
@@ -192,7 +238,9 @@ def open_keeper(ageing: Ageing, folder: Path | None) -> Iterator[Keeper]:
 
 def _just_begun(entry: Path) -> bool:
     """Whether a file is of a history that another process is beginning, or was killed at."""
-    return entry.name in (LOCK, SURFACES) or (entry.name.startswith(f".{MANIFEST}.") and entry.suffix == ".part")
+    return entry.name in (LOCK, SURFACES, FRAMES) or (
+        entry.name.startswith(f".{MANIFEST}.") and entry.suffix == ".part"
+    )
 
 
 def _digest(case: Case, surfaces: MovingSurfaces) -> str:
@@ -217,25 +265,37 @@ def _manifest(case: Case, digest: str, folder: Path) -> dict[str, Any]:
     }
 
 
-def _packed(worn: Worn, identity: str) -> bytes:
-    arrays: dict[str, Any] = {**worn.arrays(), IDENTITY: np.array(identity)}
+def _packed(arrays: Arrays, identity: str) -> bytes:
+    everything: dict[str, Any] = {**arrays, IDENTITY: np.array(identity)}
     packed = BytesIO()
-    np.savez(packed, **arrays)
+    np.savez(packed, **everything)
     return packed.getvalue()
 
 
-def _read_worn(path: Path, identity: str) -> Worn | None:
+def _read(path: Path, identity: str, made: Callable[[Arrays], T]) -> T | None:
+    """What was packed into a file; None where there is none."""
     if not path.exists():
         return None
     try:
         with np.load(BytesIO(read_sealed(path, REMEDY)), allow_pickle=False) as kept:
             arrays = {name: kept[name] for name in kept.files}
+        require_case(path, str(arrays.pop(IDENTITY, "")), identity, REMEDY)
+        return made(arrays)
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(f"{path} is damaged; {REMEDY}") from error
-    require_case(path, str(arrays.pop(IDENTITY, "")), identity, REMEDY)
-    return Worn.of_arrays(arrays)
+        raise UnreadableFile(f"{path} is damaged, or of another asperity; {REMEDY}") from error
+
+
+def _frame_file(folder: Path, number: int) -> Path:
+    return folder / FRAMES / f"{number:06d}.npz"
+
+
+def _frames(folder: Path, identity: str, before: int) -> dict[int, Frame]:
+    """Those kept of the jumps before that one."""
+    paths = [_frame_file(folder, number) for number in range(before)]
+    frames = [frame for path in paths if (frame := _read(path, identity, Frame.of_arrays)) is not None]
+    return {frame.number: frame for frame in frames}
 
 
 def _rows(folder: Path, identity: str) -> list[Row]:

@@ -24,9 +24,8 @@ class Worn:
     `number` of the jump and its `time` [s]; `worn` what the law of removal took off, `flattened` what was pressed flat,
     `changed` what mechanisms added (or, negative, took). `booked` is what `worn` must be of volume [m^3], k times
     asperity load times sliding distance; `mechanical` what mechanisms took. `rates` [m/s] and `seconds` of the jump
-    before, for the comparison of two jumps with one; `factor` on the length of jumps that it led to, `error` of Sq,
-    relative, that it has summed up to; `longest` [s] that mechanisms let the next jump take. `facts` of the jump and
-    `states` of mechanisms, by name and body.
+    before, for the comparison of two jumps with one; `error` of Sq, relative, that it has summed up to; `longest` [s]
+    that mechanisms let the next jump take. `facts` of the jump and `states` of mechanisms, by name and body.
     """
 
     number: int = 0
@@ -38,7 +37,6 @@ class Worn:
     seconds: float = 0.0
     booked: tuple[float, float] = (0.0, 0.0)
     mechanical: tuple[float, float] = (0.0, 0.0)
-    factor: float = 1.0
     error: float = 0.0
     longest: float = math.inf
     facts: Mapping[str, float] = field(default_factory=dict)
@@ -61,7 +59,6 @@ class Worn:
             self.number,
             self.time,
             self.seconds,
-            self.factor,
             self.error,
             self.longest,
             *self.booked,
@@ -77,7 +74,7 @@ class Worn:
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "Worn":
         """What `arrays` made."""
-        number, time, seconds, factor, error, longest, *volumes = map(float, arrays["numbers"])
+        number, time, seconds, error, longest, *volumes = map(float, arrays["numbers"])
         states: dict[str, dict[str, npt.NDArray[Any]]] = {}
         for name, value in arrays.items():
             if name.startswith("state:"):
@@ -85,6 +82,6 @@ class Worn:
                 states.setdefault(mechanism, {})[key] = value
         facts = {name.removeprefix("fact:"): float(value) for name, value in arrays.items() if name.startswith("fact:")}
         maps: dict[str, Any] = {name: (arrays[f"{name}_0"], arrays[f"{name}_1"]) for name in FIELDS}
-        begun = cls(**maps, number=int(number), time=time, seconds=seconds, factor=factor, error=error, longest=longest)
+        begun = cls(**maps, number=int(number), time=time, seconds=seconds, error=error, longest=longest)
         booked, mechanical = (volumes[0], volumes[1]), (volumes[2], volumes[3])
         return replace(begun, booked=booked, mechanical=mechanical, facts=facts, states=states)

@@ -53,16 +53,28 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughe
             return Coefficient(law.equal_to_archard(middle.k, boundary_friction), middle.low, middle.high)
 
         first, second = map(coefficient, self.k)
+        overrolling = plain(self.overrolling)
+        _require_ways_round(overrolling, conditions)
         chosen = {name: getattr(self, name) for name in MECHANISMS}
         return WearModel(
             law=law,
             coefficients=(first, second),
             flattening=self.flattening,
             mechanisms={name: _made(one, MECHANISMS[name]) for name, one in chosen.items() if one is not None},
-            overrolling=plain(self.overrolling),
+            overrolling=overrolling,
             patches=self.patches,
             step=self.step,
         )
+
+
+def _require_ways_round(rates: tuple[float, float] | None, conditions: ContactConditions) -> None:
+    width = 2.0 * conditions.hertz.half_widths[0]
+    for rate, speed in zip(rates or (), conditions.surface_speeds, strict=False):
+        if 0.0 < abs(speed) < rate * width:
+            raise BadInput(
+                f"overrolling of {rate:.4g} Hz at {abs(speed):.4g} m/s is a body {1e3 * abs(speed) / rate:.3g} mm "
+                f"round, less than the contact is wide ({1e3 * width:.3g} mm); state how often a point of it passes"
+            )
 
 
 def _made(section: Section, table: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The page of a history: maps that move with a slider over the steps, and curves over time."""
+"""The page of a history, or of wear: maps that move with a slider over the steps or hours, and curves over time."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +13,6 @@ from asperity.page.pictures import Pictures
 from asperity.page.widgets import BAR, LOOK, button, sentences, text_block
 from asperity.page.work import Refused
 from asperity.quantities import quantity
-
-MICROSECONDS = 1e6
 
 
 class HistoryView:
@@ -70,7 +68,8 @@ class HistoryView:
         self._show(0)
 
     def _draw_curves(self, moved: Moved) -> None:
-        time = moved.time * MICROSECONDS
+        clock = quantity(moved.clock)
+        time = moved.time * clock.factor
         across = Range1d(float(time[0]), float(time[-1]) or 1.0)
         figures = []
         for key, values in moved.curves.items():
@@ -80,7 +79,7 @@ class HistoryView:
             made.add_layout(self._now[-1])
             figures.append(made)
         if figures:
-            figures[-1].xaxis.axis_label = "time [µs]"
+            figures[-1].xaxis.axis_label = clock.axis
         self.curves.children = figures
 
     def _show(self, place: int) -> None:
@@ -88,9 +87,10 @@ class HistoryView:
         moved = self.moved
         if moved is None or not 0 <= place < len(moved.pictures):
             return
-        at = moved.times[place] * MICROSECONDS
-        self.step.tags = ["Step", str(moved.numbers[place])]
-        told = f"Step {moved.numbers[place]}, {at:.4g} µs, map {place + 1} of {len(moved.pictures)}"
+        clock = quantity(moved.clock)
+        at = moved.times[place] * clock.factor
+        told = f"{moved.names[place]}, {at:.4g} {clock.display}, map {place + 1} of {len(moved.pictures)}"
+        self.step.tags = ["Step", moved.names[place]]
         self.status.text = sentences([told], "soft")
         self.pictures.make()
         self.pictures.show(moved.pictures[place])

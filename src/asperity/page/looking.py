@@ -7,13 +7,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from asperity.ageing import Frame as WornFrame
+from asperity.ageing import WearHistory, is_wear, load_wear
 from asperity.arrays import Field
-from asperity.history import Frame, History, load_history
+from asperity.case import Case
+from asperity.history import Frame, load_history
 from asperity.page.answer import Answer, Picture, picture_parts
 from asperity.page.work import Ticket, solve_fully
 from asperity.study import StudyOverview, StudyResult, group_means, load_study
 
 MOST_FRAMES = 60  # steps of a history whose maps are shown
+OF_WEAR = ("sq_m", "clr", "worn_depth_1_m", "worn_depth_2_m", "friction_coefficient", "crf_hz")  # what of a worn one's
 OF_STEPS = ("clr", "car", "h_central_m", "friction_coefficient")  # what a history's curves show
 
 
@@ -88,19 +92,25 @@ def _study(folder: Path, stamp: float) -> StudyResult:  # noqa: ARG001 - one tha
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moved:
-    """A history as the page shows it: curves over time, SI by key, and maps of some steps."""
+    """A history as the page shows it: curves over time, SI by key, and maps of some moments.
+
+    `clock` is the key of the quantity that time is; `times` the moments that have maps, `names` what they are called.
+    """
 
     verdict: str
     notes: tuple[str, ...]
+    clock: str
     time: Field
     curves: dict[str, Field]
-    numbers: tuple[int, ...]
+    names: tuple[str, ...]
     times: tuple[float, ...]
     pictures: tuple[Picture, ...]
 
 
 def open_history(ticket: Ticket, folder: Path) -> Moved:  # noqa: ARG001
-    """A history's curves, and maps evenly over its steps."""
+    """A history's curves, and maps evenly over its steps; of a contact that wears, over its hours."""
+    if is_wear(folder):
+        return _worn(load_wear(folder))
     history = load_history(folder)
     every = -(-len(history.frames) // MOST_FRAMES) if history.frames else 1
     frames = history.frames[::every]
@@ -108,16 +118,31 @@ def open_history(ticket: Ticket, folder: Path) -> Moved:  # noqa: ARG001
     return Moved(
         verdict=history.verdict(),
         notes=history.notes,
+        clock="time_s",
         time=table["time_s"].to_numpy(dtype=float),
         curves={key: table[key].to_numpy(dtype=float) for key in OF_STEPS if key in table},
-        numbers=tuple(frame.number for frame in frames),
+        names=tuple(f"Step {frame.number}" for frame in frames),
         times=tuple(frame.time for frame in frames),
-        pictures=tuple(_picture(history, frame) for frame in frames),
+        pictures=tuple(_picture(history.case, frame) for frame in frames),
     )
 
 
-def _picture(history: History, frame: Frame) -> Picture:
-    """The maps of a step; cells without pressure or contact have ruptured, as in a contact at rest."""
-    case, touching = history.case, frame.in_contact
+def _worn(history: WearHistory) -> Moved:
+    table = history.table
+    return Moved(
+        verdict=history.verdict(),
+        notes=history.notes,
+        clock="hours",
+        time=table["hours"].to_numpy(dtype=float),
+        curves={key: table[key].to_numpy(dtype=float) for key in OF_WEAR if bool(table[key].notna().any())},
+        names=tuple(f"Jump {frame.number}" for frame in history.frames),
+        times=tuple(frame.hours for frame in history.frames),
+        pictures=tuple(_picture(history.case, frame) for frame in history.frames),
+    )
+
+
+def _picture(case: Case, frame: Frame | WornFrame) -> Picture:
+    """The maps of a moment; cells without pressure or contact have ruptured, as in a contact at rest."""
+    touching = frame.in_contact
     ruptured = (frame.pressure <= 0.0) & ~touching & (case.lubricant is not None)
     return Picture(**picture_parts(case.conditions, case.grid, frame.gap, frame.pressure, touching, ruptured))

@@ -1,8 +1,9 @@
-"""What the page is opened with: a case, a kept run, the folder of a study, a history or recordings; or nothing."""
+"""What the page is opened with: a case, a kept run, the folder of a study, a history, wear or recordings; nothing."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
+from asperity.ageing import is_wear, load_wear
 from asperity.case import Case, load_case
 from asperity.errors import UnreadableFile
 from asperity.history import is_history, load_history
@@ -51,6 +52,8 @@ def open_page(what: Path | None) -> Opened:
     if what.is_dir():
         if is_history(what):
             return Opened(kind="history", name=what.name, case=load_history(what).case, path=what)
+        if is_wear(what):
+            return Opened(kind="history", name=what.name, case=load_wear(what).case, path=what)
         if (what / MANIFEST).is_file():
             return Opened(kind="study", name=what.name, case=load_study(what).plan.case, path=what)
         return Opened(kind="recordings", name=what.name, case=paper(), path=what)

@@ -26,6 +26,7 @@ DEEPEST = 1.0  # Hertz half-widths
 LUNDBERG_PALMGREN = 9.3  # c/e = (31/3)/(10/9): exponent of life over shear stress, Lundberg and Palmgren (1947)
 WEAKEST, MOST_SCATTER = 0.1, 0.3
 FEW = 0.01  # of all cells, that a jump may let fail
+FINE, FINEST = 8.0, 16  # points across a bowl's radius, at least: cells are divided for it, into so many at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +74,7 @@ class Pits(Parametric):
         kept = {"damage": damage} | ({"strength": strength} if self.scatter > 0.0 else {})
         dx, dy = passage.grid.spacing
         facts = {
-            "measure_pa": stressed,
+            "measure_pa": self.known(stressed),
             "sum": fullest,
             "cells": float(np.count_nonzero(failed.any(axis=0))),
             "volume_m3": float(pits.sum() * dx * dy),
@@ -83,6 +84,10 @@ class Pits(Parametric):
     def measured(self, path: Field) -> Field:
         """The measure of each path [Pa], of stresses of shape (6, paths, positions), as far as it passes the limit."""
         raise NotImplementedError
+
+    def known(self, measure: float) -> float:
+        """The largest measure [Pa] as a result states it."""
+        return measure
 
     def damage(self, measure: Field) -> Field:
         """Share of its life that one over-rolling takes of a cell under a measure [Pa]; 0 up to the limit."""
@@ -111,6 +116,10 @@ class DangVanPits(Pits):
         """Dang Van's measure; a bound where that is below the limit of any cell."""
         weakest = max(WEAKEST, 1.0 - 6.0 * self.scatter) if self.scatter > 0.0 else 1.0
         return rating.dang_van_of_each(path, self.slope, above=weakest * self.limit)
+
+    def known(self, measure: float) -> float:
+        """Not a number up to the limit, where only a bound is computed."""
+        return measure if measure > self.limit else np.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,12 +211,24 @@ def _along_y(grid: Grid) -> tuple[int, bool]:
 
 
 def _bowl(depth: float, grid: Grid, aspect: float) -> tuple[Field, tuple[int, int]]:
-    """A bowl about the middle cell of an odd number of cells, and how many there are on either side."""
+    """Each cell's mean of a bowl about the middle one of an odd number of cells; how many there are on either side."""
     radius = 0.5 * aspect * depth
-    halves = [min(int(radius / step), (count - 1) // 2) for step, count in zip(grid.spacing, grid.cells, strict=True)]
-    x, y = (np.arange(-half, half + 1) * step for half, step in zip(halves, grid.spacing, strict=True))
-    square = (x[:, None] ** 2 + y[None, :] ** 2) / radius**2
-    return depth * np.maximum(1.0 - square, 0.0), (halves[0], halves[1])
+    halves, places = [], []
+    for step, count in zip(grid.spacing, grid.cells, strict=True):
+        half = min(int(np.ceil(radius / step - 0.5)), (count - 1) // 2)
+        divided = int(np.clip(np.ceil(FINE * step / radius), 1, FINEST))
+        fine = (np.arange((2 * half + 1) * divided) + 0.5) / divided
+        places.append((fine - half - 0.5) * step)
+        halves.append((half, divided))
+    (half_x, divided_x), (half_y, divided_y) = halves
+    square = (places[0][:, None] ** 2 + places[1][None, :] ** 2) / radius**2
+    cells = (2 * half_x + 1, divided_x, 2 * half_y + 1, divided_y)
+    bowl = np.maximum(1.0 - square, 0.0).reshape(cells).mean(axis=(1, 3))
+    if not bowl.any():  # far narrower than a cell
+        bowl[half_x, half_y] = 1.0
+    if all(2.0 * radius < extent for extent in grid.extent):
+        bowl *= 0.5 * np.pi * radius**2 / float(bowl.sum() * np.prod(grid.spacing))
+    return depth * bowl, (half_x, half_y)
 
 
 def _window(at: int, half: int, count: int, repeats: bool) -> tuple[Cells, Cells]:

@@ -2,8 +2,9 @@
 
 Where bodies touch all over, a wave of height A e^(iqx) carries a pressure of E* q A/2 and wears at k times it: A falls
 as exp(-k E* q s/2), s the way slid past it. A step that is longer than the shortest wave's decay would turn such waves
-over instead, and feed them. So a jump is no longer than that decay, and what it takes off is integrated along it
-exactly for such waves, by the factor (1 - exp(-z))/z, z = k E* q s/2, on every wave of the map: a mean of Cauchy
+over instead, and feed them. So what a jump takes off is integrated along it exactly for such waves, by the factor
+(1 - exp(-z))/z, z = k E* q s/2, on every wave of the map, and no jump is longer than some such decays: where bodies
+touch in parts, waves decay less, and what is spread along it is spread too far. The factor is a mean of Cauchy
 densities, so that the mean is kept and nothing is added anywhere. Where the cells end its spectrum it dips below 0 by
 some thousandths, which is cut off.
 """

@@ -15,7 +15,7 @@ MECHANISMS: dict[str, Mapping[str, type[Mechanism]]] = {  # what roughens: by ke
     "ploughing": PLOUGHING,
     "scuffing": SCUFFING,
 }
-DECAY = 20.0  # of the shortest wave, over the step: a factor e at the usual 0.05
+DECAY = 80.0  # of the shortest wave, over the step: a factor e^4 at the usual 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class WearModel:
     mechanisms : what roughens, by its key in MECHANISMS, in the order in which it is asked
     overrolling : how often a point of each body passes the contact [1/s]; None: bodies of equal radius, 2R each
     patches : positions of the tracks that a jump is the mean of; None: one every Hertz half-width, and at least 4
-    step : depth that a jump takes off anywhere over the Sq of both, at most; and a twentieth of the decay of the
+    step : depth that a jump takes off anywhere over the Sq of both, at most; and an eightieth of the decay of the
         shortest wave in it
     """
 

@@ -3,36 +3,21 @@
 The maps are small pictures in the page, shown one after the other by a few lines of script.
 """
 
-import json
-from base64 import b64encode
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
 
 from asperity.errors import BadInput
 from asperity.history import History, HistoryVibration
 from asperity.quantities import quantity
-from asperity.report.base import Picture, in_print, render, tile, write_page
+from asperity.report import moving
+from asperity.report.base import in_print, render, tile, write_page
 from asperity.report.motion import exhibits
 
-SCRIPT = resources.files("asperity.report.motion").joinpath("page.js").read_text("utf-8")
 NUMBERS = (
     "clr", "car", "car_domain", "contact_force_n", "h_min_m", "h_central_m", "h_mean_m", "p_max_pa",
     "friction_coefficient", "friction_power_w", "flow_power_w", "resonance_hz", "mass_flux_imbalance",
 )  # fmt: skip
 TILES = ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz")
-
-
-class MovingMap(NamedTuple):
-    """A map of the page: its axes, and where the pictures are laid over them, in per cent of the figure."""
-
-    picture: Picture
-    left: float
-    top: float
-    width: float
-    height: float
-    zone: tuple[float, ...]  # where lines mark the Hertz zone of a line contact
 
 
 def write_motion_report(history: History, path: str | Path, *, vibration: HistoryVibration | None = None) -> Path:
@@ -50,7 +35,7 @@ def write_motion_report(history: History, path: str | Path, *, vibration: Histor
 
 def render_motion_page(history: History, vibration: HistoryVibration | None = None) -> str:
     """The page as HTML text."""
-    reach = exhibits.ranges(history)
+    reach = moving.ranges(history.case, history.frames)
     over_time = exhibits.curves(history)
     figure = over_time.figure()
     box = figure.axes[0].get_position()
@@ -64,7 +49,7 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
         tiles=[
             tile(replace(quantity(key), deviation=f"{key}_std"), values) for key in TILES if values[key] is not None
         ],
-        maps=[_map(history, kind, reach) for kind in exhibits.KINDS],
+        maps=[moving.moving_map(history.case, kind, reach) for kind in moving.KINDS],
         curves=over_time.picture_of(figure),
         running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
         motion=motion,
@@ -73,36 +58,17 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
         settled_from=int(rows["step"].iloc[0]),
         model=history.case.contents.model,
         imbalance=quantity("mass_flux_imbalance").text(rows["mass_flux_imbalance"].mean()),
-        script=SCRIPT,
+        script=moving.SCRIPT,
         script_data=_script_data(history, reach, (100.0 * box.x0, 100.0 * box.x1)),
     )
 
 
-def _map(history: History, kind: exhibits.Kind, reach: exhibits.Ranges) -> MovingMap:
-    exhibit = exhibits.empty_map(history, kind, reach)
-    figure = exhibit.figure()
-    box = figure.axes[0].get_position()
-    left, top, width, height = (100.0 * share for share in (box.x0, 1.0 - box.y1, box.width, box.height))
-    grid, a = history.case.grid, history.case.conditions.hertz.half_widths[0]
-    sides = (-a, a) if history.case.conditions.endless else ()
-    zone = tuple(left + width * (side - grid.lower[0]) / grid.extent[0] for side in sides)
-    return MovingMap(exhibit.picture_of(figure), left, top, width, height, zone)
-
-
-def _script_data(history: History, reach: exhibits.Ranges, ends: tuple[float, float]) -> str:
-    """What the page's script shows of each kept step: its maps, its numbers in words, its place in time."""
-    pictures = [exhibits.frame_picture(frame, reach) for frame in history.frames]
+def _script_data(history: History, reach: moving.Ranges, ends: tuple[float, float]) -> str:
+    """What the page's script shows of each kept step, and where that is along the curves over time."""
     last = float(history.table["time_s"].iloc[-1])
-    held = json.dumps(
-        {
-            "ends": ends,
-            "frames": ["data:image/png;base64," + b64encode(packed).decode() for packed, _ in pictures],
-            "size": pictures[0][1],
-            "words": [_in_words(history, frame.number) for frame in history.frames],
-            "place": [frame.time / last if last else 0.0 for frame in history.frames],
-        }
-    )
-    return held.replace("<", "\\u003c")  # nothing in it ends the script
+    words = [_in_words(history, frame.number) for frame in history.frames]
+    place = [frame.time / last if last else 0.0 for frame in history.frames]
+    return moving.script_data(history.frames, words, reach, ends=ends, place=place)
 
 
 def _in_words(history: History, number: int) -> str:

@@ -65,7 +65,9 @@ def curves(history: WearHistory) -> Exhibit:
                     continue  # of a body that is smooth
                 _draw_over_hours(axes, history, key, colour, stroke)
             if len(axes.get_lines()) > 1:
-                axes.legend(loc="best")
+                low, high = axes.get_ylim()
+                axes.set_ylim(low, high + 0.25 * (high - low))  # room for the key
+                axes.legend(loc="upper right", ncols=3)
             axes.set_ylabel(quantity(side).label)
             axes.set_xlabel(quantity("hours").axis)
         return figure

@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from asperity.ageing import WearHistory, of_body
+from asperity.ageing import Frame, WearHistory, of_body
 from asperity.paper import is_papers_contact
 from asperity.quantities import quantity
+from asperity.report import moving
 from asperity.report.base import heading, in_print, render, tile, write_page
 from asperity.report.wearing import exhibits
 
@@ -47,12 +48,14 @@ def render_wear_page(history: WearHistory) -> str:
     bodies = exhibits.worn_bodies(history)
     sounds = bool(history.table["crf_hz"].notna().any())
     papers = is_papers_contact(history.case)
+    reach = moving.ranges(history.case, history.frames)
     return render(
         "wearing/page.html.j2",
         title="A contact that wears",
         history=history,
         tiles=[tile(quantity(key), at_end) for key in TILES if last[key] == last[key]],
         resonance=exhibits.resonance(history, papers=papers).picture() if sounds else None,
+        maps=[moving.moving_map(history.case, kind, reach) for kind in moving.KINDS],
         curves=exhibits.curves(history).picture(),
         surfaces=[exhibits.surfaces(body).picture() for body in bodies],
         profiles=exhibits.profiles(bodies).picture() if bodies else None,
@@ -63,7 +66,18 @@ def render_wear_page(history: WearHistory) -> str:
         coefficients=[f"{one.k:.3g}" for one in history.ageing.model.coefficients],
         stages=None if history.stages is None else in_print(history.stages.verdict),
         jump_error=quantity("jump_error").text(history.worn.error),
+        script=moving.SCRIPT,
+        script_data=moving.script_data(history.frames, [_in_words(history, frame) for frame in history.frames], reach),
     )
+
+
+def _in_words(history: WearHistory, frame: Frame) -> str:
+    """When a frame is, where on the tracks, and what the contact is like then on average."""
+    row, spacing = history.table.iloc[frame.number], history.case.grid.spacing[0]
+    moves = [body for body in (0, 1) if history.ageing.bodies[body].speed != 0.0]
+    places = " and ".join(f"{1e3 * frame.position[body] * spacing:.3f} mm on body {body + 1}" for body in moves)
+    means = ", ".join(quantity(key).named(row[key]) for key in ("sq_m", "clr"))
+    return in_print(f"after {frame.hours:.4g} h, at {places}; all positions: {means}")
 
 
 def _line(key: str, first: float, second: float) -> Line:

@@ -8,7 +8,7 @@ at.max = pictures.length - 1;
 function show(k) {
   at.value = k;
   words.textContent = data.words[k];
-  now.style.left = (data.ends[0] + data.place[k] * (data.ends[1] - data.ends[0])) + "%";
+  if (now) now.style.left = (data.ends[0] + data.place[k] * (data.ends[1] - data.ends[0])) + "%";
   const draw = () => fields.forEach((field, n) => field.drawImage(pictures[k], 0, n * ny, nx, ny, 0, 0, nx, ny));
   pictures[k].complete ? draw() : pictures[k].addEventListener("load", () => { if (+at.value === k) draw(); });
 }
