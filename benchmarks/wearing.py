@@ -12,22 +12,28 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from asperity import load_case, run_wear
 from asperity.ageing import Ageing, Solved, WearHistory, WearProgress, load_wear
 from asperity.ageing.rows import load_share
 from asperity.case import Case
+from asperity.paper import CRF_ENDS_HZ
+from asperity.quantities import quantity
+from asperity.report.style import BLUE, DASHED, GREEN, ON_PAGE, VERMILION, write_figure
 from asperity.surface.read import surface_topography
 from asperity.wearing import positions, seen
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "wearing"
-WEARS = ("ageing", "wearing", "ehl", "kernels", "surface", "lubricant")  # rooms that decide a history
+WEARS = ("wearing", "ehl", "kernels", "surface", "lubricant")  # rooms that decide a history; of their own room these:
+DECIDE = ("jump", "run", "contact", "reach", "worn", "rows")
+IMAGES = ROOT / "docs" / "images"
 EXAMPLE = ROOT / "examples" / "wear.toml"
 MEASURED = ROOT.parent / "shared" / "data" / "surfaces" / "milled_1.opd"
 KILLS, HOURS_KILLED = 10, 3.0
@@ -87,9 +93,10 @@ class Shelf:
 def stamp() -> str:
     """The code that wears, as a digest: histories of other code are not gone on with."""
     digest = hashlib.sha256()
-    for room in WEARS:
-        for path in sorted((ROOT / "src" / "asperity" / room).rglob("*.py")):
-            digest.update(path.read_bytes())
+    package = ROOT / "src" / "asperity"
+    paths = [path for room in WEARS for path in sorted((package / room).rglob("*.py"))]
+    for path in (*paths, *(package / "ageing" / f"{name}.py" for name in DECIDE)):
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
@@ -213,30 +220,34 @@ def intervals() -> Iterator[str]:
     yield f"\nThe interval is {np.mean(widths):.3f} wide on average.\n"
 
 
-PLATEAUS = tuple(
-    (sq, k, hours) for sq in ("0.5 um", "1 um", "2 um") for k, hours in ((3e-17, 200.0), (1e-16, 60.0), (3e-16, 20.0))
-)
+PLATEAUS = tuple((sq, k, 6e-15 / k) for k in (1e-16, 3e-17, 3e-16) for sq in ("0.5 um", "1 um", "2 um"))
 TIMES_K = (0.0, 1e-16, 3e-16, 1e-15, 3e-15, 6e-15)  # k of the ring times hours, at which a plateau's curves are told
 
 
 def plateau_plan(sq: str, k: float, hours: float) -> Plan:
-    overrides: Overrides = {"surface.sq": sq, "wear.k": coefficients(k), "grid.cells": [48, 48]}
+    overrides: Overrides = {
+        "surface.sq": sq, "surface.correlation_length": "30 um", "wear.k": coefficients(k), "grid.cells": [32, 32],
+    }  # fmt: skip
     return Plan(f"plateau-{sq.replace(' ', '')}-{k:g}", hours, overrides)
 
 
 def plateau(shelf: Shelf) -> Iterator[str]:
     """Removal alone, as long in k times time."""
     keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio")
-    yield "\n## Removal alone: three roughnesses, three coefficients (48 x 48 cells)\n"
+    yield "\n## Removal alone: three roughnesses, three coefficients (32 x 32 cells, correlation length 30 um)\n"
     yield f"| sq | k of the ring [1/Pa] | hours | k times hours | {' | '.join(keys)} | jumps |"
     yield f"|---|---|---|---|{'---|' * len(keys)}---|"
-    plans = [plateau_plan(*one) for one in PLATEAUS]
-    for (sq, k, hours), (_, history, _) in zip(PLATEAUS, shelf.all(plans), strict=False):
+    done = {plan.name: history for plan, history, _ in shelf.all([plateau_plan(*one) for one in PLATEAUS])}
+    for sq, k, hours in PLATEAUS:
+        if (history := done.get(plateau_plan(sq, k, hours).name)) is None:
+            continue
         for turned in TIMES_K:
             if turned <= k * hours * (1.0 + 1e-9):
                 moment = history.at(min(turned / k, hours))
                 told = " | ".join(f"{moment[key]:.4g}" for key in keys)
                 yield f"| {sq} | {k:g} | {turned / k:g} | {turned:g} | {told} | {len(history.table) - 1} |"
+    if done:
+        draw_plateaus(done)
 
 
 def measured(shelf: Shelf) -> Iterator[str]:
@@ -275,16 +286,73 @@ def rings(shelf: Shelf) -> Iterator[str]:
             yield f"| {k:g} | {row(history, *keys)} |"
 
 
+def falls_and_rises(shelf: Shelf) -> Iterator[str]:
+    """Removal beside the debris of filtered oil."""
+    keys = ("sq_m", "sq_1_m", "sq_2_m", "spk_m", "svk_m", "ssk", "clr", "crf_hz")
+    overrides: Overrides = {
+        "grid.cells": [40, 80], "wear.patches": 4,  # fine across: the marks are grooves along
+        "wear.ploughing": {"law": "debris", "concentration": "8e8 1/m^3", "sinking": 0.2, "largest": "10 um"},
+    }  # fmt: skip
+    yield "\n## Sq falls, then rises: removal, and debris of 800 particles a millilitre up to 10 um\n"
+    yield f"| hours | {' | '.join(keys)} |"
+    yield f"|---|{'---|' * len(keys)}"
+    for _, history, _ in shelf.all([Plan("falls-and-rises", 40.0, overrides)]):
+        for hours in (0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0):
+            moment = history.at(hours)
+            yield f"| {hours:g} | {' | '.join(f'{moment[key]:.4g}' for key in keys)} |"
+        draw_rise(history)
+
+
+COLOURS = {"0.5um": BLUE, "1um": GREEN, "2um": VERMILION}
+STROKES = {1e-16: "-", 3e-17: "--", 3e-16: ":"}
+
+
+def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
+    """Parameters of both bodies and CLR over k times hours, a colour each Sq, a stroke each k."""
+    figure = Figure(figsize=(ON_PAGE.double, 4.6), layout="constrained")
+    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio")
+    for axes, key in zip(figure.subplots(2, 3).ravel(), keys, strict=True):
+        for name, history in histories.items():
+            _, sq, k = name.split("-", 2)
+            table = history.table
+            axes.plot(
+                1e16 * float(k) * table["hours"], quantity(key).factor * table[key], STROKES[float(k)],
+                color=COLOURS[sq], linewidth=1.2,
+                label=f"Sq {sq.removesuffix('um')} µm" if float(k) == 1e-16 and key == "sq_m" else None,
+            )  # fmt: skip
+        axes.set(ylabel=quantity(key).label, xlabel="k times hours [1e-16 h/Pa]")
+    figure.legend(loc="outside lower center", ncols=3)
+    write_figure(figure, IMAGES / "wear-plateau.png")
+
+
+def draw_rise(history: WearHistory) -> None:
+    """Sq and CRF over hours, of removal beside debris."""
+    figure = Figure(figsize=(ON_PAGE.double, 2.9), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    table = history.table
+    for key, name, colour in (("sq_m", "both", BLUE), ("sq_2_m", "ring", GREEN), ("sq_1_m", "roller", VERMILION)):
+        left.plot(table["hours"], 1e6 * table[key], color=colour, label=name)
+    left.legend()
+    left.set(xlabel=quantity("hours").axis, ylabel=quantity("sq_m").label)
+    right.fill_between(table["hours"], table["crf_low_hz"], table["crf_high_hz"], color=BLUE, alpha=0.15, linewidth=0)
+    right.plot(table["hours"], table["crf_hz"], color=BLUE)
+    for end in CRF_ENDS_HZ:
+        right.axhline(end, color=VERMILION, linestyle=DASHED, linewidth=0.9)
+    right.set(xlabel=quantity("hours").axis, ylabel=quantity("crf_hz").label)
+    write_figure(figure, IMAGES / "wear-falls-and-rises.png")
+
+
 def lines(*, fast: bool, seconds: float) -> Iterator[str]:
     shelf = Shelf(seconds)
-    if not fast:
-        yield from kills()
-        yield from intervals()
+    yield from plateau(shelf)
+    yield from falls_and_rises(shelf)
+    yield from rings(shelf)
     yield from jumps(shelf)
     yield from grids(shelf)
-    yield from plateau(shelf)
     yield from measured(shelf)
-    yield from rings(shelf)
+    if not fast:
+        yield from intervals()
+        yield from kills()
     yield from speed(shelf)
     if shelf.left:
         yield f"\nNot at their end for want of time; the same command goes on with them: {', '.join(shelf.left)}.\n"

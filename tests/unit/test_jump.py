@@ -9,6 +9,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.ageing.contact import Solved
+from asperity.ageing.history import WearHistory
 from asperity.ageing.jump import Ageing
 from asperity.ageing.notes import of_energy, of_few_jumps, of_grooves, of_radii, of_standing
 from asperity.ageing.rows import of_body, roughness
@@ -251,3 +252,42 @@ def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened(
 def test_a_law_of_friction_without_friction_is_refused():
     with pytest.raises(BadInput, match="boundary friction of 0"):
         ageing({"wear.law": "energy", "material.boundary_friction": 0.0})
+
+
+def fallen(slope: float, curve: float = 0.0, scatter: float = 0.0, seed: int = 0, scaled: float = 0.5) -> WearHistory:
+    """A history, made up, of a CLR that falls by so much an hour, over ten hours."""
+    model = ageing({"wear.scatter": scaled})
+    hours = np.linspace(0.0, 10.0, 41)
+    clr = 0.7 + slope * hours + curve * hours**2 + scatter * np.random.default_rng(seed).standard_normal(hours.size)
+    table = pandas.DataFrame({"hours": hours, "clr": clr})
+    return WearHistory(ageing=model, table=table, worn=Worn.begin(model.surfaces))
+
+
+def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
+    history = fallen(-0.01)
+    slow, fast = history.scaled_by
+    assert history.drift("clr") == pytest.approx((-0.01, -0.01 * fast, -0.01 * slow), rel=1e-9)
+    assert fallen(-0.01, scaled=0.0).drift("clr", 2.0, 4.0) == pytest.approx((-0.01, -0.01, -0.01), rel=1e-9)
+    with pytest.raises(BadInput, match=r"a drift of clr needs 4 rows that know it, got fewer from 3 to 3\.4 h"):
+        history.drift("clr", 3.0, 3.4)
+    with pytest.raises(BadInput, match="has no number clear; it has hours, clr"):
+        history.drift("clear")
+
+
+def test_the_drift_with_another_k_is_that_of_another_time():
+    """Of a parabola, read from 2 to 4 h, k so much larger is the slope so much later, and so much faster."""
+    history = fallen(-0.01, 0.0005)
+    slow, fast = history.scaled_by
+    at = {factor: factor * (-0.01 + 0.001 * 3.0 * factor) for factor in (slow, 1.0, fast)}
+    drift = history.drift("clr", 2.0, 4.0)
+    assert drift.per_hour == pytest.approx(at[1.0], rel=1e-6)
+    assert drift.low == pytest.approx(min(at.values()), rel=0.1)
+    assert drift.high == pytest.approx(max(at.values()), rel=0.1)
+
+
+def test_the_interval_of_a_drift_holds_nine_times_in_ten():
+    held = 0
+    for seed in range(300):
+        drift = fallen(-0.01, scatter=0.02, seed=seed, scaled=0.0).drift("clr")
+        held += drift.low <= -0.01 <= drift.high
+    assert 0.86 < held / 300 < 0.94

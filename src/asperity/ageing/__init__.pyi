@@ -2,6 +2,7 @@ from .contact import Failed as Failed
 from .contact import PositionSolver as PositionSolver
 from .contact import Solved as Solved
 from .frames import Frame as Frame
+from .history import Drift as Drift
 from .history import WearHistory as WearHistory
 from .jump import Ageing as Ageing
 from .rows import of_body as of_body

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas
+import scipy
 
 from asperity.ageing.frames import Frame
 from asperity.ageing.jump import BODIES, Ageing
@@ -25,8 +26,22 @@ from asperity.surface import MovingSurfaces
 from asperity.wear import Stages, split_stages
 
 HOUR = 3600.0
+FEWEST_ROWS = 4  # that a drift is read from
 MOST_PLACES = 60  # that stages are read from
 ENDS = ("sq_m", "clr", "car", "solid_load_ratio", "h_mean_m", "friction_coefficient", "crf_hz", "crfa")
+
+
+class _Slope(NamedTuple):
+    slope: float
+    scatter: float
+
+
+class Drift(NamedTuple):
+    """How fast a number changes as the contact wears, in its unit an hour, and the ends of its 90 % interval."""
+
+    per_hour: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,6 +175,42 @@ class WearHistory:
             ends.append((float(np.min(reached)), float(np.max(reached))) if whole else (math.nan, math.nan))
         low, high = np.array(ends).T
         return pandas.DataFrame({"hours": hours, "low": low, "high": high})
+
+    def drift(self, key: str, since: float = 0.0, until: float | None = None) -> Drift:
+        """How fast a number of the table changes between two moments [h], by the line nearest to its rows there.
+
+        The interval is Student's of the line's slope, as rows scatter with the positions that they are the mean of,
+        and, where k is the only clock (`scaled_by`), it reaches over the slopes with k at the ends of its interval:
+        that of the history so much earlier or later, as far as it goes, so much slower or faster.
+
+        Raises
+        ------
+        BadInput
+            for a number that the table has not, or fewer than FEWEST_ROWS rows between the moments that know it.
+        """
+        if key not in self.table:
+            raise BadInput(f"the wear history has no number {key}; it has {', '.join(map(str, self.table.columns))}")
+        end = float(self.table["hours"].iloc[-1])
+        moments = since, end if until is None else until
+        here = self._slope(key, *moments)
+        if here is None:
+            raise BadInput(
+                f"a drift of {key} needs {FEWEST_ROWS} rows that know it, got fewer from {moments[0]:g} to "
+                f"{moments[1]:g} h; take moments further apart, or wear it with a smaller wear.step"
+            )
+        ends = [sign * here.scatter + here.slope for sign in (-1.0, 1.0)]
+        for factor in self.scaled_by or ():
+            there = self._slope(key, factor * moments[0], min(factor * moments[1], end)) or here
+            ends += [factor * (there.slope + sign * there.scatter) for sign in (-1.0, 1.0)]
+        return Drift(here.slope, min(ends), max(ends))
+
+    def _slope(self, key: str, since: float, until: float) -> "_Slope | None":
+        """Of the line nearest to the rows between, with half of its 90 % interval; None of too few rows."""
+        rows = self.table[self.table["hours"].between(since, until) & self.table[key].notna()]
+        if len(rows) < FEWEST_ROWS:
+            return None
+        fitted = scipy.stats.linregress(rows["hours"].to_numpy(float), rows[key].to_numpy(float))
+        return _Slope(float(fitted.slope), float(scipy.stats.t.ppf(0.95, len(rows) - 2) * fitted.stderr))
 
     def volume_interval(self, body: int) -> tuple[float, float] | None:
         """The 90 % interval of a body's worn volume [m^3], by k.

@@ -255,10 +255,10 @@ class Ageing:
         height = self.model.step * self.height(worn)
         modulus = self.case.conditions.pair.reduced_modulus
         longest = longest_jump(exposures, rates, height, self.model.decay, spacing, modulus)
-        if not self.model.removal_alone:
+        longest = min(longest, worn.longest)
+        if self.model.flattening or (worn.number == 0 and self.model.mechanisms):
             slowest = min((rate for rate in self.overrolling if rate > 0.0), default=1.0)
-            settled = max(worn.time, 1.0 / slowest)  # what settles at once is looked at often at first
-            longest = min(longest, worn.longest, settled)
+            longest = min(longest, max(worn.time, 1.0 / slowest))  # what settles at once is looked at often at first
         return self._within_error(worn, rates, exposures, longest)
 
     def _within_error(
