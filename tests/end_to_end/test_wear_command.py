@@ -13,6 +13,7 @@ KEYS = [
     *("jump_error", "jumps", "computed", "failed", "patches", "seconds", "folder", "table", "surfaces", "notes"),
     *("sq_m", "clr", "car", "solid_load_ratio", "h_mean_m", "friction_coefficient", "crf_hz", "crfa"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "stage", "report"),
+    *("clr_mean_low", "clr_mean_high", "crf_mean_low_hz", "crf_mean_high_hz"),
 ]
 
 

@@ -12,7 +12,7 @@ from asperity.ageing.contact import Solved
 from asperity.ageing.history import WearHistory
 from asperity.ageing.jump import Ageing
 from asperity.ageing.notes import of_energy, of_few_jumps, of_grooves, of_radii, of_standing
-from asperity.ageing.rows import of_body, roughness
+from asperity.ageing.rows import contact_row, of_body, roughness
 from asperity.ageing.run import _row
 from asperity.ageing.worn import Worn
 from asperity.ehl import ContactState
@@ -291,3 +291,16 @@ def test_the_interval_of_a_drift_holds_nine_times_in_ten():
         drift = fallen(-0.01, scatter=0.02, seed=seed, scaled=0.0).drift("clr")
         held += drift.low <= -0.01 <= drift.high
     assert 0.86 < held / 300 < 0.94
+
+
+def test_the_mean_over_positions_has_students_interval():
+    """Four shares: mean .5, deviation .1291, t(3, 95 %) = 2.353 from a printed table: .5 ± .1519."""
+    model = ageing()
+    solved = rubbed(model)[0][1]
+    shares = (0.35, 0.45, 0.55, 0.65)
+    row = contact_row(model.case, [replace(solved, state=replace(STATE, clr=share)) for share in shares], 1e-6)
+    assert row["clr"] == pytest.approx(0.5)
+    assert (row["clr_mean_low"], row["clr_mean_high"]) == pytest.approx((0.5 - 0.1519, 0.5 + 0.1519), abs=1e-4)
+    assert row["crf_mean_low_hz"] < row["crf_hz"] < row["crf_mean_high_hz"]
+    alone = contact_row(model.case, [solved], 1e-6)
+    assert math.isnan(alone["clr_mean_low"])

@@ -14,7 +14,7 @@ import scipy
 from asperity.ageing.frames import Frame
 from asperity.ageing.jump import BODIES, Ageing
 from asperity.ageing.notes import told
-from asperity.ageing.rows import of_body, state_of_row
+from asperity.ageing.rows import RESONANCE, of_body, state_of_row
 from asperity.ageing.worn import Worn
 from asperity.arrays import finite_or_none
 from asperity.case import Case
@@ -260,7 +260,7 @@ class WearHistory:
         }
         for key in ENDS:
             scalars[key] = [finite_or_none(first[key]), finite_or_none(last[key])]
-        for key in ("clr_low", "clr_high", "crf_low_hz", "crf_high_hz"):
+        for key in ("clr_low", "clr_high", "clr_mean_low", "clr_mean_high", *RESONANCE):
             scalars[key] = finite_or_none(last[key])
         scalars["stage"] = None if self.stages is None else self.stages.kind
         return scalars

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 
 from asperity.ageing.contact import Solved
 from asperity.case import Case
@@ -16,6 +17,13 @@ from asperity.surface import Surface, height_parameters
 
 Row = dict[str, float | int]
 
+LEVEL = 0.95  # of Student's distribution: 90 % lie between both of its ends
+RESONANCE = {  # end of an interval of CRF: that of CLR
+    "crf_low_hz": "clr_low",
+    "crf_high_hz": "clr_high",
+    "crf_mean_low_hz": "clr_mean_low",
+    "crf_mean_high_hz": "clr_mean_high",
+}
 LEAST_SQ = 1e-15  # [m] below which heights are rounding, and have no shape
 
 ROUGHNESS = {  # column: field of HeightParameters
@@ -90,7 +98,7 @@ def load_share(solved: Sequence[Solved]) -> Uncertainty:
 
 
 def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
-    """What the mean contact is like, with the 90 % interval of its load share and resonance.
+    """What the mean contact is like, with 90 % intervals of its load share and resonance: whole, and of the mean alone.
 
     `sq` [m] is that of the tracks, the form that wear gave them left out.
     """
@@ -103,22 +111,26 @@ def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
         values = [value for one in solved if (value := getattr(one.state, name)) is not None]
         if name != "sq":
             row[key] = float(np.mean(values)) if values else math.nan
+    shares = [one.state.clr for one in solved]
+    off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
+    reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), LEVEL))
+    of_mean = max(0.0, row["clr"] - reach), min(1.0, row["clr"] + reach)
     row |= {
         "clr_low": low,
         "clr_high": high,
+        "clr_mean_low": of_mean[0] if len(shares) > 1 else math.nan,
+        "clr_mean_high": of_mean[1] if len(shares) > 1 else math.nan,
         "solid_load_ratio": float(np.mean(borne)),
         "friction_coefficient": float(np.mean([one.friction_coefficient for one in solved])),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }
-    shares = [one.state.clr for one in solved]
-    off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
-    return row | _resonance(case, state_of_row(row), (low, high), off)
+    return row | _resonance(case, row, off)
 
 
-def _resonance(case: Case, state: ContactState, interval: tuple[float, float], off: float) -> Row:
+def _resonance(case: Case, row: Row, off: float) -> Row:
     """Of the mean contact's oscillator, and the height of its line, in closed form; `off` of the mean CLR."""
-    nothing = dict.fromkeys(("crf_hz", "crf_std_hz", "crf_low_hz", "crf_high_hz", "crfa"), math.nan)
-    model, conditions = case.vibration, case.conditions
+    nothing = dict.fromkeys(("crf_hz", "crf_std_hz", *RESONANCE, "crfa"), math.nan)
+    model, conditions, state = case.vibration, case.conditions, state_of_row(row)
     if model is None or model.needs_solution:
         return nothing
     try:
@@ -135,8 +147,7 @@ def _resonance(case: Case, state: ContactState, interval: tuple[float, float], o
     return {
         "crf_hz": float(own),
         "crf_std_hz": 0.5 * (at(state.clr + off) - at(state.clr - off)),
-        "crf_low_hz": at(interval[0]),
-        "crf_high_hz": at(interval[1]),
+        **{key: at(row[share]) for key, share in RESONANCE.items()},
         "crfa": float(spring.gain(own) * below.density(own, model.rate_hz)),
     }
 

@@ -72,11 +72,12 @@ def curves(history: WearHistory) -> Exhibit:
             axes.set_xlabel(quantity("hours").axis)
         return figure
 
-    by_k = " Shaded: the interval of the wear coefficient; it ends where the history would have to be longer."
+    by_k = " Lightly shaded: the interval of the wear coefficient; it ends where the history would have to be longer."
     return Exhibit(
         "over-hours",
         draw,
-        "Over hours of running, a point a jump." + (by_k if history.scaled_by is not None else ""),
+        "Over hours of running, a point a jump. Shaded about CLR: 90 % of its mean over a jump's positions."
+        + (by_k if history.scaled_by is not None else ""),
         "Roughness parameters, load and area shares, film, friction, flash temperature, worn depth and CRFA over hours",
     )
 
@@ -85,6 +86,9 @@ def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, st
     hours, factor = history.table["hours"].to_numpy(float), quantity(key).factor
     label = quantity(key).short if quantity(key).symbol else quantity(key).title
     axes.plot(hours, factor * history.table[key].to_numpy(float), stroke, color=colour, label=label)
+    if key == "clr":
+        low, high = (factor * history.table[end].to_numpy(float) for end in ("clr_mean_low", "clr_mean_high"))
+        axes.fill_between(hours, low, high, color=colour, alpha=0.3, linewidth=0)
     band = history.with_k(key)
     if band is not None:
         axes.fill_between(hours, factor * band["low"], factor * band["high"], color=colour, alpha=0.12, linewidth=0)
@@ -100,8 +104,13 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         left, right = panels_in_rows(figure, 2)
         hours, sq = table["hours"].to_numpy(float), display("sq_m", table["sq_m"].to_numpy(float))
         crf, low, high = (table[key].to_numpy(float) for key in ("crf_hz", "crf_low_hz", "crf_high_hz"))
+        least, most = (table[key].to_numpy(float) for key in ("crf_mean_low_hz", "crf_mean_high_hz"))
         for axes, x, key in ((left, hours, "hours"), (right, sq, "sq_m")):
-            axes.fill_between(x, low, high, color=BLUE, alpha=0.15, linewidth=0, label="90 % of positions and grid")
+            axes.fill_between(
+                x, least, most, color=BLUE, alpha=0.3, linewidth=0, label="90 % of the mean over positions"
+            )
+            if np.isfinite(low).any():
+                axes.fill_between(x, low, high, color=BLUE, alpha=0.1, linewidth=0, label="90 % with scatter and grid")
             axes.plot(x, crf, color=BLUE, label="this contact")
             axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
         right.plot(sq[:1], crf[:1], "o", color=BLUE, markersize=4, label="new")
