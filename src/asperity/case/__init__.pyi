@@ -7,6 +7,8 @@ from .beginnings import KINDS as KINDS
 from .beginnings import beginning as beginning
 from .case import Case as Case
 from .case import load_case as load_case
+from .infer import InferSection as InferSection
+from .infer import PriorSection as PriorSection
 from .laws import LubricantSection as LubricantSection
 from .laws import OilSupply as OilSupply
 from .laws import ThermalSection as ThermalSection

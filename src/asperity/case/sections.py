@@ -17,6 +17,7 @@ from asperity.case.amounts import (
     default_amount,
     parse_amount,
 )
+from asperity.case.infer import InferSection, parse_infer
 from asperity.case.laws import LubricantSection, ThermalSection
 from asperity.case.oils import SheetSection, parse_lubricant
 from asperity.case.refusals import LocatedError, Section, quoted
@@ -139,3 +140,4 @@ class CaseFile(Section):
     study: Annotated[StudySection | None, PlainValidator(parse_study)] = None
     motion: Annotated[MotionSection | None, OPTIONAL] = None
     wear: Annotated[WearSection | None, OPTIONAL] = None
+    infer: Annotated[InferSection | None, PlainValidator(parse_infer)] = None

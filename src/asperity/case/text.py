@@ -11,6 +11,7 @@ from typing import Any
 import tomli_w
 
 from asperity.case.amounts import Amount
+from asperity.case.infer import InferSection
 from asperity.case.oils import SheetSection
 from asperity.case.refusals import Section, parse_section, quoted
 from asperity.case.sections import CaseFile
@@ -108,7 +109,7 @@ def _toml_value(text: str) -> object:
 def _plain(section: Section) -> dict[str, Any]:
     """Tables of plain values, quantities as they were written; what is left out stays out."""
     values = {entry.alias or name: getattr(section, name) for name, entry in type(section).model_fields.items()}
-    if isinstance(section, StudySection):
+    if isinstance(section, StudySection | InferSection):
         values |= values.pop("axes")
     return {key: _plain_value(value) for key, value in values.items() if value is not None}
 

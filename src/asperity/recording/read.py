@@ -27,7 +27,7 @@ from asperity.recording.model import (
     ReadOptions,
     Recording,
 )
-from asperity.recording.sidecar import stated_beside
+from asperity.recording.sidecar import OPERATING, stated_beside
 from asperity.recording.units import acceleration_scale
 
 _SAME = 1e-4  # relative difference up to which two stated rates agree
@@ -186,6 +186,7 @@ def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecordi
     elif unit_text == "g":
         unit_text = "gram-force"
         notes.append(f"g is taken as grams of force, because the channel is called {selected.name}")
+    facts |= {key: stated[key] for key in OPERATING if key in stated}
     named = parse_time(path.name) or parse_time(path.stem)
     if "started" in stated:
         facts["started"] = stated["started"]

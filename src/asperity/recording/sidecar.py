@@ -10,7 +10,8 @@ from asperity.errors import BadInput
 from asperity.recording.common import parse_time
 
 FOLDER_WIDE = "recordings"
-KEYS = ("rate_hz", "unit", "channel", "scale", "started")
+OPERATING = ("load_n", "entrainment_m_s", "temperature_degc")  # of the contact, for `asperity infer`
+KEYS = ("rate_hz", "unit", "channel", "scale", "started", *OPERATING)
 SUFFIXES = (".toml", ".json")
 
 
@@ -56,6 +57,9 @@ def _checked(path: Path) -> dict[str, Any]:
             number and 0.0 < abs(value) < float("inf") and (value > 0 or key == "scale")
         ):
             raise BadInput(f"{path.name}: {key} must be a positive number, got {value!r}")
+        if key in OPERATING and not (number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING[2])):
+            what = "a temperature in degC" if key == OPERATING[2] else "a positive number"
+            raise BadInput(f"{path.name}: {key} must be {what}, got {value!r}")
         if key in ("unit", "channel") and not isinstance(value, str) and not (key == "channel" and number):
             raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
     if "started" in stated:

@@ -43,9 +43,12 @@ from .plan import SEED_KEYS as SEED_KEYS
 from .plan import StudyCase as StudyCase
 from .plan import StudyPlan as StudyPlan
 from .plan import as_written as as_written
+from .plan import full_key as full_key
 from .plan import plan_points as plan_points
 from .plan import plan_study as plan_study
 from .ranges import ParameterRange as ParameterRange
+from .ranges import overrides_at as overrides_at
+from .ranges import require_ranges as require_ranges
 from .ranges import stated_value as stated_value
 from .rated import DangVan as DangVan
 from .rated import Rating as Rating

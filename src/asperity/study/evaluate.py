@@ -7,6 +7,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 from threadpoolctl import threadpool_limits
@@ -24,6 +25,7 @@ DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
 QUICK = tuple(group for group in RUN_GROUPS if group != "own")  # its own stiffness takes as long as the contact
+STILL = tuple(group for group in RUN_GROUPS if group not in ("heat", "stress", "resonance"))
 
 Row = dict[str, Any]
 _alone = threading.Lock()  # the solver's work arrays are one set a process, and an executor may have threads
@@ -89,6 +91,12 @@ def _over_surfaces(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str,
     return {**_status(run), **mean_row((first, *others)), **read(run, lines(DOUBT))}, {}
 
 
+def _still(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+    """The contact with its own stiffness and damping where its mass resonates, and no record of a vibration."""
+    run = solve_case(case.with_overrides({"vibration": "none"}), strict=False)
+    return {**_status(run), **replace(run, case=case).numbers(STILL)}, {}
+
+
 def _vibrated(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
     return {"status": DONE, "reason": "", **vibrate_case(case).scalars()}, {}
 
@@ -97,6 +105,7 @@ EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Fi
     "solve": _solved,
     "shake": lambda case, wanted: _solved(case, wanted, RUN_GROUPS),
     "surfaces": _over_surfaces,
+    "still": _still,
     "vibrate": _vibrated,
 }
 

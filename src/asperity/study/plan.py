@@ -20,7 +20,7 @@ import scipy
 from asperity.case import Case, RangeSection, Section, Seeding, StudyKind, split_amount, to_si
 from asperity.errors import BadInput, UnreadableFile
 
-PlanKind: TypeAlias = StudyKind | Literal["surfaces"]
+PlanKind: TypeAlias = StudyKind | Literal["surfaces", "still"]
 SEED_KEYS = ("surface.seed", "vibration.seed")
 MOST_CASES = 10_000_000
 DIGITS = 9  # of a sampled value
@@ -58,7 +58,8 @@ class StudyPlan:
     points : replaced values by key, as a case file writes them
     realisations : surfaces (and vibration records) a point
     kind : "solve", a contact each; "shake", its own stiffness and damping too; "vibrate", the vibration model alone;
-        "surfaces", means and intervals over the surfaces that [solver] asks for
+        "still", a contact each with its own stiffness and no record; "surfaces", means and intervals over the surfaces
+        that [solver] asks for
     seeding : "independent", every case has seeds of its own; "common", the k-th realisation has the same at every
         point, which lets differences between points show with fewer of them
     seeds : the surfaces' seeds in place of ones drawn for the study
@@ -81,7 +82,8 @@ class StudyPlan:
 
     @cached_property
     def _fixed(self) -> dict[str, Any]:
-        values = {key: to_si(value) for key, value in _entries(self.case.contents) if not isinstance(value, Section)}
+        stated = ((k, v) for k, v in _entries(self.case.contents) if k != "infer")  # it changes no contact
+        values = {key: to_si(value) for key, value in stated if not isinstance(value, Section)}
         return {"kind": self.kind, "surface file": self.surface_digest, **values}
 
     @cached_property
@@ -134,7 +136,7 @@ def plan_study(case: Case) -> StudyPlan:
         )
     if not section.axes and section.seeds == 1:
         raise BadInput(f"{case.source}: study varies nothing; add a swept quantity or seeds")
-    keys = {_full_key(case, name): (name, values) for name, values in section.axes.items()}
+    keys = {full_key(case, name): (name, values) for name, values in section.axes.items()}
     if len(keys) < len(section.axes):
         raise BadInput(f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}")
     for key, part in permutations(keys, 2):
@@ -183,7 +185,7 @@ def plan_points(
     """
     if not points:
         raise BadInput("a study needs at least one point, got none")
-    base = replace(case, contents=case.contents.model_copy(update={"study": None}))
+    base = replace(case, contents=case.contents.model_copy(update={"study": None, "infer": None}))
     if axes is None:
         axes = tuple(dict.fromkeys(key for point in points for key in point))
     _require_values(base, axes, points)
@@ -218,13 +220,19 @@ def _require_distinct(case: Case, points: Sequence[Mapping[str, Any]]) -> None:
         seen.add(plain)
 
 
-def _full_key(case: Case, name: str) -> str:
-    """The dotted key that a name in [study] means: itself, or the one key of the case that ends so."""
-    entries = [(k, v) for k, v in _entries(case.contents) if k.partition(".")[0] not in ("study", FOR_RUNS)]
+def full_key(case: Case, name: str, section: str = "study") -> str:
+    """The dotted key that a name in [study], or in another section, means: itself, or the one key that ends so.
+
+    Raises
+    ------
+    BadInput
+        for a name that no key of the case has, or several.
+    """
+    entries = [(k, v) for k, v in _entries(case.contents) if k.partition(".")[0] not in ("study", "infer", FOR_RUNS)]
     tables = [key for key, value in entries if isinstance(value, Section)]
     keys = [key for key, value in entries if not isinstance(value, Section)]
     if name.partition(".")[0] == FOR_RUNS:
-        raise BadInput(f"{case.source}: study.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run")
+        raise BadInput(f"{case.source}: {section}.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run")
     if name in (*keys, *tables):
         return name
     meant = [key for key in keys if key.rpartition(".")[2] == name]
@@ -232,10 +240,10 @@ def _full_key(case: Case, name: str) -> str:
     if len(meant) == 1:
         return meant[0]
     if meant:
-        raise BadInput(f"{case.source}: study.{name} could mean {' or '.join(meant)}; write one of them")
+        raise BadInput(f"{case.source}: {section}.{name} could mean {' or '.join(meant)}; write one of them")
     near = get_close_matches(name, [*tables, *keys, *(key.rpartition(".")[2] for key in keys)], n=1)
     remedy = f"did you mean {near[0]}?" if near else "name one such as surface.sq or contact.load"
-    raise BadInput(f"{case.source}: study.{name} is not a key of the case; {remedy}")
+    raise BadInput(f"{case.source}: {section}.{name} is not a key of the case; {remedy}")
 
 
 def _entries(section: Section, parents: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:

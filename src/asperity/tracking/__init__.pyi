@@ -1,6 +1,10 @@
 from .checks import CheckedRecording as CheckedRecording
 from .checks import RecordingChecks as RecordingChecks
 from .checks import check_recordings as check_recordings
+from .files import OPERATING as OPERATING
+from .files import Place as Place
+from .files import Table as Table
+from .files import read_table as read_table
 from .files import recordings_in as recordings_in
 from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording

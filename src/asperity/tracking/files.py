@@ -14,6 +14,7 @@ from asperity.recording import is_sidecar
 _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
                   ".docx", ".xlsx", ".part", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
 _KNOWN = ("load_n", "speed_hz")
+OPERATING = ("load_n", "entrainment_m_s", "temperature_degc")  # what the contact was run at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,6 +25,8 @@ class Place:
     x_std: float | None = None
     load_n: float | None = None
     speed_hz: float | None = None
+    entrainment_m_s: float | None = None
+    temperature_degc: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,11 +111,12 @@ def may_be_recording(path: Path) -> bool:
     return path.suffix.lower() not in (".csv", ".tsv", ".txt") or "file" not in _heading(path)
 
 
-def read_table(path: str | Path) -> Table:
+def read_table(path: str | Path, *, operating: bool = False) -> Table:
     """Read a table (csv) of file, x and its deviation, load and speed.
 
     The column of x is the first that is none of file, load_n, speed_hz; its heading names it, such as sq_um. A column
-    of that heading with _std behind is its standard deviation.
+    of that heading with _std behind is its standard deviation. `operating` reads what the contact was run at too:
+    entrainment_m_s, temperature_degc; then x may be left out, and rows are in their order.
 
     Raises
     ------
@@ -131,29 +135,45 @@ def read_table(path: str | Path) -> Table:
     reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
     columns = [(name or "").strip() for name in reader.fieldnames or []]
     reader.fieldnames = columns
-    others = [name for name in columns if name not in ("file", *_KNOWN) and not name.endswith("_std")]
-    if "file" not in columns or not others:
+    known = tuple(dict.fromkeys((*_KNOWN, *OPERATING))) if operating else _KNOWN
+    others = [name for name in columns if name not in ("file", *known) and not name.endswith("_std")]
+    if operating:
+        _require_units(path, others)
+    if "file" not in columns or not (others or operating):
         raise UnreadableFile(
             f"{path} needs a column file and one of x, such as sq_um; got {', '.join(columns) or 'none'}"
         )
-    x_name = "x" if "x" in others else others[0]
+    x_name = "x" if "x" in others or not others else others[0]
     places = {}
     for number, row in enumerate(reader, 2):
         name = (row["file"] or "").strip()
         if not name:
             continue
 
-        x, x_std, load_n, speed_hz = (
-            _number((row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}")
-            for column in (x_name, f"{x_name}_std", *_KNOWN)
-        )
+        said = {
+            column: _number((row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}")
+            for column in (x_name, f"{x_name}_std", *known)
+        }
+        x, x_std = said.pop(x_name), said.pop(f"{x_name}_std")
+        if x is None and operating and not others:
+            x = float(number - 1)
         if x is None:
             raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
         key = Path(name.replace("\\", "/")).as_posix()
         if key in places:
             raise BadInput(f"{path}, line {number}: {name} has a row already; leave one of the two out")
-        places[key] = Place(x=x, x_std=x_std, load_n=load_n, speed_hz=speed_hz)
+        places[key] = Place(x=x, x_std=x_std, **said)
     return Table(name=path.name, x_name=x_name, places=places)
+
+
+def _require_units(path: Path, columns: Sequence[str]) -> None:
+    """BadInput for a load, speed or temperature by another name, perhaps in another unit."""
+    for name in columns:
+        for meant in OPERATING:
+            if name.lower().startswith(meant.partition("_")[0]):
+                raise BadInput(
+                    f"{path} has a column {name}; asperity infer takes {meant}, by that name and in that unit"
+                )
 
 
 def _number(text: str, delimiter: str, where: str) -> float | None:

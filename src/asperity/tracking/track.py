@@ -59,7 +59,7 @@ def track_recordings(
     channel: str | None = None,
     scale: float | None = None,
     x: Sequence[float] | None = None,
-    table: str | Path | None = None,
+    table: str | Path | Table | None = None,
     shaft_hz: Sequence[float] | None = None,
     method: SeriesMethod | None = None,
     detector: Detector = "bayesian",
@@ -77,8 +77,8 @@ def track_recordings(
     case : its contact model says where the resonance may lie, and what load share a CRF stands for
     band_hz : where to look instead; without either, the paper's contact stands in, and `notes` say so
     rate_hz, unit, channel, scale : as `read_recording` takes them, for all recordings alike
-    x : place of each recording in the series, shape (recordings,); or `table`, a csv as `read_table` takes it;
-        otherwise the hours since the first, where all say when they began, or their number
+    x : place of each recording in the series, shape (recordings,); or `table`, a csv as `read_table` takes it
+        or what that read; otherwise the hours since the first, where all say when they began, or their number
     shaft_hz : speeds of shafts whose harmonics are removed; None finds them
     method : of `series_resonances`; None takes "joint" from 6 recordings on, and of fewer says that one spectrum
         cannot tell whose resonance it shows
@@ -97,7 +97,8 @@ def track_recordings(
     """
     target = search_target(case, band_hz)
     files = recordings_in(paths)
-    x_name, places = _stated_places(files, x, read_table(table) if table is not None else None)
+    stated = table if isinstance(table, Table) or table is None else read_table(table)
+    x_name, places = _stated_places(files, x, stated)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
     spacing = common_spacing(files, options, target)
     numbered = dict(read_spectra(files, options, target, spacing, workers=workers, progress=progress))

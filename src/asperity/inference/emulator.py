@@ -1,0 +1,312 @@
+"""The contact emulated: a Sobol study of solved contacts on disk, and Gaussian processes through its means.
+
+Several surfaces a point tell the mean over patches, which a recording shows, from the scatter of patches, which it
+averages away. How far the emulator is off is found on points that its processes did not see.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+
+from asperity.arrays import Field
+from asperity.errors import AsperityError, BadInput, UnreadableFile
+from asperity.files import make_folder
+from asperity.inference.outputs import CLR, OUTPUTS, Output
+from asperity.inference.process import Process, fit_process, require_learning
+from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
+from asperity.kept import read_json, write_json
+from asperity.study import ParameterRange, StudyProgress, overrides_at, plan_points, run_study
+
+FOLDS = 5  # of the points: each is held out of the processes that foretell it
+LAYOUT = 1  # counts up when what an emulator keeps or means changes
+MOST_MISSING = 0.2  # share of the points whose contacts failed
+FITTED = "emulator.json"
+NORMAL_90 = 1.6448536269514722
+FILM_EXPONENTS = {"viscosity": 0.7, "alpha": 0.54, "load": -0.13, "sq": -1.0}  # ln Λ: Dowson and Higginson's film
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How far an emulator is off, found on points held out, in the output's own unit.
+
+    `error` is the rms of held-out means against emulated ones; `coverage` the share of them within the stated 90 %;
+    `scatter` that of one surface about its point's mean; `scatter_of_mean` that of a point's mean. Both are in every
+    error: a perfect emulator has `error` equal to `scatter_of_mean`.
+    """
+
+    error: float
+    coverage: float
+    scatter: float
+    scatter_of_mean: float
+
+
+@dataclass(frozen=True)
+class Emulator:
+    """Means over patches of what a contact shows, anywhere in its ranges, each with a standard deviation.
+
+    `scatter` is that of one patch, a line (intercept, slope) of its logarithm over that of c (1 - c), for shares.
+    """
+
+    ranges: tuple[ParameterRange, ...]
+    features: "Features"
+    processes: Mapping[str, Process]
+    quality: Mapping[str, Quality]
+    points: int
+    surfaces: int
+    failed: int
+    folder: Path
+    seconds: float  # spent on its contacts
+
+    def __call__(self, shares: Field, wanted: Iterable[str]) -> dict[str, tuple[Field, Field]]:
+        """Mean and standard deviation of the wanted outputs, on their scales, at shares (n, d) of the ranges."""
+        x = self.features(shares)
+        return {key: self.processes[key](x) for key in wanted}
+
+    def values(self, shares: Field, key: str) -> Field:
+        """The mean of one output in its own unit."""
+        return OUTPUTS[key].back(self(shares, [key])[key][0])
+
+    def scalars(self) -> dict[str, Any]:
+        """What is told of an emulator beside what it was used for."""
+        return {
+            "folder": str(self.folder),
+            "points": self.points,
+            "surfaces": self.surfaces,
+            "failed": self.failed,
+            "ranges": [str(entry) for entry in self.ranges],
+            "quality": {key: vars(quality) for key, quality in self.quality.items()},
+        }
+
+    def sentence(self) -> str:
+        """How good it is, in words."""
+        clr = self.quality[CLR]
+        return (
+            f"Emulator of {self.points} contacts, {self.surfaces} surfaces each: CLR of points held out is off by "
+            f"{100 * clr.error:.1f} points (rms; one surface scatters by {100 * clr.scatter:.1f}), and the stated 90 % "
+            f"hold {100 * clr.coverage:.0f} %."
+        )
+
+
+@dataclass(frozen=True)
+class Features:
+    """Shares of the ranges with one of them, that of the speed, replaced by an estimated film ratio.
+
+    Film and contact hang on the product of viscosity and speed, by powers that are known nearly; what they are not is
+    left to the process, which has the other shares.
+    """
+
+    ranges: tuple[ParameterRange, ...]
+    oil: tuple[Field, Field, Field] | None = None  # shares of a temperature's range; ln viscosity; ln alpha there
+
+    def __call__(self, shares: Field) -> Field:
+        """Points for the processes, shape (n, d)."""
+        place = {entry.key: number for number, entry in enumerate(self.ranges)}
+
+        def log(key: str) -> Field:
+            if key not in place:
+                return np.zeros(len(shares))
+            entry, share = self.ranges[place[key]], shares[:, place[key]]
+            ratio = np.log(entry.high / entry.low)
+            return np.asarray(share * ratio if entry.log else np.log1p(share * np.expm1(ratio)))
+
+        viscous = log("lubricant.viscosity.eta0") + log(SPEED)
+        alpha = log("lubricant.viscosity.alpha")
+        if self.oil is not None:
+            at, viscosity, piezo = self.oil
+            viscous = viscous + np.interp(shares[:, place[TEMPERATURE]], at, viscosity)
+            alpha = alpha + np.interp(shares[:, place[TEMPERATURE]], at, piezo)
+        powers = FILM_EXPONENTS
+        ratio = powers["viscosity"] * viscous + powers["alpha"] * alpha + powers["load"] * log(LOAD)
+        ratio += powers["sq"] * log("surface.sq")
+        x = shares.copy()
+        x[:, place[SPEED]] = ratio / 4.0
+        return x
+
+
+def features_of(setting: Setting) -> Features:
+    """How a setting's shares become points; of an oil by its data sheet, with viscosity over temperature."""
+    ranges = setting.ranges
+    entry = next((entry for entry in ranges if entry.key == TEMPERATURE), None)
+    if entry is None:
+        return Features(ranges)
+    at, logs = np.linspace(0.0, 1.0, 9), []
+    for share in at:
+        oil = setting.case.with_overrides(overrides_at(setting.case, [entry], [share])).lubricant
+        assert oil is not None
+        zero = np.zeros(1)
+        viscosity = float(oil.viscosity(zero)[0])
+        logs.append((np.log(viscosity), np.log(float(oil.viscosity.log_slope(zero)[0]))))
+    viscosity, alpha = np.array(logs).T
+    return Features(ranges, (at, viscosity - viscosity.mean(), alpha - alpha.mean()))
+
+
+# Built and kept ------------------------------------------------------------------------------------------------------
+
+
+def emulators_folder() -> Path:
+    """Where emulators are kept that were given no folder: the user's cache."""
+    base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
+    return (Path(base) if base else Path.home() / ".cache") / "asperity" / "emulators"
+
+
+def build_emulator(
+    setting: Setting,
+    *,
+    folder: str | Path | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
+) -> Emulator:
+    """The emulator of a setting: loaded where its folder has it, completed where it was interrupted, else computed.
+
+    Parameters
+    ----------
+    setting : from `setting_of`
+    folder : where it is kept; by default one in the user's cache, by case, ranges and version
+    executor, workers, progress : see `asperity.study.run_study`
+
+    Raises
+    ------
+    BadInput
+        without scikit-learn; for a folder that holds another emulator or cannot be written to.
+    AsperityError
+        if too many of its contacts fail.
+    """
+    sobol = _sobol(setting)
+    plan = plan_points(
+        setting.case,
+        [overrides_at(setting.case, setting.ranges, shares) for shares in sobol],
+        seeds=setting.surfaces,
+        kind="still",
+    )
+    identity = hashlib.sha256(
+        json.dumps([plan.design, [case.id for case in plan.cases], version("asperity"), LAYOUT]).encode()
+    ).hexdigest()
+    home = emulators_folder() / identity[:16] if folder is None else Path(folder)
+    fitted = home / FITTED
+    if not fitted.exists():
+        require_learning()
+    elif read_json(fitted, "delete it, and it is fitted again").get("identity") != identity:
+        raise BadInput(f"{home} holds the emulator of another case, range or version; choose another folder")
+    make_folder(home)
+    result = run_study(plan, out=home, executor=executor, workers=workers, progress=progress)
+    means = _Means.of(result.table, setting.surfaces)
+    if len(means.points) < (1.0 - MOST_MISSING) * len(sobol):
+        reasons = result.failures["reason"]
+        first = reasons.iloc[0] if len(reasons) else "they are missing"
+        raise AsperityError(
+            f"{len(sobol) - len(means.points)} of {len(sobol)} points of the emulator failed ({first}); narrow the "
+            "ranges in [infer]"
+        )
+    features = features_of(setting)
+    x = features(sobol[means.points])
+    processes, quality = _processes(means, x, fitted, identity)
+    seconds = float(result.table["seconds"].sum())
+    return Emulator(
+        setting.ranges, features, processes, quality, len(means.points), setting.surfaces, result.failed, home, seconds
+    )
+
+
+def _processes(means: "_Means", x: Field, fitted: Path, identity: str) -> tuple[dict[str, Process], dict[str, Quality]]:
+    """A process for each output and how good it is: as they were kept, or fitted now, and kept."""
+    processes, quality = {}, {}
+    known = read_json(fitted, "delete it, and it is fitted again") if fitted.exists() else None
+    for output in OUTPUTS.values():
+        y, noise = means.scaled(output)
+        if known is None:
+            processes[output.key] = fit_process(x, y, noise)
+            quality[output.key] = _held_out(means, output, processes[output.key])
+        else:
+            processes[output.key], quality[output.key] = _as_kept(known, output.key, x, y, noise)
+    if known is None:
+        kept = {key: {**processes[key].settings(), "quality": vars(quality[key])} for key in OUTPUTS}
+        write_json(fitted, {"identity": identity, "layout": LAYOUT, "outputs": kept})
+    return processes, quality
+
+
+def _sobol(setting: Setting) -> Field:
+    from scipy.stats import qmc
+
+    count = len(setting.ranges)
+    points = qmc.Sobol(count, rng=setting.seed).random(1 << (setting.points - 1).bit_length())
+    return np.asarray(points[: setting.points])
+
+
+def _as_kept(known: Mapping[str, Any], key: str, x: Field, y: Field, noise: Field) -> tuple[Process, Quality]:
+    try:
+        entry = known["outputs"][key]
+        lengths = np.asarray(entry["lengths"], dtype=float)
+        process = Process(x, y, noise, lengths, float(entry["level"]), float(entry["rough"]))
+        return process, Quality(**entry["quality"])
+    except (KeyError, TypeError, ValueError):
+        raise UnreadableFile(f"{FITTED} says nothing of {key}; delete it, and it is fitted again") from None
+
+
+@dataclass(frozen=True)
+class _Means:
+    """Means over surfaces at the points where all of them were solved, and how single ones scatter about them."""
+
+    points: Field
+    mean: pandas.DataFrame
+    variance: pandas.DataFrame  # of one surface, smoothed over the points
+    surfaces: int
+
+    @classmethod
+    def of(cls, table: pandas.DataFrame, surfaces: int) -> "_Means":
+        """From the rows of a study."""
+        keys = list(OUTPUTS)
+        done = table[table["status"] == "done"].dropna(subset=keys)
+        groups = done.groupby("point")[keys]
+        whole = groups.size() == surfaces
+        mean = groups.mean()[whole]
+        spread = groups.var(ddof=1)[whole] if surfaces > 1 else mean * 0.0
+        smoothed = {key: _smoothed(OUTPUTS[key], mean[key].to_numpy(), spread[key].to_numpy()) for key in keys}
+        return cls(mean.index.to_numpy(), mean, pandas.DataFrame(smoothed, index=mean.index), surfaces)
+
+    def scaled(self, output: Output) -> tuple[Field, Field]:
+        """Means on an output's scale, and their variance there."""
+        mean = self.mean[output.key].to_numpy()
+        variance = self.variance[output.key].to_numpy() / self.surfaces
+        return output.forward(mean), variance * output.slope(mean) ** 2
+
+
+def _smoothed(output: Output, mean: Field, variance: Field) -> Field:
+    """Variance of one surface, as a smooth function of the mean: two or three surfaces a point tell it badly each.
+
+    On the output's scale: bins of a tenth of the points, and lines between.
+    """
+    scaled, spread = output.forward(mean), variance * output.slope(mean) ** 2
+    order = np.argsort(scaled)
+    bins = np.array_split(order, min(10, max(1, len(order) // 8)))
+    centres = np.array([scaled[part].mean() for part in bins])
+    levels = np.array([spread[part].mean() for part in bins]) + 1e-12
+    return np.asarray(np.exp(np.interp(scaled, centres, np.log(levels))) / output.slope(mean) ** 2)
+
+
+def _held_out(means: _Means, output: Output, whole: Process) -> Quality:
+    """Each point foretold by a process fitted to the others."""
+    y, noise = means.scaled(output)
+    fold = np.arange(y.size) % FOLDS
+    foretold, std = np.empty(y.size), np.empty(y.size)
+    for number in range(FOLDS):
+        out = fold == number
+        process = fit_process(whole.x[~out], y[~out], noise[~out], start=whole)
+        foretold[out], std[out] = process(whole.x[out])
+    mean = means.mean[output.key].to_numpy()
+    variance = means.variance[output.key].to_numpy()
+    within = np.abs(y - foretold) <= NORMAL_90 * np.sqrt(std**2 + noise)
+    return Quality(
+        error=float(np.sqrt(np.mean((output.back(foretold) - mean) ** 2))),
+        coverage=float(np.mean(within)),
+        scatter=float(np.sqrt(np.mean(variance))),
+        scatter_of_mean=float(np.sqrt(np.mean(variance / means.surfaces))),
+    )

@@ -1,0 +1,184 @@
+"""From unknowns to what a recording shows of them, by two laws of the contact's spring, for many at once.
+
+"hertz-point" is the paper's: a sphere's spring under the asperities' load alone, with a damping that is the machine's.
+"own" is the solved contact's: its tangent stiffness, and its own damping beside the machine's.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.coupling import NoiseExcitation
+from asperity.errors import BadInput
+from asperity.hertz import point_stiffness
+from asperity.inference.emulator import Emulator
+from asperity.inference.observations import Point
+from asperity.inference.outputs import CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
+from asperity.inference.priors import Unknown, share_of
+from asperity.inference.settings import LOAD, OFFSET, SPEED, TEMPERATURE, Setting
+from asperity.quantities import quantity
+
+Law = Literal["hertz-point", "own"]
+LAWS: tuple[Law, ...] = ("hertz-point", "own")
+LEAST_SHARE = 1e-4  # of the load: below it, its logarithm means nothing
+LEAST_DAMPING = 1e-4
+
+
+class Shown(NamedTuple):
+    """What a law says that recordings show: arrays of (unknowns, operating points); logarithms, and their deviations.
+
+    `lever` is by how much ln CRF moves with the law's exponent of the load.
+    """
+
+    crf: Field
+    crf_std: Field
+    damping: Field
+    damping_std: Field
+    crfa: Field
+    lever: Field
+
+
+@dataclass(frozen=True)
+class Forward:
+    """A contact's laws over its emulator, at operating points.
+
+    Parameters
+    ----------
+    setting, emulator : what is asked, and what answers
+    points : operating points, all within the emulator's ranges
+    """
+
+    setting: Setting
+    emulator: Emulator
+    points: tuple[Point, ...]
+
+    def __post_init__(self) -> None:
+        for point in self.points:
+            require_inside(self.setting, point)
+
+    @property
+    def dims(self) -> int:
+        """How many unknowns there are."""
+        return len(self.setting.unknowns)
+
+    @cached_property
+    def _place(self) -> Mapping[str, int]:
+        return {unknown.key: number for number, unknown in enumerate(self.setting.unknowns)}
+
+    def unknown(self, z: Field, key: str, known: float) -> Field:
+        """Values of an unknown, SI, shape (n,); those of the case where it is known."""
+        if key not in self._place:
+            return np.full(len(z), known)
+        number = self._place[key]
+        return self.setting.unknowns[number].value(z[:, number])
+
+    def shares(self, z: Field) -> Field:
+        """What the emulator is asked by: (n, points, ranges)."""
+        contact = np.stack([u.share(z[:, i]) for i, u in enumerate(self.setting.contact)], axis=1)
+        shares = np.empty((len(z), len(self.points), len(self.setting.ranges)))
+        shares[:, :, : contact.shape[1]] = contact[:, None]
+        offset = self.unknown(z, OFFSET, 0.0)
+        for number, entry in enumerate(self.setting.operating, contact.shape[1]):
+            for place, point in enumerate(self.points):
+                stated = _operating_value(self.setting, point, entry.key)
+                value = Unknown("", entry).from_si(stated + (offset if entry.key == TEMPERATURE else 0.0))
+                shares[:, place, number] = np.clip(share_of(entry, value), 0.0, 1.0)
+        return shares
+
+    def emulated(self, z: Field, keys: Sequence[str]) -> dict[str, tuple[Field, Field]]:
+        """Mean and deviation of outputs, on their scales, shape (n, points)."""
+        shares = self.shares(z)
+        rows, places, ranges = shares.shape
+        answers = self.emulator(shares.reshape(-1, ranges), keys)
+        return {key: (mean.reshape(rows, places), std.reshape(rows, places)) for key, (mean, std) in answers.items()}
+
+    def states(self, z: Field, keys: Sequence[str]) -> dict[str, Field]:
+        """Outputs in their own units, shape (n, points)."""
+        return {key: OUTPUTS[key].back(mean) for key, (mean, _) in self.emulated(z, keys).items()}
+
+    def shown(self, z: Field, law: Law, *, heights: bool = True) -> Shown:
+        """What recordings show at unknowns z, shape (n, dims), by a law; nan for CRFA where no `heights` are wanted."""
+        model = self.setting.case.vibration
+        assert model is not None
+        heights = heights and isinstance(model.excitation, NoiseExcitation)
+        outputs = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
+        emulated = self.emulated(z, (*outputs, CAR) if heights else outputs)
+        mass = self.unknown(z, "mass_kg", model.mass)[:, None]
+        rest = self.unknown(z, "damping_ratio", model.damping_ratio)[:, None]
+        loads = np.array([point.load_n for point in self.points])
+        if law == "hertz-point":
+            stiffness, stiffness_std, lever = self._sphere(emulated[CLR], loads)
+            damping, damping_std = np.log(rest) + np.zeros_like(stiffness), np.zeros_like(stiffness)
+        else:
+            stiffness, stiffness_std = emulated[STIFFNESS]
+            lever = np.broadcast_to(np.log(loads), stiffness.shape)
+            own, own_std = emulated[DAMPING]
+            scale = OUTPUTS[DAMPING]
+            total = np.maximum(rest + scale.back(own), LEAST_DAMPING)
+            damping, damping_std = np.log(total), own_std / scale.slope(scale.back(own)) / total
+        crf = 0.5 * (stiffness - np.log(mass)) - math.log(2.0 * math.pi)
+        crfa = np.full(crf.shape, np.nan)
+        if heights:
+            crfa = self._height(z, crf, damping, np.maximum(OUTPUTS[CAR].back(emulated[CAR][0]), LEAST_SHARE))
+        return Shown(crf, 0.5 * stiffness_std, damping, damping_std, crfa, lever)
+
+    def _sphere(self, emulated: tuple[Field, Field], loads: Field) -> tuple[Field, Field, Field]:
+        """Logarithm of the sphere's stiffness under CLR F, its deviation, and ln(CLR F)."""
+        mean, std = emulated
+        share = OUTPUTS[CLR].back(mean)
+        borne = np.maximum(share, LEAST_SHARE)
+        conditions = self.setting.case.conditions
+        one_newton = point_stiffness(1.0, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
+        lever = np.log(borne * loads)
+        return math.log(one_newton) + lever / 3.0, std / OUTPUTS[CLR].slope(share) / borne / 3.0, lever
+
+    def _height(self, z: Field, crf: Field, damping: Field, car: Field) -> Field:
+        """Logarithm of CRFA but for a gain: Sq^2 fc^p f^(4 - 2n) / 4 ζ^2, over noise behind a low pass of order n."""
+        model = self.setting.case.vibration
+        assert model is not None
+        law = model.excitation
+        assert isinstance(law, NoiseExcitation)
+        order = law.filter_order
+        power = 2 * order - (law.coefficient == "readjusted")
+        exponent = self.unknown(z, "cutoff_exponent", law.cutoff_exponent)[:, None]
+        sq = self.unknown(z, "sq_m", math.nan)[:, None]
+        if "sq_m" not in self._place:
+            sq = np.ones((len(z), 1))
+        cutoff = exponent * np.log(car / law.car_reference)
+        return np.asarray(2.0 * np.log(sq) + power * cutoff + (4 - 2 * order) * crf - 2.0 * damping - math.log(4.0))
+
+
+def _operating_value(setting: Setting, point: Point, key: str) -> float:
+    """An operating quantity of a point, SI; the case's own temperature where the point has none."""
+    if key == LOAD:
+        return point.load_n
+    if key == SPEED:
+        return point.entrainment_m_s
+    if point.temperature_k is not None:
+        return point.temperature_k
+    return float(setting.case.contents.lubricant.temperature)  # type: ignore[union-attr]
+
+
+def require_inside(setting: Setting, point: Point) -> None:
+    """BadInput for an operating point that the emulator does not reach, or a temperature that its oil has not."""
+    if point.temperature_k is not None and all(entry.key != TEMPERATURE for entry in setting.operating):
+        raise BadInput(
+            "a recording's temperature needs an oil by its data sheet, whose viscosity over temperature is known; "
+            "state [lubricant] by grade and temperature, or leave the column temperature_degc out"
+        )
+    names = {LOAD: "load_n", SPEED: "entrainment_speed_m_s", TEMPERATURE: "oil_temperature_k"}
+    for entry in setting.operating:
+        value = _operating_value(setting, point, entry.key)
+        low, high = (float(end) for end in Unknown("", entry).to_si(np.array([entry.low, entry.high])))
+        if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
+            shown = quantity(names[entry.key])
+            whose = f" of {point.names[0]}" if point.names and point.names[0] else ""
+            raise BadInput(
+                f"{shown.name}{whose} must lie within {shown.number(low)} to {shown.text(high)}, where the contact is "
+                f"emulated, got {shown.text(value)}; widen infer.{entry.key.rpartition('.')[2]} in the case"
+            )

@@ -1,0 +1,139 @@
+"""The one call: recordings, or what they said, to what is possible of the contact."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from pathlib import Path
+
+from asperity.case import Case
+from asperity.errors import BadInput, require_choice
+from asperity.inference.emulator import Emulator, build_emulator
+from asperity.inference.forward import Forward, Law
+from asperity.inference.inference import Inference
+from asperity.inference.listening import listen
+from asperity.inference.next_point import candidate_points, expected_information
+from asperity.inference.observations import Observation, Point, points_of
+from asperity.inference.posterior import Sampler, new_pools, posterior_draws, prior_draws, sample_models, with_point
+from asperity.inference.sampling import Pool
+from asperity.inference.settings import Setting, setting_of
+from asperity.study import StudyProgress
+
+SAMPLERS: tuple[Sampler, ...] = ("importance", "nested")
+
+
+def infer_contact(
+    recordings: Sequence[str | Path | Observation],
+    *,
+    case: Case,
+    table: str | Path | None = None,
+    emulator: Emulator | str | Path | None = None,
+    sampler: Sampler = "importance",
+    seed: int = 0,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
+) -> Inference:
+    """What recordings say of a contact, with intervals, and what cannot be told.
+
+    Parameters
+    ----------
+    recordings : files and folders of recordings, or `Observation`s; none at all gives what is known before any
+    case : the contact; its [infer] says what is not known of it
+    table : csv of what each file was recorded at, see `listen`
+    emulator : one that is there, or the folder to keep it in; None: one in the user's cache. Building it solves
+        hundreds of contacts, once
+    sampler : "importance", seconds; "nested", minutes, by dynesty, to check the other
+    seed : of all that is drawn; the same seed gives the same numbers
+    workers, executor, progress : see `asperity.study.run_study`, of the emulator's contacts
+
+    Raises
+    ------
+    BadInput
+        for a case, table, recording or operating point that cannot be used; without the extra `infer`.
+    AsperityError
+        where a posterior was not found, or too many of the emulator's contacts fail.
+    """
+    require_choice("sampler", sampler, SAMPLERS)
+    setting = setting_of(case)
+    given = [one for one in recordings if isinstance(one, Observation)]
+    files = [one for one in recordings if not isinstance(one, Observation)]
+    if given and files:
+        raise BadInput("recordings must be files or observations, got both; infer one after the other")
+    silent: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+    if files:
+        heard = listen(files, setting, table=table)
+        given, silent, notes = list(heard.observations), heard.silent, heard.notes
+    if not isinstance(emulator, Emulator):
+        emulator = build_emulator(setting, folder=emulator, executor=executor, workers=workers, progress=progress)
+    return infer_observations(setting, emulator, given, sampler=sampler, seed=seed, silent=silent, notes=notes)
+
+
+def infer_observations(
+    setting: Setting,
+    emulator: Emulator,
+    observations: Sequence[Observation],
+    *,
+    sampler: Sampler = "importance",
+    seed: int = 0,
+    silent: tuple[tuple[str, str], ...] = (),
+    notes: tuple[str, ...] = (),
+) -> Inference:
+    """The same, of a setting and its emulator; `silent` are recordings that said nothing, and why."""
+    conditions = setting.case.conditions
+    own = Point(conditions.load, conditions.entrainment_speed)
+    forward = Forward(setting, emulator, (own, *points_of(observations)))
+    return _inferred(forward, tuple(observations), new_pools(forward, seed), sampler, seed, silent, notes)
+
+
+def with_observation(inference: Inference, observation: Observation) -> Inference:
+    """One recording more, by the draws that are there: a second where the whole takes several.
+
+    Raises
+    ------
+    BadInput
+        for an operating point that the emulator does not reach.
+    """
+    observations = (*inference.observations, observation)
+    before = inference.forward
+    points = (before.points[0], *points_of(observations))
+    forward, pools = replace(before, points=points), dict(inference.pools)
+    if len(points) > len(before.points):
+        pools = with_point(pools, forward, replace(before, points=points[-1:]))
+    else:
+        pools = {law: pool.with_columns(_again(forward, law), pool.shown) for law, pool in pools.items()}
+    told = inference.silent, inference.notes
+    return _inferred(forward, observations, pools, "importance", inference.seed, *told, quickly=True)
+
+
+def _again(forward: Forward, law: Law) -> Callable[..., object]:
+    return lambda z: forward.shown(z, law)
+
+
+def _inferred(
+    forward: Forward,
+    observations: tuple[Observation, ...],
+    pools: dict[Law, Pool],
+    sampler: Sampler,
+    seed: int,
+    silent: tuple[tuple[str, str], ...],
+    notes: tuple[str, ...],
+    *,
+    quickly: bool = False,
+) -> Inference:
+    models, sampled = sample_models(forward, pools, sampler=sampler, seed=seed, quickly=quickly)
+    draws = posterior_draws(forward, sampled, discrepancy=True, seed=seed)
+    candidates = expected_information(forward, draws, candidate_points(forward.setting), seed=seed)
+    return Inference(
+        forward=forward,
+        observations=observations,
+        silent=silent,
+        models=models,
+        prior=prior_draws(forward, seed),
+        draws=draws,
+        exact=posterior_draws(forward, sampled, discrepancy=False, seed=seed),
+        candidates=tuple(candidates),
+        pools=pools,
+        seed=seed,
+        notes=notes,
+    )

@@ -1,0 +1,72 @@
+"""How probable what was heard is, by a law, with or without a term for what the law itself gets wrong.
+
+Without the term, a frequency is off by its measurement and the emulator. With it, each operating point has an error of
+the law, and the law's exponent of the load one for all; how large they are is not known, and three sizes are as
+probable. CRFA has a gain that nobody knows, for all recordings in common.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.inference.forward import Shown
+from asperity.inference.observations import Heard, Point
+
+SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
+OF_DAMPING, OF_HEIGHT = 5.0, 10.0  # the same error in ln ζ and ln CRFA
+GAIN_STD = 3.0  # of ln CRFA: a factor 20 either way
+EMULATED_HEIGHT_STD = 0.1  # of ln CRFA: CAR is emulated too
+
+
+def log_likelihood(shown: Shown, points: Sequence[Point], *, discrepancy: bool) -> Field:
+    """Logarithm of p(heard | unknowns), shape (n,); `shown` has a column for each of the points."""
+    if not discrepancy:
+        return _at_size(shown, points, 0.0)
+    levels = log_at_sizes(shown, points)
+    return np.asarray(np.logaddexp.reduce(levels, axis=0) - np.log(len(SIZES)))
+
+
+def log_at_sizes(shown: Shown, points: Sequence[Point]) -> Field:
+    """The same for each of `SIZES` of the law's error, shape (sizes, n)."""
+    return np.stack([_at_size(shown, points, size) for size in SIZES])
+
+
+def _at_size(shown: Shown, points: Sequence[Point], size: float) -> Field:
+    total = _gaussian(
+        [point.crf for point in points],
+        shown.crf,
+        shown.crf_std,
+        size,
+        size * (shown.lever - shown.lever.mean(axis=1, keepdims=True)),
+    )
+    total = total + _gaussian(
+        [point.damping for point in points],
+        shown.damping,
+        shown.damping_std,
+        OF_DAMPING * size,
+        np.zeros_like(shown.lever),
+    )
+    if np.isnan(shown.crfa).any():
+        return total
+    height_std = np.full(shown.crfa.shape, EMULATED_HEIGHT_STD)
+    gain = np.full(shown.crfa.shape, GAIN_STD)
+    return total + _gaussian([point.crfa for point in points], shown.crfa, height_std, OF_HEIGHT * size, gain)
+
+
+def _gaussian(heard: Sequence[Heard], shown: Field, std: Field, size: float, common: Field) -> Field:
+    """Logarithm of a normal density of residuals: independent ones of three sources, and one in common by `common`.
+
+    Covariance D + u uᵀ, by Sherman and Morrison.
+    """
+    here = np.array([not np.isnan(one.value) for one in heard])
+    if not here.any():
+        return np.zeros(len(shown))
+    value = np.array([one.value for one in heard])[here]
+    measured = np.array([one.std for one in heard])[here]
+    variance = measured**2 + std[:, here] ** 2 + size**2
+    rest, shared = value - shown[:, here], common[:, here]
+    inner = 1.0 + np.sum(shared**2 / variance, axis=1)
+    square = np.sum(rest**2 / variance, axis=1) - np.sum(rest * shared / variance, axis=1) ** 2 / inner
+    logs = np.sum(np.log(2.0 * np.pi * variance), axis=1) + np.log(inner)
+    return np.asarray(-0.5 * (square + logs))

@@ -1,0 +1,119 @@
+"""What a recording says: a resonance with its deviations, and under which load and speed it was made."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from asperity.errors import BadInput, require_positive
+
+LEAST_STD = 1e-4  # relative, of a frequency: no machine is steadier
+LOST = math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """A recording's contact resonance and its operating point.
+
+    Parameters
+    ----------
+    load_n, entrainment_m_s : load [N] and entrainment speed [m/s] of the contact
+    temperature_k : of the oil [K]; None: as the case has it
+    crf_hz, crf_std_hz : frequency of the resonance and its standard deviation [Hz]
+    crfa, crfa_std : its height [(m/s^2)^2/Hz]; nan where it is not comparable
+    damping_ratio, damping_std : its width; nan where it is not determined
+    name, x : what it is called, and where it stands in a series (hours)
+    """
+
+    load_n: float
+    entrainment_m_s: float
+    crf_hz: float
+    crf_std_hz: float
+    temperature_k: float | None = None
+    crfa: float = LOST
+    crfa_std: float = LOST
+    damping_ratio: float = LOST
+    damping_std: float = LOST
+    name: str = ""
+    x: float = LOST
+
+    def __post_init__(self) -> None:
+        what = f"{self.name}: " if self.name else ""
+        require_positive(f"{what}load_n", self.load_n, "N")
+        require_positive(f"{what}entrainment_m_s", self.entrainment_m_s, "m/s")
+        require_positive(f"{what}crf_hz", self.crf_hz, "Hz")
+        require_positive(f"{what}crf_std_hz", self.crf_std_hz, "Hz")
+        for name, value, std in (("crfa", self.crfa, self.crfa_std),
+                                 ("damping_ratio", self.damping_ratio, self.damping_std)):  # fmt: skip
+            if not math.isnan(value):
+                require_positive(f"{what}{name}", value)
+                require_positive(f"{what}standard deviation of {name}", std)
+        if self.temperature_k is not None:
+            require_positive(f"{what}temperature_k", self.temperature_k, "K")
+
+    @property
+    def place(self) -> tuple[float, float, float | None]:
+        """Its operating point."""
+        return self.load_n, self.entrainment_m_s, self.temperature_k
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A logarithm that was measured at an operating point, and its standard deviation; nan where it was not."""
+
+    value: float = math.nan
+    std: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """An operating point, and what its recordings say together."""
+
+    load_n: float
+    entrainment_m_s: float
+    temperature_k: float | None = None
+    crf: Heard = field(default_factory=Heard)
+    damping: Heard = field(default_factory=Heard)
+    crfa: Heard = field(default_factory=Heard)
+    names: tuple[str, ...] = ()
+
+
+def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
+    """Recordings by their operating points, in order: those of one point are repeats of one thing.
+
+    Raises
+    ------
+    BadInput
+        where only some of them say how warm the oil was.
+    """
+    if len({one.temperature_k is None for one in observations}) > 1:
+        raise BadInput("some recordings have a temperature and some have none; give it of all, or of none")
+    groups: dict[tuple[float, float, float | None], list[Observation]] = {}
+    for one in observations:
+        groups.setdefault(one.place, []).append(one)
+    return tuple(
+        Point(
+            *place,
+            crf=_together([(one.crf_hz, one.crf_std_hz) for one in group], LEAST_STD),
+            damping=_together([(one.damping_ratio, one.damping_std) for one in group]),
+            crfa=_together([(one.crfa, one.crfa_std) for one in group]),
+            names=tuple(one.name for one in group),
+        )
+        for place, group in groups.items()
+    )
+
+
+def _together(pairs: Sequence[tuple[float, float]], least: float = 0.0) -> Heard:
+    """The logarithm that repeats measure: their weighted mean, and no surer of it than their scatter lets them be."""
+    known = np.array([(math.log(value), max(std / value, least)) for value, std in pairs if not math.isnan(value)])
+    if not len(known):
+        return Heard()
+    values, stds = known.T
+    weights = stds**-2.0 / np.sum(stds**-2.0)
+    mean = float(weights @ values)
+    std = float(np.sum(stds**-2.0) ** -0.5)
+    if len(known) > 1:
+        scatter = float(np.sqrt(np.sum((values - mean) ** 2) / (len(known) - 1) / len(known)))
+        std = max(std, scatter)
+    return Heard(mean, std)

@@ -1,0 +1,225 @@
+"""Posteriors of all models, and what contacts they leave possible: draws of unknowns with the contact's state.
+
+A model is a law of the contact's spring, with or without a term for its error. Models are weighed by their evidence.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from scipy.special import logsumexp
+
+from asperity.arrays import Field
+from asperity.errors import AsperityError
+from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
+from asperity.inference.likelihood import SIZES, log_at_sizes, log_likelihood
+from asperity.inference.observations import Point
+from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
+from asperity.inference.sampling import FEWEST, QUICKLY, Pool, Sampled, importance, nested
+
+Sampler = Literal["importance", "nested"]
+DRAWS = 2000  # equally probable ones, of each posterior
+STATE = (CLR, CAR, FILM, FRICTION)
+MODELS: tuple[tuple[Law, bool], ...] = tuple((law, discrepancy) for law in LAWS for discrepancy in (True, False))
+RULED_OUT = 12.0  # in ln evidence below the best: odds of 160 000 to one
+
+
+@dataclass(frozen=True)
+class Model:
+    """A law, with or without its error, and how probable what was heard makes it among all models.
+
+    `found` is whether its posterior could be sampled; one that is ruled out need not be.
+    """
+
+    law: Law
+    discrepancy: bool
+    log_evidence: float
+    log_evidence_std: float
+    probability: float
+    information_bits: float
+    effective: float
+
+    def scalars(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Equally probable contacts: unknowns z (n, dims), states (n, points) in their own units, which law each is by.
+
+    `size` is the law's error that each has, relative to CRF; `effective` how many independent ones they are worth.
+    """
+
+    z: Field
+    law: Field  # number in LAWS
+    size: Field
+    states: Mapping[str, Field]
+    effective: float
+
+
+def sample_models(
+    forward: Forward, pools: Mapping[Law, Pool], *, sampler: Sampler, seed: int, quickly: bool = False
+) -> tuple[tuple[Model, ...], dict[tuple[Law, bool], Sampled]]:
+    """Every model sampled, with its evidence; `quickly` is enough where draws were learnt before.
+
+    Raises
+    ------
+    AsperityError
+        where the posterior of a model that counts was not found.
+    """
+    sampled: dict[tuple[Law, bool], Sampled] = {}
+    how: dict[str, Any] = {"enough": QUICKLY} if quickly else {}
+    best = -np.inf
+    for law, discrepancy in _likeliest_first(forward, pools):
+        target = _target(forward.points, discrepancy=discrepancy)
+        if sampler == "nested":
+            one = nested(_evaluate(forward, law), target, forward.dims, seed)
+        else:
+            one = importance(pools[law], target, best=best, **how)
+        sampled[law, discrepancy], best = one, max(best, one.log_evidence)
+    for (law, _), one in sampled.items():
+        if one.effective < FEWEST and one.log_evidence > best - RULED_OUT:
+            raise AsperityError(
+                f"the posterior by the law {law} was not found: its draws are worth {one.effective:.0f}; take nested "
+                "sampling, or wider priors"
+            )
+    total = logsumexp([one.log_evidence for one in sampled.values()])
+    models = tuple(
+        Model(law, discrepancy, one.log_evidence, one.log_evidence_std, float(np.exp(one.log_evidence - total)),
+              one.information_bits, one.effective)
+        for (law, discrepancy), one in sorted(sampled.items(), key=lambda entry: MODELS.index(entry[0]))
+    )  # fmt: skip
+    return models, sampled
+
+
+def _likeliest_first(forward: Forward, pools: Mapping[Law, Pool]) -> list[tuple[Law, bool]]:
+    """Models by what the draws that are there make of them: draws are then not spent on the hopeless."""
+
+    def likelihood(model: tuple[Law, bool]) -> float:
+        return float(_target(forward.points, discrepancy=model[1])(pools[model[0]].shown).max())
+
+    return sorted(MODELS, key=likelihood, reverse=True)
+
+
+def _target(points: tuple[Point, ...], *, discrepancy: bool) -> Callable[[Shown], Field]:
+    return lambda shown: log_likelihood(shown, points, discrepancy=discrepancy)
+
+
+def _evaluate(forward: Forward, law: Law) -> Callable[[Field], Shown]:
+    return lambda z: forward.shown(z, law)
+
+
+def new_pools(forward: Forward, seed: int) -> dict[Law, Pool]:
+    """Draws from the prior, for each law."""
+    return {law: Pool(_evaluate(forward, law), joined, _taken, forward.dims, seed) for law in LAWS}
+
+
+def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> dict[Law, Pool]:
+    """The draws that count, with one more operating point, `added`, behind those of before; `forward` has them all."""
+    extended = {}
+    before = forward.points[: -len(added.points)]
+    for law, whole in pools.items():
+        pool = whole.reduced([_target(before, discrepancy=flag)(whole.shown) for flag in (True, False)])
+        more = added.shown(pool.z, law)
+        columns = Shown(*(np.hstack(pair) for pair in zip(pool.shown, more, strict=True)))
+        extended[law] = pool.with_columns(_evaluate(forward, law), columns)
+    return extended
+
+
+def _taken(shown: Shown, rows: Field) -> Shown:
+    return Shown(*(column[rows] for column in shown))
+
+
+def joined(first: Shown, second: Shown) -> Shown:
+    """Rows of one behind those of the other."""
+    return Shown(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+
+
+# Draws ---------------------------------------------------------------------------------------------------------------
+
+
+def posterior_draws(
+    forward: Forward, sampled: Mapping[tuple[Law, bool], Sampled], *, discrepancy: bool, seed: int
+) -> Draws:
+    """Equally probable contacts by both laws, weighed by their evidence, with or without the laws' error."""
+    rng = np.random.default_rng([seed, 4, discrepancy])
+    both = [sampled[law, discrepancy] for law in LAWS]
+    total = logsumexp([one.log_evidence for one in both])
+    shares = np.exp([one.log_evidence - total for one in both])
+    counts = np.round(DRAWS * shares).astype(int)
+    parts = [
+        _drawn(forward, law, one, int(count), rng, discrepancy=discrepancy)
+        for law, one, count in zip(LAWS, both, counts, strict=True)
+        if count
+    ]
+    effective = float(1.0 / np.sum([share**2 / one.effective for share, one in zip(shares, both, strict=True)]))
+    whole = _joined_draws(parts)
+    return replace(whole, effective=effective)
+
+
+def prior_draws(forward: Forward, seed: int) -> Draws:
+    """Equally probable contacts before any recording."""
+    rng = np.random.default_rng([seed, 5])
+    z = rng.standard_normal((DRAWS, forward.dims))
+    emulated = forward.emulated(z, STATE)
+    states = {
+        key: OUTPUTS[key].back(mean + std * rng.standard_normal(mean.shape)) for key, (mean, std) in emulated.items()
+    }
+    zero = np.zeros(DRAWS)
+    return Draws(z, zero.astype(int), zero, states, float(DRAWS))
+
+
+def _drawn(
+    forward: Forward, law: Law, sampled: Sampled, count: int, rng: np.random.Generator, *, discrepancy: bool
+) -> Draws:
+    places = (rng.random() + np.arange(count)) / count
+    chosen = np.minimum(np.searchsorted(np.cumsum(sampled.weights), places), len(sampled.weights) - 1)
+    z = sampled.z[chosen]
+    shown = forward.shown(z, law)
+    size: Field = _sizes(shown, forward.points, rng) if discrepancy else np.zeros(count)
+    emulated = forward.emulated(z, STATE)
+    states = {}
+    for key, (mean, std) in emulated.items():
+        scaled: Field = mean + std * rng.standard_normal(mean.shape)
+        if key == CLR and law == "hertz-point":
+            scaled = _corrected(scaled, mean, std, shown, forward.points, size, rng)
+        states[key] = OUTPUTS[key].back(scaled)
+    return Draws(z, np.full(count, LAWS.index(law)), size, states, sampled.effective)
+
+
+def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) -> Field:
+    """How large the law's error is, drawn for each contact from what was heard."""
+    logs = log_at_sizes(shown, points)
+    shares = np.exp(logs - logsumexp(logs, axis=0))
+    place = np.sum(np.cumsum(shares, axis=0) < rng.random(shares.shape[1]), axis=0)
+    return np.asarray(np.array(SIZES)[np.minimum(place, len(SIZES) - 1)])
+
+
+def _corrected(
+    scaled: Field, mean: Field, std: Field, shown: Shown, points: tuple[Point, ...], size: Field,
+    rng: np.random.Generator,
+) -> Field:  # fmt: skip
+    """Load shares that the emulator left open, drawn anew with what each point's CRF says of them.
+
+    By Matheron's rule: a joint draw of share and frequency, moved by what the frequency heard differs from it.
+    """
+    heard = np.array([point.crf.value for point in points])
+    measured = np.array([point.crf.std for point in points])
+    share = OUTPUTS[CLR].back(mean)
+    slope = 1.0 / (6.0 * np.maximum(share, LEAST_SHARE) * OUTPUTS[CLR].slope(share))  # d ln CRF / d scale
+    noise = np.sqrt(measured**2 + size[:, None] ** 2)
+    drawn = shown.crf + slope * (scaled - mean) + noise * rng.standard_normal(mean.shape)
+    gain = std**2 * slope / (std**2 * slope**2 + noise**2)
+    return np.where(np.isnan(heard), scaled, scaled + gain * (heard - drawn))
+
+
+def _joined_draws(parts: list[Draws]) -> Draws:
+    return Draws(
+        np.concatenate([part.z for part in parts]),
+        np.concatenate([part.law for part in parts]),
+        np.concatenate([part.size for part in parts]),
+        {key: np.concatenate([part.states[key] for part in parts]) for key in STATE},
+        sum(part.effective for part in parts),
+    )

@@ -1,0 +1,114 @@
+"""A Gaussian process over the unit cube: fitted by scikit-learn, asked by a few lines of algebra.
+
+scikit-learn finds the lengths and levels; what is asked a million times a second needs neither its checks nor itself.
+"""
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy
+
+from asperity.arrays import Field
+from asperity.errors import BadInput
+
+LENGTHS = (0.1, 30.0)  # of the kernel, in widths of the cube
+LEVELS = (1e-2, 1e2)  # variance of the process over that of the data
+ROUGHNESS = (1e-5, 1.0)  # white noise beside the stated one: what the process does not follow
+TREND_NOISE = 0.02  # least variance of a point in the fit of the trend
+AT_ONCE = 8192  # points asked at a time
+
+
+@dataclass(frozen=True)
+class Process:
+    """A linear trend, and a Gaussian process (Matern 5/2, a length each axis) of what is left, on its own scale.
+
+    Parameters
+    ----------
+    x : points, shape (n, d)
+    y, noise : values there and their variance, which is known, shape (n,)
+    lengths, level, rough : of the kernel, over `scale` squared; `rough` is white, and part of the stated deviation
+    """
+
+    x: Field
+    y: Field
+    noise: Field
+    lengths: Field
+    level: float
+    rough: float
+
+    @cached_property
+    def _trend(self) -> Field:
+        weight = 1.0 / np.sqrt(self.noise + TREND_NOISE)
+        return np.asarray(np.linalg.lstsq(_basis(self.x) * weight[:, None], self.y * weight, rcond=None)[0])
+
+    @cached_property
+    def _scale(self) -> float:
+        return float(np.std(self.y - _basis(self.x) @ self._trend)) or 1.0
+
+    @cached_property
+    def _solved(self) -> tuple[Field, Field]:
+        """Inverse of the covariance, and that times the data."""
+        rest = (self.y - _basis(self.x) @ self._trend) / self._scale
+        covariance = self._kernel(self.x) + np.diag(self.noise / self._scale**2 + self.rough)
+        inverse = scipy.linalg.cho_solve(scipy.linalg.cho_factor(covariance, lower=True), np.eye(rest.size))
+        return inverse, inverse @ rest
+
+    def _kernel(self, x: Field) -> Field:
+        near, far = x / self.lengths, self.x / self.lengths
+        square = np.sum(near**2, axis=1)[:, None] + np.sum(far**2, axis=1) - 2.0 * near @ far.T
+        distance = np.sqrt(5.0 * np.maximum(square, 0.0))
+        return np.asarray(self.level * (1.0 + distance + distance**2 / 3.0) * np.exp(-distance))
+
+    def __call__(self, x: Field) -> tuple[Field, Field]:
+        """Mean and standard deviation at points, shape (n, d): of the mean over surfaces, not of one surface."""
+        inverse, weights = self._solved
+        means, stds = [], []
+        for part in np.array_split(x, max(1, -(-len(x) // AT_ONCE))):
+            kernel = self._kernel(part)
+            known = np.einsum("ij,ij->i", kernel @ inverse, kernel)
+            means.append(_basis(part) @ self._trend + self._scale * (kernel @ weights))
+            stds.append(self._scale * np.sqrt(np.maximum(self.level - known, 0.0) + self.rough))
+        return np.concatenate(means), np.concatenate(stds)
+
+    def settings(self) -> dict[str, Any]:
+        """What `fit_process` found, in numbers."""
+        return {"lengths": [float(length) for length in self.lengths], "level": self.level, "rough": self.rough}
+
+
+def _basis(x: Field) -> Field:
+    return np.hstack([np.ones((len(x), 1)), x])
+
+
+def require_learning() -> None:
+    """BadInput unless scikit-learn is there."""
+    try:
+        import sklearn.gaussian_process  # noqa: F401 - an extra, and long to load
+    except ModuleNotFoundError:
+        raise BadInput(
+            "the emulator needs scikit-learn, which is not installed; pip install 'asperity[infer]'"
+        ) from None
+
+
+def fit_process(x: Field, y: Field, noise: Field, start: Process | None = None) -> Process:
+    """The likeliest process through values with known noise, from `start` or from lengths of the whole cube."""
+    require_learning()
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    lengths: Field = np.ones(x.shape[1])
+    level, rough = 1.0, 0.01
+    if start is not None:
+        lengths, level, rough = start.lengths, start.level, start.rough
+    plain = Process(x, y, noise, lengths, level, rough)
+    kernel = ConstantKernel(level, LEVELS) * Matern(lengths, LENGTHS, nu=2.5) + WhiteKernel(rough, ROUGHNESS)
+    learner = GaussianProcessRegressor(kernel, alpha=noise / plain._scale**2 + 1e-10, random_state=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound is one that does not matter
+        learner.fit(x, (y - _basis(x) @ plain._trend) / plain._scale)
+    product, white = learner.kernel_.k1, learner.kernel_.k2
+    return Process(x, y, noise, np.atleast_1d(product.k2.length_scale), float(product.k1.constant_value),
+                   float(white.noise_level))  # fmt: skip

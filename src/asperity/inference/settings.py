@@ -1,0 +1,221 @@
+"""What a case leaves to be inferred: the unknowns with their priors, where it may be run, and how it is emulated."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from asperity.case import Case, InferSection, PriorSection, SheetSection, split_amount
+from asperity.errors import BadInput
+from asperity.inference.priors import Unknown
+from asperity.study import ParameterRange, full_key, overrides_at, require_ranges, stated_value
+
+LOAD, SPEED, TEMPERATURE = "contact.load", "contact.entrainment_speed", "lubricant.temperature"
+OFFSET = "temperature_offset_k"
+OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 2.0)}  # of the case's own
+TEMPERATURE_SPAN_K = 25.0  # either side of the case's own
+OFFSET_STD_K = 3.0
+CELLS_OF_A_LENGTH = 2.0  # correlation lengths shorter than that are none on the grid
+LENGTHS = ("surface.correlation_length", "surface.correlation_length[0]", "surface.correlation_length[1]")
+
+
+@dataclass(frozen=True, slots=True)
+class _Default:
+    """What is taken of a quantity where [infer] says nothing: a factor either way, ends, or a relative deviation."""
+
+    key: str
+    factor: float = 1.0
+    ends: tuple[float, float] | None = None
+    relative_std: float = math.nan
+    reason: str = ""
+    emulated: bool = True
+
+
+UNKNOWNS: Mapping[str, _Default] = {
+    "surface.sq": _Default("sq_m", 4.0, reason="from a fourth of the stated Sq to four times it"),
+    LENGTHS[0]: _Default("correlation_length_x_m", 1.6, reason="a factor 1.6 either way"),
+    LENGTHS[1]: _Default("correlation_length_x_m", 1.6, reason="a factor 1.6 either way"),
+    LENGTHS[2]: _Default("correlation_length_y_m", 1.6, reason="a factor 1.6 either way"),
+    "material.hardness": _Default("hardness_pa", 2.0, reason="a factor 2 either way: it is seldom stated"),
+    "lubricant.viscosity.eta0": _Default("oil_viscosity_pa_s", 2.0, reason="15 to 20 K either way"),
+    "lubricant.viscosity.alpha": _Default("oil_alpha_1_pa", 1.25, reason="what estimates of alpha differ by"),
+    "vibration.mass": _Default("mass_kg", relative_std=0.1, reason="a mass is weighed, its effective share is not",
+                               emulated=False),
+    "vibration.damping_ratio": _Default("damping_ratio", 3.0, reason="dry joints to damped ones", emulated=False),
+    "vibration.cutoff_exponent": _Default("cutoff_exponent", ends=(0.0, 0.5), emulated=False,
+                                          reason="from a cut-off that ignores CAR to one that goes with its root"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is to be inferred of a case.
+
+    Parameters
+    ----------
+    case : the contact, on the emulator's grid, without [infer]
+    contact : unknowns that the emulator takes
+    others : unknowns of what it is heard by: mass, damping, bandwidth; temperature's offset
+    operating : ranges of load, speed and, of an oil by its data sheet, temperature
+    points, surfaces, seed : of the emulator
+    """
+
+    case: Case
+    contact: tuple[Unknown, ...]
+    others: tuple[Unknown, ...]
+    operating: tuple[ParameterRange, ...]
+    points: int
+    surfaces: int
+    seed: int
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """All of them, in the order of their numbers."""
+        return (*self.contact, *self.others)
+
+    @property
+    def ranges(self) -> tuple[ParameterRange, ...]:
+        """What the emulator is asked by, in order."""
+        return (*(unknown.range for unknown in self.contact), *self.operating)
+
+
+def setting_of(case: Case) -> Setting:
+    """What a case leaves to be inferred, by its [infer] and, where that says nothing, by the defaults in `UNKNOWNS`.
+
+    Raises
+    ------
+    BadInput
+        for a case without [vibration], oil or roughness; a prior for what cannot be inferred; a range that the grid
+        cannot carry.
+    """
+    if case.vibration is None:
+        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+    if case.lubricant is None:
+        raise BadInput(f"{case.source}: the contact is dry, and shares no load with oil; state a lubricant")
+    if stated_value(case, "surface.kind") == "flat":
+        raise BadInput(f"{case.source}: surface is flat, and nothing touches; take a rough one")
+    section = case.contents.infer or InferSection()
+    base = case.with_overrides({"infer": "none", "study": "none", "grid.cells": list(section.cells)})
+    stated = {_key_of(case, name): prior for name, prior in section.axes.items()}
+    operating = _operating(base, stated)
+    unknowns = [
+        unknown
+        for key, default in UNKNOWNS.items()
+        if (unknown := _unknown(base, key, default, stated.get(key), operating)) is not None
+    ]
+    if not any(unknown.key == "sq_m" for unknown in unknowns) and "surface.sq" not in stated:
+        raise BadInput(f"{case.source}: surface has no sq to infer; take a generated one, kind gaussian")
+    if any(entry.key == TEMPERATURE for entry in operating):
+        unknowns.append(Unknown.stated(OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil against that stated"))
+    contact = tuple(u for u in unknowns if u.range.key in UNKNOWNS and UNKNOWNS[u.range.key].emulated)
+    others = tuple(u for u in unknowns if u not in contact)
+    setting = Setting(base, contact, others, operating, section.points, section.surfaces, section.seed)
+    require_ranges(base, setting.ranges, {})
+    return setting
+
+
+def _key_of(case: Case, name: str) -> str:
+    """The case key that a name in [infer] means; BadInput for one that is neither an unknown nor an operating one."""
+    key = name if name in UNKNOWNS else full_key(case, name, "infer")
+    if key not in UNKNOWNS and key not in (*OPERATING, TEMPERATURE):
+        known = ", ".join(sorted({entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING, TEMPERATURE)}))
+        raise BadInput(f"{case.source}: infer.{name} cannot be inferred; what can is {known}")
+    return key
+
+
+def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, ...]:
+    ranges = []
+    for key, (low, high) in OPERATING.items():
+        own, unit = split_amount(stated_value(case, key))
+        default = ParameterRange(key, low * float(own), high * float(own), unit, "about the case's own")
+        ranges.append(_stated_range(case, key, stated.get(key)) or default)
+    if isinstance(case.contents.lubricant, SheetSection):
+        own, unit = split_amount(stated_value(case, TEMPERATURE))
+        ends = float(own) - TEMPERATURE_SPAN_K, float(own) + TEMPERATURE_SPAN_K
+        default = ParameterRange(TEMPERATURE, *ends, unit, "about the case's own")
+        ranges.append(_stated_range(case, TEMPERATURE, stated.get(TEMPERATURE)) or default)
+    elif TEMPERATURE in stated:
+        raise BadInput(f"{case.source}: infer.temperature needs an oil by its data sheet; state grade and temperature")
+    return tuple(ranges)
+
+
+def _stated_range(case: Case, key: str, prior: Any) -> ParameterRange | None:
+    """Where the contact may be run, as [infer] states it; None where it does not."""
+    if prior is None:
+        return None
+    if not isinstance(prior, PriorSection) or prior.start is None:
+        name = key.rpartition(".")[2]
+        raise BadInput(f"{case.source}: infer.{name} is where the contact may be run; give from and to")
+    return _range(case, key, prior.start, prior.to)
+
+
+def _range(case: Case, key: str, start: Any, to: Any, reason: str = "as stated") -> ParameterRange:
+    low, unit = _amount(case, key, "from", start)
+    high, _ = _amount(case, key, "to", to, unit)
+    return ParameterRange(key, low, high, unit, reason)
+
+
+def _amount(case: Case, key: str, entry: str, value: Any, unit: str | None = None) -> tuple[float, str]:
+    try:
+        number, own = split_amount(value, unit)
+    except BadInput as error:
+        raise BadInput(f"{case.source}: infer.{key.rpartition('.')[2]}.{entry} {error}") from None
+    return float(number), own
+
+
+def _unknown(
+    case: Case, key: str, default: _Default, prior: Any, operating: tuple[ParameterRange, ...]
+) -> Unknown | None:
+    """A quantity that is not known, as stated or by default; None where the case has none, or knows it."""
+    own = stated_value(case, key)
+    if key == LENGTHS[0] and isinstance(own, list):
+        own = own[0] if own[0] == own[1] else None
+    elif key in LENGTHS[1:] and (own is None or _isotropic(case)):
+        own = None
+    if prior == "known" or own is None:
+        if isinstance(prior, PriorSection):
+            raise BadInput(f"{case.source}: infer.{key} has a prior, and the case has no such quantity")
+        return None
+    if isinstance(prior, PriorSection) and prior.start is None:
+        mean, unit = _amount(case, key, "value", prior.value)
+        std, _ = _amount(case, key, "std", prior.std, unit)
+        if not 0.0 < std < math.inf:
+            raise BadInput(f'{case.source}: infer.{key}.std must be positive, got {prior.std}; what is sure is "known"')
+        return Unknown.stated(default.key, key, mean, std, unit, "as stated")
+    if isinstance(prior, PriorSection):
+        stated = _range(case, key, prior.start, prior.to)
+        carried = _carried(case, stated, operating) if key in LENGTHS else stated
+        if carried != stated:
+            raise BadInput(
+                f"{case.source}: infer.{key.rpartition('.')[2]} must lie within {carried.low:g} to {carried.high:g} "
+                f"{carried.unit}, which the emulator's grid carries at every load; narrow it, or state more infer.cells"
+            )
+        return Unknown(default.key, stated)
+    number, unit = split_amount(own)
+    mean = float(number)
+    if not math.isnan(default.relative_std):
+        return Unknown.stated(default.key, key, mean, default.relative_std * mean, unit, default.reason)
+    low, high = default.ends or (mean / default.factor, mean * default.factor)
+    entry = ParameterRange(key, float(f"{low:.4g}"), float(f"{high:.4g}"), unit, default.reason)
+    return Unknown(default.key, _carried(case, entry, operating) if key in LENGTHS else entry)
+
+
+def _isotropic(case: Case) -> bool:
+    lengths = stated_value(case, LENGTHS[0])
+    return not isinstance(lengths, list) or lengths[0] == lengths[1]
+
+
+def _carried(case: Case, lengths: ParameterRange, operating: tuple[ParameterRange, ...]) -> ParameterRange:
+    """The part of a range of correlation lengths that the grid carries at every load."""
+    loads = next(entry for entry in operating if entry.key == LOAD)
+    grids = [case.with_overrides(overrides_at(case, [loads], [end])).grid for end in (0.0, 1.0)]
+    scale = 1.0 / float(Unknown("", lengths).to_si(1.0))  # type: ignore[arg-type]
+    low = CELLS_OF_A_LENGTH * scale * max(max(grid.spacing) for grid in grids)
+    high = 0.49 * scale * min(min(grid.extent) for grid in grids)
+    low, high = max(lengths.low, float(f"{1.005 * low:.3g}")), min(lengths.high, float(f"{0.995 * high:.3g}"))
+    if low >= high:
+        raise BadInput(
+            f"{case.source}: the emulator's grid carries no correlation length from {lengths.low:g} to "
+            f"{lengths.high:g} {lengths.unit}; state more infer.cells, or the length as known"
+        )
+    return replace(lengths, low=low, high=high)

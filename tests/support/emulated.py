@@ -1,0 +1,58 @@
+"""An emulator whose contact is a formula: what it says is known, and it takes no solving."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from asperity.case import load_case
+from asperity.inference import Emulator, Quality, Setting, setting_of
+from asperity.inference.emulator import features_of
+from asperity.inference.outputs import OUTPUTS
+from asperity.inference.process import Process
+
+CASE = Path(__file__).parents[2] / "examples" / "infer.toml"
+POINTS = 64  # a power of two
+
+
+def formula_setting(**overrides: object) -> Setting:
+    """The example's setting."""
+    case = load_case(CASE)
+    return setting_of(case.with_overrides(overrides) if overrides else case)
+
+
+def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
+    """Shares, film, friction, stiffness and damping of a contact whose film ratio goes as exp(4 x)."""
+    film = 1.6 * np.exp(4.0 * x)
+    share = 1.0 / (1.0 + film**2.5)
+    return {
+        "clr": share,
+        "car": 0.2 * share,
+        "h_mean_m": film * sq,
+        "friction_coefficient": 0.02 + 0.13 * share,
+        "contact_stiffness_n_m": 3.3e8 * (1.0 + 0.02 * share),
+        "contact_damping_ratio": 0.03 * (1.0 - share),
+    }
+
+
+def formula_emulator(setting: Setting) -> Emulator:
+    """Processes through the formula, on a Sobol sequence, without noise."""
+    shares = qmc.Sobol(len(setting.ranges), rng=np.random.default_rng(1)).random(POINTS)
+    features = features_of(setting)
+    x = features(shares)
+    speed = len(setting.contact) + 1
+    values = formula(x[:, speed], 1e-6 * setting.contact[0].in_unit(_z(shares[:, 0])))
+    lengths = np.full(x.shape[1], 30.0)
+    lengths[[0, speed]] = 3.0, 0.6
+    processes = {
+        key: Process(x, output.forward(values[key]), np.full(POINTS, 1e-4), lengths, 30.0, 4e-4)
+        for key, output in OUTPUTS.items()
+    }
+    quality = {key: Quality(0.01, 0.9, 0.05, 0.02) for key in OUTPUTS}
+    return Emulator(setting.ranges, features, processes, quality, POINTS, 4, 0, Path("formula"), 0.0)
+
+
+def _z(share: np.ndarray) -> np.ndarray:
+    from scipy.special import ndtri
+
+    return ndtri(np.clip(share, 1e-9, 1.0 - 1e-9))
