@@ -39,6 +39,7 @@ ALONE = (  # whose times are their result: nothing runs beside them; those first
     "study",
     "rollers",
     "bounded",
+    "monitor",
 )
 ABREAST = (  # what is counted, on each processor one of these, each one part or some that need what another keeps
     ("wearing",),

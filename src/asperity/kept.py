@@ -59,9 +59,21 @@ def _believed(path: Path, stated: str | None, content: Any, remedy: str) -> None
 # Files of bytes -------------------------------------------------------------------------------------------------------
 
 
+def sealed(body: bytes) -> bytes:
+    """Bytes with their digest behind them."""
+    return body + _MARK + digest(body).encode()
+
+
+def unsealed(content: bytes, name: str, remedy: str) -> bytes:
+    """The bytes that `sealed` took; UnreadableFile, which names the thing and ends with the remedy, for any others."""
+    body, mark, stated = content[: -_DIGITS - len(_MARK)], content[-_DIGITS - len(_MARK) : -_DIGITS], content[-_DIGITS:]
+    _believed(Path(name), stated.decode("latin-1") if mark == _MARK else None, body, remedy)
+    return body
+
+
 def write_sealed(path: Path, body: bytes) -> None:
     """Write bytes and their digest behind them, whole or not at all; raises as `files.whole_file`."""
-    write_bytes(path, body + _MARK + digest(body).encode())
+    write_bytes(path, sealed(body))
 
 
 def read_sealed(path: Path, remedy: str) -> bytes:

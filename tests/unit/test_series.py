@@ -5,7 +5,7 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
-from asperity.wear import series_resonances
+from asperity.wear import learn_series, series_resonances
 from asperity.wear.resonance import line_shape
 from asperity.wear.separation import Blocks, Parameters, _costs, _point
 from asperity.wear.series import _Line, _objection
@@ -54,6 +54,25 @@ def test_the_moving_line_is_told_from_standing_modes_as_high():
     assert [one.crfa for one in found] == pytest.approx(np.full(TRUTH.size, 0.7), rel=0.1)
     fooled = series_resonances(series(), band_hz=BAND, method="peak")
     assert np.mean([abs(one.crf_hz - f) > 100.0 for one, f in zip(fooled, TRUTH, strict=True)]) > 0.5
+
+
+def test_a_further_recording_is_judged_beside_what_others_have_settled():
+    """As if all had been separated together, within the deviations; and what is no line of the contact is none."""
+    truth = 3300.0 + 300.0 * np.random.default_rng(5).standard_normal(60).clip(-1.3, 1.3)
+    spectra = series(truth=truth, seed=5)
+    together = series_resonances(spectra, band_hz=BAND)
+    first, shared = learn_series(spectra[:40], band_hz=BAND)
+    assert [one.crf_hz for one in first] == [one.crf_hz for one in series_resonances(spectra[:40], band_hz=BAND)]
+    beside = shared.resonances(spectra[40:])
+    pulls = [(one.crf_hz - all_.crf_hz) / all_.crf_std for one, all_ in zip(beside, together[40:], strict=True)]
+    assert np.max(np.abs(pulls)) < 1.0
+    errors = [(one.crf_hz - f) / one.crf_std for one, f in zip(beside, truth[40:], strict=True)]
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
+    assert [one.crf_std for one in beside] == pytest.approx([one.crf_std for one in together[40:]], rel=0.3)
+    (silent,) = shared.resonances(series(0.0, truth=truth[:1], seed=6))
+    assert not silent.found
+    with pytest.raises(BadInput, match="not of this series"):
+        shared.resonances([replace(spectra[0], frequency_hz=2.0 * FREQUENCY)])
 
 
 def test_the_fit_scatters_as_it_says():

@@ -15,9 +15,9 @@ from asperity.tracking import recordings_in, search_target, track_recordings
 from asperity.tracking.files import read_table
 from asperity.tracking.reading import (
     common_spacing,
-    load_reading,
     read_spectrum,
-    save_reading,
+    reading_bytes,
+    reading_from,
     segment_length,
 )
 from asperity.tracking.track import judge
@@ -89,14 +89,15 @@ def test_lines_are_as_fine_as_the_records_are_long(tmp_path):
 
 def test_a_reading_is_kept_in_full(tmp_path):
     readings = read_spectrum(record(tmp_path / "a.npz", 1), ReadOptions(), TARGET, 4.0)
-    save_reading(readings, tmp_path / "kept")
-    again = load_reading(tmp_path / "kept")
+    packed = reading_bytes(readings)
+    again = reading_from(packed, "kept")
     assert np.array_equal(again.spectrum.density, readings.spectrum.density)
     assert np.array_equal(again.spectrum.frequency_hz, readings.spectrum.frequency_hz)
     assert replace(again, spectrum=None) == replace(readings, spectrum=None)
-    (tmp_path / "kept").write_bytes((tmp_path / "kept").read_bytes()[:500])
-    with pytest.raises(UnreadableFile, match="delete it"):
-        load_reading(tmp_path / "kept")
+    with pytest.raises(UnreadableFile, match="read again"):
+        reading_from(packed[:500], "kept")
+    with pytest.raises(UnreadableFile, match="kept is damaged"):
+        reading_from(packed[:500] + b"x" + packed[501:], "kept")
 
 
 def test_processes_read_what_one_alone_reads(tmp_path, monkeypatch):

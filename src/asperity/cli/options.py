@@ -123,6 +123,15 @@ Acknowledge = Annotated[
         metavar="RECORDING", help="Somebody has looked, up to this recording or 'last': begin anew behind it."
     ),
 ]
+StoreFile = Annotated[
+    Path | None,
+    typer.Option("--store", metavar="DB", help="One SQLite file for recordings and judgements; several may share it."),
+]
+Machine = Annotated[str | None, typer.Option(metavar="NAME", help="Whose recordings these are, in the store.")]
+Point = Annotated[str | None, typer.Option(metavar="NAME", help="Measuring point on it; by default the folder.")]
+SensorName = Annotated[
+    str | None, typer.Option("--sensor", metavar="NAME", help="Sensor there; by default the channel.")
+]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

@@ -1,14 +1,14 @@
 """`asperity check`, `track` and `watch`: measured recordings, from files to a verdict."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from asperity import files, processes, report, tracking
+from asperity import files, processes, recording, report, tracking
 from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, case_at, require_output
@@ -17,10 +17,11 @@ from asperity.errors import BadInput
 from asperity.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track
+    from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track, Update
     from asperity.wear import SeriesMethod, StageSource
 
 EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # of the alarm's state; the others end with 0
+PAGE = "report.html"
 IN_FULL = 4  # recordings that `check` shows with every fact
 
 
@@ -110,6 +111,10 @@ def track(
     stages_from: options.StagesFrom = "crf",
     false_alarms: options.FalseAlarms = 1e-3,
     acknowledge: options.Acknowledge = None,
+    store: options.StoreFile = None,
+    machine: options.Machine = None,
+    point: options.Point = None,
+    sensor: options.SensorName = None,
     page: options.Page = None,
     out: Annotated[
         list[Path] | None, typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat.")
@@ -123,6 +128,8 @@ def track(
         files.require_writable(page)
     for path in out or ():
         require_output(path, ".csv", ".parquet", ".nc")
+    if store is not None:
+        files.require_writable(store)
     with _files_read("reading recordings ...", quiet=quiet) as step:
         tracked = tracking.track_recordings(
             paths,
@@ -142,6 +149,9 @@ def track(
             progress=step,
         )
     kept = _write(tracked, out or (), page)
+    if store is not None:
+        stated = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
+        kept.append(tracking.keep_track(tracked, store, stated, machine=machine, point=point, sensor=sensor))
     hint = ["  Add --report track.html for the page, --out track.csv for the table."]
     show(
         tracked.verdict(),
@@ -154,7 +164,7 @@ def track(
         as_json=as_json,
         quiet=quiet,
     )
-    _end(tracked)
+    _end(tracked.alarm.state)
 
 
 @app.command()
@@ -179,6 +189,10 @@ def watch(
     stages_from: options.StagesFrom = "crf",
     false_alarms: options.FalseAlarms = 1e-3,
     acknowledge: options.Acknowledge = None,
+    store: options.StoreFile = None,
+    machine: options.Machine = None,
+    point: options.Point = None,
+    sensor: options.SensorName = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -187,7 +201,7 @@ def watch(
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     files.make_folder(kept)
-    last: Track | None = None
+    state: str = "cannot-tell"
     with _files_read("watching ...", quiet=quiet) as step:
         updates = tracking.watch_folder(
             folder,
@@ -204,6 +218,11 @@ def watch(
             stages_from=cast("StageSource", stages_from),
             false_alarm_rate=false_alarms,
             acknowledge=acknowledge,
+            store=store,
+            machine=machine,
+            point=point,
+            sensor=sensor,
+            recall=(kept / PAGE).is_file(),
             once=once,
             every_s=every,
             settle_s=settle,
@@ -212,37 +231,48 @@ def watch(
         )
         try:
             for update in updates:
-                last = update.track
-                if update.track is not None:
-                    _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / "report.html")
-                _show_update(update.new, update.track, update.waiting, kept, as_json=as_json, quiet=quiet)
+                state = _written_and_shown(update, kept, as_json=as_json, quiet=quiet) or state
         except KeyboardInterrupt:
             if once:
                 raise
             print(f"stopped; what was heard is in {kept}, and the next watch goes on from there", file=sys.stderr)
-    _end(last)
+    _end(state)
 
 
-def _end(tracked: "Track | None") -> None:
-    """End with the code that the alarm's state has; without any recording nothing can be told."""
-    state = "cannot-tell" if tracked is None else tracked.alarm.state
+def _end(state: str) -> None:
+    """End with the code that the alarm's state has."""
     if state in EXIT_CODES:
         raise typer.Exit(EXIT_CODES[state])
 
 
+def _written_and_shown(update: "Update", kept: Path, *, as_json: bool, quiet: bool) -> str | None:
+    """Write and show what an update says; the alarm's state, None without any recording."""
+    said = update.said if update.track is None else update.track.scalars()
+    if update.track is not None:
+        _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / PAGE)
+    _show_update(update.new, said, update.waiting, kept, as_json=as_json, quiet=quiet)
+    return None if said is None else str(said["alarm"]["state"])
+
+
 def _show_update(
-    new: "Sequence[Reading]", tracked: "Track | None", waiting: int, results: Path, *, as_json: bool, quiet: bool
+    new: "Sequence[Reading]",
+    said: Mapping[str, Any] | None,
+    waiting: int,
+    results: Path,
+    *,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     """One update of a watch: a JSON object a line, or a verdict with what is new."""
-    verdict = "Nothing to judge yet: no recording has arrived." if tracked is None else tracked.verdict()
+    verdict = "Nothing to judge yet: no recording has arrived." if said is None else said["verdict"]
     if waiting:
         verdict += f" {waiting} more may still be written and wait for the next look."
-    values: dict[str, Any] = {"verdict": verdict} if tracked is None else tracked.scalars()
+    values: dict[str, Any] = {"verdict": verdict} if said is None else dict(said)
     arrived = [recording.file for recording in new]
     show(
         verdict,
         lambda: {**values, "new": arrived, "waiting": waiting, "results": str(results)},
-        [] if tracked is None else _arrived(new, values["recordings"], results),
+        [] if said is None else _arrived(new, values["recordings"], results),
         as_json=as_json,
         quiet=quiet,
         a_line=True,

@@ -8,6 +8,9 @@ from .files import read_table as read_table
 from .files import recordings_in as recordings_in
 from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording
+from .overview import StoreOverview as StoreOverview
+from .overview import keep_track as keep_track
+from .overview import store_overview as store_overview
 from .reading import Reading as Reading
 from .target import Target as Target
 from .target import search_target as search_target

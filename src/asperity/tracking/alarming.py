@@ -11,8 +11,9 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
+from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
-from asperity.wear import Alarm, Sight, Stages, StageSource, Watched, sequential_alarm
+from asperity.wear import Alarm, Said, Sight, Stages, StageSource, Watched, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
 DAMPING_LEAST = 0.2  # of its logarithm
@@ -30,6 +31,7 @@ def raise_alarm(
     *,
     false_alarm_rate: float,
     acknowledge: str | None = None,
+    before: Before | None = None,
     unit: str = "",
 ) -> Alarm:
     """The alarm of a series, in agreement with its stages.
@@ -40,6 +42,7 @@ def raise_alarm(
     stages, stages_of : of the whole series, and how to have them of a part
     false_alarm_rate : alarms without wear, a recording
     acknowledge : the recording up to which somebody has looked, by its name; "last" for all
+    before : what was said of these recordings before
 
     Raises
     ------
@@ -55,11 +58,19 @@ def raise_alarm(
         confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
         acknowledged=_acknowledged(tracked, acknowledge),
         unit=unit,
+        said=_said(tracked, before),
     )
     if stages is not None and stages.kind == "severe" and acknowledge is None:
         chance = f"not yet beyond what chance does once in {1.0 / false_alarm_rate:.0f} recordings"
         return alarm.alerted(f"a severe stage is found, {chance}", source)
     return alarm
+
+
+def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> Said:
+    if before is None:
+        return Said()
+    known = {number: before.states.get(one.file) for number, one in enumerate(tracked)}
+    return Said({number: state for number, state in known.items() if state}, before.reason, before.raised_by)
 
 
 def _severe(stages: Stages | None) -> bool:

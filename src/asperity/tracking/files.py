@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 from asperity.errors import BadInput, UnreadableFile
@@ -80,6 +81,27 @@ class Table:
         return {str(path): self.place(path) for path in paths}
 
 
+def in_time(times: Sequence[datetime | None], heard: Sequence[bool]) -> tuple[list[float], str]:
+    """Hours since the first recording, where all say when they began and not all at once; their number otherwise.
+
+    What was not heard, no recording or a damaged one, takes no place: it stands at that of the one before.
+    """
+    known = [time for time, there in zip(times, heard, strict=True) if there]
+    stated = [time for time in known if time is not None]
+    if len(stated) == len(known) and len(set(stated)) > 1:
+        first = min(stated)
+        x = iter([(time - first).total_seconds() / 3600.0 for time in stated])
+        x_name = "time_h"
+    else:
+        x, x_name = iter([float(number) for number in range(1, len(known) + 1)]), "recording"
+    at = 0.0 if x_name == "time_h" else 1.0
+    places = []
+    for there in heard:
+        at = next(x) if there else at
+        places.append(at)
+    return places, x_name
+
+
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
     """The files named, and those in the folders named, by name with numbers in their order.
 
@@ -96,7 +118,7 @@ def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
             inside = [file for file in path.iterdir() if may_be_recording(file)]
             if not inside:
                 raise BadInput(f"{path} holds no recordings; name files, or the folder they lie in")
-            recordings += sorted(inside, key=lambda file: _natural(file.name))
+            recordings += sorted(inside, key=lambda file: natural(file.name))
         elif path.exists():
             recordings.append(path)
         else:
@@ -198,5 +220,6 @@ def _heading(path: Path) -> list[str]:
     return [field.strip().strip('"') for field in re.split(r"[,;\t]", first.strip())]
 
 
-def _natural(name: str) -> list[tuple[int, int | str]]:
+def natural(name: str) -> list[tuple[int, int | str]]:
+    """By what names are sorted so that their numbers stand in order."""
     return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", name) if part]

@@ -67,7 +67,7 @@ class TrackedRecording:
         resonance, quality = self.resonance, self.reading.quality
         return {
             "file": self.file,
-            "x": finite_or_none(self.x),
+            "x": None if self.reading.refused else finite_or_none(self.x),
             "x_std": finite_or_none(self.x_std),
             "crf_hz": finite_or_none(resonance.crf_hz),
             "crf_std_hz": finite_or_none(resonance.crf_std_hz),

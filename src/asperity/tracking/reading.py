@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from asperity.errors import BadInput, UnreadableFile
-from asperity.kept import read_sealed, write_sealed
+from asperity.kept import sealed, unsealed
 from asperity.processes import leave_interrupts_to_the_parent
 from asperity.recording import Gauge, Quality, ReadOptions, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
@@ -48,6 +48,11 @@ class Reading:
     facts: dict[str, tuple[str, str]] = field(default_factory=dict)
     started: str = ""
     reason: str = ""
+
+    @property
+    def refused(self) -> bool:
+        """Whether it is no recording at all, or one that nothing could be read of."""
+        return self.spectrum is None and self.quality is None
 
     @property
     def usable(self) -> bool:
@@ -153,8 +158,8 @@ def _size(path: Path) -> int:
 # Kept between runs ---------------------------------------------------------------------------------------------------
 
 
-def save_reading(reading: Reading, path: Path) -> None:
-    """Write a reading, whole or not at all, to be read by `load_reading`; raises as `files.whole_file`."""
+def reading_bytes(reading: Reading) -> bytes:
+    """A reading as bytes with their digest, to be read by `reading_from`."""
     density = np.empty(0) if reading.spectrum is None else reading.spectrum.density
     content: dict[str, Any] = asdict(replace(reading, spectrum=None))
     if reading.spectrum is not None:
@@ -162,19 +167,19 @@ def save_reading(reading: Reading, path: Path) -> None:
         content["spectrum"] = {name: getattr(reading.spectrum, name) for name in kept}
     packed = BytesIO()
     np.savez(packed, density=density, told=np.array(json.dumps(content)))
-    write_sealed(path, packed.getvalue())
+    return sealed(packed.getvalue())
 
 
-def load_reading(path: Path) -> Reading:
-    """What `save_reading` wrote.
+def reading_from(packed: bytes, name: str) -> Reading:
+    """What `reading_bytes` made.
 
     Raises
     ------
     UnreadableFile
         for anything else.
     """
-    remedy = "delete it, and its recording is read again"
-    body = BytesIO(read_sealed(path, remedy))
+    remedy = "its recording is read again"
+    body = BytesIO(unsealed(packed, name, remedy))
     try:
         with np.load(body, allow_pickle=False) as stored:
             density, content = stored["density"], json.loads(str(stored["told"]))
@@ -188,4 +193,4 @@ def load_reading(path: Path) -> Reading:
             quality = Quality(**quality | {name: tuple(quality[name]) for name in ("faults", "remarks")})
         return Reading(spectrum=spectrum, quality=quality, **content)
     except Exception as error:
-        raise UnreadableFile(f"{path} is no reading of a recording; {remedy}") from error
+        raise UnreadableFile(f"{name} is no reading of a recording; {remedy}") from error

@@ -4,7 +4,7 @@ Reading is left to `reading`, the methods to `asperity.wear`; what is decided he
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +18,8 @@ from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
 from asperity.tracking.alarming import raise_alarm
-from asperity.tracking.files import Place, Table, read_table, recordings_in
+from asperity.tracking.files import Place, Table, in_time, read_table, recordings_in
+from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track, TrackedRecording
 from asperity.tracking.reading import WINDOW, Reading, common_spacing, read_spectra
 from asperity.tracking.target import Target, search_target
@@ -36,7 +37,6 @@ from asperity.wear import (
     comparability,
     damping_objection,
     no_resonance,
-    remove_lines,
     series_resonances,
     split_stages,
 )
@@ -132,17 +132,25 @@ def judge(
     stages_from: StageSource = "crf",
     false_alarm_rate: float = FALSE_ALARMS,
     acknowledge: str | None = None,
+    learned: Learned | None = None,
+    before: Before | None = None,
 ) -> Track:
-    """What recordings say together that have been read; otherwise as `track_recordings`."""
+    """What recordings say together that have been read; otherwise as `track_recordings`.
+
+    With `learned`, further recordings are judged beside what it holds; `before` is what was said of them before.
+    """
     require_choice("source of stages", stages_from, get_args(StageSource))
     notes = [f"The band is {target.source}."] if target.assumed else []
     if places is None:
-        places, x_name = _places_in_time(readings)
+        x, x_name = in_time([reading.time for reading in readings], [not reading.refused for reading in readings])
+        places = {reading.file: Place(x=at) for reading, at in zip(readings, x, strict=True)}
     order = np.argsort(np.array([places[reading.file].x for reading in readings]), kind="stable")
     series, left_out = _on_one_grid(_without_silence([readings[number] for number in order]))
     notes += left_out
     spectra = {number: _spectrum(reading) for number, reading in enumerate(series) if reading.usable}
-    cleaned = [remove_lines(spectrum, shaft_hz=shaft_hz) for spectrum in spectra.values()]
+    files = [series[number].file for number in spectra]
+    memory = Learned() if learned is None else learned
+    cleaned = [memory.clean(file, one, shaft_hz) for file, one in zip(files, spectra.values(), strict=True)]
     chosen = method or ("joint" if len(spectra) >= FEWEST_RECORDINGS else ALONE)
     if method is None and chosen != "joint" and spectra:
         notes.append(
@@ -152,7 +160,10 @@ def judge(
     groups = -(-len(spectra) // MOST_TOGETHER) if chosen == "joint" else 1
     if groups > 1:
         notes.append(f"{len(spectra)} recordings were separated in {groups} groups, each spread over the whole series.")
-    resonances = _resonances(cleaned, target, chosen, groups)
+    if learned is not None and chosen == "joint":
+        resonances = learned.resonances(files, cleaned, target.band_hz)
+    else:
+        resonances = _resonances(cleaned, target, chosen, groups)
     if method is None and chosen == ALONE:
         resonances = [_not_the_contacts(line) if line.found else line for line in resonances]
     used = dict(zip(spectra, zip(cleaned, resonances, strict=True), strict=True))
@@ -176,7 +187,8 @@ def judge(
                 speed_hz=place.speed_hz,
             )
         )
-    return _staged(tracked, x_name, target, chosen, (detector, stages_from), (false_alarm_rate, acknowledge), notes)
+    alarming = (false_alarm_rate, acknowledge, before)
+    return _staged(tracked, x_name, target, chosen, (detector, stages_from), alarming, notes)
 
 
 def _staged(
@@ -185,7 +197,7 @@ def _staged(
     target: Target,
     method: SeriesMethod,
     staging: tuple[Detector, StageSource],
-    alarming: tuple[float, str | None],
+    alarming: tuple[float, str | None, Before | None],
     notes: list[str],
 ) -> Track:
     used = [recording for recording in tracked if recording.clean is not None]
@@ -194,7 +206,7 @@ def _staged(
     crf = np.array([recording.resonance.crf_hz for recording in tracked])
     crf_std = np.array([recording.resonance.crf_std for recording in tracked])
     crf_std = np.where(np.isfinite(crf_std), crf_std, 0.0)
-    stages_by = _stages_by(tracked, staging[0], _unit_of(x_name), comparable=comparable)
+    stages_by = _Ways(tracked, staging[0], _unit_of(x_name), comparable)
     stages = stages_by.get(staging[1])
     severe: Field = np.full(x.size, np.nan)
     labels: tuple[str, ...] = ("none",) * x.size
@@ -210,9 +222,10 @@ def _staged(
         tracked,
         staging[1],
         stages,
-        lambda part: _stages_by(part, staging[0], "", comparable=comparable, sources=staging[1:]).get(staging[1]),
+        lambda part: _Ways(part, staging[0], "", comparable).get(staging[1]),
         false_alarm_rate=alarming[0],
         acknowledge=alarming[1],
+        before=alarming[2],
         unit=_unit_of(x_name),
     )
     if target.full_load_crf_hz is not None:
@@ -256,34 +269,40 @@ def _facts_of(recording: TrackedRecording) -> RecordingFacts:
     )
 
 
-def _stages_by(
-    tracked: Sequence[TrackedRecording],
-    detector: Detector,
-    unit: str,
-    *,
-    comparable: bool,
-    sources: Sequence[StageSource] = get_args(StageSource),
-) -> dict[StageSource, Stages]:
-    """The stage as CRF, damping and both tell it; nothing where no resonance was found."""
-    if not any(recording.resonance.found for recording in tracked):
-        return {}
-    resonances = [recording.resonance for recording in tracked]
-    damping, damping_std = np.array([recording.damping for recording in tracked]).T
-    return {
-        source: split_stages(
-            [recording.x for recording in tracked],
-            [resonance.crf_hz for resonance in resonances],
-            [resonance.crfa for resonance in resonances] if comparable else None,
-            crf_std_hz=[resonance.crf_std for resonance in resonances],
-            damping_ratio=damping,
-            damping_std=damping_std,
-            x_std=[recording.x_std for recording in tracked],
-            source=source,
-            detector=detector,
-            unit=unit,
-        )
-        for source in sources
-    }
+class _Ways(Mapping[StageSource, Stages]):
+    """The stage as CRF, damping and both tell it, each worked out when it is asked for; none without a resonance."""
+
+    def __init__(self, tracked: Sequence[TrackedRecording], detector: Detector, unit: str, comparable: bool) -> None:
+        self.tracked, self.detector, self.unit, self.comparable = tracked, detector, unit, comparable
+        found = any(recording.resonance.found for recording in tracked)
+        self.sources: tuple[StageSource, ...] = get_args(StageSource) if found else ()
+        self.known: dict[StageSource, Stages] = {}
+
+    def __len__(self) -> int:
+        return len(self.sources)
+
+    def __iter__(self) -> Iterator[StageSource]:
+        return iter(self.sources)
+
+    def __getitem__(self, source: StageSource) -> Stages:
+        if source not in self.sources:
+            raise KeyError(source)
+        if source not in self.known:
+            resonances = [recording.resonance for recording in self.tracked]
+            damping, damping_std = np.array([recording.damping for recording in self.tracked]).T
+            self.known[source] = split_stages(
+                [recording.x for recording in self.tracked],
+                [resonance.crf_hz for resonance in resonances],
+                [resonance.crfa for resonance in resonances] if self.comparable else None,
+                crf_std_hz=[resonance.crf_std for resonance in resonances],
+                damping_ratio=damping,
+                damping_std=damping_std,
+                x_std=[recording.x_std for recording in self.tracked],
+                source=source,
+                detector=self.detector,
+                unit=self.unit,
+            )
+        return self.known[source]
 
 
 def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
@@ -315,7 +334,7 @@ def _copies(tracked: Sequence[TrackedRecording]) -> list[str]:
     return [
         f"{name} and {other} hold the same samples; leave one of them out."
         for (first, name), (second, other) in pairwise(sampled)
-        if first.shape == second.shape and np.allclose(first, second, rtol=1e-4, atol=0.0)
+        if first.shape == second.shape and bool(np.all(np.abs(first - second) <= 1e-4 * second))
     ]
 
 
@@ -332,17 +351,6 @@ def _stated_places(
     if table is not None:
         return table.x_name, table.placed(files)
     return "", None
-
-
-def _places_in_time(readings: Sequence[Reading]) -> tuple[dict[str, Place], str]:
-    """Hours since the first recording, where all say when they began and not all at once; their number otherwise."""
-    times = [reading.time for reading in readings]
-    known = [time for time in times if time is not None]
-    if len(known) == len(readings) and len(set(known)) > 1:
-        first = min(known)
-        hours = [(time - first).total_seconds() / 3600.0 for time in known]
-        return {reading.file: Place(x=hour) for reading, hour in zip(readings, hours, strict=True)}, "time_h"
-    return {reading.file: Place(x=float(number)) for number, reading in enumerate(readings, 1)}, "recording"
 
 
 def _without_silence(series: list[Reading]) -> list[Reading]:

@@ -1,43 +1,51 @@
 """A folder watched: each recording is read once as it arrives, and the series judged anew.
 
-What was read is kept in files of its own, so that a watch can stop at any moment and go on later.
+What was read and said is kept in a store, so that a watch can stop at any moment and go on later. Of a long series the
+first recordings and the latest are judged; the others stand in the store as they were judged.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from datetime import datetime
+from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
 from time import sleep, time
+from typing import Any, NamedTuple
 
 from asperity.case import Case
-from asperity.errors import BadInput, UnreadableFile
+from asperity.errors import BadInput
 from asperity.files import make_folder
-from asperity.kept import read_json, write_json
 from asperity.recording import ReadOptions
-from asperity.tracking.alarm_log import LOG, AlarmLog
-from asperity.tracking.alarming import LAST
-from asperity.tracking.files import Place, read_table, recordings_in
+from asperity.tracking.alarming import BASELINE, LAST
+from asperity.tracking.files import Place, Table, in_time, may_be_recording, natural, read_table
+from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
-from asperity.tracking.reading import Reading, common_spacing, load_reading, read_spectra, save_reading
+from asperity.tracking.reading import Reading, common_spacing, read_spectra
+from asperity.tracking.store import STORE, Sensor, Store, Version
+from asperity.tracking.store import Place as Spot
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
-from asperity.wear import FALSE_ALARMS, Detector, SeriesMethod, StageSource
+from asperity.wear import FALSE_ALARMS, AlarmState, Detector, SeriesMethod, StageSource
 
-MEMORY = "heard"  # folder beside the results, a file a recording
-SETTINGS = "watch.json"
+STRIDE = 80  # recordings that are judged together where many arrive at once
+LATEST = 112  # recordings of a long series that are judged with the first BASELINE: as many as the alarm looks back
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Update:
     """What is new: files just read, and the series with them; None as long as there is none.
 
-    `waiting` files have changed so lately that they may still be written.
+    `waiting` files have changed so lately that they may still be written. Where nothing was new, `track` is None and
+    `said` the last judgement, as `Track.scalars` gave it.
     """
 
     new: tuple[Reading, ...]
     track: Track | None
     waiting: int = 0
+    said: Mapping[str, Any] | None = None
 
 
 def watch_folder(
@@ -57,6 +65,11 @@ def watch_folder(
     stages_from: StageSource = "crf",
     false_alarm_rate: float = FALSE_ALARMS,
     acknowledge: str | None = None,
+    store: str | Path | None = None,
+    machine: str | None = None,
+    point: str | None = None,
+    sensor: str | None = None,
+    recall: bool = False,
     once: bool = False,
     every_s: float = 5.0,
     settle_s: float = 2.0,
@@ -68,126 +81,242 @@ def watch_folder(
     Parameters
     ----------
     folder : where recordings arrive
-    out : folder for what was read; made if need be. A later watch with the same `out` goes on from there
+    out : folder for the store; made if need be. A later watch with the same store goes on from there
     every_s : seconds between two looks
     settle_s : seconds for which a file must have stayed unchanged before it is read: it may still be written
-    acknowledge : as `track_recordings`; kept in `out`, and every judgement with it: an alarm stands until then
+    acknowledge : as `track_recordings`; kept in the store, and every judgement with it: an alarm stands until then
+    store : SQLite file for what was read and said, asperity.db in `out` by default; several watches may share one
+    machine, point, sensor : whose recordings these are, in the store; by default "machine", the folder, the channel
+    recall : at the start give the last judgement, where neither recordings nor what is asked has changed since
     others : as `track_recordings`; a recording that is not in `table` yet waits until it is
 
     Raises
     ------
     BadInput
-        for a folder that is none, or other settings than those `out` was begun with.
+        for a folder that is none, or other settings than those the store was begun with.
     """
     folder, out = Path(folder), Path(out)
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
+    make_folder(out)
     target = search_target(case, band_hz)
-    memory = _Memory(out, target, ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale))
-    log = AlarmLog(out / LOG)
-    judging = partial(
-        judge,
-        shaft_hz=shaft_hz,
-        method=method,
-        detector=detector,
-        stages_from=stages_from,
-        false_alarm_rate=false_alarm_rate,
-    )
+    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
+    spot = Spot(machine or "machine", point or folder.resolve().name, sensor or channel or "sensor")
+    memory = _Memory(Store(store or out / STORE).sensor(spot, settings_of(target, options)), target, options)
+    asked: dict[str, Any] = {
+        "shaft_hz": shaft_hz,
+        "method": method,
+        "detector": detector,
+        "stages_from": stages_from,
+        "false_alarm_rate": false_alarm_rate,
+    }
+    pace = _Pace(recall=recall, once=once, every_s=every_s, settle_s=settle_s)
+    return _looks(memory, folder, table, acknowledge, asked, pace, partial(memory.read, workers, progress))
+
+
+class _Pace(NamedTuple):
+    """How often a folder is looked into, and whether the first look may give what was said last."""
+
+    recall: bool
+    once: bool
+    every_s: float
+    settle_s: float
+
+
+def _looks(
+    memory: "_Memory",
+    folder: Path,
+    table: str | Path | None,
+    acknowledge: str | None,
+    asked: Mapping[str, Any],
+    pace: _Pace,
+    read: Callable[[list[Version]], tuple[Reading, ...]],
+) -> Iterator[Update]:
+    """An update at the start and whenever recordings have arrived."""
     first = True
     while True:
-        present = _present(folder)
-        unread = [path for path in present if memory.recall(path) is None]
-        arrived = [path for path in unread if _settled(path, settle_s)]
-        new = memory.read(arrived, workers, progress)
-        readings = [reading for path in present if (reading := memory.recall(path)) is not None]
+        present = memory.present(folder)
+        unread = [key for key in present if key not in memory.sensor.recordings]
+        arrived = [key for key in unread if _settled(Path(key.file), pace.settle_s)]
+        new = read(arrived)
+        known = [key for key in present if key in memory.sensor.recordings]
+        waiting = len(unread) - len(arrived)
         if new or first:
-            placed, places, x_name = _placed(readings, table)
-            judged = partial(judging, placed, target, places, x_name)
-            track = _kept(judged, log, new, acknowledge if first else None) if placed else None
-            yield Update(new=new, track=track, waiting=len(unread) - len(arrived))
-        if once:
+            named = None if table is None or not known else read_table(table)
+            question = _digest(asked, named, known, memory.target)
+            recalled = first and pace.recall and not new and acknowledge is None
+            said = memory.said(question) if recalled else None
+            if said is not None:
+                yield Update(new=(), track=None, waiting=waiting, said=said)
+            else:
+                order = _ordered(known, named, memory.sensor)
+                judging = partial(judge, **asked)
+                track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
+                yield Update(new=new, track=track, waiting=waiting)
+        if pace.once:
             return
         first = False
-        sleep(every_s)
+        sleep(pace.every_s)
 
 
-def _placed(readings: list[Reading], table: str | Path | None) -> tuple[list[Reading], dict[str, Place] | None, str]:
-    """The recordings that the table knows by now, where they stand, and the name of x."""
-    if table is None or not readings:
-        return readings, None, ""
-    named = read_table(table)
-    known = [reading for reading in readings if named.row(Path(reading.file)) is not None]
-    return known, named.placed([Path(reading.file) for reading in known]), named.x_name
+def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
+    """By what recordings are read: recordings of one sensor are all read alike."""
+    return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options)
 
 
-def _kept(judged: Callable[..., Track], log: AlarmLog, new: tuple[Reading, ...], acknowledge: str | None) -> Track:
-    """A judgement as the log leaves it, an acknowledgement taken first."""
-    track = judged(acknowledge=acknowledge)
-    names = {Path(recording.file).name for recording in track.recordings}
-    if acknowledge is not None:
-        log.acknowledge(track.recordings[-1].file if acknowledge == LAST else acknowledge)
-    if log.acknowledged in names:
-        track = judged(acknowledge=log.acknowledged)
-    return log.judged(track, [reading.file for reading in new])
+class _Order(dict[Version, Place]):
+    """Recordings in the order in which they are judged, each with its place; `x_name` says what x is."""
+
+    x_name = ""
+
+    def until(self, end: int) -> "_Order":
+        """The first of them."""
+        part = _Order([*self.items()][:end])
+        part.x_name = self.x_name
+        return part
+
+
+def _ordered(known: Sequence[Version], table: Table | None, sensor: Sensor) -> _Order:
+    """The recordings that the table knows by now, or all, by x."""
+    if table is not None:
+        places = table.placed([Path(key.file) for key in known if table.row(Path(key.file)) is not None])
+        placed = {key: places[key.file] for key in known if key.file in places}
+        x_name = table.x_name
+    else:
+        started = [sensor.recordings[key].started for key in known]
+        heard = [not sensor.recordings[key].refused for key in known]
+        x, x_name = in_time([datetime.fromisoformat(one) if one else None for one in started], heard)
+        placed = {key: Place(x=at) for key, at in zip(known, x, strict=True)}
+    order = _Order(sorted(placed.items(), key=lambda pair: pair[1].x))
+    order.x_name = x_name
+    return order
+
+
+def _window(order: _Order, sensor: Sensor) -> list[Version]:
+    """What is judged of a long series: the first ones nobody has acknowledged, the latest, and who raised the alarm."""
+    keys = list(order)
+    if len(keys) <= BASELINE + LATEST:
+        return keys
+    names = [Path(key.file).name for key in keys]
+    behind = names.index(sensor.acknowledged) + 1 if sensor.acknowledged in names else 0
+    chosen = {*range(behind, min(behind + BASELINE, len(keys))), *range(len(keys) - LATEST, len(keys))}
+    if sensor.standing is not None:
+        chosen |= {number for number, key in enumerate(keys) if key.file == sensor.standing.file}
+    return [keys[number] for number in sorted(chosen)]
+
+
+def _digest(asked: Mapping[str, Any], table: Table | None, known: Sequence[Version], target: Target) -> str:
+    """What a judgement depends on, besides what the store holds."""
+    told = [asked, repr(table), known, target.full_load_crf_hz]
+    return sha256(json.dumps(told, default=str).encode()).hexdigest()
 
 
 class _Memory:
-    """What was read so far, on disk and, as far as this run has needed it, at hand."""
+    """What a watch knows of its sensor: the store, and what of it this run has needed, at hand."""
 
-    def __init__(self, out: Path, target: Target, options: ReadOptions) -> None:
-        self.folder, self.target, self.options = out / MEMORY, target, options
-        self.settings = out / SETTINGS
-        self._loaded: dict[str, Reading] = {}
-        make_folder(self.folder)
-        self.expected = {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options)
-        remedy = "delete its folder, and recordings are read again"
-        begun = read_json(self.settings, remedy) if self.settings.is_file() else self.expected
-        self.spacing_hz: float | None = begun.get("spacing_hz")
-        for name, value in self.expected.items():
-            if begun.get(name) != value:
-                raise BadInput(
-                    f"{out} was begun with {name} {begun.get(name)}, now it is {value}; "
-                    "go on with the same, or choose another out"
-                )
+    def __init__(self, sensor: Sensor, target: Target, options: ReadOptions) -> None:
+        self.sensor, self.target, self.options = sensor, target, options
+        self._readings: dict[Version, Reading] = {}
+        self._learned: Learned | None = None
 
-    def recall(self, path: Path) -> Reading | None:
-        """What this version of the file gave; None for one not read yet."""
-        key = _key(path)
-        if key not in self._loaded and (self.folder / key).is_file():
-            try:
-                self._loaded[key] = load_reading(self.folder / key)
-            except UnreadableFile:
-                (self.folder / key).unlink()  # cut short by a crash: read it again
-        return self._loaded.get(key)
+    def present(self, folder: Path) -> list[Version]:
+        """Recordings that lie in the folder now, by name with numbers in their order."""
+        versions = []
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                try:
+                    status = entry.stat()
+                except OSError:
+                    continue  # gone, or a link to nothing
+                key = Version(entry.path, f"{status.st_size} {status.st_mtime_ns}")
+                if key in self.sensor.recordings or may_be_recording(Path(key.file)):
+                    versions.append((_sorting(entry.name), key))
+        return [key for _, key in sorted(versions)]
 
-    def read(self, paths: list[Path], workers: int, progress: Callable[[Reading], None] | None) -> tuple[Reading, ...]:
+    def read(
+        self, workers: int, progress: Callable[[Reading], None] | None, keys: list[Version]
+    ) -> tuple[Reading, ...]:
         """Read files, and keep what each gave as soon as it is there."""
-        if not paths:
+        if not keys:
             return ()
-        if self.spacing_hz is None:
-            self.spacing_hz = common_spacing(paths, self.options, self.target)
-            write_json(self.settings, self.expected | {"spacing_hz": self.spacing_hz})
-        keys = [_key(path) for path in paths]  # before reading: what changes meanwhile is read again
-        reader = read_spectra(paths, self.options, self.target, self.spacing_hz, workers=workers, progress=progress)
+        paths = [Path(key.file) for key in keys]
+        if self.sensor.spacing_hz is None:
+            self.sensor.settle_spacing(common_spacing(paths, self.options, self.target))
+        assert self.sensor.spacing_hz is not None  # just settled
+        reader = read_spectra(
+            paths, self.options, self.target, self.sensor.spacing_hz, workers=workers, progress=progress
+        )
         for number, reading in reader:
-            save_reading(reading, self.folder / keys[number])
-            self._loaded[keys[number]] = reading
-        return tuple(self._loaded[key] for key in keys)
+            self.sensor.keep(keys[number], reading)
+            self._readings[keys[number]] = reading
+        return tuple(self._readings[key] for key in keys)
+
+    def said(self, question: str) -> dict[str, Any] | None:
+        """The last judgement, where it was of the same question."""
+        return self.sensor.said() if self.sensor.asked == question else None
+
+    def judged(
+        self, judging: Callable[..., Track], order: _Order, new: int, question: str, acknowledge: str | None
+    ) -> Track | None:
+        """A judgement as the store leaves it, an acknowledgement taken first; of many new ones, one after another.
+
+        None where there is nothing to judge.
+        """
+        if not order:
+            return None
+        if acknowledge is not None:
+            self.sensor.acknowledge(_named(acknowledge, [*order]))
+        keys = list(order)
+        unjudged = (number for number, key in enumerate(keys) if self.sensor.recordings[key].state is None)
+        first = max(next(unjudged, len(keys)), BASELINE + LATEST)
+        for end in range(first, len(keys), STRIDE):
+            self._judged(judging, order.until(end), 0, "", again=acknowledge is not None)
+        return self._judged(judging, order, new, question, again=acknowledge is not None)
+
+    def _judged(self, judging: Callable[..., Track], order: _Order, new: int, question: str, *, again: bool) -> Track:
+        window = _window(order, self.sensor)
+        held = {key: self._readings.get(key) or self.sensor.reading(key) for key in window}
+        self._readings = {key: reading for key, reading in held.items() if reading is not None}
+        states: dict[str, AlarmState] = {}
+        for key in window:
+            state = self.sensor.recordings[key].state if key in self.sensor.recordings else None
+            if state is not None and not again:
+                states[key.file] = state
+        standing = self.sensor.standing
+        before = Before(states) if standing is None else Before(states, standing.reason, standing.raised_by)
+        if self._learned is None:
+            self._learned = self.sensor.learned()
+        names = {Path(key.file).name for key in self._readings}
+        track = judging(
+            [*self._readings.values()],
+            self.target,
+            {key.file: order[key] for key in self._readings},
+            order.x_name,
+            acknowledge=self.sensor.acknowledged if self.sensor.acknowledged in names else None,
+            learned=self._learned,
+            before=before,
+        )
+        return self.sensor.judged(track, {key.file: key for key in window}, new, question, self._learned)
 
 
-def _present(folder: Path) -> list[Path]:
-    try:
-        return recordings_in([folder])
-    except BadInput:  # nothing there yet
-        return []
+def _named(acknowledge: str, order: Sequence[Version]) -> str:
+    """The name of the recording up to which somebody has looked."""
+    if acknowledge == LAST:
+        return Path(order[-1].file).name
+    for key in order:
+        if acknowledge in (key.file, Path(key.file).name):
+            return Path(key.file).name
+    raise BadInput(f"{acknowledge} is not among the {len(order)} recordings; acknowledge one of them, or {LAST}")
 
 
-def _key(path: Path) -> str:
-    """A name for this version of a file: another size or time makes another."""
-    status = path.stat()
-    return sha256(f"{path.name} {status.st_size} {status.st_mtime_ns}".encode()).hexdigest()[:32] + ".npz"
+@lru_cache(maxsize=1 << 16)
+def _sorting(name: str) -> list[tuple[int, int | str]]:
+    return natural(name)
 
 
 def _settled(path: Path, seconds: float) -> bool:
-    status = path.stat()
+    try:
+        status = path.stat()
+    except OSError:
+        return False  # taken away meanwhile
     return status.st_size > 0 and time() - status.st_mtime >= seconds

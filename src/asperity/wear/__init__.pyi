@@ -2,6 +2,7 @@ from .alarm import ALARM_STATES as ALARM_STATES
 from .alarm import FALSE_ALARMS as FALSE_ALARMS
 from .alarm import Alarm as Alarm
 from .alarm import AlarmState as AlarmState
+from .alarm import Said as Said
 from .alarm import Sight as Sight
 from .alarm import Watched as Watched
 from .alarm import sequential_alarm as sequential_alarm
@@ -25,6 +26,8 @@ from .resonance import line_shape as line_shape
 from .resonance import no_resonance as no_resonance
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
 from .series import SeriesMethod as SeriesMethod
+from .series import Shared as Shared
+from .series import learn_series as learn_series
 from .series import series_resonances as series_resonances
 from .stages import IN_WORDS as IN_WORDS
 from .stages import Detector as Detector

@@ -3,8 +3,9 @@
 What is watched comes in as `Watched` series; what a recording's state is without any change, as `Sight`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -47,6 +48,20 @@ class Sight(NamedTuple):
     reason: str = ""
 
 
+class Said(NamedTuple):
+    """States that recordings had when they came, by their number; what stands, and who raised it, where an alarm does.
+
+    The last recording's is judged in any case.
+    """
+
+    states: Mapping[int, AlarmState] = MappingProxyType({})
+    reason: str = ""
+    raised_by: str = ""
+
+
+NOTHING_SAID = Said()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
     """Where an alarm stands at the end of a series.
@@ -85,6 +100,7 @@ def sequential_alarm(
     confirmed: Callable[[int], bool] = lambda _: True,
     acknowledged: int = 0,
     unit: str = "",
+    said: Said = NOTHING_SAID,
 ) -> Alarm:
     """One decision a recording, each from what had been recorded by then.
 
@@ -98,6 +114,7 @@ def sequential_alarm(
         alarm by the contact
     acknowledged : how many recordings somebody has looked at; what comes behind them is judged by itself
     unit : of x
+    said : what earlier judgements have said, which stays as it was said
 
     Raises
     ------
@@ -110,8 +127,12 @@ def sequential_alarm(
             "in 1000 recordings"
         )
     states: list[AlarmState] = ["none"] * acknowledged
-    reason, raised_by = "", ""
+    reason, raised_by = said.reason, said.raised_by
     for number in range(acknowledged, len(sights)):
+        before = said.states.get(number) if number < len(sights) - 1 else None
+        if before is not None:
+            states.append(before)
+            continue
         if states and states[-1] == "alarm" and number > acknowledged:
             states.append("alarm")
             continue

@@ -158,6 +158,8 @@ def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
     own = places.variance + scatters[:, None] ** 2  # (scatters, places)
     variance = np.broadcast_to(own, (columns.shape[0], *own.shape))
     uncertain = bool(np.any(places.x_std > 0.0))
+    if not uncertain and np.ptp(places.variance) == 0.0:
+        return _evenly(columns[:, 0], places.y, own[:, 0])
     for _ in range(6 if uncertain else 1):
         information = np.einsum("bsp,btpi,btpj->bsij", 1.0 / variance, columns, columns, optimize=True)
         right = np.einsum("bsp,btpi->bsi", places.y / variance, columns, optimize=True)
@@ -170,6 +172,18 @@ def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
     likelihood = -0.5 * np.sum(off**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
     marginal = likelihood - 0.5 * np.linalg.slogdet(information + ridge)[1]
     return Fitted(np.max(likelihood, axis=1), marginal, linear)
+
+
+def _evenly(columns: Field, y: Field, variance: Field) -> Fitted:
+    """The same where all places weigh alike, so that one fit a bend does for every variance (scatters,)."""
+    information = np.swapaxes(columns, 1, 2) @ columns
+    ridge = 1e-12 * np.einsum("bii->b", information)[:, None, None] * np.eye(columns.shape[-1])
+    linear = np.linalg.solve(information + ridge, np.swapaxes(columns, 1, 2) @ y[:, None])
+    squares = np.sum((y - (columns @ linear)[..., 0]) ** 2, axis=1)[:, None]
+    likelihood = -0.5 * (squares / variance + y.size * np.log(2.0 * np.pi * variance))
+    determinant = np.linalg.slogdet(information + ridge)[1][:, None] - columns.shape[-1] * np.log(variance)
+    every = np.broadcast_to(linear[:, None, :, 0], (*likelihood.shape, columns.shape[-1]))
+    return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, every)
 
 
 def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:

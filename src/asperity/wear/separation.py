@@ -4,10 +4,11 @@ P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) (f/f_i)^t is fitted to all spectra at on
 docs/theory/indicators.md has the equations.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.arrays import Field, Mask
 from asperity.wear.resonance import line_and_slopes, line_shape
@@ -68,7 +69,8 @@ class Separation(NamedTuple):
     witnesses: list[int]
 
 
-def _coarser(blocks: Blocks) -> Blocks:
+def coarser(blocks: Blocks) -> Blocks:
+    """The same in fewer blocks, for searches."""
     size = -(-blocks.centre.size // COARSE_BLOCKS)
     count = blocks.centre.size // size
     shape = (-1, count, size)
@@ -79,43 +81,75 @@ def _coarser(blocks: Blocks) -> Blocks:
     return Blocks(blocks.centre[: count * size].reshape(count, size).mean(axis=1), mean, total)
 
 
-def _templates(centre: Field) -> Templates:
+def templates_on(centre: Field) -> Templates:
+    """Lines at every block, of several dampings."""
     f0, damping = (part.ravel() for part in np.meshgrid(centre, DAMPINGS, indexing="ij"))
     return Templates(f0, damping, line_shape(centre, f0[:, None], damping[:, None]))
 
 
-def _search(blocks: Blocks, base: Field, templates: Templates) -> tuple[Field, Field]:
+class Model(NamedTuple):
+    """1/M and ln M, (templates, blocks), of lines of one height over a base of 1."""
+
+    inverse: Field
+    logarithm: Field
+
+
+def models(base: Field, templates: Templates, centre: Field) -> Iterator[Model]:
+    """M = 1 + a L B(f0)/B for every height a of the search."""
+    rise = templates.shape * (base[_nearest(centre, templates)][:, None] / base)
+    for height in LEVELS:
+        model = 1.0 + height * rise
+        yield Model(1.0 / model, np.log(model))
+
+
+def _nearest(centre: Field, templates: Templates) -> npt.NDArray[np.intp]:
+    return np.searchsorted(centre, templates.f0).clip(0, centre.size - 1)
+
+
+def _search(
+    blocks: Blocks, base: Field, templates: Templates, prepared: Iterable[Model] | None = None
+) -> tuple[Field, Field]:
     """-ln likelihood of each recording for a line at each template, gain and height at their best, and ln of those.
 
-    Shapes (recordings, templates) and (recordings, templates, 2): ln A, ln g. With P = g B M, M = 1 + a L B(f0)/B, the
-    best gain is the mean of D/(B M); what remains are two matrix products.
+    Shapes (recordings, templates) and (recordings, templates, 2): ln A, ln g. With P = g B M the best gain is the mean
+    of D/(B M); what remains are two matrix products. `prepared` are the `models`, where they are at hand.
     """
-    nearest = np.searchsorted(blocks.centre, templates.f0).clip(0, base.size - 1)
-    rise = templates.shape * (base[nearest][:, None] / base)
+    height_of = base[_nearest(blocks.centre, templates)]
     relative = blocks.weight * blocks.density / base
     total = blocks.weight.sum(axis=1)[:, None]
     constant = (blocks.weight @ np.log(base))[:, None]
     least = np.full((blocks.density.shape[0], templates.f0.size), np.inf)
     values = np.zeros((*least.shape, 2))
     prior = 0.5 * (np.log(templates.damping / USUAL_DAMPING) / DAMPING_SPREAD) ** 2
-    for height in LEVELS:
-        model = 1.0 + height * rise
-        gain = relative @ (1.0 / model).T / total
-        cost = blocks.weight @ np.log(model).T + total * (np.log(gain) + 1.0) + constant + prior
+    for height, model in zip(LEVELS, prepared or models(base, templates, blocks.centre), strict=True):
+        gain = relative @ model.inverse.T / total
+        cost = blocks.weight @ model.logarithm.T + total * (np.log(gain) + 1.0) + constant + prior
         better = cost < least
         least = np.where(better, cost, least)
-        logarithms = np.stack([np.log(height * base[nearest]) + np.log(gain), np.log(gain)], axis=-1)
+        logarithms = np.stack([np.log(height * height_of) + np.log(gain), np.log(gain)], axis=-1)
         values = np.where(better[..., None], logarithms, values)
     return least, values
 
 
 def _tracks(blocks: Blocks, base: Field, templates: Templates) -> Field:
     """The best line in each recording, given the base: ln A, ln f, ln ζ, ln g, shape (recordings, 4)."""
-    cost, values = _search(blocks, base, templates)
+    return _best(*_search(blocks, base, templates), templates)
+
+
+def _best(cost: Field, values: Field, templates: Templates) -> Field:
     best = np.argmin(cost, axis=1)
     rows = np.arange(best.size)
     level, gain = values[rows, best].T
     return np.stack([level, np.log(templates.f0[best]), np.log(templates.damping[best]), gain], axis=1)
+
+
+def beside(
+    blocks: Blocks, base: Field, slope: float, templates: Templates, prepared: Iterable[Model]
+) -> tuple[Joint, Field]:
+    """Lines of recordings beside what others have settled: ln B (blocks,) and slope; the fit, and `elsewhere`."""
+    coarse = coarser(blocks)
+    cost, values = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, base)), templates, prepared)
+    return _each(blocks, Parameters(_best(cost, values, templates), base, slope)), cost
 
 
 def lines_and_slopes(centre: Field, at: Parameters) -> tuple[Field, Field, Field]:
@@ -151,8 +185,8 @@ def _first_base(blocks: Blocks, quantile: float) -> Field:
 
 def separate(blocks: Blocks) -> Separation:
     """What all recordings share from all of them, or of a long series from some, evenly chosen; then every line."""
-    coarse = _coarser(blocks)
-    templates = _templates(coarse.centre)
+    coarse = coarser(blocks)
+    templates = templates_on(coarse.centre)
     recordings = blocks.density.shape[0]
     chosen = list(range(recordings))
     if recordings > MOST_TOGETHER:

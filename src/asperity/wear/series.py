@@ -5,9 +5,12 @@ found is judged here. docs/theory/indicators.md has the equations and how often 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
@@ -18,11 +21,15 @@ from asperity.wear.separation import (
     LOOSE,
     Blocks,
     Joint,
-    Separation,
+    Model,
     Templates,
+    beside,
+    coarser,
     expected_density,
     lines_and_slopes,
+    models,
     separate,
+    templates_on,
     whittle_costs,
 )
 
@@ -38,7 +45,66 @@ STANDS = "keeps its place and changes its height; CRFA is the part that changes,
 COMMON_FROM = 0.1  # share of what all recordings share in a block, from which its residual is the machine's
 WITNESS_FROM = 0.8  # of a parameter's influence, that a witness has to cover
 TINY = 1e-100
+SAME_SPACING = 1e-9
 RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shared:
+    """What all recordings of a series share, as some of them have settled it: enough to judge another beside them.
+
+    `first`, `size` and `spacing_hz` say which lines stand in which blocks; `centre` [Hz] and `base` (ln density) are of
+    blocks, shape (blocks,); `slope` of what excites the lines; `stands` whether the line keeps its place; `counts`,
+    `change`, `by_chance` how far the recordings that settled it are from it, shape (recordings, blocks).
+    """
+
+    band_hz: tuple[float, float]
+    first: int
+    size: int
+    spacing_hz: float
+    centre: Field
+    base: Field
+    slope: float
+    stands: bool
+    counts: Mask
+    change: Field
+    by_chance: Field
+
+    def fits(self, spectrum: Spectrum) -> bool:
+        """Whether a spectrum has these lines."""
+        end = self.first + self.size * self.centre.size
+        return end <= spectrum.frequency_hz.size and abs(spectrum.spacing_hz / self.spacing_hz - 1.0) < SAME_SPACING
+
+    @cached_property
+    def _search(self) -> tuple[Templates, list[Model]]:
+        """The search made ready; single precision, for it is some 30 MB and only begins the fit."""
+        empty = np.empty((1, self.centre.size))
+        coarse = coarser(Blocks(self.centre, empty, empty)).centre
+        templates = templates_on(coarse)
+        ready = models(np.exp(np.interp(coarse, self.centre, self.base)), templates, coarse)
+        return templates, [Model(*(part.astype(np.float32) for part in model)) for model in ready]
+
+    def resonances(self, spectra: Sequence[Spectrum], kept: Sequence[Mask] | None = None) -> tuple[Resonance, ...]:
+        """The contact resonance in each of further spectra, as `series_resonances` finds it.
+
+        Raises
+        ------
+        BadInput
+            for spectra on other lines, or without any vibration.
+        """
+        for spectrum in spectra:
+            if not self.fits(spectrum):
+                raise BadInput(
+                    f"a spectrum of {spectrum.frequency_hz.size} lines every {spectrum.spacing_hz:g} Hz is not of this "
+                    f"series, whose lines are {self.spacing_hz:g} Hz apart; judge it by itself"
+                )
+        lines = self.first + np.arange(self.size * self.centre.size)
+        blocks = _blocked(spectra, lines, self.size, kept)
+        templates, ready = self._search
+        joint, elsewhere = beside(blocks, self.base, self.slope, templates, ready)
+        witnesses = _Witnesses(self.counts, self.change, self.by_chance)
+        found = _Found(joint, templates, elsewhere, witnesses, self.stands)
+        return _judged(blocks, found, self.band_hz)
 
 
 def series_resonances(
@@ -67,6 +133,13 @@ def series_resonances(
         raise BadInput(f"series method must be one of {', '.join(get_args(SeriesMethod))}, got {method!r}")
     if method != "joint":
         return tuple(contact_resonance(spectrum, band_hz=band_hz, method=method) for spectrum in spectra)
+    return learn_series(spectra, band_hz=band_hz, kept=kept)[0]
+
+
+def learn_series(
+    spectra: Sequence[Spectrum], *, band_hz: tuple[float, float], kept: Sequence[Mask] | None = None
+) -> tuple[tuple[Resonance, ...], Shared]:
+    """The joint separation of `series_resonances`, and what it learned, by which further spectra can be judged."""
     if len(spectra) < FEWEST_RECORDINGS:
         raise BadInput(
             f"the joint separation needs at least {FEWEST_RECORDINGS} recordings to tell what stays from what moves, "
@@ -85,7 +158,10 @@ def series_resonances(
         inside = require_band(spectrum, band_hz)
     from threadpoolctl import threadpool_limits
 
-    blocks = _blocks(spectra, inside, kept)
+    lines = np.flatnonzero(inside)
+    size = -(-lines.size // MOST_BLOCKS)
+    lines = lines[: lines.size // size * size]
+    blocks = _blocked(spectra, lines, size, kept)
     silent = ~np.any(blocks.density > 0.0, axis=1)
     if np.any(silent):
         raise BadInput(
@@ -93,14 +169,31 @@ def series_resonances(
             f"{band_hz[1]:.0f} Hz; leave it out"
         )
     with threadpool_limits(1, "blas"):  # matrices too small for two threads: they would wait for one another
-        return _judged(blocks, separate(blocks), band_hz)
+        separation = separate(blocks)
+        joint = separation.joint
+        witnesses = _witnesses(blocks, joint, separation.witnesses)
+        stands = _stands(joint, _evidence(blocks, joint)[0] > STRONG_EVIDENCE)
+        found = _Found(joint, separation.templates, separation.elsewhere, witnesses, stands)
+        resonances = _judged(blocks, found, band_hz)
+    return resonances, Shared(
+        band_hz=band_hz,
+        first=int(lines[0]),
+        size=size,
+        spacing_hz=first.spacing_hz,
+        centre=blocks.centre,
+        base=joint.parameters.base,
+        slope=joint.parameters.slope,
+        stands=stands,
+        counts=witnesses.counts,
+        change=witnesses.change,
+        by_chance=witnesses.by_chance,
+    )
 
 
-def _blocks(spectra: Sequence[Spectrum], inside: Mask, kept: Sequence[Mask] | None) -> Blocks:
-    lines = np.flatnonzero(inside)
-    size = -(-lines.size // MOST_BLOCKS)
+def _blocked(
+    spectra: Sequence[Spectrum], lines: npt.NDArray[np.intp], size: int, kept: Sequence[Mask] | None
+) -> Blocks:
     count = lines.size // size
-    lines = lines[: count * size]
     shape = (len(spectra), count, size)
     density = np.stack([spectrum.density[lines] for spectrum in spectra]).reshape(shape)
     good = np.ones(shape, dtype=bool) if kept is None else np.stack([mask[lines] for mask in kept]).reshape(shape)
@@ -111,27 +204,55 @@ def _blocks(spectra: Sequence[Spectrum], inside: Mask, kept: Sequence[Mask] | No
     return Blocks(centre, mean, averages * share)
 
 
-def _misfit(blocks: Blocks, joint: Joint, witnesses: list[int]) -> Field:
+class _Witnesses(NamedTuple):
+    """How far recordings are from what was fitted to them, relative to what all share; (recordings, blocks) each."""
+
+    counts: Mask  # where what all share is most of what is there
+    change: Field
+    by_chance: Field  # variance that chance brings
+
+
+class _Found(NamedTuple):
+    """A fit to be judged: lines and what they stand beside; -ln likelihood of a line at each template."""
+
+    joint: Joint
+    templates: Templates
+    elsewhere: Field
+    witnesses: _Witnesses
+    stands: bool
+
+
+def _shares(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
+    """What line, place, damping and machine each have in what is expected (recordings, 4, blocks), and that."""
+    line, by_f0, by_damping = lines_and_slopes(blocks.centre, joint.parameters)
+    expected = expected_density(blocks, joint.parameters)
+    return np.stack([line, by_f0, by_damping, expected - line], axis=1) / expected[:, None], expected
+
+
+def _witnesses(blocks: Blocks, joint: Joint, rows: list[int]) -> _Witnesses:
+    relative, expected = _shares(blocks, joint)
+    common = relative[rows, 3]
+    counts = (common > COMMON_FROM) & (blocks.weight[rows] > 0.0)
+    share = np.where(counts, common, 1.0)
+    change = np.where(counts, (blocks.density / expected - 1.0)[rows] / share, 0.0)
+    by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[rows], 1.0) * share**2), 0.0)
+    return _Witnesses(counts, change, by_chance)
+
+
+def _misfit(blocks: Blocks, joint: Joint, witnesses: _Witnesses) -> Field:
     """Standard deviations (recordings, 4) that a machine brings which does not quite repeat itself, beside chance.
 
     What the fit of one recording would make of the residuals that the others have where its line lies: its influence
     a_b on each parameter, applied to r_jb of those recordings j whose own line is far; squared, averaged over them,
-    less what chance explains. `witnesses` are the indices j.
+    less what chance explains.
     """
-    line, by_f0, by_damping = lines_and_slopes(blocks.centre, joint.parameters)
-    expected = expected_density(blocks, joint.parameters)
-    relative = np.stack([line, by_f0, by_damping, expected - line], axis=1) / expected[:, None]
+    relative, _ = _shares(blocks, joint)
     information = np.einsum("npb,nqb,nb->npq", relative, relative, blocks.weight, optimize=True) + LOOSE * np.eye(4)
     influence = np.linalg.solve(information, relative * blocks.weight[:, None])
-    common = relative[:, 3]
-    felt = influence * common[:, None]  # what a relative change of the machine in block b does to each parameter
-    counts = ((common > COMMON_FROM) & (blocks.weight > 0.0))[witnesses]
-    share = np.where(counts, common[witnesses], 1.0)
-    change = np.where(counts, (blocks.density / expected - 1.0)[witnesses] / share, 0.0)
-    by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[witnesses], 1.0) * share**2), 0.0)
-    moved = np.einsum("npb,jb->npj", felt, change, optimize=True) ** 2
-    expected_of_chance = np.einsum("npb,jb->npj", felt**2, by_chance, optimize=True)
-    whole = np.einsum("npb,jb->npj", felt**2, counts.astype(float), optimize=True)
+    felt = influence * relative[:, None, 3]  # what a relative change of the machine in block b does to each parameter
+    moved = np.einsum("npb,jb->npj", felt, witnesses.change, optimize=True) ** 2
+    expected_of_chance = np.einsum("npb,jb->npj", felt**2, witnesses.by_chance, optimize=True)
+    whole = np.einsum("npb,jb->npj", felt**2, witnesses.counts.astype(float), optimize=True)
     # a witness has to cover nearly all that matters; the less chance blurs it, the more it counts
     enough = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
     witness = enough / np.maximum(expected_of_chance, TINY) ** 2
@@ -139,33 +260,42 @@ def _misfit(blocks: Blocks, joint: Joint, witnesses: list[int]) -> Field:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _judged(blocks: Blocks, separation: Separation, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
-    """Which of the lines are there, each with its reason."""
-    joint = separation.joint
-    own, base, _ = joint.parameters
-    expected = expected_density(blocks, joint.parameters)
-    with_line = whittle_costs(blocks, expected)
-    bare = np.exp(base)
+def _evidence(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
+    """By how much (BIC) a line beside what all share explains each recording better; what all share alone."""
+    bare = np.exp(joint.parameters.base)
     relative = np.sum(blocks.weight * blocks.density / bare, axis=1) / blocks.weight.sum(axis=1)
     alone = relative[:, None] * bare
-    evidence = 2.0 * (whittle_costs(blocks, alone) - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1))
+    with_line = whittle_costs(blocks, expected_density(blocks, joint.parameters))
+    return 2.0 * (whittle_costs(blocks, alone) - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1)), alone
 
-    std = np.hypot(joint.std, _misfit(blocks, joint, separation.witnesses))
+
+def _stands(joint: Joint, significant: Mask) -> bool:
+    """A line that keeps its place can lend any part of its height to what all recordings share."""
+    own = joint.parameters.own
+    places, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
+    return places.size > 0 and float(np.std(places)) < STANDING * float(np.median(widths))
+
+
+def _judged(blocks: Blocks, found: _Found, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
+    """Which of the lines are there, each with its reason."""
+    joint = found.joint
+    own, base, _ = joint.parameters
+    evidence, alone = _evidence(blocks, joint)
+    bare, expected = np.exp(base), expected_density(blocks, joint.parameters)
+
+    std = np.hypot(joint.std, _misfit(blocks, joint, found.witnesses))
     off = blocks.density / expected - 1.0
     counted = blocks.weight > 0.0
     excess = np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / np.sum(counted, axis=1)
     misfit = np.sqrt(np.maximum(excess, 0.0))
 
-    significant = evidence > STRONG_EVIDENCE
-    places, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
-    # a line that keeps its place can lend any part of its height to what all recordings share
-    stands = places.size > 0 and float(np.std(places)) < STANDING * float(np.median(widths))
+    way = STANDS if found.stands else MOVES
     resonances = []
     for i in range(own.shape[0]):
         fitted = np.exp(own[i])
         deviations = std[i, :3] * fitted[:3]
         _, f0, zeta, gain = (float(value) for value in fitted)
-        rival = _rival(f0, zeta, separation.elsewhere[i], separation.templates)
+        rival = _rival(f0, zeta, found.elsewhere[i], found.templates)
         line = _Line(f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival)
         objection = _objection(line, band_hz)
         if objection is not None:
@@ -175,8 +305,8 @@ def _judged(blocks: Blocks, separation: Separation, band_hz: tuple[float, float]
         resonances.append(
             fitted_resonance(
                 fitted[:3],
-                np.where([stands, False, False], np.nan, deviations),
-                reason=f"a line {line.width:.0f} Hz wide {STANDS if stands else MOVES} (BIC {line.evidence:+.0f})",
+                np.where([found.stands, False, False], np.nan, deviations),
+                reason=f"a line {line.width:.0f} Hz wide {way} (BIC {line.evidence:+.0f})",
                 band_hz=band_hz,
                 method="joint",
                 evidence=line.evidence,

@@ -1,0 +1,45 @@
+"""`asperity store`: what a store of monitored machines holds."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from asperity import tracking
+from asperity.cli.app import app
+from asperity.cli.options import AsJson, Quiet, require_output
+from asperity.cli.recordings import EXIT_CODES
+from asperity.cli.show import columns, show, written
+from asperity.quantities import NO_VALUE
+
+
+@app.command()
+def store(
+    file: Annotated[Path, typer.Argument(metavar="DB", help="The store of a watch or a track, such as asperity.db.")],
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Write every recording as a row (.parquet, .csv); may be repeated."),
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say where every machine, point and sensor of a store stands; the gravest decides the exit code."""
+    for path in out or ():
+        require_output(path, ".csv", ".parquet")
+    overview = tracking.store_overview(file)
+    kept = [overview.export(path) for path in out or ()]
+    rows = [
+        [*(row[name] for name in ("machine", "point", "sensor")), str(row["recordings"]), row["state"],
+         NO_VALUE if row["since"] is None else Path(row["since"]).name, row["reason"]]
+        for row in overview.rows
+    ]  # fmt: skip
+    show(
+        overview.verdict(),
+        lambda: overview.scalars() | {"written": [str(path) for path in kept]},
+        columns(["machine", "point", "sensor", "recordings", "state", "since", "why"], rows, left=3) if rows else [],
+        written("  Written", *kept),
+        as_json=as_json,
+        quiet=quiet,
+    )
+    if overview.state in EXIT_CODES:
+        raise typer.Exit(EXIT_CODES[overview.state])

@@ -1,0 +1,142 @@
+"""What a store holds, for who looks after many machines: a line a sensor, and the recordings as a table to export."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asperity.errors import BadInput
+from asperity.files import whole_file, write_csv
+from asperity.recording import ReadOptions
+from asperity.tracking.model import Track
+from asperity.tracking.store import ACKNOWLEDGED, Place, Store, Version
+from asperity.tracking.watch import settings_of
+
+if TYPE_CHECKING:
+    import pandas
+
+GRAVEST = ("alarm", "blind", "cannot-tell", "alert", "none")
+IN_WORDS = {"blind": "blind", "cannot-tell": "cannot tell", "alert": "alert", "none": "none", "alarm": "ALARM"}
+ENDINGS = (".csv", ".parquet")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoreOverview:
+    """Where every sensor of a store stands; `rows` the gravest first, as `asperity store --json` has them."""
+
+    path: Path
+    rows: tuple[dict[str, Any], ...]
+
+    @property
+    def state(self) -> str:
+        """The gravest state of all."""
+        return min((row["state"] for row in self.rows), key=GRAVEST.index, default="cannot-tell")
+
+    def verdict(self) -> str:
+        """One sentence: how many sensors, how many of them need somebody."""
+        if not self.rows:
+            return f"{self.path.name} holds no recordings yet."
+        machines = len({row["machine"] for row in self.rows})
+        held = sum(row["recordings"] for row in self.rows)
+        several = f"{len(self.rows)} sensor{'s' * (len(self.rows) > 1)} on {machines} machine{'s' * (machines > 1)}"
+        counts = {state: sum(row["state"] == state for row in self.rows) for state in GRAVEST[:-1]}
+        spoken = ", ".join(f"{IN_WORDS[state]} {count}" for state, count in counts.items() if count)
+        return f"{several}, {held} recordings: {spoken or 'no alarm'}."
+
+    def scalars(self) -> dict[str, Any]:
+        """Everything that `asperity store --json` prints."""
+        return {"verdict": self.verdict(), "state": self.state, "sensors": list(self.rows)}
+
+    def export(self, path: str | Path) -> Path:
+        """Write every recording of the store, a row each with machine, point and sensor, as .csv or .parquet.
+
+        Raises
+        ------
+        BadInput
+            for another ending, or a path that cannot be written to.
+        """
+        path = Path(path)
+        if path.suffix.lower() not in ENDINGS:
+            raise BadInput(f"a store is exported as .csv or .parquet, got {path.name}; change its ending")
+        table = _table(Store(self.path, make=False))
+        if path.suffix.lower() == ".csv":
+            write_csv(path, table)
+        else:
+            with whole_file(path) as part:
+                table.to_parquet(part, index=False)
+        return path
+
+
+def store_overview(path: str | Path) -> StoreOverview:
+    """Look into a store.
+
+    Raises
+    ------
+    UnreadableFile
+        for a file that is none.
+    """
+    store = Store(path, make=False)
+    rows = []
+    for number, place in store.places():
+        ((held, last),) = store.read("SELECT count(*), max(heard) FROM recording WHERE sensor = ?", number)
+        judged = store.read(
+            "SELECT state, since, reason, time, verdict FROM judgement WHERE sensor = ? AND state != ? "
+            "ORDER BY id DESC LIMIT 1",
+            *(number, ACKNOWLEDGED),
+        )
+        fallen = ("cannot-tell", None, "nothing judged yet", None, "Nothing judged yet.")
+        state, since, reason, judged_at, verdict = judged[0] if judged else fallen
+        told = {"recordings": held, "last_heard": last, "state": state, "since": since, "reason": reason}
+        rows.append(place._asdict() | told | {"judged": judged_at, "verdict": verdict})
+    rows.sort(key=lambda row: GRAVEST.index(row["state"]))
+    return StoreOverview(path=Path(path), rows=tuple(rows))
+
+
+def _table(store: Store) -> "pandas.DataFrame":
+    import pandas
+
+    rows = store.read("SELECT sensor, file, heard, started, state, row FROM recording ORDER BY sensor, id")
+    places: Mapping[int, Place] = dict(store.places())
+    return pandas.DataFrame(
+        {
+            **places[sensor]._asdict(),
+            "heard": heard,
+            **({"file": file, "started": started or None, "state": state} if row is None else json.loads(row)),
+        }
+        for sensor, file, heard, started, state, row in rows
+    )
+
+
+def keep_track(
+    track: Track,
+    store: str | Path,
+    options: ReadOptions,
+    *,
+    machine: str | None = None,
+    point: str | None = None,
+    sensor: str | None = None,
+) -> Path:
+    """Append a track's recordings and its judgement to a store, and say where that is.
+
+    Parameters
+    ----------
+    options : by which the recordings were read
+    machine, point, sensor : as `watch_folder` takes them
+
+    Raises
+    ------
+    BadInput
+        for a sensor whose recordings were read otherwise before.
+    """
+    folder = Path(track.recordings[0].file).resolve().parent.name
+    place = Place(machine or "machine", point or folder, sensor or options.channel or "sensor")
+    entered = Store(store).sensor(place, settings_of(track.target, options))
+    keys = {}
+    for recording in track.recordings:
+        status = Path(recording.file).stat()
+        key = keys[recording.file] = Version(recording.file, f"{status.st_size} {status.st_mtime_ns}")
+        if key not in entered.recordings:
+            entered.keep(key, recording.reading)
+    entered.judged(track, keys, len(keys), "", None)
+    return entered.store.path

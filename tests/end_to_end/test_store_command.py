@@ -1,0 +1,206 @@
+"""One store for many machines, as a user meets it: filled by `watch` and `track`, shown, exported, killed, resumed."""
+
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+
+from asperity.errors import AsperityError, UnreadableFile
+from asperity.tracking import store_overview, watch_folder
+from asperity.tracking.store import Store
+
+ONCE = ("--once", "--settle", "0", "--quiet")
+
+
+def snapshots(folder, levels, seconds=0.1, first=0):
+    """Noise of a machine without a contact resonance: a tenth of a second each."""
+    Path(folder).mkdir(exist_ok=True)
+    for number, level in enumerate(levels, first):
+        rng = np.random.default_rng(number)
+        values = level * rng.standard_normal(round(seconds * 20e3))
+        np.savez(Path(folder) / f"s-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
+
+
+def failing(steady=12, loud=24):
+    """Steady, then up twenty times."""
+    return np.concatenate([np.ones(steady), np.exp(np.log(20.0) * np.arange(loud) / (loud - 1))])
+
+
+def asked(store, query):
+    with closing(sqlite3.connect(store)) as connection:
+        return connection.execute(query).fetchall()
+
+
+def without_times(store):
+    """All that a store holds, but for when it was written."""
+    return [
+        asked(store, "SELECT file, started, state, row, reading FROM recording ORDER BY file"),
+        asked(store, "SELECT state, since, reason, raised_by, verdict, recordings FROM judgement ORDER BY id"),
+        asked(store, "SELECT name, settings, said FROM sensor"),
+    ]
+
+
+def test_one_store_holds_many_machines_and_says_which_needs_somebody(asp):
+    snapshots("drive", np.ones(10))
+    snapshots("fan", failing())
+    assert asp("watch", "drive", *ONCE, "--store", "plant.db", "--machine", "Pump 3", "--point", "DE")[0] == 4
+    assert asp("track", "fan", "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE", "--quiet")[0] == 3
+    code, out, _ = asp("store", "plant.db", "--json", "--out", "plant.parquet", "--out", "plant.csv")
+    said = json.loads(out)
+    assert (code, said["state"]) == (3, "alarm")
+    assert said["verdict"] == "2 sensors on 2 machines, 46 recordings: ALARM 1, cannot tell 1."
+    assert [row["machine"] for row in said["sensors"]] == ["Fan 1", "Pump 3"]  # the gravest first
+    assert said["sensors"][0]["reason"].startswith("the level (rms) rose to")
+    table = pandas.read_parquet("plant.parquet")
+    assert list(table["machine"].value_counts().sort_index()) == [36, 10]
+    assert table[table.machine == "Fan 1"]["state"].iloc[-1] == "alarm"
+    rms = asked("plant.db", "SELECT rms FROM trend WHERE machine = 'Fan 1' ORDER BY x")
+    assert np.allclose([value for (value,) in rms], failing(), rtol=0.1)  # as anybody may ask
+    assert len(pandas.read_csv("plant.csv")) == 46
+    code, out, _ = asp("watch", "fan", *ONCE, "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE")
+    assert code == 3
+    assert out.startswith("ALARM since s-")
+
+
+def test_what_is_known_is_not_judged_again(asp, monkeypatch):
+    snapshots("in", np.ones(10))
+    first = asp("watch", "in", "--once", "--settle", "0", "--json")
+    judged = []
+    monkeypatch.setattr("asperity.tracking.watch.judge", lambda *_, **__: judged.append(1))
+    second = asp("watch", "in", "--once", "--settle", "0", "--json")
+    assert (judged, second[0]) == ([], first[0])
+    before, after = json.loads(first[1]), json.loads(second[1])
+    assert (len(before.pop("new")), after.pop("new")) == (10, [])
+    assert after == before
+
+
+@pytest.mark.parametrize("change", [("--false-alarms", "1/500"), ("--acknowledge", "last"), ("--stages-from", "both")])
+def test_another_question_is_judged_again(asp, change):
+    snapshots("in", np.ones(10))
+    asp("watch", "in", *ONCE)
+    asp("watch", "in", *ONCE, *change)
+    states = asked("in/asperity-watch/asperity.db", "SELECT state FROM judgement WHERE state != 'acknowledged'")
+    assert len(states) == 2
+
+
+def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path):
+    levels = failing()
+    for name in ("whole", "killed"):
+        (tmp_path / name).mkdir()
+        snapshots(tmp_path / name / "in", levels)
+    command = [sys.executable, "-m", "asperity", "watch", "in", *ONCE, "--workers", "1"]
+    assert subprocess.run(command, cwd=tmp_path / "whole", check=False).returncode == 3
+    store = tmp_path / "killed/in/asperity-watch/asperity.db"
+    heard = [0]
+    while len(heard) < 5 and heard[-1] < len(levels) - 6:
+        process = subprocess.Popen(command, cwd=tmp_path / "killed")
+        while process.poll() is None and (not store.is_file() or _count(store) < heard[-1] + 6):
+            time.sleep(0.005)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        heard.append(_count(store))
+    assert heard[1] > 0
+    assert heard[-1] < len(levels)  # it was killed before the end
+    assert subprocess.run(command, cwd=tmp_path / "killed", check=False).returncode == 3
+    assert without_times(store) == without_times(tmp_path / "whole/in/asperity-watch/asperity.db")
+
+
+def _count(store):
+    try:
+        return asked(store, "SELECT count(*) FROM recording")[0][0]
+    except sqlite3.OperationalError:
+        return 0  # not begun yet
+
+
+def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeypatch):
+    """An alarm long before the latest recordings is not passed over, and stands."""
+    monkeypatch.setattr("asperity.tracking.watch.LATEST", 16)
+    monkeypatch.setattr("asperity.tracking.watch.STRIDE", 8)
+    snapshots(tmp_path / "in", [*failing(), *np.ones(30)])
+    (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)
+    assert update.track.alarm.state == "alarm"
+    since = Path(update.track.recordings[update.track.alarm.since].file).name
+    assert "s-012.npz" < since < "s-036.npz"
+    assert len(update.track.recordings) in (24, 25)  # the first eight, the latest, and the one that raised it
+    states = asked(tmp_path / "out/asperity.db", "SELECT state FROM recording ORDER BY file")
+    assert all(state for (state,) in states)  # each was judged
+    snapshots(tmp_path / "in", [1.0], first=66)
+    (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)
+    assert update.track.alarm.state == "alarm"
+    assert "raised before and not acknowledged" not in update.track.alarm.reason  # it is among those judged
+    (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0, acknowledge="last")
+    assert update.track.alarm.state == "none"
+
+
+def test_a_file_that_is_no_store_is_refused(asp):
+    Path("text.db").write_text("not a database, but long enough to be taken for one\n" * 100)
+    assert "is no store of asperity, or damaged" in asp("store", "text.db")[2]
+    with closing(sqlite3.connect("other.db")) as connection:
+        connection.execute("CREATE TABLE theirs (a)")
+    before = Path("other.db").read_bytes()
+    code, _, err = asp("store", "other.db")
+    assert code == 2
+    assert "other.db is a database of something else" in err
+    assert asked("other.db", "SELECT name FROM sqlite_master") == [("theirs",)]
+    assert len(before) == Path("other.db").stat().st_size
+    assert asp("store", "absent.db")[0] == 2
+    snapshots("in", np.ones(3))
+    assert asp("track", "in", "--store", "nowhere/plant.db")[0] == 2
+    assert "holds no recordings yet" in store_overview(_empty("empty.db")).verdict()
+    with closing(sqlite3.connect("empty.db")) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    with pytest.raises(UnreadableFile, match="a store of version 99"):
+        Store("empty.db")
+
+
+def _empty(path):
+    Store(path).close()
+    return path
+
+
+def test_a_store_that_another_program_holds_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("asperity.tracking.store.BUSY_S", 0.05)
+    store = Store(tmp_path / "plant.db")
+    with store.transaction(), pytest.raises(AsperityError, match="another program holds it"):
+        next(watch_folder(_folder(tmp_path), tmp_path / "out", store=tmp_path / "plant.db", once=True))
+
+
+def _folder(tmp_path):
+    snapshots(tmp_path / "in", [1.0])
+    return tmp_path / "in"
+
+
+def test_a_damaged_recording_of_the_store_is_read_again(tmp_path):
+    snapshots(tmp_path / "in", np.ones(8))
+    look = {"once": True, "settle_s": 0.0}
+    next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    with closing(sqlite3.connect(tmp_path / "out/asperity.db")) as connection:
+        connection.execute("UPDATE recording SET reading = x'00ff' WHERE file LIKE '%s-003.npz'")
+        connection.commit()
+    next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    update = next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    assert [Path(reading.file).name for reading in update.new] == ["s-003.npz"]
+    assert len(update.track.recordings) == 8
+
+
+def test_a_file_that_changed_is_another_recording_and_its_past_is_kept(tmp_path):
+    snapshots(tmp_path / "in", np.ones(8))
+    look = {"once": True, "settle_s": 0.0}
+    next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    snapshots(tmp_path / "in", [2.0], first=3)
+    os.utime(tmp_path / "in/s-003.npz", (1e9, 1e9))
+    update = next(watch_folder(tmp_path / "in", tmp_path / "out", **look))
+    assert len(update.track.recordings) == 8
+    assert update.track.recordings[3].reading.quality.rms == pytest.approx(2.0, rel=0.1)
+    assert asked(tmp_path / "out/asperity.db", "SELECT count(*) FROM recording") == [(9,)]
+    shutil.rmtree(tmp_path / "in")
