@@ -132,6 +132,16 @@ Point = Annotated[str | None, typer.Option(metavar="NAME", help="Measuring point
 SensorName = Annotated[
     str | None, typer.Option("--sensor", metavar="NAME", help="Sensor there; by default the channel.")
 ]
+OnAlarm = Annotated[
+    str | None,
+    typer.Option(metavar="CMD", help="Run this at every change of state, without a shell; it gets JSON on its stdin."),
+]
+WebHook = Annotated[
+    str | None, typer.Option("--webhook", metavar="URL", help="Post JSON there at every change of state.")
+]
+Mqtt = Annotated[
+    str | None, typer.Option(metavar="URL", help="Publish JSON at mqtt://HOST/TOPIC at every change of state.")
+]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

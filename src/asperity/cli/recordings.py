@@ -193,6 +193,9 @@ def watch(
     machine: options.Machine = None,
     point: options.Point = None,
     sensor: options.SensorName = None,
+    on_alarm: options.OnAlarm = None,
+    webhook: options.WebHook = None,
+    mqtt: options.Mqtt = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -222,6 +225,7 @@ def watch(
             machine=machine,
             point=point,
             sensor=sensor,
+            call=tracking.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
             recall=(kept / PAGE).is_file(),
             once=once,
             every_s=every,
@@ -251,6 +255,8 @@ def _written_and_shown(update: "Update", kept: Path, *, as_json: bool, quiet: bo
     if update.track is not None:
         _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / PAGE)
     _show_update(update.new, said, update.waiting, kept, as_json=as_json, quiet=quiet)
+    for sentence in update.failed:
+        print(sentence, file=sys.stderr)
     return None if said is None else str(said["alarm"]["state"])
 
 

@@ -1,3 +1,5 @@
+from .calls import Caller as Caller
+from .calls import callers as callers
 from .checks import CheckedRecording as CheckedRecording
 from .checks import RecordingChecks as RecordingChecks
 from .checks import check_recordings as check_recordings

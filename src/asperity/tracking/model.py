@@ -157,9 +157,10 @@ class Track:
             for source, stages in self.stages_by.items()
         ]
 
-    def scalars(self) -> dict[str, Any]:
-        """Everything that `asperity track --json` prints."""
+    def scalars(self, *, every_way: bool = True) -> dict[str, Any]:
+        """Everything that `asperity track --json` prints; without `every_way` only the stage that decides."""
         stages = self.stages
+        ways = self.stages_by if every_way else {} if stages is None else {stages.source: stages}
         return {
             "verdict": self.verdict(),
             "recordings": [recording.row() for recording in self.recordings],
@@ -172,7 +173,7 @@ class Track:
                 "labels": [recording.label for recording in self.recordings],
                 "evidence": {} if stages is None else {k: finite_or_none(v) for k, v in stages.evidence.items()},
             },
-            "stages_by": {source: _in_json(stages) for source, stages in self.stages_by.items()},
+            "stages_by": {source: _in_json(told) for source, told in ways.items()},
             "alarm": self._alarm(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),

@@ -12,6 +12,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import require_writable
@@ -39,6 +40,11 @@ CREATE TABLE recording (
 CREATE TABLE judgement (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, time TEXT NOT NULL, state TEXT NOT NULL,
     since TEXT, reason TEXT, raised_by TEXT, false_alarm_rate REAL, verdict TEXT, recordings INTEGER, new INTEGER);
+CREATE TABLE call (
+    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, who TEXT NOT NULL, state TEXT NOT NULL,
+    said TEXT NOT NULL, time TEXT NOT NULL, attempts INTEGER NOT NULL DEFAULT 0, due REAL NOT NULL DEFAULT 0,
+    failure TEXT, answered TEXT);
+CREATE INDEX calls ON call (sensor, who);
 CREATE INDEX judgements ON judgement (sensor, state);
 CREATE VIEW trend AS
     SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file, recording.heard,
@@ -74,13 +80,13 @@ class Standing(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """A recording of the store: its number there, when it began (ISO, empty if unknown), its state, None unjudged.
+    """A recording of the store: its number there, when it began, None if unknown, its state, None unjudged.
 
     `refused` where nothing could be read of it.
     """
 
     number: int
-    started: str
+    time: datetime | None
     state: AlarmState | None
     refused: bool
 
@@ -196,7 +202,9 @@ class Sensor:
                 )
         self.settings = begun
         self.recordings: dict[Version, Kept] = {
-            Version(file, version): Kept(row, started or "", state, bool(refused))
+            Version(file, version): Kept(
+                row, datetime.fromisoformat(started) if started else None, state, bool(refused)
+            )
             for row, file, version, started, state, refused in store.read(
                 "SELECT id, file, version, started, state, refused FROM recording WHERE sensor = ?", number
             )
@@ -239,7 +247,7 @@ class Sensor:
                 told,
             )
             (number,) = run("SELECT last_insert_rowid()").fetchone()
-        self.recordings[key] = Kept(number, reading.started, None, reading.refused)
+        self.recordings[key] = Kept(number, reading.time, None, reading.refused)
 
     def reading(self, key: Version) -> Reading | None:
         """What was kept; None, and forgotten, where it is damaged."""
@@ -284,7 +292,15 @@ class Sensor:
             )
         self.acknowledged, self.standing = file, None
 
-    def judged(self, track: Track, keys: Mapping[str, Version], new: int, asked: str, learned: Learned | None) -> Track:
+    def judged(
+        self,
+        track: Track,
+        keys: Mapping[str, Version],
+        new: int,
+        asked: str,
+        learned: Learned | None,
+        who: Sequence[str] = (),
+    ) -> Track:
         """Keep a judgement; the track with the alarm that stands, where this judgement would have dropped it.
 
         Parameters
@@ -292,6 +308,7 @@ class Sensor:
         keys : of its recordings, by their files
         new : recordings that it is the first to judge
         asked : what it was asked, as `asked` gives it back
+        who : is to be called where the state is another than they were told last
         """
         if self.standing is not None and track.alarm.state != "alarm":
             files = [recording.file for recording in track.recordings]
@@ -299,7 +316,7 @@ class Sensor:
             reason = f"{self.standing.reason}; raised before and not acknowledged"
             held = replace(track.alarm, state="alarm", since=since, reason=reason, raised_by=self.standing.raised_by)
             track = replace(track, alarm=held)
-        said = track.scalars()
+        said = track.scalars(every_way=False)
         rows, alarm = said.pop("recordings"), said["alarm"]
         numbers = [self.recordings[keys[row["file"]]].number for row in rows]
         with self.store.transaction() as run:
@@ -310,6 +327,7 @@ class Sensor:
                 "recordings, new) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (self.number, _now(), *_standing(alarm), alarm["false_alarm_rate"], said["verdict"], len(rows), new),
             )
+            self._call(run, who, _told(said, rows[-1]["file"]))
             told = (asked, json.dumps({**said, "numbers": numbers}), self.number)
             run("UPDATE sensor SET asked = ?, said = ? WHERE id = ?", told)
             if learned is not None and learned.shared is not None:
@@ -322,6 +340,45 @@ class Sensor:
         if alarm["state"] == "alarm" and self.standing is None:
             self.standing = Standing(alarm["since"], alarm["reason"], alarm["raised_by"] or "")
         return track
+
+    def _call(self, run: Any, who: Sequence[str], said: Mapping[str, Any]) -> None:
+        """Note whom to call, in the same transaction as the judgement: neither can be without the other."""
+        for name in who:
+            last = run(
+                "SELECT state FROM call WHERE sensor = ? AND who = ? ORDER BY id DESC LIMIT 1", (self.number, name)
+            ).fetchone()
+            if last is None or last[0] != said["state"]:
+                told = {"id": str(uuid4()), "time": _now(), **self.place._asdict(), "before": last and last[0], **said}
+                run(
+                    "INSERT INTO call (sensor, who, state, said, time) VALUES (?, ?, ?, ?, ?)",
+                    (self.number, name, said["state"], json.dumps(told), told["time"]),
+                )
+
+    def tell(self, who: Sequence[str], said: Mapping[str, Any]) -> None:
+        """Note whom to call who does not know yet what was said last."""
+        with self.store.transaction() as run:
+            self._call(run, who, _told(said, said["recordings"][-1]["file"]))
+
+    def waiting(self, who: str) -> list[tuple[int, int, float, str]]:
+        """Calls that nobody has answered yet: number, attempts, when the next is due [s], what is to be said."""
+        return self.store.read(
+            "SELECT id, attempts, due, said FROM call WHERE sensor = ? AND who = ? AND answered IS NULL ORDER BY id",
+            *(self.number, who),
+        )
+
+    def called(self, number: int, *, failure: str | None = None, due: float = 0.0) -> None:
+        """Keep how a call went: answered, or why not and when it is due again."""
+        answered = None if failure is not None else _now()
+        with self.store.transaction() as run:
+            run(
+                "UPDATE call SET attempts = attempts + 1, failure = ?, due = ?, answered = ? WHERE id = ?",
+                (failure, due, answered, number),
+            )
+
+
+def _told(said: Mapping[str, Any], recording: str) -> dict[str, Any]:
+    """What is said of a judgement to who is called."""
+    return {**said["alarm"], "verdict": said["verdict"], "recording": recording}
 
 
 def _standing(alarm: Mapping[str, Any]) -> Sequence[str | None]:

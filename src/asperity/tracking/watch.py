@@ -8,11 +8,11 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import datetime
 from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
 from time import sleep, time
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from asperity.case import Case
@@ -20,6 +20,7 @@ from asperity.errors import BadInput
 from asperity.files import make_folder
 from asperity.recording import ReadOptions
 from asperity.tracking.alarming import BASELINE, LAST
+from asperity.tracking.calls import Caller, deliver
 from asperity.tracking.files import Place, Table, in_time, may_be_recording, natural, read_table
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
@@ -38,6 +39,7 @@ LATEST = 112  # recordings of a long series that are judged with the first BASEL
 class Update:
     """What is new: files just read, and the series with them; None as long as there is none.
 
+    `failed` are sentences on calls that have not worked.
     `waiting` files have changed so lately that they may still be written. Where nothing was new, `track` is None and
     `said` the last judgement, as `Track.scalars` gave it.
     """
@@ -45,6 +47,7 @@ class Update:
     new: tuple[Reading, ...]
     track: Track | None
     waiting: int = 0
+    failed: tuple[str, ...] = ()
     said: Mapping[str, Any] | None = None
 
 
@@ -69,6 +72,7 @@ def watch_folder(
     machine: str | None = None,
     point: str | None = None,
     sensor: str | None = None,
+    call: Sequence[Caller] = (),
     recall: bool = False,
     once: bool = False,
     every_s: float = 5.0,
@@ -87,6 +91,8 @@ def watch_folder(
     acknowledge : as `track_recordings`; kept in the store, and every judgement with it: an alarm stands until then
     store : SQLite file for what was read and said, asperity.db in `out` by default; several watches may share one
     machine, point, sensor : whose recordings these are, in the store; by default "machine", the folder, the channel
+    call : who is told when the state is another than they were told last, as `callers` makes them; a call that fails
+        is kept in the store and made again
     recall : at the start give the last judgement, where neither recordings nor what is asked has changed since
     others : as `track_recordings`; a recording that is not in `table` yet waits until it is
 
@@ -102,7 +108,7 @@ def watch_folder(
     target = search_target(case, band_hz)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
     spot = Spot(machine or "machine", point or folder.resolve().name, sensor or channel or "sensor")
-    memory = _Memory(Store(store or out / STORE).sensor(spot, settings_of(target, options)), target, options)
+    memory = _Memory(Store(store or out / STORE).sensor(spot, settings_of(target, options)), target, options, call)
     asked: dict[str, Any] = {
         "shaft_hz": shaft_hz,
         "method": method,
@@ -147,12 +153,17 @@ def _looks(
             recalled = first and pace.recall and not new and acknowledge is None
             said = memory.said(question) if recalled else None
             if said is not None:
-                yield Update(new=(), track=None, waiting=waiting, said=said)
+                memory.sensor.tell([caller.name for caller in memory.call], said)
+                failed = deliver(memory.sensor, memory.call, now=True)
+                yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
             else:
                 order = _ordered(known, named, memory.sensor)
                 judging = partial(judge, **asked)
                 track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
-                yield Update(new=new, track=track, waiting=waiting)
+                failed = deliver(memory.sensor, memory.call, now=first)
+                yield Update(new=new, track=track, waiting=waiting, failed=failed)
+        else:
+            deliver(memory.sensor, memory.call)
         if pace.once:
             return
         first = False
@@ -164,58 +175,60 @@ def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
     return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options)
 
 
-class _Order(dict[Version, Place]):
-    """Recordings in the order in which they are judged, each with its place; `x_name` says what x is."""
+class _Order(NamedTuple):
+    """Recordings in the order in which they are judged, where each stands, and what x is; more of it from a table."""
 
-    x_name = ""
+    keys: list[Version]
+    x: list[float]
+    x_name: str
+    places: Mapping[str, Place] = MappingProxyType({})
 
-    def until(self, end: int) -> "_Order":
-        """The first of them."""
-        part = _Order([*self.items()][:end])
-        part.x_name = self.x_name
-        return part
+    def place(self, number: int) -> Place:
+        """Where a recording stands."""
+        return self.places.get(self.keys[number].file) or Place(x=self.x[number])
 
 
 def _ordered(known: Sequence[Version], table: Table | None, sensor: Sensor) -> _Order:
     """The recordings that the table knows by now, or all, by x."""
     if table is not None:
         places = table.placed([Path(key.file) for key in known if table.row(Path(key.file)) is not None])
-        placed = {key: places[key.file] for key in known if key.file in places}
-        x_name = table.x_name
-    else:
-        started = [sensor.recordings[key].started for key in known]
-        heard = [not sensor.recordings[key].refused for key in known]
-        x, x_name = in_time([datetime.fromisoformat(one) if one else None for one in started], heard)
-        placed = {key: Place(x=at) for key, at in zip(known, x, strict=True)}
-    order = _Order(sorted(placed.items(), key=lambda pair: pair[1].x))
-    order.x_name = x_name
-    return order
+        keys = sorted((key for key in known if key.file in places), key=lambda key: places[key.file].x)
+        return _Order(keys, [places[key.file].x for key in keys], table.x_name, places)
+    kept = [sensor.recordings[key] for key in known]
+    x, x_name = in_time([one.time for one in kept], [not one.refused for one in kept])
+    order = sorted(range(len(known)), key=x.__getitem__)
+    return _Order([known[number] for number in order], [x[number] for number in order], x_name)
 
 
-def _window(order: _Order, sensor: Sensor) -> list[Version]:
+def _window(order: _Order, end: int, sensor: Sensor) -> list[int]:
     """What is judged of a long series: the first ones nobody has acknowledged, the latest, and who raised the alarm."""
-    keys = list(order)
-    if len(keys) <= BASELINE + LATEST:
-        return keys
-    names = [Path(key.file).name for key in keys]
-    behind = names.index(sensor.acknowledged) + 1 if sensor.acknowledged in names else 0
-    chosen = {*range(behind, min(behind + BASELINE, len(keys))), *range(len(keys) - LATEST, len(keys))}
+    keys = order.keys[:end]
+    if end <= BASELINE + LATEST:
+        return list(range(end))
+    behind = 0
+    if sensor.acknowledged is not None:
+        behind = next((number for number, key in enumerate(keys, 1) if _name(key) == sensor.acknowledged), 0)
+    chosen = {*range(behind, min(behind + BASELINE, end)), *range(end - LATEST, end)}
     if sensor.standing is not None:
         chosen |= {number for number, key in enumerate(keys) if key.file == sensor.standing.file}
-    return [keys[number] for number in sorted(chosen)]
+    return sorted(chosen)
+
+
+def _name(key: Version) -> str:
+    return key.file.rpartition(os.sep)[2]
 
 
 def _digest(asked: Mapping[str, Any], table: Table | None, known: Sequence[Version], target: Target) -> str:
     """What a judgement depends on, besides what the store holds."""
-    told = [asked, repr(table), known, target.full_load_crf_hz]
-    return sha256(json.dumps(told, default=str).encode()).hexdigest()
+    told = json.dumps([asked, repr(table), target.full_load_crf_hz], default=str)
+    return sha256("\n".join([told, *map("\0".join, known)]).encode(errors="replace")).hexdigest()
 
 
 class _Memory:
     """What a watch knows of its sensor: the store, and what of it this run has needed, at hand."""
 
-    def __init__(self, sensor: Sensor, target: Target, options: ReadOptions) -> None:
-        self.sensor, self.target, self.options = sensor, target, options
+    def __init__(self, sensor: Sensor, target: Target, options: ReadOptions, call: Sequence[Caller]) -> None:
+        self.sensor, self.target, self.options, self.call = sensor, target, options, call
         self._readings: dict[Version, Reading] = {}
         self._learned: Learned | None = None
 
@@ -262,19 +275,31 @@ class _Memory:
 
         None where there is nothing to judge.
         """
-        if not order:
+        keys, again = order.keys, acknowledge is not None
+        if not keys:
             return None
         if acknowledge is not None:
-            self.sensor.acknowledge(_named(acknowledge, [*order]))
-        keys = list(order)
+            self.sensor.acknowledge(_named(acknowledge, keys))
         unjudged = (number for number, key in enumerate(keys) if self.sensor.recordings[key].state is None)
-        first = max(next(unjudged, len(keys)), BASELINE + LATEST)
+        first = max(next(unjudged, len(keys)) + STRIDE, BASELINE + LATEST)
         for end in range(first, len(keys), STRIDE):
-            self._judged(judging, order.until(end), 0, "", again=acknowledge is not None)
-        return self._judged(judging, order, new, question, again=acknowledge is not None)
+            self._judged(judging, order, end, 0, "", again=again, who=())
+        who = [caller.name for caller in self.call]
+        return self._judged(judging, order, len(keys), new, question, again=again, who=who)
 
-    def _judged(self, judging: Callable[..., Track], order: _Order, new: int, question: str, *, again: bool) -> Track:
-        window = _window(order, self.sensor)
+    def _judged(
+        self,
+        judging: Callable[..., Track],
+        order: _Order,
+        end: int,
+        new: int,
+        question: str,
+        *,
+        again: bool,
+        who: Sequence[str],
+    ) -> Track:
+        """A judgement of the series up to an end."""
+        window = {order.keys[number]: order.place(number) for number in _window(order, end, self.sensor)}
         held = {key: self._readings.get(key) or self.sensor.reading(key) for key in window}
         self._readings = {key: reading for key, reading in held.items() if reading is not None}
         states: dict[str, AlarmState] = {}
@@ -286,27 +311,27 @@ class _Memory:
         before = Before(states) if standing is None else Before(states, standing.reason, standing.raised_by)
         if self._learned is None:
             self._learned = self.sensor.learned()
-        names = {Path(key.file).name for key in self._readings}
+        names = {_name(key) for key in self._readings}
         track = judging(
             [*self._readings.values()],
             self.target,
-            {key.file: order[key] for key in self._readings},
+            {key.file: window[key] for key in self._readings},
             order.x_name,
             acknowledge=self.sensor.acknowledged if self.sensor.acknowledged in names else None,
             learned=self._learned,
             before=before,
         )
-        return self.sensor.judged(track, {key.file: key for key in window}, new, question, self._learned)
+        return self.sensor.judged(track, {key.file: key for key in window}, new, question, self._learned, who)
 
 
-def _named(acknowledge: str, order: Sequence[Version]) -> str:
+def _named(acknowledge: str, keys: Sequence[Version]) -> str:
     """The name of the recording up to which somebody has looked."""
     if acknowledge == LAST:
-        return Path(order[-1].file).name
-    for key in order:
-        if acknowledge in (key.file, Path(key.file).name):
-            return Path(key.file).name
-    raise BadInput(f"{acknowledge} is not among the {len(order)} recordings; acknowledge one of them, or {LAST}")
+        return _name(keys[-1])
+    for key in keys:
+        if acknowledge in (key.file, _name(key)):
+            return _name(key)
+    raise BadInput(f"{acknowledge} is not among the {len(keys)} recordings; acknowledge one of them, or {LAST}")
 
 
 @lru_cache(maxsize=1 << 16)

@@ -154,36 +154,41 @@ def _constant(_: Field, at: Places) -> tuple[Field, Field]:
 
 def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
     """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
-    columns, slopes = (part[:, None] for part in candidate.model(candidate.bends, places))  # (bends, 1, places, linear)
+    columns, slopes = candidate.model(candidate.bends, places)  # (bends, places, linear)
     own = places.variance + scatters[:, None] ** 2  # (scatters, places)
+    if not np.any(places.x_std > 0.0):
+        return _surely(columns, places.y, own)
+    columns, slopes = columns[:, None], slopes[:, None]
     variance = np.broadcast_to(own, (columns.shape[0], *own.shape))
-    uncertain = bool(np.any(places.x_std > 0.0))
-    if not uncertain and np.ptp(places.variance) == 0.0:
-        return _evenly(columns[:, 0], places.y, own[:, 0])
-    for _ in range(6 if uncertain else 1):
+    for _ in range(6):
         information = np.einsum("bsp,btpi,btpj->bsij", 1.0 / variance, columns, columns, optimize=True)
         right = np.einsum("bsp,btpi->bsi", places.y / variance, columns, optimize=True)
-        ridge = 1e-12 * np.einsum("bsii->bs", information)[..., None, None] * np.eye(columns.shape[-1])
-        linear = np.linalg.solve(information + ridge, right[..., None])[..., 0]
+        linear, determinant = _solved(information, right)
         steepness = np.einsum("btpi,bsi->bsp", slopes, linear, optimize=True)
-        if uncertain:
-            variance = own + (steepness * places.x_std) ** 2
+        variance = own + (steepness * places.x_std) ** 2
     off = places.y - np.einsum("btpi,bsi->bsp", columns, linear, optimize=True)
     likelihood = -0.5 * np.sum(off**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
-    marginal = likelihood - 0.5 * np.linalg.slogdet(information + ridge)[1]
-    return Fitted(np.max(likelihood, axis=1), marginal, linear)
+    return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
 
 
-def _evenly(columns: Field, y: Field, variance: Field) -> Fitted:
-    """The same where all places weigh alike, so that one fit a bend does for every variance (scatters,)."""
-    information = np.swapaxes(columns, 1, 2) @ columns
-    ridge = 1e-12 * np.einsum("bii->b", information)[:, None, None] * np.eye(columns.shape[-1])
-    linear = np.linalg.solve(information + ridge, np.swapaxes(columns, 1, 2) @ y[:, None])
-    squares = np.sum((y - (columns @ linear)[..., 0]) ** 2, axis=1)[:, None]
-    likelihood = -0.5 * (squares / variance + y.size * np.log(2.0 * np.pi * variance))
-    determinant = np.linalg.slogdet(information + ridge)[1][:, None] - columns.shape[-1] * np.log(variance)
-    every = np.broadcast_to(linear[:, None, :, 0], (*likelihood.shape, columns.shape[-1]))
-    return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, every)
+def _surely(columns: Field, y: Field, variance: Field) -> Fitted:
+    """The same where x is certain, so that no variance (scatters, places) depends on the fit."""
+    weight = 1.0 / variance
+    bends, places, size = columns.shape
+    products = (columns[..., None] * columns[:, :, None]).reshape(bends, places, size**2)
+    information = (weight @ products).reshape(bends, weight.shape[0], size, size)
+    linear, determinant = _solved(information, weight @ (columns * y[:, None]))
+    off = y - linear @ np.swapaxes(columns, 1, 2)
+    squares = np.einsum("bsp,sp->bs", off**2, weight)
+    likelihood = -0.5 * (squares + np.sum(np.log(2.0 * np.pi * variance), axis=-1))
+    return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
+
+
+def _solved(information: Field, right: Field) -> tuple[Field, Field]:
+    """What solves the normal equations (bends, scatters, linear), and ln of their determinant."""
+    ridge = 1e-12 * np.einsum("bsii->bs", information)[..., None, None] * np.eye(information.shape[-1])
+    linear = np.linalg.solve(information + ridge, right[..., None])[..., 0]
+    return linear, np.linalg.slogdet(information + ridge)[1]
 
 
 def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:

@@ -122,8 +122,9 @@ def _search(
     values = np.zeros((*least.shape, 2))
     prior = 0.5 * (np.log(templates.damping / USUAL_DAMPING) / DAMPING_SPREAD) ** 2
     for height, model in zip(LEVELS, prepared or models(base, templates, blocks.centre), strict=True):
-        gain = relative @ model.inverse.T / total
-        cost = blocks.weight @ model.logarithm.T + total * (np.log(gain) + 1.0) + constant + prior
+        as_precise = model.inverse.dtype  # a product of two precisions would copy the larger one
+        gain = relative.astype(as_precise) @ model.inverse.T / total
+        cost = blocks.weight.astype(as_precise) @ model.logarithm.T + total * (np.log(gain) + 1.0) + constant + prior
         better = cost < least
         least = np.where(better, cost, least)
         logarithms = np.stack([np.log(height * height_of) + np.log(gain), np.log(gain)], axis=-1)
