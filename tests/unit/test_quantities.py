@@ -10,6 +10,7 @@ from asperity.surface import ProfileParameters, SurfaceParameters
 SCALED = (
     "1",
     "m",
+    "m/s",
     "m3",
     "Pa",
     "s",

@@ -201,9 +201,6 @@ def watch(
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
     kept = out if out is not None else folder / "asperity-watch"
-    if not folder.is_dir():
-        raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
-    files.make_folder(kept)
     state: str = "cannot-tell"
     with _files_read("watching ...", quiet=quiet) as step:
         updates = tracking.watch_folder(
@@ -329,6 +326,7 @@ def _searched(tracked: "Track") -> Block:
         ("method", tracked.method),
         *tracked.stage_rows(),
         ("alarm", tracked.alarm.verdict),
+        ("severity, last recording", tracked.recordings[-1].severity()),
     ]
     yield from table(rows, (*tracked.problems, *tracked.notes))
 

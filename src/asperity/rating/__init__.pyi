@@ -17,3 +17,6 @@ from .micropitting import bulk_temperature as bulk_temperature
 from .micropitting import loss_factor as loss_factor
 from .micropitting import mesh_friction as mesh_friction
 from .micropitting import specific_film as specific_film
+from .severity import ZONES as ZONES
+from .severity import severity_zone as severity_zone
+from .severity import velocity_rms as velocity_rms

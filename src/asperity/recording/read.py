@@ -186,7 +186,7 @@ def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecordi
     elif unit_text == "g":
         unit_text = "gram-force"
         notes.append(f"g is taken as grams of force, because the channel is called {selected.name}")
-    facts |= {key: stated[key] for key in OPERATING if key in stated}
+    facts |= {key: stated[key] for key in (*OPERATING, "machine_class", "faults_hz") if key in stated}
     named = parse_time(path.name) or parse_time(path.stem)
     if "started" in stated:
         facts["started"] = stated["started"]

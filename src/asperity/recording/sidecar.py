@@ -11,8 +11,9 @@ from asperity.recording.common import parse_time
 
 FOLDER_WIDE = "recordings"
 OPERATING = ("load_n", "entrainment_m_s", "temperature_degc")  # of the contact, for `asperity infer`
-KEYS = ("rate_hz", "unit", "channel", "scale", "started", *OPERATING)
+KEYS = ("rate_hz", "unit", "channel", "scale", "started", "machine_class", "faults_hz", *OPERATING)
 SUFFIXES = (".toml", ".json")
+MACHINE_CLASSES = ("large-rigid", "large-flexible", "medium-rigid", "medium-flexible")  # of ISO 20816-3
 
 
 def is_sidecar(path: Path) -> bool:
@@ -60,6 +61,10 @@ def _checked(path: Path) -> dict[str, Any]:
         if key in OPERATING and not (number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING[2])):
             what = "a temperature in degC" if key == OPERATING[2] else "a positive number"
             raise BadInput(f"{path.name}: {key} must be {what}, got {value!r}")
+        if key == "faults_hz":
+            _require_rates(path, value)
+        if key == "machine_class" and value not in MACHINE_CLASSES:
+            raise BadInput(f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got {value!r}")
         if key in ("unit", "channel") and not isinstance(value, str) and not (key == "channel" and number):
             raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
     if "started" in stated:
@@ -70,3 +75,19 @@ def _checked(path: Path) -> dict[str, Any]:
     if "channel" in stated:
         stated["channel"] = str(stated["channel"])
     return stated
+
+
+def _require_rates(path: Path, value: Any) -> None:
+    """Rates at which faults pass, by their names, such as BPFO = 87.3."""
+    numbers = (
+        isinstance(value, dict)
+        and value
+        and all(
+            isinstance(rate, int | float) and not isinstance(rate, bool) and 0.0 < rate < float("inf")
+            for rate in value.values()
+        )
+    )
+    if not numbers:
+        raise BadInput(
+            f"{path.name}: faults_hz must be positive rates by name, such as {{ BPFO = 87.3 }}, got {value!r}"
+        )

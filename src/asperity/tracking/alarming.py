@@ -13,7 +13,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
-from asperity.wear import Alarm, Said, Sight, Stages, StageSource, Watched, sequential_alarm
+from asperity.wear import Alarm, AlarmState, Said, Sight, Stages, StageSource, Watched, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
 DAMPING_LEAST = 0.2  # of its logarithm
@@ -21,6 +21,8 @@ LEVEL_LEAST = float(np.log(2.0))  # 6 dB, which ISO 13373-1 takes for a change w
 BASELINE = 8  # recordings by which a CRF is counted from 1
 UNSEEN = 3  # recordings without a resonance, from which on nobody sees the contact
 LAST = "last"
+ZONES_IN_A_ROW = 2
+ZONE_STATES: dict[str, AlarmState] = {"D": "alarm", "C": "alert"}
 
 
 def raise_alarm(
@@ -62,8 +64,8 @@ def raise_alarm(
     )
     if stages is not None and stages.kind == "severe" and acknowledge is None:
         chance = f"not yet beyond what chance does once in {1.0 / false_alarm_rate:.0f} recordings"
-        return alarm.alerted(f"a severe stage is found, {chance}", source)
-    return alarm
+        alarm = alarm.alerted(f"a severe stage is found, {chance}", source)
+    return _by_zone(tracked[_acknowledged(tracked, acknowledge) :], alarm)
 
 
 def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> Said:
@@ -106,19 +108,44 @@ def _levels(tracked: Sequence[TrackedRecording]) -> list[Watched]:
         return []
     (usual, _), *_ = units.most_common(1)
 
-    def logarithms(name: str) -> Field:
+    def logarithms(value: Callable[[TrackedRecording], float]) -> Field:
         values = np.full(len(tracked), np.nan)
         for number, one in enumerate(tracked):
             quality = one.reading.quality
-            if quality is not None and not quality.dead and one.reading.unit == usual and getattr(quality, name) > 0.0:
-                values[number] = np.log(getattr(quality, name))
+            if quality is not None and not quality.dead and one.reading.unit == usual and value(one) > 0.0:
+                values[number] = np.log(value(one))
         return values
 
+    def quality_of(name: str) -> Callable[[TrackedRecording], float]:
+        return lambda one: float(getattr(one.reading.quality, name))
+
+    def depth_of(name: str) -> Callable[[TrackedRecording], float]:
+        return lambda one: one.reading.depths.get(name, np.nan)
+
+    faults = dict.fromkeys(name for one in tracked for name in one.reading.depths)
+    heard = {
+        "the level (rms)": quality_of("rms"),
+        "kurtosis": quality_of("kurtosis"),
+        "velocity (rms)": lambda one: one.reading.velocity,
+    }
+    deep = {f"the envelope at {name}": depth_of(name) for name in faults}
+    every = {words: logarithms(value) for words, value in (heard | deep).items()}
     return [
-        Watched(name=words, values=values, least=LEVEL_LEAST, contact=False, in_words=_times)
-        for words, values in (("the level (rms)", logarithms("rms")), ("kurtosis", logarithms("kurtosis")))
+        Watched(name=words, values=values, least=LEVEL_LEAST, contact=False, in_words=_times, jumps=words in deep)
+        for words, values in every.items()
         if np.isfinite(values).any()
     ]
+
+
+def _by_zone(tracked: Sequence[TrackedRecording], alarm: Alarm) -> Alarm:
+    """What ISO 20816-3 says of the last recordings, where that is graver: zone D twice running alarms, C alerts."""
+    zones = [one.zone for one in tracked if one.zone is not None][-ZONES_IN_A_ROW:]
+    if len(zones) < ZONES_IN_A_ROW or tracked[-1].zone is None or alarm.state in ("alarm", "blind"):
+        return alarm
+    for zone, state in ZONE_STATES.items():
+        if min(zones) >= zone:
+            return alarm.raised_to(state, tracked[-1].severity(), "zone")
+    return alarm
 
 
 def _moved(by: float) -> str:

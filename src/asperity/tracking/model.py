@@ -16,6 +16,7 @@ from asperity.errors import BadInput
 from asperity.files import whole_file, write_csv
 from asperity.kept import netcdf_bytes
 from asperity.quantities import quantity
+from asperity.rating import ZONES, severity_zone
 from asperity.tracking.reading import Reading
 from asperity.tracking.target import Target
 from asperity.wear import IN_WORDS, Alarm, AlarmState, CleanSpectrum, Resonance, Stages, StageSource
@@ -62,6 +63,25 @@ class TrackedRecording:
             return np.nan, np.nan
         return self.resonance.damping_ratio, self.resonance.damping_ratio_std
 
+    @property
+    def zone(self) -> str | None:
+        """Its zone of ISO 20816-3, A to D; None without a machine class, an acceleration, or a long enough record."""
+        if "machine_class" not in self.reading.facts or not np.isfinite(self.reading.velocity):
+            return None
+        return severity_zone(self.reading.velocity, self.reading.facts["machine_class"][0])
+
+    def severity(self) -> str:
+        """Its velocity and zone in words, or why they are not determined."""
+        velocity, zone = self.reading.velocity, self.zone
+        if not np.isfinite(velocity):
+            return (
+                "velocity not determined: that takes an acceleration of known unit, sampled at 2.5 kHz or more for 2 s"
+            )
+        said = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz"
+        if zone is None:
+            return f"{said}; zone of ISO 20816-3 not determined: no machine_class is stated beside the recording"
+        return f"{said}: zone {zone} of ISO 20816-3 ({self.reading.facts['machine_class'][0]}), {ZONES[zone]}"
+
     def row(self) -> dict[str, Any]:
         """Its line of the table, by the names of `asperity track --json`; None where there is nothing."""
         resonance, quality = self.resonance, self.reading.quality
@@ -92,6 +112,9 @@ class TrackedRecording:
                 name: None if quality is None else finite_or_none(getattr(quality, name))
                 for name in ("rms", "crest", "kurtosis")
             },
+            "velocity_rms": finite_or_none(self.reading.velocity),
+            "zone": self.zone,
+            "depths": {name: finite_or_none(depth) for name, depth in self.reading.depths.items()},
             "load_n": self.load_n,
             "speed_hz": self.speed_hz,
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
@@ -201,7 +224,7 @@ class Track:
         """One row a recording, in the order of x."""
         import pandas
 
-        return pandas.DataFrame([recording.row() for recording in self.recordings])
+        return pandas.DataFrame([flat(recording.row()) for recording in self.recordings])
 
     def to_dataset(self) -> "xarray.Dataset":
         """Indicators on (recording), spectra on (recording, frequency), with CF attributes."""
@@ -272,6 +295,13 @@ class Track:
                 encoding = {name: packed for name in ("density", "kept") if name in dataset}
                 part.write_bytes(netcdf_bytes(dataset, encoding))
         return path
+
+
+def flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A recording's line with a column for each fault's depth."""
+    depths = row.get("depths", {})
+    rest = {name: value for name, value in row.items() if name != "depths"}
+    return rest | {f"depth_{name}": depth for name, depth in depths.items()}
 
 
 def _in_json(stages: Stages) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from asperity.errors import BadInput
 from asperity.files import whole_file, write_csv
 from asperity.recording import ReadOptions
-from asperity.tracking.model import Track
+from asperity.tracking.model import Track, flat
 from asperity.tracking.store import ACKNOWLEDGED, Place, Store, Version
 from asperity.tracking.watch import settings_of
 
@@ -102,7 +102,7 @@ def _table(store: Store) -> "pandas.DataFrame":
         {
             **places[sensor]._asdict(),
             "heard": heard,
-            **({"file": file, "started": started or None, "state": state} if row is None else json.loads(row)),
+            **({"file": file, "started": started or None, "state": state} if row is None else flat(json.loads(row))),
         }
         for sensor, file, heard, started, state, row in rows
     )

@@ -20,9 +20,11 @@ import scipy
 from asperity.errors import BadInput, UnreadableFile
 from asperity.kept import sealed, unsealed
 from asperity.processes import leave_interrupts_to_the_parent
+from asperity.rating import velocity_rms
 from asperity.recording import Gauge, Quality, ReadOptions, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
 from asperity.tracking.target import Target
+from asperity.vibration import Envelope
 
 WINDOW = "hann"
 FINEST_HZ = 0.5  # spacing of lines: shaft harmonics a few hertz apart stay apart
@@ -36,7 +38,8 @@ class Reading:
     """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
     `rate_doubt` is the relative standard deviation of the rate. `facts` are texts by name, each with its source;
-    `started` is in ISO form or empty.
+    `started` is in ISO form or empty. `depths` are how deep the envelope is modulated at the rates of faults, where a
+    sidecar states those; `velocity` is rms, 10 to 1000 Hz [m/s], nan of what is no acceleration or too short to tell.
     """
 
     file: str
@@ -47,6 +50,8 @@ class Reading:
     unit: str = ""
     facts: dict[str, tuple[str, str]] = field(default_factory=dict)
     started: str = ""
+    velocity: float = np.nan
+    depths: dict[str, float] = field(default_factory=dict)
     reason: str = ""
 
     @property
@@ -79,10 +84,12 @@ def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: 
         facts={name: (_text(fact.value), fact.source) for name, fact in opened.facts.items()},
         started=opened.started.isoformat() if opened.started else "",
     )
-    gauge = Gauge()
+    gauge, envelope = Gauge(), Envelope(opened.rate_hz)
+    rates = opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {}
+    blocks = gauge.watch(opened.blocks())
     try:
         spectrum: Spectrum | None = averaged_spectrum(
-            gauge.watch(opened.blocks()),
+            envelope.watch(blocks) if rates else blocks,
             opened.rate_hz,
             opened.unit,
             segment=segment_length(opened.rate_hz, spacing_hz),
@@ -94,7 +101,12 @@ def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: 
     except BadInput as refusal:
         spectrum, failed = None, str(refusal)
     quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
-    return replace(known, spectrum=spectrum, quality=quality, reason="; ".join(quality.faults) or failed)
+    velocity = np.nan
+    if spectrum is not None and opened.comparable:
+        velocity = velocity_rms(spectrum.frequency_hz, spectrum.density)
+    reason = "; ".join(quality.faults) or failed
+    depths = envelope.depths(rates)
+    return replace(known, spectrum=spectrum, quality=quality, velocity=velocity, depths=depths, reason=reason)
 
 
 def _text(value: object) -> str:

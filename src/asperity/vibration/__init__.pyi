@@ -1,3 +1,4 @@
+from .envelope import Envelope as Envelope
 from .excitation import PATCHES as PATCHES
 from .excitation import Excitation as Excitation
 from .excitation import FilteredNoise as FilteredNoise

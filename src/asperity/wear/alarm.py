@@ -32,6 +32,7 @@ class Watched:
     least : the change from which on it is worth acting, in units of `values`
     contact : whether it is the contact's, whose severe stage is a rise that flattens; otherwise a level, which grows
     in_words : a change of it, in words
+    jumps : whether a jump upwards alarms, as neither gain nor a moved sensor makes one
     """
 
     name: str
@@ -39,6 +40,7 @@ class Watched:
     least: float
     contact: bool
     in_words: Callable[[float], str]
+    jumps: bool = False
 
 
 class Sight(NamedTuple):
@@ -87,8 +89,12 @@ class Alarm:
         """The same with an alert at its end, where nothing graver stands there."""
         if self.state not in ("none", "cannot-tell"):
             return self
-        states = (*self.states[:-1], "alert")
-        return replace(self, state="alert", states=states, since=len(states) - 1, reason=reason, raised_by=raised_by)
+        return self.raised_to("alert", reason, raised_by)
+
+    def raised_to(self, state: AlarmState, reason: str, raised_by: str) -> "Alarm":
+        """The same with another state at its end."""
+        states = (*self.states[:-1], state)
+        return replace(self, state=state, states=states, since=len(states) - 1, reason=reason, raised_by=raised_by)
 
 
 def sequential_alarm(
@@ -207,10 +213,13 @@ def _decided(
         if looked.change.log_ratio >= threshold(share) and (not one.contact or confirmed(number)):
             return "alarm", course, one.name
         leaning = (course, one.name)
+    for one, looked, share in zip(watched, found, shares, strict=True):
+        if one.jumps and looked.step.change > 0.0 and looked.step.log_ratio >= threshold(share):
+            return "alarm", _jumped(one, looked, unit), one.name
     if sight.state == "blind":
         return "blind", sight.reason, ""
     stepped = [
-        f"{one.name} {one.in_words(looked.step.change)} at once, at {looked.step.at:.4g} {unit}".rstrip()
+        _jumped(one, looked, unit)
         for one, looked, share in zip(watched, found, shares, strict=True)
         if looked.step.log_ratio >= threshold(share)
     ]
@@ -225,3 +234,7 @@ def _decided(
     if places < FEWEST:
         return "cannot-tell", f"the baseline is being learned, {places} of {FEWEST} places so far", ""
     return "none", f"nothing beyond what chance does once in {1.0 / rate:.0f} recordings", ""
+
+
+def _jumped(one: Watched, looked: _Looked, unit: str) -> str:
+    return f"{one.name} {one.in_words(looked.step.change)} at once, at {looked.step.at:.4g} {unit}".rstrip()

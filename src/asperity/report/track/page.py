@@ -98,6 +98,10 @@ def _tiles(track: Track) -> list[Tile]:
             low, high = last.clr_interval
             interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
             tiles.append(Tile("Load share, last", clr.text(last.clr), interval))
+    zone = track.recordings[-1].zone
+    if zone is not None:
+        velocity = quantity("velocity_rms").text(track.recordings[-1].reading.velocity)
+        tiles.append(Tile("ISO 20816-3, last", f"Zone {zone}", f"{velocity} rms"))
     unusable = sum(not recording.reading.usable for recording in track.recordings)
     tiles.append(Tile("Not usable", f"{unusable}", f"of {total}"))
     return tiles

@@ -1,0 +1,146 @@
+"""Velocity and its zones, and envelopes, held against closed forms and the standard's table; and what they raise."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.rating import severity_zone, velocity_rms
+from asperity.recording import read_recording
+from asperity.signals import Signal, power_spectrum
+from asperity.tracking import track_recordings
+from asperity.vibration import Envelope
+
+RATE = 20e3
+
+
+@pytest.mark.parametrize(("hertz", "within"), [(25.0, 0.03), (50.0, 0.01), (300.0, 2e-3), (990.0, 2e-3)])
+def test_velocity_of_a_tone_is_acceleration_over_angular_frequency(hertz, within):
+    time = np.arange(round(10 * RATE)) / RATE
+    wave = 3.0 * np.sin(2.0 * np.pi * hertz * time)
+    spectrum = power_spectrum(Signal(wave, RATE, "m/s^2"), segment=4800)  # lines 4.17 Hz apart
+    exact = 3.0 / np.sqrt(2.0) / (2.0 * np.pi * hertz)
+    assert velocity_rms(spectrum.frequency_hz, spectrum.density) == pytest.approx(exact, rel=within)
+
+
+def test_velocity_of_white_noise_is_the_integral_of_its_band():
+    """∫ S/(2πf)² df from 10 to 1000 Hz = S/(4π²) (1/10 - 1/1000); lines as wide as 1 Hz add 5 % at the lower end."""
+    frequency = np.arange(0.0, 5000.0, 0.1)
+    exact = np.sqrt(2.0 / (4.0 * np.pi**2) * (1.0 / 10.0 - 1.0 / 1000.0))
+    assert velocity_rms(frequency, np.full(frequency.size, 2.0)) == pytest.approx(exact, rel=5e-3)
+
+
+def test_velocity_is_not_told_by_coarse_lines_or_a_low_rate():
+    assert np.isnan(velocity_rms(np.arange(0.0, 2000.0, 6.0), np.ones(334)))
+    assert np.isnan(velocity_rms(np.arange(0.0, 900.0, 1.0), np.ones(900)))
+
+
+@pytest.mark.parametrize(
+    ("machine", "mm_s", "zone"),  # ISO 10816-3:2009, tables A.1 and A.2, which ISO 20816-3:2022 has taken over
+    [
+        ("large-rigid", (2.2, 2.4, 4.4, 4.6, 7.0, 7.2), "ABBCCD"),
+        ("large-flexible", (3.4, 3.6, 7.0, 7.2, 10.9, 11.1), "ABBCCD"),
+        ("medium-rigid", (1.3, 1.5, 2.7, 2.9, 4.4, 4.6), "ABBCCD"),
+        ("medium-flexible", (2.2, 2.4, 4.4, 4.6, 7.0, 7.2), "ABBCCD"),
+    ],
+)
+def test_zones_are_those_of_the_standard(machine, mm_s, zone):
+    assert "".join(severity_zone(1e-3 * value, machine) for value in mm_s) == zone
+    with pytest.raises(BadInput, match="machine class must be one of"):
+        severity_zone(1.0, "small")
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
+def test_a_modulated_tone_is_as_deep_as_its_closed_form(share):
+    """(1 + m cos)² = 1 + m²/2 + 2m cos + m²/2 cos 2: rms of both lines over the mean; a taper takes 15 % at most."""
+    time = np.arange(round(8 * RATE)) / RATE
+    wave = (1.0 + share * np.cos(2.0 * np.pi * 87.3 * time)) * np.cos(2.0 * np.pi * 4321.0 * time)
+    envelope = Envelope(RATE)
+    passed = [*envelope.watch([wave[:50_000], wave[50_000:120_001], wave[120_001:]])]
+    assert np.array_equal(np.concatenate(passed), wave)
+    exact = np.sqrt(2.0 * share**2 + share**4 / 8.0) / (1.0 + share**2 / 2.0)
+    depths = envelope.depths({"outer": 87.3, "inner": 131.9, "slow": 0.5})
+    assert depths["outer"] == pytest.approx(exact, rel=0.15)
+    assert depths["inner"] < 0.02 * exact
+    assert np.isnan(depths["slow"])
+
+
+def test_an_envelope_of_a_short_record_or_of_gaps_says_what_it_can():
+    noise = np.random.default_rng(1).standard_normal(round(9 * RATE))
+    short, gaps = Envelope(RATE), Envelope(RATE)
+    list(short.watch([noise[:2000]]))
+    assert 0.0 < short.depths({"fault": 87.3})["fault"] < 0.4
+    assert np.isnan(short.depths({"fault": 30.0})["fault"])  # fewer than four turns
+    noise[1000] = np.nan
+    list(gaps.watch([noise]))
+    assert gaps.chunks == 1  # of two, one has a gap
+    silent = Envelope(RATE)
+    list(silent.watch([np.zeros(2000)]))
+    assert np.isnan(silent.depths({"fault": 87.3})["fault"])
+
+
+def recordings(folder, velocities, depths, seconds=2.0, **stated):
+    """A machine that shakes at 50 Hz, of this velocity [m/s], whose bearing rings at 4 kHz every 1/87.3 s, so deep."""
+    folder.mkdir()
+    time = np.arange(round(seconds * RATE)) / RATE
+    for number, (velocity, depth) in enumerate(zip(velocities, depths, strict=True)):
+        rng = np.random.default_rng(number)
+        shaken = np.sqrt(2.0) * velocity * 2.0 * np.pi * 50.0 * np.sin(2.0 * np.pi * 50.0 * time)
+        ringing = rng.standard_normal(time.size) * (1.0 + depth * np.cos(2.0 * np.pi * 87.3 * time))
+        np.savez(folder / f"s-{number:03}.npz", acc=shaken + 0.3 * ringing, fs=RATE, unit="m/s^2")
+    (folder / "recordings.json").write_text(json.dumps(stated))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("velocity", "zone", "state", "said"),
+    [
+        (8e-3, "D", "alarm", "velocity 8 mm/s rms, 10 to 1000 Hz: zone D of ISO 20816-3 (large-rigid), severe enough"),
+        (6e-3, "C", "alert", "velocity 6 mm/s rms, 10 to 1000 Hz: zone C"),
+        (3e-3, "B", "cannot-tell", "These recordings cannot tell"),
+    ],
+)
+def test_a_zone_raises_what_the_standard_says(tmp_path, velocity, zone, state, said):
+    folder = recordings(tmp_path / "in", [velocity] * 3, [0.0] * 3, seconds=0.5, machine_class="large-rigid")
+    track = track_recordings([folder], band_hz=(2000.0, 4000.0))
+    assert {recording.zone for recording in track.recordings} == {zone}
+    assert track.alarm.state == state
+    assert said in track.verdict()
+    assert track.scalars()["recordings"][0]["velocity_rms"] == pytest.approx(velocity, rel=0.02)
+    looked = track_recordings([folder], band_hz=(2000.0, 4000.0), acknowledge="last")
+    assert looked.alarm.state == "none"
+
+
+def test_without_a_class_there_is_a_velocity_and_no_zone(tmp_path):
+    folder = recordings(tmp_path / "in", [8e-3] * 3, [0.0] * 3, seconds=0.5)
+    track = track_recordings([folder], band_hz=(2000.0, 4000.0))
+    assert track.recordings[-1].zone is None
+    assert track.alarm.state != "alarm"
+    assert "zone of ISO 20816-3 not determined: no machine_class" in track.recordings[-1].severity()
+
+
+@pytest.mark.parametrize("late", [np.geomspace(0.05, 0.9, 14), np.full(14, 0.3)], ids=["grows", "jumps"])
+def test_a_fault_that_is_heard_in_the_envelope_alarms_where_the_level_does_not(tmp_path, late):
+    """The level stays where it is; only the outer ring is heard more and more."""
+    depths = np.concatenate([np.zeros(14), late])
+    folder = recordings(tmp_path / "in", [1e-3] * 28, depths, faults_hz={"outer ring": 87.3, "inner ring": 131.9})
+    track = track_recordings([folder], band_hz=(2000.0, 4000.0))
+    assert (track.alarm.state, track.alarm.raised_by) == ("alarm", "the envelope at outer ring")
+    assert track.table["depth_outer ring"].iloc[-1] > 5.0 * track.table["depth_inner ring"].iloc[-1]
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ({"machine_class": "huge"}, "machine_class must be one of large-rigid"),
+        ({"faults_hz": 87.3}, "faults_hz must be positive rates by name"),
+        ({"faults_hz": {"BPFO": -1.0}}, "faults_hz must be positive rates by name"),
+        ({"faults_hz": {}}, "faults_hz must be positive rates by name"),
+    ],
+)
+def test_what_a_sidecar_cannot_mean_is_refused(tmp_path, stated, said):
+    folder = recordings(tmp_path / "in", [1e-3], [0.0], **stated)
+    with pytest.raises(BadInput, match=said):
+        read_recording(Path(folder) / "s-000.npz")
