@@ -12,6 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 MISSING = {"", "nan", "na", "n/a", "null", "none", "bad", "***", "-", "--", "---", "inf", "-inf", "#n/a", "overload"}
+_DATE = re.compile(r"\b\d{1,4}([./-])\d{1,2}\1\d{2,4}\b|\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
+_THOUSANDS = {  # by whether decimals follow a comma
+    False: re.compile(r"[-+]?\d{1,3}(,\d{3})+(\.\d*)?([eE][-+]?\d+)?"),
+    True: re.compile(r"[-+]?\d{1,3}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?"),
+}
 _COMMAS_BETWEEN_BLANKS = re.compile(r"\s*-?\d+(,\d+)?([eE][+-]?\d+)?(\s+-?\d+(,\d+)?([eE][+-]?\d+)?)*\s*")
 
 
@@ -39,6 +44,8 @@ class Dialect:
         text = field.strip().strip('"').strip()
         if text.lower() in MISSING:
             return np.nan
+        if _THOUSANDS[self.comma].fullmatch(text):
+            text = text.replace("." if self.comma else ",", "")
         try:
             return float(text.replace(",", ".") if self.comma else text) if "_" not in text else None
         except ValueError:
@@ -47,10 +54,13 @@ class Dialect:
 
 def sniff_dialect(sample: Sequence[str], fewest_columns: int = 1) -> Dialect:
     """The dialect of lines that are mostly rows of at least so many numbers."""
+    sample = [_DATE.sub("", line) for line in sample]
     rows = [line for line in sample if re.fullmatch(r"[\s\d.,;+\-eE\"]+", line)] or sample
     numbers = "\n".join(rows)
     for separator in (";", "\t"):
         if sum(separator in line for line in rows) > len(rows) / 2:
+            if re.search(r"\d\.\d{3},\d", numbers):  # 1.234,5
+                return Dialect(separator, comma=True)
             return Dialect(separator, "," in numbers and not re.search(r"\d\.\d", numbers))
     if '"' in numbers:
         comma = bool(re.search(r'"[^",\n]*,[^",\n]*"(?:[,\s]|$)', numbers)) and "." not in numbers

@@ -101,6 +101,14 @@ _TIMES = (
     "%d-%b-%y %H:%M:%S",  # UFF
     "%d-%b-%Y %H:%M:%S",
     "%d.%m.%Y %H:%M:%S",
+    "%d.%m.%Y %H:%M:%S.%f",
+    "%d.%m.%Y %H:%M:%S,%f",
+    "%d.%m.%Y %H:%M",
+    "%d.%m.%y %H:%M:%S",
+    "%m/%d/%Y %I:%M:%S %p",  # who writes AM and PM writes the month first
+    "%m/%d/%Y %I:%M:%S.%f %p",
+    "%m/%d/%Y %I:%M %p",
+    "%Y/%m/%d %H:%M:%S.%f",
     "%Y/%m/%d %H:%M:%S",
 )
 

@@ -6,9 +6,11 @@ Nothing is guessed: what neither the file, nor a sidecar beside it, nor the call
 import math
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile, ZipFile
 
 from asperity.errors import BadInput, UnreadableFile, require_positive
 from asperity.files import require_file
@@ -131,6 +133,8 @@ def read_contents(path: Path) -> Contents:
     if not head:
         raise UnreadableFile(f"{path.name} is empty; {REMEDY}")
     suffix = path.suffix[1:].lower()
+    if head.startswith((b"PK\x03\x04", b"PK\x05\x06")) and (packed := _packed(path)):
+        raise UnreadableFile(f"{path.name} is {packed}")
     chosen = next((form for form in FORMATS if form.known(head)), None)
     if chosen is None:
         if suffix == "mat" and not text.looks_like_text(head):
@@ -160,6 +164,17 @@ def read_contents(path: Path) -> Contents:
     if not contents.channels:
         raise UnreadableFile(f"{path.name} holds no row of samples; give a file with a recording in it")
     return contents
+
+
+def _packed(path: Path) -> str:
+    """What a zip file is, by what lies in it, and what to do with it; empty of an npz, or one too damaged to tell."""
+    with suppress(OSError, BadZipFile), ZipFile(path) as packed:
+        names = packed.namelist()
+        if any(name.startswith("xl/") for name in names):
+            return "an Excel workbook; save the sheet that holds the recording as csv"
+        if not all(name.endswith(".npy") for name in names) or not names:
+            return f"a zip archive of {len(names)} files; unpack it, and name what was in it"
+    return ""
 
 
 def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecording:

@@ -188,6 +188,9 @@ def _declared(header: list[str]) -> dict[str, str]:
         if not pair:
             continue
         key, value = re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I), pair[2].strip()
+        several = {part.strip() for part in re.split(r"[\t;]", value) if part.strip()}
+        if len(several) == 1:  # lvm states each for every channel
+            (value,) = several
         scaled = re.fullmatch(r"([-+\d.,eE]+)\s*(kHz|Hz|ms|us|µs|s|S/s|samples/s)?", value)
         if scaled:
             try:

@@ -39,8 +39,10 @@ _PER_SECOND_SQUARED = re.compile(
 
 RATE_NAMES = {"fs", "fs_hz", "sr", "sr_hz", "rate_hz", "sample_rate", "sample_rate_hz", "sampling_rate",
               "sampling_rate_hz", "samplerate", "samplingrate", "sampling_frequency", "sampling_frequency_hz",
-              "sample_frequency", "samplingfrequency", "samplefrequency"}  # fmt: skip
-STEP_NAMES = {"dt", "dt_s", "wf_increment", "sample_interval", "sampling_interval", "delta_t", "sample_period"}
+              "sample_frequency", "samplingfrequency", "samplefrequency", "abtastrate", "abtastfrequenz",
+              "messrate", "abtastrate_hz", "abtastfrequenz_hz"}  # fmt: skip
+STEP_NAMES = {"dt", "dt_s", "wf_increment", "sample_interval", "sampling_interval", "delta_t", "sample_period",
+              "delta_x", "abtastintervall", "abtastzeit"}  # fmt: skip
 UNIT_NAMES = {"unit", "units", "unit_string", "engineering_units", "y_unit", "y_units", "unitname"}
 START_NAMES = {"started", "start", "start_time", "wf_start_time", "started_at", "start_datetime", "recorded", "date"}
 

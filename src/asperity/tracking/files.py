@@ -13,7 +13,9 @@ from asperity.files import require_file
 from asperity.recording import is_sidecar
 
 _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
-                  ".docx", ".xlsx", ".part", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
+                  ".docx", ".xlsx", ".part", ".filepart",
+                  ".crdownload", ".partial", ".download", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
+_ABOUT = {"readme", "liesmich", "license", "licence", "changelog"}  # names of files that are about others
 _KNOWN = ("load_n", "speed_hz")
 OPERATING = ("load_n", "entrainment_m_s", "temperature_degc")  # what the contact was run at
 
@@ -129,6 +131,8 @@ def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
 def may_be_recording(path: Path) -> bool:
     """Whether a file in a folder is taken for a recording."""
     if not path.is_file() or path.name.startswith(".") or is_sidecar(path) or path.suffix.lower() in _NO_RECORDINGS:
+        return False
+    if path.stem.lower() in _ABOUT and path.suffix.lower() in ("", ".txt"):
         return False
     return path.suffix.lower() not in (".csv", ".tsv", ".txt") or "file" not in _heading(path)
 
