@@ -9,7 +9,7 @@ from math import ceil
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
 from asperity.recording.model import UNKNOWN, OpenRecording
 
 QUIET = 0.01  # m/s^2 rms: the noise of an accelerometer, not a machine
@@ -139,12 +139,21 @@ class Gauge:
         if high == self.high:
             self.clipped_high += _in_runs(values == high)
 
+    def without_stuck(self, blocks: Iterable[Field]) -> Iterator[Field]:
+        """Pass the blocks on with stretches that stand still as missing: samples were lost there, and held or filled.
+
+        A box of held values raises the spectrum below the inverse of its length, and boxes in turns make lines. What
+        stands still for most of the time is left as it is, and refused by `quality`.
+        """
+        for block in blocks:
+            hit = _stuck(block)
+            yield block if hit is None or hit.mean() > MOST_STUCK else np.where(hit, np.nan, block)
+
     def _stand_still(self, values: Field) -> None:
         """Counts samples that equal `STUCK` neighbours in a row; compared at a distance first, which is rare."""
-        suspects = values[:-STUCK:STUCK] == values[STUCK::STUCK] if values.size > STUCK else np.zeros(0, bool)
-        if suspects.any():
-            same = np.diff(values) == 0.0
-            self.stuck += _in_runs(same, STUCK)
+        hit = _stuck(values)
+        if hit is not None:
+            self.stuck += int(hit.sum())
 
     def quality(
         self, recording: OpenRecording, *, width_hz: float | None, band_hz: tuple[float, float] | None
@@ -186,7 +195,9 @@ class Gauge:
                 worth = "CRFA is too low" if clipped > CLIPPED_SHARE else "hardly matters"
                 remarks.append(f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {worth}")
             if 0 < self.stuck <= MOST_STUCK * self.finite:
-                remarks.append(f"stands still for {100 * self.stuck / self.finite:.2g} % of the time: samples lost?")
+                remarks.append(
+                    f"stands still for {100 * self.stuck / self.finite:.2g} % of the time: samples lost? Left out"
+                )
             if rms > 0.0 and abs(self.mean) > OFFSET * rms:
                 remarks.append(
                     f"offset of {self.mean:.3g} {unit}, {abs(self.mean) / rms:.1f} times the rms; it is removed"
@@ -238,6 +249,19 @@ def _converter_step(values: Field) -> float | None:
     if levels.size < 2 or levels.size > values.size / 16:
         return None
     return float(np.diff(levels).min())
+
+
+def _stuck(values: Field) -> Mask | None:
+    """Which samples follow an equal one in a stretch of `STUCK` or more; None, at once, where there is none."""
+    if values.size <= STUCK or not (values[:-STUCK:STUCK] == values[STUCK::STUCK]).any():
+        return None
+    edges = np.diff(np.concatenate([[False], np.diff(values) == 0.0, [False]]).astype(np.int8))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    hit = np.zeros(values.size, dtype=bool)
+    for start, end in zip(starts, ends, strict=True):
+        if end - start >= STUCK:
+            hit[start + 1 : end + 1] = True
+    return hit
 
 
 def _in_runs(hit: Field, shortest: int = CLIPPED_RUN) -> int:

@@ -86,7 +86,7 @@ def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: 
     )
     gauge, envelope = Gauge(), Envelope(opened.rate_hz)
     rates = opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {}
-    blocks = gauge.watch(opened.blocks())
+    blocks = gauge.without_stuck(gauge.watch(opened.blocks()))
     try:
         spectrum: Spectrum | None = averaged_spectrum(
             envelope.watch(blocks) if rates else blocks,
