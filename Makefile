@@ -30,8 +30,9 @@ attacks: $(READY)
 	$(BIN)/python -m benchmarks.attacks --share 0.02
 	$(BIN)/python -m benchmarks.crashes 2
 
+# the site, in build/site: warnings are errors, nothing is fetched
 docs: $(READY)
-	$(BIN)/python docs/make_quantities.py
+	$(BIN)/python docs/build.py
 
 clean:
 	rm -rf $(VENV)

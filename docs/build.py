@@ -1,0 +1,97 @@
+"""Builds the site into build/site: `make docs`.
+
+The pages are staged first, in one tree with the README, the changelog and the reference of `make_reference.py`, so that
+nothing that is made ever stands among what is written. Warnings are errors; nothing is fetched.
+"""
+
+import os
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import make_quantities
+import make_reference
+from sphinx.cmd.build import main as sphinx
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+STAGE, SITE, KEPT = (ROOT / "build" / name for name in ("site-source", "site", "site-kept"))
+BESIDE = {
+    "README.md": "readme.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "SECURITY.md": "security.md",
+}
+LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
+REST = "<!-- the rest -->"  # where pages go that no other list of pages names
+
+
+def staged(path: Path) -> Path:
+    """Where a file of the repository lies in the stage: docs is its root."""
+    name = path.relative_to(ROOT).as_posix()
+    return STAGE / BESIDE.get(name, name.removeprefix("docs/"))
+
+
+def sources() -> Iterator[Path]:
+    """What the site is made of, but for the reference."""
+    yield from (ROOT / name for name in BESIDE)
+    yield from (ROOT / "examples").glob("*.toml")
+    yield from (path for path in DOCS.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+
+
+def relinked(path: Path) -> str:
+    """A page whose links lead where they lead in the repository."""
+    here = staged(path).parent
+
+    def leading(link: re.Match) -> str:
+        target, hash_, anchor = link[2].partition("#")
+        if "://" in target or not target:
+            return link[0]
+        there = staged((path.parent / target).resolve())
+        return f"{link[1]}{os.path.relpath(there, here)}{hash_}{anchor}{link[3]}"
+
+    parts = re.split(r"(^```.*?^```)", path.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    return "".join(part if part.startswith("```") else LINK.sub(leading, part) for part in parts)
+
+
+def listed(texts: dict[Path, str]) -> set[str]:
+    """Pages of the stage's root that some list of pages names."""
+    blocks = (block for text in texts.values() for block in re.findall(r"```\{toctree\}.*?```", text, re.DOTALL))
+    return {
+        line.strip().rpartition("/")[2] for block in blocks for line in block.splitlines() if line.startswith("../")
+    }
+
+
+def stage() -> None:
+    """Bring the stage up to date; what has not changed keeps its time, so that only what has is built anew."""
+    texts = {staged(path): relinked(path) for path in sources() if path.suffix == ".md"}
+    texts |= {STAGE / name: text for name, text in make_reference.pages().items()}
+    rest = sorted(path.stem for path in texts if path.parent == STAGE and path.stem != "index")
+    names = "\n".join(f"../{name}" for name in rest if name not in listed(texts))
+    wanted = {path: text.replace(REST, names).encode() for path, text in texts.items()}
+    wanted |= {staged(path): path.read_bytes() for path in sources() if path.suffix != ".md"}
+    made = [STAGE / name for name in ("gallery", "reference/names")]
+    for path in STAGE.rglob("*"):
+        if path.is_file() and path not in wanted and not any(path.is_relative_to(folder) for folder in made):
+            path.unlink()
+    for path, content in wanted.items():
+        if not path.exists() or path.read_bytes() != content:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+
+def main() -> int:
+    """Write the page of quantities, stage, and build; the exit code."""
+    make_quantities.PAGE.write_text(make_quantities.page(), "utf-8")
+    stage()
+    shutil.rmtree(SITE, ignore_errors=True)
+    code = sphinx(["-W", "--keep-going", "-q", "-b", "html", "-d", str(KEPT), str(STAGE), str(SITE)])
+    if code == 0:
+        print(f"The site is in {SITE.relative_to(ROOT)}: open {(SITE / 'index.html').relative_to(ROOT)}.")  # noqa: T201
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+"""Sphinx on what `docs/build.py` staged: this folder's pages, the README, and the generated reference."""
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from docstrings import described, plain
+
+project = "asperity"
+author = "The asperity developers"
+copyright = author
+release = version = version_of("asperity")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+]
+templates_path = ["_templates"]
+exclude_patterns = ["scripts"]  # the gallery is made of them
+default_role = "literal"
+
+myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_heading_anchors = 6
+
+autosummary_generate = ["reference/api.rst"]
+autosummary_ignore_module_all = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_default_options = {"members": True, "inherited-members": False}
+napoleon_google_docstring = False
+
+mathjax_path = "mathjax/tex-svg.js"
+mathjax3_config = {"options": {"enableMenu": False}}  # the menu is what would ask other machines for speech rules
+copybutton_prompt_text = "$ "
+
+html_theme = "pydata_sphinx_theme"
+html_title = "asperity"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "logo": {"text": "asperity"},
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "navbar_align": "left",
+    "header_links_before_dropdown": 8,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "use_edit_page_button": False,
+}
+html_context = {"default_mode": "auto"}
+html_sidebars = {"index": []}
+
+sphinx_gallery_conf = {
+    "examples_dirs": "scripts",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"/\d\d_",
+    "within_subsection_order": "FileNameSortKey",
+    "show_memory": False,
+    "show_signature": False,
+    "download_all_examples": False,
+    "min_reported_time": 0,
+    "plot_gallery": True,
+    "abort_on_example_error": True,
+    "remove_config_comments": True,
+    "reset_modules": ("docstrings.styled",),
+    "image_scrapers": ("matplotlib",),
+    "matplotlib_animations": False,
+    "nested_sections": False,
+    "write_computation_times": False,
+    "backreferences_dir": None,
+}
+
+
+def setup(app):
+    """Docstrings speak Markdown in places, and what reStructuredText would read into them is put right here."""
+    app.connect("autodoc-process-docstring", described, priority=100)  # before napoleon reads them
+    app.connect("autodoc-process-docstring", plain)

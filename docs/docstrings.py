@@ -1,0 +1,57 @@
+"""Docstrings as Sphinx reads them, and the look of the gallery's figures.
+
+What reStructuredText would take for markup is meant as it stands; fields are told by the comments behind them.
+"""
+
+import inspect
+import re
+from typing import Any
+
+CODE = re.compile(r"(``?[^`]+``?)")
+
+
+def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: list[str]) -> None:
+    """Escape bars, stars and trailing underscores outside code, in place; add what a class says behind its fields."""
+    if what == "class":
+        lines += _fields(thing)
+    lines[:] = ["".join(_escaped(part) for part in CODE.split(line)) for line in lines]
+
+
+def described(_app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
+    """Put what a parameter is on a line of its own: behind the colon numpy's form has types, and ours has words."""
+    lines[:] = [part for line in lines for part in _entry(line)]
+
+
+def _entry(line: str) -> list[str]:
+    found = re.fullmatch(r"([a-z]\w*(?:, \w+)*) : (.+)", line)
+    return [found[1], f"    {found[2]}"] if found else [line]
+
+
+def _escaped(text: str) -> str:
+    return text if CODE.fullmatch(text) else re.sub(r"([|*]|(?<=\w)_(?!\w))", r"\\\1", text)
+
+
+def _fields(owner: type) -> list[str]:
+    """Fields that a comment explains in the source, as a list."""
+    told = re.findall(r"^    (\w+): .*?  # (?!noqa|type:)(.+)$", inspect.getsource(owner), re.MULTILINE)
+    return ["", *(f"- ``{name}``: {comment}" for name, comment in told), ""] if told else []
+
+
+def styled(_gallery: dict[str, Any], _script: str) -> None:
+    """Matplotlib's settings for every script of the gallery."""
+    import matplotlib as mpl
+
+    mpl.rcdefaults()
+    mpl.use("agg")
+    settings = {
+        "figure.dpi": 100,
+        "savefig.dpi": 160,
+        "savefig.bbox": "tight",
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.titlesize": "medium",
+        "legend.frameon": False,
+        "lines.markersize": 5,
+        "image.interpolation": "nearest",
+    }
+    mpl.rcParams.update(settings)

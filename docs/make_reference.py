@@ -1,0 +1,178 @@
+"""The generated pages of the reference: what Python offers, commands, keys of a case, keys of JSON.
+
+Each is made of what the program itself reads: the stub of its names, typer's commands, pydantic's sections, the
+catalogue of quantities. JSON's shape is that of the golden numbers, which the tests hold against every command.
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, get_args
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+from asperity.quantities import catalogue  # noqa: E402
+from support.vocabulary import case_sections, commands, golden  # noqa: E402  the documentation's tests read the same
+
+GROUPS = {  # of names, by the module that hands them out
+    "Contacts and bodies": ("conditions", "grid", "surface"),
+    "Oils": ("lubricant",),
+    "Solving a contact": ("ehl", "errors"),
+    "Case files, runs, studies": ("case", "results", "study", "history", "ageing", "report"),
+    "Vibration": ("coupling", "vibration", "signals"),
+    "Recordings and wear": ("recording", "tracking", "wear"),
+}
+
+JSON = """With `--json` a command prints one object, numbers in SI, `null` for what there is not. \
+A key with dots lies inside another, one with [] in each entry of a list."""
+
+
+def pages() -> dict[str, str]:
+    """Path in the site's source: text."""
+    return {
+        "reference/api.rst": api_page(),
+        "reference/commands.md": commands_page(),
+        "reference/case-keys.md": case_page(),
+        "reference/json-keys.md": json_page(),
+    }
+
+
+def public_names() -> dict[str, list[str]]:
+    """The names of `asperity` by the module that hands them out."""
+    stub = ast.parse((ROOT / "src" / "asperity" / "__init__.pyi").read_text("utf-8"))
+    names: dict[str, list[str]] = {}
+    for node in stub.body:
+        if isinstance(node, ast.ImportFrom):
+            names.setdefault(str(node.module), []).extend(alias.name for alias in node.names)
+    return names
+
+
+def api_page() -> str:
+    """An entry for every public name; a module that stands in no group has its own."""
+    names = public_names()
+    grouped = {module for modules in GROUPS.values() for module in modules}
+    groups = GROUPS | {module.capitalize(): (module,) for module in names if module not in grouped}
+    parts = ["Python", "======", "", "``import asperity as asp``. SI throughout. Each is loaded when it is first used."]
+    for title, modules in groups.items():
+        listed = [f"   {name}" for module in modules for name in names[module]]
+        options = ["   :toctree: names", "   :nosignatures:"]
+        parts += ["", title, "-" * len(title), "", ".. currentmodule:: asperity", "", ".. autosummary::", *options, ""]
+        parts += listed
+    return "\n".join([*parts, ""])
+
+
+def commands_page() -> str:
+    """Every command as typer has it."""
+    parts = ["# Commands", "", "What `--help` says. What the output means is in [command-line](../command-line.md)."]
+    for name, command in commands().items():
+        options = [
+            entry for entry in command.params if entry.opts[0].startswith("-") or entry.param_type_name == "argument"
+        ]
+        usage = " ".join(_usage(entry) for entry in options if entry.param_type_name == "argument")
+        said = (command.help or "").strip().replace("\n", " ")
+        parts += ["", f"## asperity {name}".rstrip(), "", said, "", "```text"]
+        parts += [" ".join(f"asperity {name} {usage} [OPTIONS]".split()), "```", ""]
+        parts += _table(("", "value", "default", "says"), [_option(entry) for entry in options])
+    return "\n".join([*parts, ""])
+
+
+def _usage(entry: Any) -> str:
+    name = entry.metavar or entry.name.upper()
+    return name if entry.required else f"[{name}]"
+
+
+def _option(entry: Any) -> tuple[str, ...]:
+    argument = entry.param_type_name == "argument"
+    names = [_usage(entry)] if argument else [*entry.opts, *entry.secondary_opts]
+    kind = getattr(entry.type_descriptor.annotation, "__name__", "").replace("str", "text").upper()
+    value = "" if argument or entry.is_flag else entry.metavar or kind
+    default = "" if entry.default in (None, False, ()) or callable(entry.default) else f"`{entry.default}`"
+    return ", ".join(f"`{name}`" for name in names), f"`{value}`" if value else "", default, _cell(entry.help or "")
+
+
+def case_page() -> str:
+    """Every key of every table, as pydantic's models read it; what each means is told in docs/case-file.md."""
+    parts = [
+        "# Keys of a case file",
+        "",
+        "What each means, and why its default is what it is, says [the case file](../case-file.md).",
+    ]
+    for name, section in sorted(case_sections().items(), key=lambda item: (item[0] != "Top level", item[0])):
+        rows = [_key(*item) for item in section.model_fields.items()]
+        parts += ["", f"## {name.replace('file = ', 'file = ...')}", "", *_table(("key", "takes", "default"), rows)]
+    return "\n".join([*parts, ""])
+
+
+def _key(name: str, field: Any) -> tuple[str, ...]:
+    inside = list(_parts(field.annotation, *field.metadata))
+    units = [part.args[0] for part in inside if isinstance(part, partial) and part.func.__name__ == "parse_amount"]
+    choices = [f"`{part}`" for part in inside if isinstance(part, str)]
+    plain = [word for kind, word in PLAIN.items() if kind in inside]
+    default = "required" if field.is_required() else _shown(field.get_default(call_default_factory=True))
+    return f"`{name}`", ", ".join([f"amount in {units[0]}"] if units else choices or plain or ["table"]), default
+
+
+PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text"}
+
+
+def _parts(*things: Any) -> Iterator[Any]:
+    """What an annotation is made of: types, texts of its choices, and what reads it."""
+    for thing in things:
+        yield from _parts(*get_args(thing))
+        yield from _parts(*getattr(thing, "__metadata__", ()))
+        yield getattr(thing, "func", None) if hasattr(thing, "json_schema_input_type") else thing
+
+
+def _shown(default: Any) -> str:
+    if default is None:
+        return "none"
+    if isinstance(default, tuple):
+        return ", ".join(map(_shown, default))
+    if isinstance(default, bool):
+        return f"`{str(default).lower()}`"
+    text = getattr(default, "text", default)
+    return "a table of defaults" if hasattr(type(text), "model_fields") else f"`{text}`"
+
+
+def json_page() -> str:
+    """Keys of `--json` by command, as the golden numbers have them."""
+    parts = ["# Keys of JSON", "", JSON]
+    for command in commands():
+        if trees := golden(command):
+            kinds = {path: kind for tree in trees for path, kind in _leaves(tree)}
+            rows = [(f"`{path}`", kind, *_meaning(path)) for path, kind in kinds.items()]
+            parts += ["", f"## {command}", "", *_table(("key", "holds", "unit", "is"), rows)]
+    return "\n".join([*parts, ""])
+
+
+def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    """Paths to what is no object, each with what it holds."""
+    if isinstance(tree, dict):
+        for key, inner in tree.items():
+            yield from _leaves(inner, f"{path}.{key}".lstrip("."))
+    elif isinstance(tree, list) and tree and isinstance(tree[0], dict):
+        for entry in tree:
+            yield from _leaves(entry, f"{path}[]")
+    else:
+        yield path, {bool: "true or false", str: "text", list: "list", type(None): ""}.get(type(tree), "number")
+
+
+def _meaning(path: str) -> tuple[str, str]:
+    """Unit and name of the catalogue; of a value's deviation or beginning, those of the value."""
+    key = re.split(r"[.\]]+", path.removesuffix("[]"))[-1]
+    for suffix, words in {"": "", "_start": ", at the beginning", "_std": ", standard deviation"}.items():
+        if key.endswith(suffix) and (entry := catalogue().get(key.removesuffix(suffix))):
+            said = f"{entry.name}: {entry.meaning}" if entry.meaning else entry.name
+            return entry.unit if entry.unit != "1" else "-", _cell(said + words)
+    return "", ""
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;").replace("*", r"\*").replace("[", r"\[")
+
+
+def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    return [f"| {' | '.join(cells)} |" for cells in (heads, ("---",) * len(heads), *rows)]

@@ -1,0 +1,34 @@
+"""
+What each roller of a bearing bears
+===================================
+
+A cylindrical roller bearing under a radial load: only half of its rollers bear, fewer the larger the clearance. Each is
+a contact of its own; the most loaded one is what ratings and films are about.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from asperity import machine
+
+figure, axis = plt.subplots(figsize=(7, 4))
+for clearance in (0.0, 20e-6, 50e-6):
+    bearing = machine.CylindricalRollerBearing(
+        rollers=13,
+        roller_diameter=9e-3,
+        roller_length=8.8e-3,
+        pitch_diameter=46.5e-3,
+        radial_load=4000.0,
+        speed=2 * np.pi * 1500 / 60,
+        clearance=clearance,
+    )
+    angle = np.degrees((np.array(bearing.angles) + np.pi) % (2 * np.pi) - np.pi)
+    order = np.argsort(angle)
+    loads = np.array(bearing.loads)
+    axis.plot(angle[order], loads[order], "o-", label=f"clearance {clearance * 1e6:.0f} µm: {loads.max():.0f} N")
+
+# %%
+# Stribeck's estimate for a bearing without clearance: the most loaded roller bears 4 F/Z.
+axis.axhline(4 * 4000 / 13, ls=":", color="0.4", label="4 F / Z")
+axis.set(xlabel="place from the load's direction [deg]", ylabel="load on the roller [N]")
+axis.legend()
