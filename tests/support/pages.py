@@ -93,4 +93,10 @@ def read(path: Path) -> Page:
 
 def pages() -> list[Page]:
     """What a user or a contributor reads; the changelog is history and names what is gone."""
-    return [read(path) for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")))]
+    return [
+        read(path)
+        for path in (
+            *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY")),
+            *sorted(ROOT.glob("docs/**/*.md")),
+        )
+    ]

@@ -41,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="plain")
     try:
-        code = app(args=arguments, prog_name="asperity", standalone_mode=False)
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        code = app(args=given, prog_name="asperity", standalone_mode=False, obj=given)
         sys.stdout.flush()
         if code == INTERRUPTED:
             code = _complain("interrupted; nothing half written was left behind", 1)
@@ -91,9 +92,14 @@ def _name(sign: str) -> str:
     return unicodedata.normalize("NFKD", sign).encode("ascii", "ignore").decode() or "?"
 
 
-def _show_version(requested: bool) -> None:
+def _show_version(context: typer.Context, requested: bool) -> None:
+    """Print the version and end before any other option is read, which would load what reads them."""
     if requested:
         print(f"asperity {asperity.__version__}")
+        if "--verbose" in context.obj:
+            from asperity.cli.about import about
+
+            print(*about(), sep="\n")
         raise typer.Exit
 
 
@@ -101,6 +107,9 @@ def _show_version(requested: bool) -> None:
 def _asperity(
     _version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+    ] = False,
+    _verbose: Annotated[
+        bool, typer.Option("--verbose", help="With --version: what a bug report needs to know.")
     ] = False,
 ) -> None:
     pass

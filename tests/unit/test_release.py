@@ -1,0 +1,93 @@
+"""What a release states of itself: one version everywhere, metadata by their schemas, needs as pyproject has them."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+
+import jsonschema
+import pytest
+import yaml
+
+from support.source import PACKAGE, ROOT
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+CONDA = {"matplotlib": "matplotlib-base"}  # what conda-forge calls it
+LARGEST = 2_500_000  # bytes of the package as it is installed, without its needs
+
+
+def stated(name: str) -> dict:
+    text = (ROOT / name).read_text("utf-8")
+    return json.loads(text) if name.endswith(".json") else yaml.safe_load(text)
+
+
+def schema(name: str) -> dict:
+    return json.loads((ROOT / "tests" / "reference" / "schemas" / name).read_text("utf-8"))
+
+
+FILES = {
+    "CITATION.cff": "citation-file-format-1.2.0.json",
+    "codemeta.json": "codemeta.json",
+    ".zenodo.json": "zenodo.json",
+}
+
+
+@pytest.mark.parametrize(("file", "by"), FILES.items())
+def test_metadata_meet_their_schema(file, by):
+    jsonschema.validate(stated(file), schema(by))
+
+
+@pytest.mark.parametrize(("file", "by"), FILES.items())
+def test_metadata_without_a_name_or_with_a_strange_key_are_refused(file, by):
+    whole = stated(file)
+    without = {key: value for key, value in whole.items() if key not in ("title", "name")}
+    for wrong in (without, {**whole, "strange": 1}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(wrong, schema(by))
+
+
+def test_one_version_stands_everywhere():
+    versions = {name: stated(name)["version"] for name in FILES}
+    versions["recipe"] = stated("recipe/recipe.yaml")["context"]["version"]
+    assert versions == dict.fromkeys(versions, PROJECT["version"])
+
+
+def test_one_paper_and_one_licence():
+    doi = stated("CITATION.cff")["references"][0]["doi"]
+    assert stated("codemeta.json")["referencePublication"]["@id"] == f"https://doi.org/{doi}"
+    assert stated(".zenodo.json")["related_identifiers"][0]["identifier"] == doi
+    assert stated("CITATION.cff")["license"] == stated(".zenodo.json")["license"] == PROJECT["license"]
+    assert stated("codemeta.json")["license"].endswith(f"/{PROJECT['license']}")
+
+
+def test_the_recipe_needs_what_the_project_needs():
+    wanted = {CONDA.get(name, name).lower(): bound for name, bound in map(split, PROJECT["dependencies"])}
+    wanted["python"] = PROJECT["requires-python"]
+    assert dict(map(split, stated("recipe/recipe.yaml")["requirements"]["run"])) == wanted
+
+
+def split(requirement: str) -> tuple[str, str]:
+    name, bound = re.fullmatch(r"([\w-]+) ?(>=[\d.]+)", requirement).groups()
+    return name, bound
+
+
+def test_the_package_stays_small():
+    assert (
+        sum(path.stat().st_size for path in PACKAGE.rglob("*") if path.suffix not in (".pyc", ".nbi", ".nbc")) < LARGEST
+    )
+
+
+def test_what_a_bug_report_says_has_versions_and_no_paths():
+    command = [sys.executable, "-m", "asperity", "--version", "--verbose"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    lines = said.splitlines()
+    assert re.fullmatch(r"asperity \d+\.\d+\.\d+", lines[0])
+    assert lines[1].startswith(f"Python {sys.version_info.major}.{sys.version_info.minor}")
+    assert sum(line.startswith("numpy ") for line in lines) == 1
+    assert all(
+        any(line.lower().startswith(split(need)[0].lower()) for line in lines) for need in PROJECT["dependencies"]
+    )
+    assert re.search(r"[/\\~]\w", said) is None
+    plain = subprocess.run(command[:-1], capture_output=True, text=True, check=True).stdout
+    assert plain == f"{lines[0]}\n"
