@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import Options, contact_state, solve_contact
+from asperity.ehl import Options, contact_state, least_film, solve_contact
 from asperity.grid import Grid
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
 from asperity.surface import flat_surface
@@ -58,6 +58,16 @@ def test_films_of_a_ball_on_a_flat(m, l, oil, h_central, h_min):  # noqa: E741
     assert extrapolated_c / unit == pytest.approx(h_central, rel=0.005)
     assert extrapolated_m / unit == pytest.approx(h_min, rel=0.005)
     assert abs(fine_c / unit - h_central) < abs(coarse_c / unit - h_central) / 2.0
+
+
+def test_oil_that_hardly_thickens_parts_a_ball_in_few_steps():
+    """From the hard fit's film, half of the soft one's, the bodies touched, and 270 steps hardly got them apart."""
+    conditions, _ = moes_contact(20, 0.5)
+    a = conditions.hertz.half_widths[0]
+    grid = Grid((129, 129), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
+    solution = solve_contact(conditions, BARUS, flat_surface(grid), options=Options(contact_film=1e-12))
+    assert len(solution.convergence.history) < 40
+    assert solution.gap.min() == pytest.approx(least_film(conditions, BARUS), rel=0.1)
 
 
 @pytest.mark.parametrize("radius", [5e-3, (5e-3, 10e-3), (12e-3, 4e-3)])

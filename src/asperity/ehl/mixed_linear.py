@@ -26,7 +26,7 @@ from asperity.kernels.stencils import Far, Stencil
 LEFT = 0.03  # share to which the linearised equations are left: left more, single cells go round for many steps ...
 LEFT_FAR, FAR_OFF = 0.1, 0.1  # ... but from where more than this is left, and steps follow borders cell by cell ...
 LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
-LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... where no oil may be lost, from so little left on: that has to be met far closer
+LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... from so little left on, of followed oil that may not be lost: met far closer
 OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
 MOST_KRYLOV_STEPS = 60
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
@@ -60,7 +60,8 @@ class MixedLinear:
         self.faces = single_faces(balance.faces, dtype)
         self.content_by_gap, self.content_by_pressure = self.film.content_by_gap, self.film.content_by_pressure
         self.kept = self._kept(problem.past)
-        if problem.past is not None and problem.past.followed:
+        self.follows_oil = problem.past is not None and problem.past.followed
+        if self.follows_oil:
             self.film = self.film.followed
         stencil, far = self._stencil()
         self.blocks = Blocks(
@@ -189,7 +190,7 @@ def newton_step(balance: MixedBalance) -> Pressures:
     wanted = system.joined(wet, closed.ravel()[system.touching], float(system.weight * missing))
     far = balance.residual_rms > FAR_OFF
     left = LEFT_SMOOTH if linear.follows_wedge else LEFT_FAR if far else LEFT
-    if problem.conserve and balance.residual_rms < NEAR:
+    if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
         left = LEFT_NEAR
     solved = gmres(system.product, system.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
     d_oil = known_oil + np.where(linear.lubricated, solved[:count].reshape(cells), zero)

@@ -64,7 +64,11 @@ def first_guess(
 ) -> tuple[Field, float]:
     """Hertz pressure, with the bodies as far apart as the film of a smooth contact holds them."""
     pressure = np.minimum(problem.form.hertz(problem.x, problem.y), problem.p_cap)
-    film = smooth_film(conditions, lubricant) / scales.gap if lubricant else 0.0
+    film = 0.0
+    if lubricant:
+        film = smooth_film(conditions, lubricant) / scales.gap
+        if not np.any(problem.roughness):  # too near, smooth bodies touch where oil has to part them, and stay so
+            film = max(film, least_films(conditions, lubricant)["isoviscous-elastic"].film / scales.gap)
     smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))
 
