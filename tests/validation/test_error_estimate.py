@@ -120,6 +120,19 @@ def test_grids_that_agree_by_chance_are_not_believed():
     assert grid_error([figures(0.60)], smooth=False, cell=0.05, by_first_order=figures(0.40)) is None
 
 
+def test_three_grids_and_both_orders_say_that_the_load_share_keeps_its_way():
+    """By hand: 0.70, 0.60, 0.56, and 0.57 by first order; other figures are not told so much by it."""
+    found = grid_error(
+        [figures(0.70), figures(0.60), figures(0.56)], smooth=False, cell=0.05, by_first_order=figures(0.57)
+    )
+    assert found.sides("clr") == pytest.approx((2.0 * 0.04 + 0.05**2, 0.5 * 0.04 + 0.05**2))
+    assert found.sides("car") == pytest.approx((0.8 * 2.5 * 0.004, 0.8 * 1.5 * 0.004))
+    chance = grid_error(
+        [figures(0.90), figures(0.60), figures(0.60)], smooth=False, cell=0.0, by_first_order=figures(0.60)
+    )
+    assert chance.clr == pytest.approx(1.25 * 0.25 * 0.30)
+
+
 def test_two_pressures_ask_the_first_order_wedge_too(monkeypatch):
     """On a contact of which it makes 0.02 more of the load share than the second-order one."""
     asked = []

@@ -27,6 +27,7 @@ from asperity.ehl.posing import (
 from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import COARSE_TOLERANCE, FAR_OFF, MOST_COARSE_ITERATIONS, Progress, Search
+from asperity.ehl.shares import carried_share
 from asperity.ehl.solution import ContactSolution, Oil
 from asperity.ehl.starts import Lubricated, dry_start, handed_up, on_a_roller
 from asperity.errors import BadInput
@@ -40,6 +41,8 @@ MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
 ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
 MOST_ROUGHLY = 80
 MOST_AT_ONCE = 40
+MOST_BACK = 20  # steps from the second-order wedge's solution to the first-order one
+TOLD = 0.2  # of what these have made of the load share: a step that moves it by less is the last
 MOST_NEAR = 12  # steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
 BALANCED = 1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
 LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
@@ -172,7 +175,7 @@ class MixedSearch(Search):
                 step = self.run(problem, steps, tolerance, soon, stray=STRAY)
             if self.settled(tolerance):
                 if not coarsely:
-                    self.by_first_order = self._figures(_towards_first_order(problem, step))
+                    self.by_first_order = self._figures(_back_to_first_order(problem, step))
                 return step
         return self.finish(problem, unknowns, coarsely=coarsely, last=last)
 
@@ -371,10 +374,20 @@ def _kept_for(problem: Problem, length: float, content: Field) -> Past:
     return replace(past, rate=past.rate + 1.0 / length, source=past.source - content / length)
 
 
-def _towards_first_order(problem: Problem, step: Step) -> Step:
-    """A step from the second-order wedge's solution: about nine tenths of the way to the first-order one."""
-    *_, back = islice(newton(problem, _reached(step), second_order=False), 2)
+def _back_to_first_order(problem: Problem, step: Step) -> Step:
+    """From the second-order wedge's solution to the first-order one, met roughly, or as far as steps move the load."""
+    told = back = step
+    for back in islice(newton(problem, _reached(step), second_order=False), MOST_BACK + 1):
+        if back.number > 0:
+            moved, all_of_it = (abs(_clr(back) - _clr(other)) for other in (told, step))
+            if back.balance.residual_rms < ROUGHLY or moved < TOLD * all_of_it:
+                break
+            told = back
     return back
+
+
+def _clr(step: Step) -> float:
+    return carried_share(step.balance.pressure, step.balance.in_contact)
 
 
 def _reached(step: Step) -> Pressures:

@@ -1,5 +1,6 @@
 """The way from a guess on the coarsest grid to the solution on the finest, and the decision when to stop."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 
@@ -27,6 +28,7 @@ ONWARDS, BACK = 2.5, 1.5  # of the difference to the coarser grid: how far a rou
 AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
 UNRESOLVED = 2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
 BY_TWO_ORDERS = 0.8  # share of all this where both orders of the wedge are known, and tell more
+KEPT_ON, KEPT_BACK, KEPT_UNRESOLVED = 2.0, 0.5, 1.0  # the same of the load share, where three grids are known too
 OF_ENDS = 3.0  # of the same, of what is read off a roller's ends: their error falls with the cell, not its square
 NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
 SCATTER = 0.03  # of a figure of the ends, below which differences say nothing of where they go
@@ -220,7 +222,9 @@ def grid_error(
     cells (`benchmarks.intervals`). A roller's edge pressure and end film get 3 d, and up to ten times that where d
     does not shrink as grids get finer. d is no less than a quarter of the difference between the grids before, lest
     two grids agree by chance, and no less than what the second-order wedge did to the first order's figures on the
-    finest grid; where that is known, 0.8 of all this will do. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
+    finest grid; where that is known, 0.8 of all this will do. The load share, where three grids
+    are known too, gets 2 d the way that it went, 0.5 d the other and one of the squared cell. Source: P. J. Roache,
+    J. Fluids Eng. 116 (1994) 405.
     """
     if len(on_grids) < 2:
         return None
@@ -237,6 +241,9 @@ def grid_error(
         apart, share = apart.at_least(fine.off(by_first_order)), BY_TWO_ORDERS
     half = apart.times(0.5 * share * (ONWARDS + BACK)).plus(replace(nothing, clr=share * UNRESOLVED * cell**2))
     lean = apart.times(0.5 * share * (ONWARDS - BACK)).signed(fine.minus(coarse))
+    if by_first_order is not None and before:
+        half = replace(half, clr=0.5 * (KEPT_ON + KEPT_BACK) * apart.clr + KEPT_UNRESOLVED * cell**2)
+        lean = replace(lean, clr=math.copysign(0.5 * (KEPT_ON - KEPT_BACK) * apart.clr, fine.clr - coarse.clr))
     return GridError(**asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0)))
 
 
