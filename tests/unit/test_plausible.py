@@ -7,9 +7,10 @@ import pytest
 
 from asperity.conditions import ElasticPair
 from asperity.ehl import Options, inlet_notes, plausibility_notes, solution_notes, solve_contact
+from asperity.ehl.plausible import ridge_radii
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.surface import Surface, gaussian_surface
+from asperity.surface import Surface, flat_surface, gaussian_surface, ground_surface
 from support.paper import barus, contact, grid
 
 HARD = {"load": 20000.0, "hardness": 7e9}
@@ -89,3 +90,32 @@ def test_a_film_far_from_its_fits_is_told_with_the_reason():
     assert any("nearest fit's" in note and "the inlet starves it" in note for note in solution_notes(starved))
     flooded = replace(smooth, grid=grid((256, 8), (-12.0, 2.0)), heights=np.zeros((256, 8)))
     assert solution_notes(solve_contact(contact(), oil, flooded)) == ()
+
+
+def test_ridges_without_a_radius_are_told():
+    """Grooves that cut one another leave edges; a Gaussian surface's crests have a radius on any grid."""
+    conditions, on = contact(speed=0.1), grid((96, 64))
+    ground = ground_surface(
+        on, sq=0.5e-6, groove_width=40e-6, groove_length=80e-6, direction=np.pi / 2, rng=np.random.default_rng(1)
+    )
+    gaussian = gaussian_surface(on, sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
+    of_ground, of_gaussian = (solve_contact(conditions, barus(), surface) for surface in (ground, gaussian))
+    (said,) = (note for note in solution_notes(of_ground) if "are edges" in note)
+    assert "on cells twice as wide" in said
+    assert not any("are edges" in note for note in solution_notes(of_gaussian))
+    dry = solve_contact(conditions, None, ground)
+    assert not any("are edges" in note for note in solution_notes(dry))
+
+
+@pytest.mark.parametrize(("shape", "ratio"), [(lambda t: t**2, 1.0), (lambda t: np.abs(t) * 1e-5, 2.0)])
+def test_the_radius_of_ridges_is_that_of_a_parabola_and_an_edge_has_none(shape, ratio):
+    """Ten crests of radius 1/2 m along x, in units of the lengths; of edges twice as much on cells twice as wide."""
+    on = grid((240, 16))
+    past_crest = (np.arange(240) % 24 - 12) * on.spacing[0]
+    surface = Surface(np.repeat(-shape(past_crest)[:, None], 16, axis=1), on)
+    pressed = replace(solve_contact(contact(), None, flat_surface(on)), surface=surface)
+    touching = replace(pressed, in_contact=np.ones(on.cells, dtype=bool))
+    near, far = ridge_radii(touching)
+    assert far / near == pytest.approx(ratio)
+    assert near == pytest.approx(0.5 if ratio == 1.0 else on.spacing[0] / 2e-5)
+    assert ridge_radii(replace(touching, in_contact=np.zeros(on.cells, dtype=bool))) is None

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from asperity.conditions import ContactConditions
 from asperity.ehl.ends import BEARING, along_roller
 from asperity.ehl.gridding import (
@@ -27,6 +29,7 @@ STIFFEST = 1.3e12  # diamond has 1.1 TPa
 LARGEST_BARUS = 15.0  # alpha p_h
 HALF_SPACE = 20.0  # E' over a pressure below which bodies are no elastic half-spaces of small strain
 STARVED = 0.03  # loss of film that is said
+EDGED, FEWEST_RIDGES = 1.6, 20  # radius of ridges over that on the cells as they are, on cells twice as wide
 FILM_BY_PRESSURE = 0.75  # relative loss of film over the share of the inlet's pressure that is missing
 
 
@@ -148,10 +151,33 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
         yield f"Contact runs into the {edges} of the grid, and what lies beyond it is missing: widen the grid."
     if shortfalls := grid_shortfalls(conditions, lubricant, solution.surface):
         yield f"The grid of {grid.cells[0]} x {grid.cells[1]} cells has {'; '.join(shortfalls)}."
+    if lubricant is not None and (radii := ridge_radii(solution)) and radii[1] > EDGED * radii[0]:
+        here, wider = (f"{1e6 * radius:.2g} um" for radius in radii)
+        yield (
+            f"The ridges that touch are edges: along x their radius is {here} on these cells and {wider} on cells "
+            "twice as wide. Each finer grid shows the oil other inlets, so that CLR may have no limit that a grid "
+            "could show; its interval holds the next finer grid and no more."
+        )
     if (along := along_roller(solution)) is not None:
         yield from along.undetermined
     if (far := far_from_fits(solution)) is not None:
         yield far
+
+
+def ridge_radii(solution: ContactSolution) -> tuple[float, float] | None:
+    """Median radius along x of the crests that touch [m], by differences over one cell and over two.
+
+    Those of a smooth crest agree; of an edge, whose radius is what the cells make of it, the second is twice the
+    first. None where fewer than twenty touch.
+    """
+    heights, dx = solution.surface.heights, solution.grid.spacing[0]
+    crest = heights[2:-2]
+    near, far = (2.0 * crest - heights[2 - n : -2 - n] - heights[2 + n : heights.shape[0] - 2 + n] for n in (1, 2))
+    touching = solution.in_contact[2:-2] & (near > 0.0) & (far > 0.0)
+    touching &= (crest >= heights[1:-3]) & (crest >= heights[3:-1])
+    if np.count_nonzero(touching) < FEWEST_RIDGES:
+        return None
+    return float(dx**2 / np.median(near[touching])), float(4.0 * dx**2 / np.median(far[touching]))
 
 
 def _reached_edges(solution: ContactSolution) -> str:
