@@ -50,6 +50,7 @@ MISTAKES = {
     "other geometry": ('geometry = "line"', 'geometry = "point"', ("length belongs to a line contact", "leave it out")),
     "missing surface file": ('kind = "gaussian"', 'file = "ring.x3p"', ("surface",)),
     "fine surface on coarse grid": ("cells = [64, 64]", "cells = [16, 16]", ("correlation length", "20 um")),
+    "roughness of nothing": ('sq = "1 um"', 'sq = "1e-300 um"', ("sq must be at least 1e-15 m", "got 1e-306 m")),
     "slow sampling": ("damping_ratio", 'rate = "5 kHz"\ndamping_ratio', ("sampling rate", "5000 Hz")),
 }
 
@@ -69,6 +70,13 @@ def measured(path: str, cells: tuple[int, int], pixel: float, missing: float = 0
     heights = 1e-6 * rng.standard_normal(cells)
     heights[rng.random(cells) < missing] = np.nan
     x3pio.write(path, heights.T, x_scale=pixel, y_scale=pixel)
+
+
+def test_an_oil_that_is_no_liquid_under_the_load_is_refused(refused):
+    write_case('"18.2 1/GPa"', '"1e9 1/GPa"')
+    said = refused("solve", "case.toml", "--out", "run.nc")
+    for name in ("coefficient of 1e+09 1/GPa", "Hertz's pressure of 0.569 GPa", "check its unit"):
+        assert name in said
 
 
 def test_a_surface_with_too_much_missing_is_refused(refused):

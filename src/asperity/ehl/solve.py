@@ -21,7 +21,7 @@ from asperity.ehl.solution import ContactSolution
 from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
-from asperity.lubricant import Lubricant
+from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
 RIGID = 30.0  # half-widths on which a film bears, from where rollers are refused
@@ -54,12 +54,15 @@ def solve_contact(
     Raises
     ------
     BadInput
-        for a grid that does not hold the contact or repeats along the wrong axis, or factors that do not fit it.
+        for a grid that does not hold the contact or repeats along the wrong axis, factors that do not fit it, or an
+        oil whose viscosity is no number at Hertz's pressure.
     NotConverged
         when strict and the tolerance was not met; carries the unfinished solution.
     """
     options = options or Options()
     _check_grid(conditions, lubricant, surface)
+    if lubricant is not None:
+        require_liquid(lubricant.viscosity, conditions.hertz.p_max)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
     solve = SOLVERS[options.model if lubricant else PAPER]  # without oil there is one pressure, and nothing to lose

@@ -42,6 +42,7 @@ from .viscosity import VISCOSITY_LAWS as VISCOSITY_LAWS
 from .viscosity import Barus as Barus
 from .viscosity import Roelands as Roelands
 from .viscosity import ViscosityLaw as ViscosityLaw
+from .viscosity import require_liquid as require_liquid
 from .walther import Walther as Walther
 from .walther import viscosity_100_of as viscosity_100_of
 from .walther import viscosity_index as viscosity_index

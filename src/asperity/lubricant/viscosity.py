@@ -6,6 +6,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.arrays import Field
+from asperity.errors import BadInput
 from asperity.quantities import Parameter, Parametric
 
 LARGEST_EXPONENT = 400.0  # of an exponential law: glass long before, and e^709 is no longer a number
@@ -72,3 +73,25 @@ class Roelands(Parametric):
 
 
 VISCOSITY_LAWS: dict[str, type[ViscosityLaw]] = {"barus": Barus, "roelands": Roelands}
+
+
+def require_liquid(law: ViscosityLaw, pressure: float) -> None:
+    """Say that an oil's pressure-viscosity coefficient thickens it beyond any number, unless it does not.
+
+    Parameters
+    ----------
+    law : its viscosity
+    pressure : a contact's largest [Pa]
+
+    Raises
+    ------
+    BadInput
+        where the coefficient at ambient pressure times the pressure exceeds 400: no solver can tell films by it.
+    """
+    slope = float(law.log_slope(np.zeros(1))[0])
+    if not slope * pressure <= LARGEST_EXPONENT:
+        raise BadInput(
+            f"a pressure-viscosity coefficient of {slope * 1e9:.3g} 1/GPa thickens the oil by "
+            f"exp({slope * pressure:.3g}) at Hertz's pressure of {pressure / 1e9:.3g} GPa, where "
+            f"exp({LARGEST_EXPONENT:g}) is glass; check its unit"
+        )

@@ -13,7 +13,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
 from asperity.surface import johnson
-from asperity.surface.model import Surface, length_text
+from asperity.surface.model import Surface, length_text, require_roughness
 
 _LARGEST_WAVENUMBER = 9.0  # times the correlation length: beyond it a Gaussian spectrum holds exp(-81/4), nothing
 
@@ -230,7 +230,7 @@ def _filtered_noise(
     rng: np.random.Generator,
 ) -> Surface:
     """White noise on as many samples as the spectrum needs, filtered, then evaluated at the grid's cell centres."""
-    require_positive("sq", sq, "m")
+    require_roughness(sq)
     # an odd count has no Nyquist wave, so every wave of the noise has its conjugate
     sides = list(zip(largest_wavenumbers, grid.extent, strict=True))
     highest = [int(np.ceil(k * extent / (2.0 * np.pi))) for k, extent in sides]

@@ -8,6 +8,15 @@ from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 from asperity.grid import Grid
 
+LEAST_SQ = 1e-15  # m, the size of an atom's nucleus
+
+
+def require_roughness(sq: float) -> float:
+    """Return an Sq [m], or say why it is none that a surface can be scaled to."""
+    if require_positive("sq", sq, "m") < LEAST_SQ:
+        raise BadInput(f'sq must be at least {LEAST_SQ:g} m, got {sq:.3g} m; raise it, or take kind = "flat"')
+    return sq
+
 
 @dataclass(frozen=True, slots=True)
 class Surface:
@@ -36,7 +45,7 @@ class Surface:
     def scaled(cls, heights: Field, grid: Grid, sq: float) -> "Surface":
         """Heights of any size, less their mean and scaled to an `sq` [m]."""
         heights = np.ascontiguousarray(heights - heights.mean())
-        return cls(heights * (require_positive("sq", sq, "m") / np.std(heights)), grid)
+        return cls(heights * (require_roughness(sq) / np.std(heights)), grid)
 
     @property
     def sq(self) -> float:

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
+from asperity.errors import BadInput
 from asperity.grid import Grid
 from asperity.surface.condition import Form, Outliers, condition_surface
-from asperity.surface.model import MeasuredSurface, Surface, area_text, length_text
+from asperity.surface.model import MeasuredSurface, Surface, area_text, length_text, require_roughness
 from asperity.surface.read import surface_topography
 
 Fit = Literal["crop", "tile"]
@@ -97,7 +97,7 @@ def prepare_surface(
     if fit not in get_args(Fit):
         raise BadInput(f"fit must be one of {', '.join(get_args(Fit))}, got {fit!r}")
     if sq is not None:
-        require_positive("sq", sq, "m")
+        require_roughness(sq)
     levelled, conditioning = condition_surface(
         measured, form=form, turn=turn, outliers=outliers, s_filter=s_filter, l_filter=l_filter
     )
