@@ -330,9 +330,11 @@ COLOURS = {"0.5um": BLUE, "1um": GREEN, "2um": VERMILION}
 STROKES = {1e-16: "-", 3e-17: "--", 3e-16: ":"}
 
 
+@ON_PAGE.drawing()
 def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
     """Parameters of both bodies and CLR over k times hours, a colour each Sq, a stroke each k."""
-    figure = Figure(figsize=(ON_PAGE.double, 4.6), layout="constrained")
+    figure = Figure(figsize=(ON_PAGE.double, 4.8))
+    figure.subplots_adjust(left=0.075, right=0.985, top=0.97, bottom=0.18, wspace=0.32, hspace=0.32)
     keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio")
     for axes, key in zip(figure.subplots(2, 3).ravel(), keys, strict=True):
         for name, history in histories.items():
@@ -344,20 +346,23 @@ def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
                 label=f"Sq {sq.removesuffix('um')} µm" if float(k) == 1e-16 and key == "sq_m" else None,
             )  # fmt: skip
         axes.set(ylabel=quantity(key).label, xlabel="k times hours [1e-16 h/Pa]")
-    figure.legend(loc="outside lower center", ncols=3)
+    figure.legend(loc="lower center", ncols=3)
     write_figure(figure, IMAGES / "wear-plateau.png")
 
 
+@ON_PAGE.drawing()
 def draw_rise(history: WearHistory) -> None:
     """Sq and CRF over hours, of removal beside fatigue."""
-    figure = Figure(figsize=(ON_PAGE.double, 2.9), layout="constrained")
+    figure = Figure(figsize=(ON_PAGE.double, 2.9))
+    figure.subplots_adjust(left=0.075, right=0.985, top=0.96, bottom=0.17, wspace=0.22)
     left, right = figure.subplots(1, 2)
     table = history.table
     for key, name, colour in (("sq_m", "both", BLUE), ("sq_2_m", "ring", GREEN), ("sq_1_m", "roller", VERMILION)):
         left.plot(table["hours"], 1e6 * table[key], color=colour, label=name)
     left.legend()
     left.set(xlabel=quantity("hours").axis, ylabel=quantity("sq_m").label)
-    right.fill_between(table["hours"], table["crf_low_hz"], table["crf_high_hz"], color=BLUE, alpha=0.15, linewidth=0)
+    ends = (table[key] for key in ("crf_mean_low_hz", "crf_mean_high_hz"))
+    right.fill_between(table["hours"], *ends, color=BLUE, alpha=0.25, linewidth=0)
     right.plot(table["hours"], table["crf_hz"], color=BLUE)
     for end in CRF_ENDS_HZ:
         right.axhline(end, color=VERMILION, linestyle=DASHED, linewidth=0.9)
