@@ -13,6 +13,7 @@ from urllib.parse import urlencode
 
 import panel
 from bokeh.models import UIElement
+from tornado.iostream import StreamClosedError
 from tornado.web import RedirectHandler
 from tornado.websocket import WebSocketClosedError
 
@@ -31,6 +32,7 @@ USER = "asperity"  # under whom everybody comes in; the page for the password sa
 SHORTEST = 8  # characters of a password
 LOOK_MS, FRAME_MS = 5000, 250  # between two looks at a folder, and two steps of a history
 WAIT_MS = 15_000  # for a visitor that has gone
+PING_S = 120  # between two questions whether a visitor is still there, who has as long to answer
 MESSAGE = 24_000_000  # bytes that a browser may send at a time
 
 
@@ -169,7 +171,7 @@ class _NobodyListens(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether a record is told."""
-        return not (record.exc_info and record.exc_info[0] is WebSocketClosedError)
+        return not (record.exc_info and record.exc_info[0] in (WebSocketClosedError, StreamClosedError))
 
 
 def _quieten() -> None:
@@ -259,6 +261,8 @@ def serve_page(
             title="asperity",
             use_index=False,
             extra_patterns=[("/", RedirectHandler, {"url": f"/{opened.kind}", "permanent": False})],
+            keep_alive_milliseconds=0,  # Bokeh's own takes the session from a socket that has still to close
+            websocket_ping_interval=PING_S,
             check_unused_sessions_milliseconds=WAIT_MS // 3,
             unused_session_lifetime_milliseconds=WAIT_MS,
             websocket_max_message_size=MESSAGE,
