@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from asperity import inference, processes
+from asperity import inference, processes, report
 from asperity.cli import options
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, Overrides, Quiet, chosen_case
-from asperity.cli.show import Block, columns, progress, show, table
+from asperity.cli.options import AsJson, Overrides, Page, Quiet, chosen_case, require_output
+from asperity.cli.show import Block, columns, progress, show, table, written
 from asperity.errors import BadInput, require_choice
 from asperity.quantities import quantity
 
@@ -48,6 +48,7 @@ def infer(
     shaft: options.Shaft = None,
     method: options.Method = None,
     workers: options.Workers = None,
+    page: Page = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -59,6 +60,7 @@ def infer(
     require_choice("--sampler", sampler, inference.SAMPLERS)
     chosen = chosen_case(case_file, overrides)
     setting = inference.setting_of(chosen)
+    require_output(page, ".html", option="--report")
     count = workers or processes.cores()
     with progress("recordings", "reading recordings ...", quiet=quiet):
         heard = inference.listen(
@@ -86,7 +88,12 @@ def infer(
     )
     notes = table([], (*found.warnings(), *found.notes, found.emulator.sentence()))
     blocks = (_told(found), _points(found), _models(found), notes)
-    show(found.verdict(), found.scalars, *blocks, as_json=as_json, quiet=quiet)
+    if page is not None:
+        report.write_inference_report(found, page)
+    told = {"report": None if page is None else str(page)}
+    show(
+        found.verdict(), lambda: found.scalars() | told, *blocks, written("report", page), as_json=as_json, quiet=quiet
+    )
 
 
 def _emulated(setting: "Setting", folder: Path | None, workers: int, *, quiet: bool) -> "Emulator":

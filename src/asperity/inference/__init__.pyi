@@ -1,5 +1,6 @@
 from .emulator import Emulator as Emulator
 from .emulator import Features as Features
+from .emulator import GridError as GridError
 from .emulator import Quality as Quality
 from .emulator import build_emulator as build_emulator
 from .emulator import emulators_folder as emulators_folder

@@ -16,11 +16,11 @@ from asperity.arrays import Field
 from asperity.coupling import NoiseExcitation
 from asperity.errors import BadInput
 from asperity.hertz import point_stiffness
-from asperity.inference.emulator import Emulator
+from asperity.inference.emulator import Emulator, GridError
 from asperity.inference.observations import Point
 from asperity.inference.outputs import CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
 from asperity.inference.priors import Unknown, share_of
-from asperity.inference.settings import LOAD, OFFSET, SPEED, TEMPERATURE, Setting
+from asperity.inference.settings import GRID_ERROR, LOAD, OFFSET, SPEED, TEMPERATURE, Setting
 from asperity.quantities import quantity
 
 Law = Literal["hertz-point", "own"]
@@ -95,7 +95,12 @@ class Forward:
         shares = self.shares(z)
         rows, places, ranges = shares.shape
         answers = self.emulator(shares.reshape(-1, ranges), keys)
-        return {key: (mean.reshape(rows, places), std.reshape(rows, places)) for key, (mean, std) in answers.items()}
+        z_grid = self.unknown(z, GRID_ERROR, 0.0)[:, None]
+        found: dict[str, tuple[Field, Field]] = {}
+        for key, (mean, std) in answers.items():
+            error = self.emulator.grid.get(key, GridError())
+            found[key] = mean.reshape(rows, places) + error.at(z_grid), std.reshape(rows, places)
+        return found
 
     def states(self, z: Field, keys: Sequence[str]) -> dict[str, Field]:
         """Outputs in their own units, shape (n, points)."""

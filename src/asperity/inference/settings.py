@@ -11,7 +11,7 @@ from asperity.inference.priors import Unknown
 from asperity.study import ParameterRange, full_key, overrides_at, require_ranges, stated_value
 
 LOAD, SPEED, TEMPERATURE = "contact.load", "contact.entrainment_speed", "lubricant.temperature"
-OFFSET = "temperature_offset_k"
+OFFSET, GRID_ERROR = "temperature_offset_k", "grid_error"
 OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 2.0)}  # of the case's own
 TEMPERATURE_SPAN_K = 25.0  # either side of the case's own
 OFFSET_STD_K = 3.0
@@ -55,7 +55,7 @@ class Setting:
     ----------
     case : the contact, on the emulator's grid, without [infer]
     contact : unknowns that the emulator takes
-    others : unknowns of what it is heard by: mass, damping, bandwidth; temperature's offset
+    others : unknowns of what it is heard by: mass, damping, bandwidth; temperature's offset; the error by the grid
     operating : ranges of load, speed and, of an oil by its data sheet, temperature
     points, surfaces, seed : of the emulator
     """
@@ -107,6 +107,7 @@ def setting_of(case: Case) -> Setting:
         raise BadInput(f"{case.source}: surface has no sq to infer; take a generated one, kind gaussian")
     if any(entry.key == TEMPERATURE for entry in operating):
         unknowns.append(Unknown.stated(OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil against that stated"))
+    unknowns.append(Unknown.stated(GRID_ERROR, "grid.cells", 0.0, 1.0, "", "of the emulator's grid"))
     contact = tuple(u for u in unknowns if u.range.key in UNKNOWNS and UNKNOWNS[u.range.key].emulated)
     others = tuple(u for u in unknowns if u not in contact)
     setting = Setting(base, contact, others, operating, section.points, section.surfaces, section.seed)

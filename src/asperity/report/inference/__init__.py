@@ -1,0 +1,1 @@
+"""The page of what recordings say of a contact."""

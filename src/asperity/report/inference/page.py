@@ -1,0 +1,98 @@
+"""One HTML page of an inference: verdict, marginals, pairs, prediction against data, models, what to run next."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from asperity.inference import CRUCIAL, Inference
+from asperity.quantities import quantity
+from asperity.report.base import Tile, heading, render, write_page
+from asperity.report.inference import exhibits
+
+
+class Line(NamedTuple):
+    """A row of the table: what it is, median, interval with and without the laws' error, bits, what to think of it."""
+
+    name: str
+    median: str
+    interval: str
+    exact: str
+    bits: str
+    remark: str
+
+
+def write_inference_report(found: Inference, path: str | Path) -> Path:
+    """Write one self-contained HTML page about what recordings say, whole or not at all.
+
+    Raises
+    ------
+    BadInput
+        for a path that cannot be written to.
+    """
+    return write_page(path, lambda: render_inference_page(found))
+
+
+def render_inference_page(found: Inference) -> str:
+    """The page as HTML text."""
+    known = found.posterior()
+    return render(
+        "inference/page.html.j2",
+        title="What recordings say of a contact",
+        found=found,
+        tiles=[
+            Tile(heading(quantity(key)), quantity(key).number(known[key].median),
+                 f"({quantity(key).interval(known[key].low, known[key].high)})")
+            for key in CRUCIAL if key in known
+        ],
+        warnings=found.warnings(),
+        marginals=exhibits.marginals(found).picture(),
+        pairs=exhibits.pairs(found).picture(),
+        predicted=exhibits.predicted(found).picture() if found.observations else None,
+        following=exhibits.following(found).picture(),
+        lines=_lines(found),
+        points=_points(found),
+        models=[
+            (model.law, "with its error" if model.discrepancy else "exact",
+             quantity("log_evidence").number(model.log_evidence, model.log_evidence_std),
+             quantity("model_probability").text(model.probability))
+            for model in found.models
+        ],
+        emulator=found.emulator.sentence(),
+    )  # fmt: skip
+
+
+def _lines(found: Inference) -> list[Line]:
+    exact, lines = found.posterior(discrepancy=False), []
+    for key, one in found.posterior().items():
+        entry, other = quantity(key), exact[key]
+        remark = "" if one.learnt else "as assumed"
+        if one.against:
+            remark = f"against the {'lower' if one.against == 'low' else 'upper'} end of its prior"
+        lines.append(
+            Line(
+                heading(entry),
+                entry.number(one.median),
+                entry.interval(one.low, one.high),
+                entry.interval(other.low, other.high),
+                quantity("information_bits").number(one.information_bits),
+                remark,
+            )
+        )
+    return lines
+
+
+def _points(found: Inference) -> list[list[str]]:
+    rows = []
+    for one in found.at_points():
+        clr, film = one.state["clr"], one.state["h_mean_m"]
+        stage, probability = max(one.stages.items(), key=lambda entry: entry[1])
+        rows.append(
+            [
+                quantity("load_n").text(one.point.load_n),
+                quantity("entrainment_speed_m_s").text(one.point.entrainment_m_s),
+                str(len(one.point.names)),
+                quantity("clr").interval(clr.low, clr.high),
+                quantity("h_mean_m").interval(film.low, film.high),
+                f"{stage} ({100 * probability:.0f} %)",
+            ]
+        )
+    return rows

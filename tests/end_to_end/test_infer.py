@@ -1,0 +1,143 @@
+"""`asperity infer` from files to verdict: a small emulator that is solved, kept and gone on from; what is refused."""
+
+import json
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from asperity.case import load_case
+from asperity.errors import BadInput
+from asperity.inference import Observation, build_emulator, infer_observations, listen, setting_of
+from asperity.report import write_inference_report
+from asperity.tracking import read_table
+from support.emulated import formula_emulator, formula_setting
+from support.recordings import SHARED
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "infer.toml"
+SMALL = {
+    "surface.correlation_length": "40 um",
+    "infer": {
+        "points": 16, "surfaces": 2, "cells": [32, 24], "sq": {"from": "0.5 um", "to": "2 um"},
+        "correlation_length": "known", "hardness": "known", "eta0": "known", "alpha": "known",
+        "load": {"from": "400 N", "to": "600 N"}, "entrainment_speed": {"from": "1 m/s", "to": "3 m/s"},
+    },
+}  # fmt: skip
+REAL = ("mfpt", "ims", "mfpt-formats", "endaq", "uff")
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A setting, its emulator, and the folder that holds it."""
+    folder = tmp_path_factory.mktemp("infer") / "emulator"
+    setting = setting_of(load_case(EXAMPLE).with_overrides(SMALL))
+    with ThreadPoolExecutor(1) as executor:
+        return setting, build_emulator(setting, folder=folder, executor=executor), folder
+
+
+def test_an_emulator_foretells_contacts_and_says_how_well(small):
+    _, emulator, _ = small
+    quality = emulator.quality["clr"]
+    assert quality.error < 3.0 * quality.scatter
+    assert set(emulator.grid) == set(emulator.quality)
+    rough, smooth = (emulator.values(np.array([[share, 0.5, 0.5]]), "clr")[0] for share in (0.9, 0.1))
+    assert rough > smooth + 0.2  # more of the load on rougher surfaces
+    slow, fast = (emulator.values(np.array([[0.5, 0.5, share]]), "clr")[0] for share in (0.05, 0.95))
+    assert slow > fast + 0.05  # and less where the film is thicker
+    assert "which is corrected for" in emulator.sentence()
+
+
+def test_an_emulator_comes_back_as_it_was_and_is_no_other_cases(small):
+    setting, emulator, folder = small
+    again = build_emulator(setting, folder=folder)
+    at = np.random.default_rng(0).random((5, 3))
+    for key in ("clr", "contact_stiffness_n_m"):
+        assert np.array_equal(again(at, [key])[key], emulator(at, [key])[key])
+    assert again.quality == emulator.quality
+    other = setting_of(load_case(EXAMPLE).with_overrides({**SMALL, "contact.slip": 0.1}))
+    with pytest.raises(BadInput, match="holds the emulator of another case"):
+        build_emulator(other, folder=folder)
+
+
+def test_an_emulator_interrupted_goes_on(small, tmp_path):
+    setting, emulator, folder = small
+    shutil.copytree(folder, tmp_path / "half")
+    (tmp_path / "half" / "emulator.json").unlink()
+    sorted((tmp_path / "half" / "parts").iterdir())[0].unlink()
+    with ThreadPoolExecutor(1) as executor:
+        again = build_emulator(setting, folder=tmp_path / "half", executor=executor)
+    at = np.full((1, 3), 0.4)
+    assert again.values(at, "clr") == pytest.approx(emulator.values(at, "clr"), abs=1e-6)
+
+
+def test_noise_cannot_be_told_by_command(asp, small):
+    rng = np.random.default_rng(1)
+    for number in range(2):
+        wavfile.write(f"noise-{number}.wav", 20_000, rng.standard_normal(40_000).astype(np.float32))
+    Path("recordings.toml").write_text('unit = "m/s^2"\nscale = 1\nload_n = 500\nentrainment_m_s = 2\n', "utf-8")
+    folder = small[2]
+    Path("infer.toml").write_text(load_case(EXAMPLE).with_overrides(SMALL).text, "utf-8")
+    command = ("infer", "noise-0.wav", "noise-1.wav", "--case", "infer.toml", "--emulator", str(folder))
+    code, out, err = asp(*command, "--json", "--report", "page.html")
+    assert (code, err) == (0, "")
+    said = json.loads(out)
+    assert said["verdict"].startswith("Cannot be told: no recording shows a contact resonance")
+    assert said["identifiable"] is False
+    assert len(said["silent"]) == 2
+    assert "<script" not in Path("page.html").read_text("utf-8")
+    assert asp(*command, "--quiet")[1] == said["verdict"] + "\n"
+
+
+def test_refusals_are_one_sentence(asp):
+    shutil.copy(EXAMPLE, "infer.toml")
+    wavfile.write("a.wav", 20_000, np.random.default_rng(1).standard_normal(20_000).astype(np.float32))
+    Path("kilo.csv").write_text("file,load_kn\na.wav,0.5\n", "utf-8")
+    Path("nan.csv").write_text("file,load_n\na.wav,nan\n", "utf-8")
+    Path("empty").mkdir()
+    for arguments, said in (
+        (("a.wav",), "give --case"),
+        (("--case", "infer.toml"), "asperity infer needs recordings"),
+        (("empty", "--case", "infer.toml"), "holds no recordings"),
+        (("a.wav", "--case", "infer.toml", "--table", "kilo.csv"), "has a column load_kn; asperity infer takes load_n"),
+        (("a.wav", "--case", "infer.toml", "--table", "nan.csv"), "load_n must be a number"),
+        (("a.wav", "--case", "infer.toml", "--sampler", "mcmc"), "--sampler must be one of importance, nested"),
+    ):
+        code, out, err = asp("infer", *arguments)
+        assert (code, out) == (2, "")
+        assert said in err
+        assert err.count("\n") == 1
+
+
+def test_a_table_of_operating_points_needs_no_x(tmp_path):
+    path = tmp_path / "conditions.csv"
+    path.write_text("file,load_n,entrainment_m_s,temperature_degc\na.wav,500,1.5,60\nb.wav,,2,61\n", "utf-8")
+    places = read_table(path, operating=True).places
+    assert (places["a.wav"].load_n, places["a.wav"].entrainment_m_s, places["a.wav"].temperature_degc) == (500, 1.5, 60)
+    assert (places["b.wav"].load_n, places["b.wav"].x) == (None, 2.0)
+
+
+@pytest.mark.parametrize("folder", REAL)
+def test_no_real_recording_is_told_anything_from(folder):
+    """Bearings with faults, a stopped machine, a shaker, a microphone: none shows a contact resonance."""
+    if not (SHARED / "vibration" / folder).exists():
+        pytest.skip("the shared data are not here")
+    setting = formula_setting()
+    options = {"ims": {"rate_hz": 20_000.0, "unit": "g", "channel": "1"}, "endaq": {"channel": "1"}}
+    heard = listen([SHARED / "vibration" / folder], setting, **options.get(folder, {}))
+    found = infer_observations(setting, formula_emulator(setting), heard.observations, silent=heard.silent)
+    assert found.verdict().startswith("Cannot be told")
+    assert not found.identifiable
+
+
+def test_a_page_shows_what_was_heard(tmp_path):
+    setting = formula_setting()
+    heard = [Observation(load_n=load, entrainment_m_s=1.0, crf_hz=3300.0 * (load / 500.0) ** 0.2, crf_std_hz=5.0,
+                         name=f"{load:g}.wav") for load in (300.0, 500.0, 900.0)]  # fmt: skip
+    found = infer_observations(setting, formula_emulator(setting), heard, notes=("A note of its own.",))
+    text = write_inference_report(found, tmp_path / "page.html").read_text("utf-8")
+    for words in ("Verdict", "A note of its own.", "Against what was heard", "to run next", "hertz-point"):
+        assert words in text
+    assert text.count("<img") == 4
