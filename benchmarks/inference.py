@@ -62,6 +62,9 @@ def run(machines: int, kept: Path) -> None:
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
+    emulator = replace(
+        emulator, grid={}
+    )  # truths are solved on its own grid: what a finer one changes is no part of them
     truths = solved(setting, machines, kept / "truth")
     rows = kept / "rows.csv"
     done = {} if not rows.exists() else {(row["machine"], row["law"]): True for row in csv.DictReader(rows.open())}

@@ -352,3 +352,11 @@ def test_a_process_of_no_slope_is_flat():
     mean, std = process(np.array([[0.35], [0.9]]))
     assert mean == pytest.approx([2.0, 2.0], abs=1e-6)
     assert np.all(std >= 0.0)
+
+
+def test_the_height_of_one_line_says_nothing_of_the_contact(setting, emulator):
+    """The gain of what excites and hears it is free: any CRFA at all leaves Sq and damping where they are."""
+    plain = heard(setting, emulator, SIX[2:3])[0]
+    loud = [replace(plain, crfa=height, crfa_std=0.03 * height) for height in (1e-6, 1e6)]
+    quiet, noisy = (infer_observations(setting, emulator, [one]).posterior()["sq_m"] for one in loud)
+    assert [quiet.low, quiet.median, quiet.high] == pytest.approx([noisy.low, noisy.median, noisy.high], rel=0.2)
