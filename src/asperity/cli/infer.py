@@ -53,10 +53,9 @@ def infer(
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
-    if case_file is None:
-        raise BadInput("asperity infer needs the contact; give --case CASE.toml")
-    if not paths:
-        raise BadInput("asperity infer needs recordings; name files, or the folder they lie in")
+    if case_file is None or not paths:
+        lacks = "the contact; give --case CASE.toml" if case_file is None else "recordings; name files, or their folder"
+        raise BadInput(f"asperity infer needs {lacks}")
     require_choice("--sampler", sampler, inference.SAMPLERS)
     chosen = chosen_case(case_file, overrides)
     setting = inference.setting_of(chosen)
@@ -86,8 +85,7 @@ def infer(
         silent=heard.silent,
         notes=heard.notes,
     )
-    notes = table([], (*found.warnings(), *found.notes, found.emulator.sentence()))
-    blocks = (_told(found), _points(found), _models(found), notes)
+    blocks = (_told(found), _points(found), _models(found), _notes(found))
     if page is not None:
         report.write_inference_report(found, page)
     told = {"report": None if page is None else str(page)}
@@ -148,6 +146,11 @@ def _points(found: "Inference") -> Block:
         )
     if rows:
         yield from columns(["F [N]", "u [m/s]", "recordings", "CLR, 90 %", "film, 90 %", "stage"], rows, left=0)
+
+
+def _notes(found: "Inference") -> Block:
+    """What makes intervals doubtful, what was taken for granted, how good the emulator is."""
+    return table([], (*found.warnings(), *found.notes, found.emulator.sentence()))
 
 
 def _models(found: "Inference") -> Block:
