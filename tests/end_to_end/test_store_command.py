@@ -205,3 +205,31 @@ def test_a_file_that_changed_is_another_recording_and_its_past_is_kept(tmp_path)
     assert update.track.recordings[3].reading.quality.rms == pytest.approx(2.0, rel=0.1)
     assert asked(tmp_path / "out/asperity.db", "SELECT count(*) FROM recording") == [(9,)]
     shutil.rmtree(tmp_path / "in")
+
+
+def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
+    """Of a clock that is ahead, empty, cut, foreign, half copied, a duplicate, and one that comes late."""
+    snapshots("in", np.ones(8))
+    ahead = time.time() + 7200.0
+    os.utime("in/s-005.npz", (ahead, ahead))
+    Path("in/empty.npz").touch()
+    Path("in/cut.npz").write_bytes(Path("in/s-001.npz").read_bytes()[:700])
+    Path("in/notes.txt").write_text("Nothing of note.\n")
+    Path("in/late.npz.filepart").write_bytes(b"PK")
+    shutil.copy("in/s-002.npz", "in/s-002-copy.npz")
+    look = ("watch", "in", "--once", "--settle", "0.2", "--json")
+    time.sleep(0.3)
+    said = json.loads(asp(*look)[1])
+    assert said["waiting"] == 1  # the empty one
+    rows = {Path(row["file"]).name: row for row in said["recordings"]}
+    assert len(rows) == 11
+    assert rows["s-005.npz"]["rms"] == pytest.approx(1.0, rel=0.1)
+    assert {name for name, row in rows.items() if row["x"] is None} == {"cut.npz", "notes.txt"}
+    Path("in/late.npz.filepart").unlink()
+    snapshots("in", [1.0], first=3)  # written again, later
+    snapshots("in", [1.0], first=9)
+    time.sleep(0.3)
+    said = json.loads(asp(*look)[1])
+    assert sorted(Path(file).name for file in said["new"]) == ["s-003.npz", "s-009.npz"]
+    assert len(said["recordings"]) == 12
+    assert asked("in/asperity-watch/asperity.db", "SELECT count(*) FROM recording") == [(13,)]

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,7 +60,8 @@ class StoreOverview:
         path = Path(path)
         if path.suffix.lower() not in ENDINGS:
             raise BadInput(f"a store is exported as .csv or .parquet, got {path.name}; change its ending")
-        table = _table(Store(self.path, make=False))
+        with closing(Store(self.path, make=False)) as store:
+            table = _table(store)
         if path.suffix.lower() == ".csv":
             write_csv(path, table)
         else:
@@ -76,21 +78,24 @@ def store_overview(path: str | Path) -> StoreOverview:
     UnreadableFile
         for a file that is none.
     """
-    store = Store(path, make=False)
-    rows = []
-    for number, place in store.places():
-        ((held, last),) = store.read("SELECT count(*), max(heard) FROM recording WHERE sensor = ?", number)
-        judged = store.read(
-            "SELECT state, since, reason, time, verdict FROM judgement WHERE sensor = ? AND state != ? "
-            "ORDER BY id DESC LIMIT 1",
-            *(number, ACKNOWLEDGED),
-        )
-        fallen = ("cannot-tell", None, "nothing judged yet", None, "Nothing judged yet.")
-        state, since, reason, judged_at, verdict = judged[0] if judged else fallen
-        told = {"recordings": held, "last_heard": last, "state": state, "since": since, "reason": reason}
-        rows.append(place._asdict() | told | {"judged": judged_at, "verdict": verdict})
+    with closing(Store(path, make=False)) as store:
+        rows = [_standing(store, number, place) for number, place in store.places()]
     rows.sort(key=lambda row: GRAVEST.index(row["state"]))
     return StoreOverview(path=Path(path), rows=tuple(rows))
+
+
+def _standing(store: Store, number: int, place: Place) -> dict[str, Any]:
+    """A sensor's line."""
+    ((held, last),) = store.read("SELECT count(*), max(heard) FROM recording WHERE sensor = ?", number)
+    judged = store.read(
+        "SELECT state, since, reason, time, verdict FROM judgement WHERE sensor = ? AND state != ? "
+        "ORDER BY id DESC LIMIT 1",
+        *(number, ACKNOWLEDGED),
+    )
+    fallen = ("cannot-tell", None, "nothing judged yet", None, "Nothing judged yet.")
+    state, since, reason, judged_at, verdict = judged[0] if judged else fallen
+    told = {"recordings": held, "last_heard": last, "state": state, "since": since, "reason": reason}
+    return place._asdict() | told | {"judged": judged_at, "verdict": verdict}
 
 
 def _table(store: Store) -> "pandas.DataFrame":
@@ -131,12 +136,13 @@ def keep_track(
     """
     folder = Path(track.recordings[0].file).resolve().parent.name
     place = Place(machine or "machine", point or folder, sensor or options.channel or "sensor")
-    entered = Store(store).sensor(place, settings_of(track.target, options))
-    keys = {}
-    for recording in track.recordings:
-        status = Path(recording.file).stat()
-        key = keys[recording.file] = Version(recording.file, f"{status.st_size} {status.st_mtime_ns}")
-        if key not in entered.recordings:
-            entered.keep(key, recording.reading)
-    entered.judged(track, keys, len(keys), "", None)
-    return entered.store.path
+    with closing(Store(store)) as opened:
+        entered = opened.sensor(place, settings_of(track.target, options))
+        keys = {}
+        for recording in track.recordings:
+            status = Path(recording.file).stat()
+            key = keys[recording.file] = Version(recording.file, f"{status.st_size} {status.st_mtime_ns}")
+            if key not in entered.recordings:
+                entered.keep(key, recording.reading)
+        entered.judged(track, keys, len(keys), "", None)
+    return opened.path

@@ -242,11 +242,13 @@ class Sensor:
         told = (self.number, *key, _now(), reading.started, reading.refused, reading_bytes(reading))
         with self.store.transaction() as run:
             run(
-                "INSERT OR REPLACE INTO recording (sensor, file, version, heard, started, refused, reading) "
-                "VALUES (?, ?, ?, ?, ?, ?, ?)",
+                "INSERT INTO recording (sensor, file, version, heard, started, refused, reading) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?) "
+                "ON CONFLICT (sensor, file, version) DO UPDATE SET reading = excluded.reading",  # by another watch
                 told,
             )
-            (number,) = run("SELECT last_insert_rowid()").fetchone()
+            found = run("SELECT id FROM recording WHERE sensor = ? AND file = ? AND version = ?", told[:3])
+            (number,) = found.fetchone()
         self.recordings[key] = Kept(number, reading.time, None, reading.refused)
 
     def reading(self, key: Version) -> Reading | None:
@@ -276,12 +278,9 @@ class Sensor:
             return None
         said: dict[str, Any] = json.loads(text)
         numbers = said.pop("numbers")
-        rows = {
-            number: json.loads(row)
-            for number, row in self.store.read("SELECT id, row FROM recording WHERE sensor = ? AND row NOT NULL",
-                                               self.number)
-        }  # fmt: skip
-        return {"verdict": said.pop("verdict"), "recordings": [rows[n] for n in numbers if n in rows], **said}
+        among = f"({', '.join('?' * len(numbers))})"
+        rows = dict(self.store.read(f"SELECT id, row FROM recording WHERE id IN {among}", *numbers))
+        return {"verdict": said.pop("verdict"), "recordings": [json.loads(rows[number]) for number in numbers], **said}
 
     def acknowledge(self, file: str) -> None:
         """Somebody has looked at everything up to this recording."""

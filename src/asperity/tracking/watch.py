@@ -7,11 +7,12 @@ first recordings and the latest are judged; the others stand in the store as the
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
-from time import sleep, time
+from time import monotonic, sleep, time
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -139,35 +140,36 @@ def _looks(
     read: Callable[[list[Version]], tuple[Reading, ...]],
 ) -> Iterator[Update]:
     """An update at the start and whenever recordings have arrived."""
-    first = True
-    while True:
-        present = memory.present(folder)
-        unread = [key for key in present if key not in memory.sensor.recordings]
-        arrived = [key for key in unread if _settled(Path(key.file), pace.settle_s)]
-        new = read(arrived)
-        known = [key for key in present if key in memory.sensor.recordings]
-        waiting = len(unread) - len(arrived)
-        if new or first:
-            named = None if table is None or not known else read_table(table)
-            question = _digest(asked, named, known, memory.target)
-            recalled = first and pace.recall and not new and acknowledge is None
-            said = memory.said(question) if recalled else None
-            if said is not None:
-                memory.sensor.tell([caller.name for caller in memory.call], said)
-                failed = deliver(memory.sensor, memory.call, now=True)
-                yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
+    with closing(memory.sensor.store):
+        first = True
+        while True:
+            present = memory.present(folder)
+            unread = [key for key in present if key not in memory.sensor.recordings]
+            arrived = memory.settled(unread, pace)
+            new = read(arrived)
+            known = [key for key in present if key in memory.sensor.recordings]
+            waiting = len(unread) - len(arrived)
+            if new or first:
+                named = None if table is None or not known else read_table(table)
+                question = _digest(asked, named, known, memory.target)
+                recalled = first and pace.recall and not new and acknowledge is None
+                said = memory.said(question) if recalled else None
+                if said is not None:
+                    memory.sensor.tell([caller.name for caller in memory.call], said)
+                    failed = deliver(memory.sensor, memory.call, now=True)
+                    yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
+                else:
+                    order = _ordered(known, named, memory.sensor)
+                    judging = partial(judge, **asked)
+                    track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
+                    failed = deliver(memory.sensor, memory.call, now=first)
+                    yield Update(new=new, track=track, waiting=waiting, failed=failed)
             else:
-                order = _ordered(known, named, memory.sensor)
-                judging = partial(judge, **asked)
-                track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
-                failed = deliver(memory.sensor, memory.call, now=first)
-                yield Update(new=new, track=track, waiting=waiting, failed=failed)
-        else:
-            deliver(memory.sensor, memory.call)
-        if pace.once:
-            return
-        first = False
-        sleep(pace.every_s)
+                deliver(memory.sensor, memory.call)
+            if pace.once:
+                return
+            first = False
+            sleep(pace.every_s)
 
 
 def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
@@ -231,6 +233,7 @@ class _Memory:
         self.sensor, self.target, self.options, self.call = sensor, target, options, call
         self._readings: dict[Version, Reading] = {}
         self._learned: Learned | None = None
+        self._ahead: dict[Version, float] = {}  # files of a clock that is ahead, and when they were first seen
 
     def present(self, folder: Path) -> list[Version]:
         """Recordings that lie in the folder now, by name with numbers in their order."""
@@ -245,6 +248,22 @@ class _Memory:
                 if key in self.sensor.recordings or may_be_recording(Path(key.file)):
                     versions.append((_sorting(entry.name), key))
         return [key for _, key in sorted(versions)]
+
+    def settled(self, keys: list[Version], pace: _Pace) -> list[Version]:
+        """Those that have stayed as they are long enough; of a clock that is ahead, since they were first seen."""
+        settled, ahead = [], []
+        for key in keys:
+            size, changed = map(int, key.version.split())
+            age = time() - 1e-9 * changed
+            if size > 0 and age >= pace.settle_s:
+                settled.append(key)
+            elif size > 0 and age < 0.0:
+                ahead.append(key)
+        seen = {key: self._ahead.get(key, monotonic()) for key in ahead}
+        if pace.once and ahead and not self._ahead:
+            sleep(pace.settle_s)
+        self._ahead = seen
+        return settled + [key for key in ahead if monotonic() - seen[key] >= pace.settle_s and _unchanged(key)]
 
     def read(
         self, workers: int, progress: Callable[[Reading], None] | None, keys: list[Version]
@@ -339,9 +358,9 @@ def _sorting(name: str) -> list[tuple[int, int | str]]:
     return natural(name)
 
 
-def _settled(path: Path, seconds: float) -> bool:
+def _unchanged(key: Version) -> bool:
     try:
-        status = path.stat()
+        status = Path(key.file).stat()
     except OSError:
         return False  # taken away meanwhile
-    return status.st_size > 0 and time() - status.st_mtime >= seconds
+    return key.version == f"{status.st_size} {status.st_mtime_ns}"

@@ -1,4 +1,5 @@
 from .alarm import ALARM_STATES as ALARM_STATES
+from .alarm import ALERTS as ALERTS
 from .alarm import FALSE_ALARMS as FALSE_ALARMS
 from .alarm import Alarm as Alarm
 from .alarm import AlarmState as AlarmState

@@ -10,7 +10,7 @@ from asperity.quantities import NO_VALUE, quantity
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, in_print, render, write_page
 from asperity.report.track import exhibits
 from asperity.tracking import Track, TrackedRecording
-from asperity.wear import IN_WORDS
+from asperity.wear import ALERTS, IN_WORDS
 
 METHODS = {
     "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
@@ -22,6 +22,21 @@ METHODS = {
     "peak": "The paper's: each spectrum smoothed three times by a five-point cubic, the highest point of the band "
     "taken. It is not tested against chance, and structural modes or shaft lines can be that point.",
 }
+NEXT = {  # what to do, by the alarm's state; of an alarm by who raised it, its first word
+    "CRF": "Look at the contact before it goes on under this load: oil sample (particles, water, viscosity), "
+    "temperature, load and speed against what they were; inspect the surfaces at the next stop, and plan that stop.",
+    "the": "Look for what grew: bearing and mesh rates in the envelope, imbalance and looseness at the shaft's rate, "
+    "a sensor that was moved. Repeat the recording today; if it stays, inspect.",
+    "zone": "Take the machine down in a controlled way, or take its load off, and find the cause: balance, alignment, "
+    "looseness, bearings.",
+    "alert": "Record more often (ten times) until it becomes an alarm or goes away; nothing need be stopped for it.",
+    "cannot-tell": "Name what is missing: longer recordings, the case or band of the contact, more recordings for a "
+    "baseline, or the cause of a step; then acknowledge it.",
+    "blind": "Check that the machine runs, then sensor, cable and supply. Until then nobody hears the machine.",
+    "none": "Nothing; record on as planned.",
+}
+NEXT |= {"damping": NEXT["CRF"], "kurtosis": NEXT["the"], "velocity": NEXT["the"]}
+SUREST = 0.99  # beyond which a probability says more of the model than of the machine
 NO_BREAK = ("saturating exponential", "saturating hyperbola", "straight line", "smooth curves", "no change")
 MOST_LINES = 20  # of those taken out, listed by name
 
@@ -44,6 +59,7 @@ def render_track_page(track: Track) -> str:
         title=_title(track),
         track=track,
         tiles=_tiles(track),
+        act=_act(track),
         trend=_pictures([exhibits.trend(track)] if track.resonance_count else []),
         more=_pictures(_details(track)),
         heads=_heads(track),
@@ -79,6 +95,46 @@ def _title(track: Track) -> str:
     return f"Contact resonance of a series{where}"
 
 
+def _act(track: Track) -> list[tuple[str, str]]:
+    """For who must act: what changed, since when, how sure, what to do next."""
+    alarm, last = track.alarm, track.recordings[-1]
+    rows = [("What", capitalised(in_print(alarm.reason)) + ".")]
+    if alarm.since is not None:
+        first = track.recordings[alarm.since]
+        when = f", {_when(first)}" if first.reading.started else ""
+        rows.append(("Since", f"{Path(first.file).name}{when} ({exhibits.x_label(track)}: {first.x:.4g})"))
+    rows.append(("Last heard", f"{Path(last.file).name}{', ' + _when(last) if last.reading.started else ''}"))
+    rows.append(("Severity", capitalised(in_print(last.severity())) + "."))
+    rows.append(("How sure", _how_sure(track)))
+    kind = alarm.raised_by.partition(" ")[0] if alarm.state == "alarm" else alarm.state
+    return [*rows, ("What next", NEXT[kind])]
+
+
+def _when(recording: TrackedRecording) -> str:
+    return recording.reading.started.replace("T", " ")
+
+
+def _how_sure(track: Track) -> str:
+    """What the alarm's rate and the stage's probability say, and what they do not."""
+    alarm, last = track.alarm, track.recordings[-1]
+    if alarm.raised_by == "zone":
+        return "The standard's limits for machines of this class, not what this machine is used to."
+    if alarm.state not in ("alarm", "alert"):
+        return "No statement: see what is missing." if alarm.state != "none" else "Small changes would not be seen yet."
+    said = f"Set to be said without wear once in {1.0 / alarm.false_alarm_rate:.0f} recordings"
+    said = said if alarm.state == "alarm" else f"Not sure: chance does it {ALERTS:.0f} times as often as it alarms"
+    if np.isfinite(last.severe_probability) and alarm.raised_by in ("CRF", "damping"):
+        said += f"; probability of the severe stage {_likely(last.severe_probability)}, if the line is the contact's"
+    return f"{said}."
+
+
+def _likely(probability: float) -> str:
+    """A probability, never certain: the model it is of is not."""
+    if probability > SUREST:
+        return f"above {SUREST:g}"
+    return f"below {1.0 - SUREST:.2g}" if probability < 1.0 - SUREST else f"{probability:.2f}"
+
+
 def _tiles(track: Track) -> list[Tile]:
     total, stages = len(track.recordings), track.stages
     tiles = [Tile("Resonance found", f"{track.resonance_count}", f"of {total}")]
@@ -92,8 +148,7 @@ def _tiles(track: Track) -> list[Tile]:
         value, _, deviation = crf.text(last.resonance.crf_hz, last.resonance.crf_std).partition(" ")
         tiles.append(Tile(f"Last {crf.short}", value, deviation))
         if np.isfinite(last.severe_probability):
-            probability = quantity("severe_probability").text(last.severe_probability)
-            tiles.append(Tile("Severe, last recording", probability, "probability"))
+            tiles.append(Tile("Severe, last recording", _likely(last.severe_probability), "probability"))
         if np.isfinite(last.clr):
             low, high = last.clr_interval
             interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
@@ -149,8 +204,9 @@ def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
         "not determined" if resonance.found and recording.damping_reason else quantity("damping_ratio").number_in(row)
     )
     resonant.append(width)
-    keys = [*(["clr"] if with_clr else []), "severe_probability"]
-    cells = [place, *resonant, *(quantity(key).number(row[key]) for key in keys)]
+    severe = _likely(recording.severe_probability) if np.isfinite(recording.severe_probability) else NO_VALUE
+    shares = [quantity("clr").number(row["clr"])] if with_clr else []
+    cells = [place, *resonant, *shares, severe]
     return _Row(
         Path(recording.file).name, cells, recording.label, in_print("" if resonance.found else resonance.reason)
     )

@@ -1,0 +1,62 @@
+"""What a track's page says to who must act: what changed, since when, how sure, what next; never that it is certain."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity.report.track.page import NEXT, render_track_page
+from asperity.tracking import track_recordings
+from asperity.wear import ALARM_STATES
+
+BAND = (2000.0, 4000.0)
+
+
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory):
+    """Snapshots of a machine whose level rises twenty times, an hour apart."""
+    folder = tmp_path_factory.mktemp("in")
+    levels = [*np.ones(12), *np.exp(np.log(20.0) * np.arange(24) / 23)]
+    for number, level in enumerate(levels):
+        values = level * np.random.default_rng(number).standard_normal(2000)
+        name = f"2024.01.{1 + number // 24:02}.{number % 24:02}.00.00.npz"
+        np.savez(folder / name, acc=values, fs=20e3, unit="m/s^2")
+    return track_recordings([folder], band_hz=BAND)
+
+
+def acted(track):
+    """The block for who must act, by its headings."""
+    html = render_track_page(track)
+    block = html.partition('<dl class="act">')[2].partition("</dl>")[0]
+    return dict(re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", block))
+
+
+def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
+    said = acted(failing)
+    assert list(said) == ["What", "Since", "Last heard", "Severity", "How sure", "What next"]
+    assert re.fullmatch(r"The level \(rms\) rose to [\d.]+ times what it was since [\d.]+ h\.", said["What"])
+    first = failing.recordings[failing.alarm.since]
+    assert first.reading.started.replace("T", " ") in said["Since"]
+    assert said["Last heard"].endswith("2024-01-02 11:00:00")
+    assert "velocity not determined" in said["Severity"].lower()
+    assert said["How sure"] == "Set to be said without wear once in 1000 recordings."
+    assert said["What next"].startswith("Look for what grew")
+
+
+@pytest.mark.parametrize("state", [state for state in ALARM_STATES if state != "alarm"])
+def test_every_state_has_something_to_do(failing, state):
+    said = acted(replace(failing, alarm=replace(failing.alarm, state=state, raised_by="")))
+    assert said["What next"] == NEXT[state].replace("'", "&#39;")
+
+
+@pytest.mark.parametrize(
+    ("probability", "said"), [(1.0, "above 0.99"), (0.997, "above 0.99"), (0.42, "0.42"), (0.0, "below 0.01")]
+)
+def test_a_probability_is_never_certain(failing, probability, said):
+    *others, last = failing.recordings
+    found = replace(last, resonance=replace(last.resonance, found=True, crf_hz=3e3), severe_probability=probability)
+    html = render_track_page(replace(failing, recordings=(*others, found)))
+    tile = re.search(r"Severe, last recording.*?</div>", html, re.S)[0]
+    assert said in re.sub("<[^>]*>", "", tile)
+    assert not re.search(r"\b1\.00\b|\b100 %", html)
