@@ -71,16 +71,19 @@ def test_a_watch_keeps_its_alarm_until_it_is_acknowledged(asp):
         Path(f"in/s-{number:03}.npz").unlink()
     code, out, _ = asp("watch", "in", *rates)
     assert code == 3
-    assert "raised before and not acknowledged" in json.loads(out)["verdict"]
+    assert json.loads(out)["alarm"]["since"] == since
+    snapshots("in", [1.0], first=STEADY + LOUD)
+    code, out, _ = asp("watch", "in", *rates)
+    assert (code, json.loads(out)["alarm"]["since"]) == (3, since)
     code, out, _ = asp("watch", "in", *rates, "--acknowledge", "last")
     assert (code, json.loads(out)["alarm"]["state"]) == (0, "none")
-    snapshots("in", levels[:3], first=STEADY)
+    snapshots("in", levels[:3], first=STEADY + LOUD + 1)
     code, out, _ = asp("watch", "in", *rates)
     assert (code, json.loads(out)["alarm"]["state"]) == (4, "cannot-tell")  # the baseline is learned anew
     log = rows("SELECT state, since, time FROM judgement ORDER BY id")
     assert [state for state, _, _ in log] == ["alarm", "alarm", "acknowledged", "none", "cannot-tell"]
     assert log[0][1] == since
-    assert log[2][1] == "s-011.npz"
+    assert log[2][1] == "s-036.npz"
     assert all(time for _, _, time in log)
 
 

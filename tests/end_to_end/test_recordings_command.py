@@ -181,7 +181,7 @@ def test_watch_hears_each_file_once_and_goes_on(asp, rig):
     assert len(second["recordings"]) == 21
     for name in ("track.csv", "track.nc", "report.html"):
         assert Path("in/asperity-watch", name).is_file()
-    direct = json.loads(asp("track", "in", "--case", "case.toml", "--json")[1])
+    direct = json.loads(asp("track", str(Path("in").resolve()), "--case", "case.toml", "--json")[1])
     assert direct["recordings"] == second["recordings"]  # what was kept is what was heard
     code, _, err = asp(*arguments, "--unit", "g")
     assert code == 2

@@ -96,15 +96,13 @@ def test_another_question_is_judged_again(asp, change):
 
 def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path):
     levels = failing()
-    for name in ("whole", "killed"):
-        (tmp_path / name).mkdir()
-        snapshots(tmp_path / name / "in", levels)
-    command = [sys.executable, "-m", "asperity", "watch", "in", *ONCE, "--workers", "1"]
-    assert subprocess.run(command, cwd=tmp_path / "whole", check=False).returncode == 3
-    store = tmp_path / "killed/in/asperity-watch/asperity.db"
+    snapshots(tmp_path / "in", levels)
+    command = [sys.executable, "-m", "asperity", "watch", "in", *ONCE, "--workers", "1", "--store"]
+    assert subprocess.run([*command, "whole.db"], cwd=tmp_path, check=False).returncode == 3
+    store = tmp_path / "killed.db"
     heard = [0]
     while len(heard) < 5 and heard[-1] < len(levels) - 6:
-        process = subprocess.Popen(command, cwd=tmp_path / "killed")
+        process = subprocess.Popen([*command, "killed.db"], cwd=tmp_path)
         while process.poll() is None and (not store.is_file() or _count(store) < heard[-1] + 6):
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
@@ -112,8 +110,8 @@ def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path):
         heard.append(_count(store))
     assert heard[1] > 0
     assert heard[-1] < len(levels)  # it was killed before the end
-    assert subprocess.run(command, cwd=tmp_path / "killed", check=False).returncode == 3
-    assert without_times(store) == without_times(tmp_path / "whole/in/asperity-watch/asperity.db")
+    assert subprocess.run([*command, "killed.db"], cwd=tmp_path, check=False).returncode == 3
+    assert without_times(store) == without_times(tmp_path / "whole.db")
 
 
 def _count(store):
@@ -233,3 +231,67 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
     assert sorted(Path(file).name for file in said["new"]) == ["s-003.npz", "s-009.npz"]
     assert len(said["recordings"]) == 12
     assert asked("in/asperity-watch/asperity.db", "SELECT count(*) FROM recording") == [(13,)]
+
+
+def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
+    """A watch that runs for months, and a person who looks."""
+    snapshots("in", failing())
+    looks = watch_folder("in", "out", every_s=0.0, settle_s=0.0, machine="Fan 1", point="DE")
+    assert next(looks).track.alarm.state == "alarm"
+    assert asp("store", "out/asperity.db", "--quiet")[0] == 3
+    assert asp("store", "out/asperity.db", "--quiet", "--acknowledge", "Fan 1/DE/sensor")[0] == 3  # nothing new is said
+    snapshots("in", [1.0], first=40)
+    assert next(looks).track.alarm.state == "cannot-tell"
+    looks.close()
+    assert asp("store", "out/asperity.db", "--quiet")[0] == 4
+    assert (
+        "the store has no sensor 'Fan 2'; it has Fan 1/DE/sensor"
+        in asp("store", "out/asperity.db", "--acknowledge", "Fan 2")[2]
+    )
+
+
+def test_a_track_acknowledges_in_the_store_and_ends_as_the_store_does(asp):
+    snapshots("in", failing())
+    assert asp("track", "in", "--store", "plant.db", "--quiet")[0] == 3
+    assert asp("track", "in/s-001.npz", "in/s-002.npz", "--store", "plant.db", "--quiet")[0] == 3  # it stands
+    assert asp("track", "in", "--store", "plant.db", "--quiet", "--acknowledge", "last")[0] == 0
+    assert asp("store", "plant.db", "--quiet")[0] == 0
+
+
+def test_two_folders_of_one_name_are_two_machines(asp):
+    for machine in ("pump1", "pump2"):
+        Path(machine).mkdir()
+        snapshots(f"{machine}/DE", failing() if machine == "pump1" else np.ones(10))
+        asp("watch", f"{machine}/DE", *ONCE, "--store", "plant.db")
+    said = json.loads(asp("store", "plant.db", "--json")[1])
+    assert [(row["machine"], row["state"]) for row in said["sensors"]] == [("pump1", "alarm"), ("pump2", "cannot-tell")]
+    Path("other/pump1").mkdir(parents=True)
+    snapshots("other/pump1/DE", np.ones(3))
+    code, _, err = asp("watch", "other/pump1/DE", *ONCE, "--store", "plant.db")
+    assert code == 2
+    assert "was begun with folder" in err
+    absolute = str(Path("pump1/DE").resolve())
+    assert asp("watch", absolute, *ONCE, "--store", "plant.db")[0] == 3  # the same folder, named otherwise
+    assert json.loads(asp("store", "plant.db", "--json")[1])["sensors"][0]["recordings"] == 36
+
+
+def test_what_is_stated_later_beside_a_recording_counts(asp):
+    Path("in").mkdir()
+    for number in range(3):
+        np.save(f"in/s-{number}.npy", np.random.default_rng(number).standard_normal(2000))
+    look = ("watch", "in", "--once", "--settle", "0", "--json")
+    assert {row["rate_hz"] for row in json.loads(asp(*look)[1])["recordings"]} == {None}
+    Path("in/recordings.json").write_text('{"rate_hz": 20000}')
+    said = json.loads(asp(*look)[1])
+    assert len(said["new"]) == len(said["recordings"]) == 3
+    assert {row["rate_hz"] for row in said["recordings"]} == {20000.0}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
+    snapshots("in", np.ones(3))
+    shutil.copy("in/s-000.npz", b"in/r\xff\xe9.npz")
+    code, out, err = asp("watch", "in", *ONCE)
+    assert code == 4
+    assert out
+    assert "is left out: its name is not UTF-8; rename it" in err

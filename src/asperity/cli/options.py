@@ -134,13 +134,23 @@ SensorName = Annotated[
 ]
 OnAlarm = Annotated[
     str | None,
-    typer.Option(metavar="CMD", help="Run this at every change of state, without a shell; it gets JSON on its stdin."),
+    typer.Option(
+        metavar="CMD",
+        envvar="ASPERITY_ON_ALARM",
+        help="Run this at every change of state, without a shell; it gets JSON on its stdin.",
+    ),
 ]
 WebHook = Annotated[
-    str | None, typer.Option("--webhook", metavar="URL", help="Post JSON there at every change of state.")
+    str | None,
+    typer.Option(
+        "--webhook", metavar="URL", envvar="ASPERITY_WEBHOOK", help="Post JSON there at every change of state."
+    ),
 ]
 Mqtt = Annotated[
-    str | None, typer.Option(metavar="URL", help="Publish JSON at mqtt://HOST/TOPIC at every change of state.")
+    str | None,
+    typer.Option(
+        envvar="ASPERITY_MQTT", metavar="URL", help="Publish JSON at mqtt://HOST/TOPIC at every change of state."
+    ),
 ]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 

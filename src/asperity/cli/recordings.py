@@ -148,10 +148,11 @@ def track(
             workers=workers or processes.cores(),
             progress=step,
         )
-    kept = _write(tracked, out or (), page)
     if store is not None:
         stated = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
-        kept.append(tracking.keep_track(tracked, store, stated, machine=machine, point=point, sensor=sensor))
+        names = {"machine": machine, "point": point, "sensor": sensor}
+        tracked = tracking.keep_track(tracked, store, stated, acknowledge=acknowledge, **names)
+    kept = [*_write(tracked, out or (), page), *([] if store is None else [store])]
     hint = ["  Add --report track.html for the page, --out track.csv for the table."]
     show(
         tracked.verdict(),

@@ -20,12 +20,17 @@ def store(
         list[Path] | None,
         typer.Option(metavar="FILE", help="Write every recording as a row (.parquet, .csv); may be repeated."),
     ] = None,
+    acknowledge: Annotated[
+        str | None, typer.Option(metavar="MACHINE/POINT/SENSOR", help="Somebody has looked at it, up to now.")
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Say where every machine, point and sensor of a store stands; the gravest decides the exit code."""
     for path in out or ():
         require_output(path, ".csv", ".parquet")
+    if acknowledge is not None:
+        tracking.acknowledge_in(file, acknowledge)
     overview = tracking.store_overview(file)
     kept = [overview.export(path) for path in out or ()]
     rows = [

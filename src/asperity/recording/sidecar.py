@@ -21,6 +21,14 @@ def is_sidecar(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
+def names_beside(name: str) -> list[str]:
+    """Names that a recording's sidecar may have, the one that counts first."""
+    bare = Path(name)
+    own = [f"{name}{suffix}" for suffix in SUFFIXES]
+    own += [f"{bare.stem}{suffix}" for suffix in SUFFIXES if bare.suffix]
+    return [*own, *(f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES)]
+
+
 def stated_beside(path: Path) -> tuple[dict[str, Any], str]:
     """What is stated beside `path`, and the name of the file that states it; nothing, if there is none.
 
@@ -29,11 +37,7 @@ def stated_beside(path: Path) -> tuple[dict[str, Any], str]:
     BadInput
         for a sidecar that cannot be read, an unknown key, or a value that is none of its kind.
     """
-    names = [f"{path.name}{suffix}" for suffix in SUFFIXES]
-    if path.suffix:
-        names += [f"{path.stem}{suffix}" for suffix in SUFFIXES]
-    names += [f"{FOLDER_WIDE}{suffix}" for suffix in SUFFIXES]
-    for name in names:
+    for name in names_beside(path.name):
         there = path.with_name(name)
         if there.is_file():
             return _checked(there), name

@@ -11,6 +11,7 @@ from .files import recordings_in as recordings_in
 from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording
 from .overview import StoreOverview as StoreOverview
+from .overview import acknowledge_in as acknowledge_in
 from .overview import keep_track as keep_track
 from .overview import store_overview as store_overview
 from .reading import Reading as Reading

@@ -5,6 +5,7 @@ The test is left to `asperity.wear`; which indicators it is given, and from whic
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
-from asperity.wear import Alarm, AlarmState, Said, Sight, Stages, StageSource, Watched, sequential_alarm
+from asperity.wear import Alarm, Said, Sight, Stages, StageSource, Watched, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
 DAMPING_LEAST = 0.2  # of its logarithm
@@ -21,8 +22,6 @@ LEVEL_LEAST = float(np.log(2.0))  # 6 dB, which ISO 13373-1 takes for a change w
 BASELINE = 8  # recordings by which a CRF is counted from 1
 UNSEEN = 3  # recordings without a resonance, from which on nobody sees the contact
 LAST = "last"
-ZONES_IN_A_ROW = 2
-ZONE_STATES: dict[str, AlarmState] = {"D": "alarm", "C": "alert"}
 
 
 def raise_alarm(
@@ -65,7 +64,7 @@ def raise_alarm(
     if stages is not None and stages.kind == "severe" and acknowledge is None:
         chance = f"not yet beyond what chance does once in {1.0 / false_alarm_rate:.0f} recordings"
         alarm = alarm.alerted(f"a severe stage is found, {chance}", source)
-    return _by_zone(tracked[_acknowledged(tracked, acknowledge) :], alarm)
+    return _by_zone(tracked, _acknowledged(tracked, acknowledge), alarm)
 
 
 def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> Said:
@@ -137,14 +136,16 @@ def _levels(tracked: Sequence[TrackedRecording]) -> list[Watched]:
     ]
 
 
-def _by_zone(tracked: Sequence[TrackedRecording], alarm: Alarm) -> Alarm:
-    """What ISO 20816-3 says of the last recordings, where that is graver: zone D twice running alarms, C alerts."""
-    zones = [one.zone for one in tracked if one.zone is not None][-ZONES_IN_A_ROW:]
-    if len(zones) < ZONES_IN_A_ROW or tracked[-1].zone is None or alarm.state in ("alarm", "blind"):
-        return alarm
-    for zone, state in ZONE_STATES.items():
-        if min(zones) >= zone:
-            return alarm.raised_to(state, tracked[-1].severity(), "zone")
+def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> Alarm:
+    """What ISO 20816-3 says: zone D twice running alarms, and stands as any alarm does; C at the end alerts."""
+    zones = [(number, one) for number, one in enumerate(tracked) if one.zone is not None and number >= first]
+    for (_, before), (number, one) in pairwise(zones):
+        if before.zone == one.zone == "D":
+            sooner = alarm.state == "alarm" and alarm.since is not None and alarm.since <= number
+            return alarm if sooner else alarm.raised_from(number, one.severity(), "zone")
+    lately = [one.zone for _, one in zones][-2:]
+    if len(lately) == 2 and min(filter(None, lately)) == "C" and tracked[-1].zone is not None and alarm.state == "none":
+        return alarm.alerted(tracked[-1].severity(), "zone")
     return alarm
 
 

@@ -10,9 +10,13 @@ import shlex
 import shutil
 import signal
 import subprocess
-from collections.abc import Sequence
+from base64 import b64encode
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
 from tempfile import TemporaryFile
+from threading import Thread
 from time import time
 from typing import Any, Protocol
 from urllib.parse import SplitResult, unquote, urlsplit
@@ -50,7 +54,7 @@ class Command:
     @property
     def name(self) -> str:
         """Who is called."""
-        return f"command {shlex.join(self.arguments)}"
+        return f"command {self.arguments[0]} ({_mark(*self.arguments)})"
 
     def call(self, said: dict[str, Any]) -> None:
         """Run it; Refused for another exit code than 0, or none in time."""
@@ -91,7 +95,8 @@ class Webhook:
     @property
     def name(self) -> str:
         """Who is called."""
-        return f"webhook {_bare(urlsplit(self.url))}"
+        parts = urlsplit(self.url)
+        return f"webhook {parts.scheme}://{parts.netloc.rpartition('@')[2]} ({_mark(self.url)})"
 
     def call(self, said: dict[str, Any]) -> None:
         """Post it; Refused for another answer, OSError for none."""
@@ -102,7 +107,11 @@ class Webhook:
             def redirect_request(self, *_: Any) -> None:
                 return None  # a post that is redirected becomes a get, and says nothing
 
-        request = Request(self.url, json.dumps(said).encode(), {"Content-Type": "application/json"}, method="POST")
+        parts, headers = urlsplit(self.url), {"Content-Type": "application/json"}
+        if parts.username:
+            told = f"{unquote(parts.username)}:{unquote(parts.password or '')}".encode()
+            headers["Authorization"] = f"Basic {b64encode(told).decode()}"
+        request = Request(_bare(parts), json.dumps(said).encode(), headers, method="POST")
         try:
             build_opener(Stay).open(request, timeout=NETWORK_S).close()
         except HTTPError as error:
@@ -151,6 +160,11 @@ class Topic:
             client.loop_stop()
 
 
+def _mark(*words: str) -> str:
+    """By which a caller is known again without its words, which may hold a password or a token."""
+    return sha256("\0".join(words).encode(errors="replace")).hexdigest()[:8]
+
+
 def _level(name: str) -> str:
     """A name as one level of a topic."""
     return "".join("_" if letter in "/+#\0" else letter for letter in name)
@@ -189,8 +203,31 @@ def callers(*, command: str | None = None, webhook: str | None = None, mqtt: str
             import paho.mqtt.client  # noqa: F401
         except ImportError:
             raise BadInput("MQTT needs paho-mqtt; pip install 'asperity[monitor]'") from None
+        if "+" in urlsplit(mqtt).path or "#" in mqtt:
+            raise BadInput(f"a topic to publish at has neither + nor #, got {_bare(urlsplit(mqtt))}; name one topic")
         called.append(Topic(mqtt))
     return tuple(called)
+
+
+def _within(seconds: float, call: Callable[[], None]) -> None:
+    """A call that has to be done in time, whatever the other side does: an answer may drip for ever."""
+    outcome: list[Exception | None] = []
+
+    def made() -> None:
+        try:
+            call()
+        except Exception as error:  # noqa: BLE001 (handed on)
+            outcome.append(error)
+        else:
+            outcome.append(None)
+
+    thread = Thread(target=made, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if not outcome:
+        raise Refused(f"no whole answer within {seconds:g} s")
+    if outcome[0] is not None:
+        raise outcome[0]
 
 
 def _require_address(url: str, schemes: Sequence[str], example: str) -> None:
@@ -214,9 +251,9 @@ def deliver(sensor: Sensor, called: Sequence[Caller], *, now: bool = False) -> t
             if not now and due > time():
                 break
             try:
-                caller.call(json.loads(text))
+                _within(COMMAND_S + NETWORK_S, partial(caller.call, json.loads(text)))
             except Exception as error:  # noqa: BLE001 (somebody else's program or network)
-                wait = min(RETRY_S * 2.0**attempts, SELDOM_S)
+                wait = min(RETRY_S * 2.0 ** min(attempts, 20), SELDOM_S)
                 sensor.called(number, failure=first_line(error), due=time() + wait)
                 failed.append(f"{caller.name} could not be called ({first_line(error)}); it is tried again")
                 break  # later ones wait, so that they are told in order

@@ -75,7 +75,7 @@ class TrackedRecording:
         velocity, zone = self.reading.velocity, self.zone
         if not np.isfinite(velocity):
             return (
-                "velocity not determined: that takes an acceleration of known unit, sampled at 2.5 kHz or more for 2 s"
+                "velocity not determined: it takes an acceleration of known unit, at 2.5 kHz or more for 3.2 s or more"
             )
         said = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz"
         if zone is None:

@@ -3,16 +3,17 @@
 import json
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.errors import BadInput
 from asperity.files import whole_file, write_csv
 from asperity.recording import ReadOptions
+from asperity.tracking.alarming import LAST
 from asperity.tracking.model import Track, flat
-from asperity.tracking.store import ACKNOWLEDGED, Place, Store, Version
-from asperity.tracking.watch import settings_of
+from asperity.tracking.store import ACKNOWLEDGED, FOLDER, Place, Store
+from asperity.tracking.watch import settings_of, spot_of, version_of
 
 if TYPE_CHECKING:
     import pandas
@@ -121,28 +122,60 @@ def keep_track(
     machine: str | None = None,
     point: str | None = None,
     sensor: str | None = None,
-) -> Path:
-    """Append a track's recordings and its judgement to a store, and say where that is.
+    acknowledge: str | None = None,
+) -> Track:
+    """Append a track's recordings and its judgement to a store; the track with the alarm that stands there.
 
     Parameters
     ----------
     options : by which the recordings were read
-    machine, point, sensor : as `watch_folder` takes them
+    machine, point, sensor, acknowledge : as `watch_folder` takes them
 
     Raises
     ------
     BadInput
         for a sensor whose recordings were read otherwise before.
     """
-    folder = Path(track.recordings[0].file).resolve().parent.name
-    place = Place(machine or "machine", point or folder, sensor or options.channel or "sensor")
+    whole = tuple(
+        replace(one, file=str(path), reading=replace(one.reading, file=str(path)))
+        for one in track.recordings
+        for path in [Path(one.file).resolve()]
+    )
+    track = replace(track, recordings=whole)
+    place = spot_of(Path(whole[0].file).parent, machine, point, sensor or options.channel)
     with closing(Store(store)) as opened:
-        entered = opened.sensor(place, settings_of(track.target, options))
+        settings = settings_of(track.target, options)
+        if machine is None or point is None:
+            settings[FOLDER] = str(Path(whole[0].file).parent)
+        entered = opened.sensor(place, settings)
         keys = {}
         for recording in track.recordings:
-            status = Path(recording.file).stat()
-            key = keys[recording.file] = Version(recording.file, f"{status.st_size} {status.st_mtime_ns}")
+            key = keys[recording.file] = version_of(Path(recording.file))
             if key not in entered.recordings:
                 entered.keep(key, recording.reading)
-        entered.judged(track, keys, len(keys), "", None)
-    return opened.path
+        if acknowledge is not None:
+            entered.acknowledge(Path(whole[-1].file if acknowledge == LAST else acknowledge).name)
+        return entered.judged(track, keys, len(keys), "", None)
+
+
+def acknowledge_in(store: str | Path, named: str) -> None:
+    """Somebody has looked at a sensor, up to its last recording.
+
+    Parameters
+    ----------
+    named : the sensor, as machine/point/sensor
+
+    Raises
+    ------
+    BadInput
+        for a sensor that is not there, or has no recordings.
+    """
+    with closing(Store(store, make=False)) as opened:
+        places = {"/".join(place): place for _, place in opened.places()}
+        if named not in places:
+            raise BadInput(f"the store has no sensor {named!r}; it has {', '.join(places) or 'none'}")
+        entered = opened.sensor(places[named], {})
+        told = entered.said()
+        if told is None:
+            raise BadInput(f"nothing has been judged of {named} yet; there is nothing to acknowledge")
+        entered.acknowledge(Path(told["recordings"][-1]["file"]).name)

@@ -26,6 +26,7 @@ VERSION = 1
 BUSY_S = 30.0  # another watch may be writing
 ACKNOWLEDGED = "acknowledged"  # state of a judgement that a person has made
 REMEDY = "delete it and its recordings are read again, or choose another store"
+FOLDER = "folder"  # among the settings of a sensor that was not named: nobody else's recordings are to be taken for its
 SCHEMA = """
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
@@ -50,7 +51,9 @@ CREATE VIEW trend AS
     SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file, recording.heard,
         recording.started, recording.state, json_extract(row, '$.x') AS x, json_extract(row, '$.crf_hz') AS crf_hz,
         json_extract(row, '$.crf_std_hz') AS crf_std_hz, json_extract(row, '$.rms') AS rms,
-        json_extract(row, '$.kurtosis') AS kurtosis, json_extract(row, '$.reason') AS reason
+        json_extract(row, '$.kurtosis') AS kurtosis,
+        json_extract(row, '$.velocity_rms') AS velocity_rms, json_extract(row, '$.zone') AS zone,
+        json_extract(row, '$.reason') AS reason
     FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
         JOIN machine ON machine.id = point.machine;
 """
@@ -195,7 +198,7 @@ class Sensor:
     ) -> None:
         self.store, self.place, self.number = store, place, number
         for name, value in settings.items():
-            if begun.get(name) != value:
+            if begun.get(name) != value and not (name == FOLDER and FOLDER not in begun):
                 raise BadInput(
                     f"{store.path} was begun with {name} {begun.get(name)}, now it is {value}; go on with the same, or "
                     "choose another out or another sensor"
@@ -206,14 +209,15 @@ class Sensor:
                 row, datetime.fromisoformat(started) if started else None, state, bool(refused)
             )
             for row, file, version, started, state, refused in store.read(
-                "SELECT id, file, version, started, state, refused FROM recording WHERE sensor = ?", number
+                "SELECT id, file, version, started, state, refused FROM recording WHERE sensor = ? ORDER BY id", number
             )
         }
         self.acknowledged: str | None = None
         self.standing: Standing | None = None
-        self._look_up()
+        self.look_up()
 
-    def _look_up(self) -> None:
+    def look_up(self) -> None:
+        """What stands and up to where somebody has looked: another process may have acknowledged it."""
         last = self.store.read(
             "SELECT id, since FROM judgement WHERE sensor = ? AND state = ? ORDER BY id DESC LIMIT 1",
             *(self.number, ACKNOWLEDGED),
@@ -225,6 +229,11 @@ class Sensor:
             *(self.number, at),
         )
         self.standing = Standing(*raised[0]) if raised else None
+
+    def series(self) -> list[Version]:
+        """Its recordings, of each file the last version, whether or not the file is still there."""
+        last = {key.file: key for key in self.recordings}
+        return [*last.values()]
 
     @property
     def spacing_hz(self) -> float | None:
@@ -309,6 +318,7 @@ class Sensor:
         asked : what it was asked, as `asked` gives it back
         who : is to be called where the state is another than they were told last
         """
+        self.look_up()
         if self.standing is not None and track.alarm.state != "alarm":
             files = [recording.file for recording in track.recordings]
             since = files.index(self.standing.file) if self.standing.file in files else 0

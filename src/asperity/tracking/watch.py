@@ -7,7 +7,7 @@ first recordings and the latest are judged; the others stand in the store as the
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from hashlib import sha256
@@ -19,19 +19,20 @@ from typing import Any, NamedTuple
 from asperity.case import Case
 from asperity.errors import BadInput
 from asperity.files import make_folder
-from asperity.recording import ReadOptions
+from asperity.recording import ReadOptions, names_beside
 from asperity.tracking.alarming import BASELINE, LAST
 from asperity.tracking.calls import Caller, deliver
 from asperity.tracking.files import Place, Table, in_time, may_be_recording, natural, read_table
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, common_spacing, read_spectra
-from asperity.tracking.store import STORE, Sensor, Store, Version
+from asperity.tracking.store import FOLDER, STORE, Sensor, Store, Version
 from asperity.tracking.store import Place as Spot
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
 from asperity.wear import FALSE_ALARMS, AlarmState, Detector, SeriesMethod, StageSource
 
+SUFFIXES = (".toml", ".json")  # of sidecars
 STRIDE = 80  # recordings that are judged together where many arrive at once
 LATEST = 112  # recordings of a long series that are judged with the first BASELINE: as many as the alarm looks back
 
@@ -40,7 +41,7 @@ LATEST = 112  # recordings of a long series that are judged with the first BASEL
 class Update:
     """What is new: files just read, and the series with them; None as long as there is none.
 
-    `failed` are sentences on calls that have not worked.
+    `failed` are sentences on calls that have not worked, and on files that could not be taken.
     `waiting` files have changed so lately that they may still be written. Where nothing was new, `track` is None and
     `said` the last judgement, as `Track.scalars` gave it.
     """
@@ -91,7 +92,8 @@ def watch_folder(
     settle_s : seconds for which a file must have stayed unchanged before it is read: it may still be written
     acknowledge : as `track_recordings`; kept in the store, and every judgement with it: an alarm stands until then
     store : SQLite file for what was read and said, asperity.db in `out` by default; several watches may share one
-    machine, point, sensor : whose recordings these are, in the store; by default "machine", the folder, the channel
+    machine, point, sensor : whose recordings these are, in the store; by default the folder above, the folder, the
+        channel
     call : who is told when the state is another than they were told last, as `callers` makes them; a call that fails
         is kept in the store and made again
     recall : at the start give the last judgement, where neither recordings nor what is asked has changed since
@@ -102,14 +104,17 @@ def watch_folder(
     BadInput
         for a folder that is none, or other settings than those the store was begun with.
     """
-    folder, out = Path(folder), Path(out)
+    folder, out = Path(folder).resolve(), Path(out)
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     make_folder(out)
     target = search_target(case, band_hz)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
-    spot = Spot(machine or "machine", point or folder.resolve().name, sensor or channel or "sensor")
-    memory = _Memory(Store(store or out / STORE).sensor(spot, settings_of(target, options)), target, options, call)
+    spot = spot_of(folder, machine, point, sensor or channel)
+    settings = settings_of(target, options)
+    if machine is None or point is None:
+        settings[FOLDER] = str(folder)
+    memory = _Memory(Store(store or out / STORE).sensor(spot, settings), target, options, call)
     asked: dict[str, Any] = {
         "shaft_hz": shaft_hz,
         "method": method,
@@ -147,7 +152,7 @@ def _looks(
             unread = [key for key in present if key not in memory.sensor.recordings]
             arrived = memory.settled(unread, pace)
             new = read(arrived)
-            known = [key for key in present if key in memory.sensor.recordings]
+            known = sorted(memory.sensor.series(), key=lambda key: _sorting(_name(key)))
             waiting = len(unread) - len(arrived)
             if new or first:
                 named = None if table is None or not known else read_table(table)
@@ -163,13 +168,29 @@ def _looks(
                     judging = partial(judge, **asked)
                     track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
                     failed = deliver(memory.sensor, memory.call, now=first)
-                    yield Update(new=new, track=track, waiting=waiting, failed=failed)
+                    yield Update(new=new, track=track, waiting=waiting, failed=(*memory.left_out(), *failed))
             else:
                 deliver(memory.sensor, memory.call)
             if pace.once:
                 return
             first = False
             sleep(pace.every_s)
+
+
+def spot_of(folder: Path, machine: str | None, point: str | None, sensor: str | None) -> Spot:
+    """Names of a sensor; by default those of the folder that its recordings lie in, and of the one above."""
+    return Spot(machine or folder.parent.name or "machine", point or folder.name or "point", sensor or "sensor")
+
+
+def version_of(path: Path) -> Version:
+    """Which version of a file, and of what stands beside it, is there now."""
+    stamps = []
+    beside = next((path.with_name(name) for name in names_beside(path.name) if path.with_name(name).is_file()), None)
+    for one in (path, beside):
+        if one is not None:
+            status = one.stat()
+            stamps.append(f"{status.st_size} {status.st_mtime_ns}")
+    return Version(str(path), " ".join(stamps))
 
 
 def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
@@ -233,27 +254,39 @@ class _Memory:
         self.sensor, self.target, self.options, self.call = sensor, target, options, call
         self._readings: dict[Version, Reading] = {}
         self._learned: Learned | None = None
+        self.unnamed: set[str] = set()
         self._ahead: dict[Version, float] = {}  # files of a clock that is ahead, and when they were first seen
 
     def present(self, folder: Path) -> list[Version]:
         """Recordings that lie in the folder now, by name with numbers in their order."""
-        versions = []
+        versions, stamps = [], {}
         with os.scandir(folder) as entries:
             for entry in entries:
-                try:
+                with suppress(OSError):  # gone, or a link to nothing
                     status = entry.stat()
-                except OSError:
-                    continue  # gone, or a link to nothing
-                key = Version(entry.path, f"{status.st_size} {status.st_mtime_ns}")
-                if key in self.sensor.recordings or may_be_recording(Path(key.file)):
-                    versions.append((_sorting(entry.name), key))
+                    stamps[entry.name] = (entry, f"{status.st_size} {status.st_mtime_ns}")
+        sidecars = {name for name in stamps if name.endswith(SUFFIXES)}
+        for entry, stamp in stamps.values():
+            if not _utf8(entry.name):
+                self.unnamed.add(entry.name)
+                continue
+            beside = next((name for name in names_beside(entry.name) if name in sidecars), None) if sidecars else None
+            key = Version(entry.path, stamp if beside is None else f"{stamp} {stamps[beside][1]}")
+            if key in self.sensor.recordings or may_be_recording(Path(key.file)):
+                versions.append((_sorting(entry.name), key))
         return [key for _, key in sorted(versions)]
+
+    def left_out(self) -> Iterator[str]:
+        """A sentence on each file that cannot be entered."""
+        for name in sorted(self.unnamed):
+            shown = name.encode(errors="surrogateescape").decode(errors="replace")
+            yield f"{shown} is left out: its name is not UTF-8; rename it"
 
     def settled(self, keys: list[Version], pace: _Pace) -> list[Version]:
         """Those that have stayed as they are long enough; of a clock that is ahead, since they were first seen."""
         settled, ahead = [], []
         for key in keys:
-            size, changed = map(int, key.version.split())
+            size, changed = map(int, key.version.split()[:2])
             age = time() - 1e-9 * changed
             if size > 0 and age >= pace.settle_s:
                 settled.append(key)
@@ -294,6 +327,7 @@ class _Memory:
 
         None where there is nothing to judge.
         """
+        self.sensor.look_up()
         keys, again = order.keys, acknowledge is not None
         if not keys:
             return None
@@ -358,9 +392,17 @@ def _sorting(name: str) -> list[tuple[int, int | str]]:
     return natural(name)
 
 
+def _utf8(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def _unchanged(key: Version) -> bool:
     try:
         status = Path(key.file).stat()
     except OSError:
         return False  # taken away meanwhile
-    return key.version == f"{status.st_size} {status.st_mtime_ns}"
+    return key.version.startswith(f"{status.st_size} {status.st_mtime_ns}")

@@ -85,6 +85,8 @@ class Envelope:
         for harmonic in range(1, HARMONICS + 1):
             at, reach = harmonic * rate_hz / self.spacing_hz, max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0)
             near = self.total[max(int(np.ceil(at - reach)), 2) : int(at + reach) + 1]
+            if harmonic == 1 and not near.size:
+                return float("nan")
             if near.size:
                 power += 2.0 * float(near.max()) / self.chunks / self.squares
         mean = self.mean / self.chunks

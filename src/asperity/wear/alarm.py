@@ -89,12 +89,14 @@ class Alarm:
         """The same with an alert at its end, where nothing graver stands there."""
         if self.state not in ("none", "cannot-tell"):
             return self
-        return self.raised_to("alert", reason, raised_by)
+        states: tuple[AlarmState, ...] = (*self.states[:-1], "alert")
+        return replace(self, state="alert", states=states, since=len(states) - 1, reason=reason, raised_by=raised_by)
 
-    def raised_to(self, state: AlarmState, reason: str, raised_by: str) -> "Alarm":
-        """The same with another state at its end."""
-        states = (*self.states[:-1], state)
-        return replace(self, state=state, states=states, since=len(states) - 1, reason=reason, raised_by=raised_by)
+    def raised_from(self, number: int, reason: str, raised_by: str) -> "Alarm":
+        """An alarm from a recording on."""
+        alarms: list[AlarmState] = ["alarm"] * (len(self.states) - number)
+        states = (*self.states[:number], *alarms)
+        return replace(self, state="alarm", states=states, since=number, reason=reason, raised_by=raised_by)
 
 
 def sequential_alarm(
