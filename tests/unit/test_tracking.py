@@ -93,7 +93,8 @@ def test_a_reading_is_kept_in_full(tmp_path):
     again = reading_from(packed, "kept")
     assert np.array_equal(again.spectrum.density, readings.spectrum.density)
     assert np.array_equal(again.spectrum.frequency_hz, readings.spectrum.frequency_hz)
-    assert replace(again, spectrum=None) == replace(readings, spectrum=None)
+    assert np.array_equal(again.velocity, readings.velocity, equal_nan=True)
+    assert replace(again, spectrum=None, velocity=0.0) == replace(readings, spectrum=None, velocity=0.0)
     with pytest.raises(UnreadableFile, match="read again"):
         reading_from(packed[:500], "kept")
     with pytest.raises(UnreadableFile, match="kept is damaged"):

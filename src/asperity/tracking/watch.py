@@ -112,8 +112,7 @@ def watch_folder(
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
     spot = spot_of(folder, machine, point, sensor or channel)
     settings = settings_of(target, options)
-    if machine is None or point is None:
-        settings[FOLDER] = str(folder)
+    settings |= {} if machine and point else {FOLDER: str(folder)}
     memory = _Memory(Store(store or out / STORE).sensor(spot, settings), target, options, call)
     asked: dict[str, Any] = {
         "shaft_hz": shaft_hz,
@@ -122,7 +121,7 @@ def watch_folder(
         "stages_from": stages_from,
         "false_alarm_rate": false_alarm_rate,
     }
-    pace = _Pace(recall=recall, once=once, every_s=every_s, settle_s=settle_s)
+    pace = _Pace(recall, once, every_s, settle_s)
     return _looks(memory, folder, table, acknowledge, asked, pace, partial(memory.read, workers, progress))
 
 
