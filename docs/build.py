@@ -38,6 +38,7 @@ def sources() -> Iterator[Path]:
     """What the site is made of, but for the reference."""
     yield from (ROOT / name for name in BESIDE)
     yield from (ROOT / "examples").glob("*.toml")
+    yield ROOT / "benchmark" / "certified.csv"
     yield from (path for path in DOCS.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
 
 

@@ -116,7 +116,7 @@ def wrong_command(text: str) -> str | None:
         values = [words.pop(0) for _ in range(min(takes, len(words)))]
         if (len(values) < takes and len(values) + len(words) > 0) or any(value.startswith("--") for value in values):
             return f"{word} of asperity {name} takes a value"
-        if word == "--set" and (wrong := wrong_override(values[0])):
+        if word == "--set" and name != "check" and (wrong := wrong_override(values[0])):
             return wrong
     if given and not arguments:
         return f"asperity {name} takes no {given} arguments"

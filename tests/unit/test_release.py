@@ -54,7 +54,7 @@ def test_one_version_stands_everywhere():
 
 
 def test_one_paper_and_one_licence():
-    doi = stated("CITATION.cff")["references"][0]["doi"]
+    doi = stated("CITATION.cff")["preferred-citation"]["doi"]
     assert stated("codemeta.json")["referencePublication"]["@id"] == f"https://doi.org/{doi}"
     assert stated(".zenodo.json")["related_identifiers"][0]["identifier"] == doi
     assert stated("CITATION.cff")["license"] == stated(".zenodo.json")["license"] == PROJECT["license"]

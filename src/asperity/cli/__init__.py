@@ -6,6 +6,7 @@ cannot tell, 5 sensor or machine off.
 """
 
 from asperity.cli import (  # each adds its commands
+    benchmark,
     contact,
     exploration,
     friction,
@@ -27,6 +28,7 @@ from asperity.cli.app import app, main
 
 __all__ = [
     "app",
+    "benchmark",
     "contact",
     "exploration",
     "friction",

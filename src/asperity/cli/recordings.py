@@ -27,7 +27,13 @@ IN_FULL = 4  # recordings that `check` shows with every fact
 
 @app.command()
 def check(
-    paths: options.RecordingFiles,
+    paths: Annotated[
+        list[Path] | None, typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")
+    ] = None,
+    data_set: Annotated[
+        Path | None,
+        typer.Option("--set", metavar="DIR", help="Say whether a folder is a set of data that others can use."),
+    ] = None,
     rate: options.Rate = None,
     unit: options.Unit = None,
     channel: options.Channel = None,
@@ -38,6 +44,13 @@ def check(
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings hold: rate, unit, length, channels, gaps, clipping, offset, machine off, too short."""
+    if data_set is not None:
+        if paths:
+            raise BadInput(f"--set {data_set} takes no recordings beside it; its {tracking.STATED} names them")
+        _show_set(data_set, as_json=as_json, quiet=quiet)
+        return
+    if not paths:
+        raise BadInput("check takes recordings, or --set and the folder of a set of data; name one")
     checks = tracking.check_recordings(
         paths, case=case_at(case_file), band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale
     )
@@ -53,6 +66,15 @@ def check(
         )
     if checks.refused:
         raise BadInput("; ".join(dict.fromkeys(reason for _, reason in checks.refused)))
+
+
+def _show_set(folder: Path, *, as_json: bool, quiet: bool) -> None:
+    """What a folder lacks of a set, a line each; exit code 2 unless it is one."""
+    found = tracking.check_set(folder)
+    lines = [f"  missing: {sentence}" for sentence in found.missing]
+    show(found.verdict(), lambda: found.scalars(), lines, as_json=as_json, quiet=quiet)
+    if not found.whole:
+        raise typer.Exit(2)
 
 
 def _in_full(checked: "CheckedRecording") -> Block:

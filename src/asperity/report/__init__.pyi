@@ -1,3 +1,4 @@
+from .benchmark import benchmark_figure as benchmark_figure
 from .inference.page import write_inference_report as write_inference_report
 from .machine.page import write_machine_report as write_machine_report
 from .motion.page import write_motion_report as write_motion_report

@@ -3,6 +3,9 @@ from .calls import callers as callers
 from .checks import CheckedRecording as CheckedRecording
 from .checks import RecordingChecks as RecordingChecks
 from .checks import check_recordings as check_recordings
+from .dataset import STATED as STATED
+from .dataset import DataSet as DataSet
+from .dataset import check_set as check_set
 from .files import OPERATING as OPERATING
 from .files import Place as Place
 from .files import Table as Table

@@ -1,0 +1,1 @@
+"""Certified cases, and the program that makes them."""

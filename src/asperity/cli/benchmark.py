@@ -1,0 +1,73 @@
+"""`asperity benchmark`: any solver held against cases with certified values."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from asperity import benchmark as held
+from asperity import files, report
+from asperity.cli.app import app
+from asperity.cli.options import AsJson, Quiet, require_output
+from asperity.cli.show import Block, columns, progress, show, written
+
+if TYPE_CHECKING:
+    from asperity.benchmark import BenchmarkResult
+
+
+@app.command()
+def benchmark(
+    solver: Annotated[
+        str, typer.Option(metavar="NAME", help="asperity, tamaas, contactmechanics, or package.module:thing.")
+    ] = "asperity",
+    cells: Annotated[
+        list[int] | None, typer.Option(metavar="N", help="Cells along x; repeat. By default 64 and 128.")
+    ] = None,
+    cases: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of cases, in place of those that come with asperity.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="CSV", help="Write every row.")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="PNG|PDF", help="Draw error over time.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Hold a solver against contacts with certified values: error and time of each."""
+    if out is not None:
+        require_output(out, ".csv")
+    if figure is not None:
+        files.require_writable(figure)
+    chosen = held.solver_named(solver)
+    with progress("benchmark", "solving ...", quiet=quiet, compiles=solver == "asperity") as display:
+        result = held.run_benchmark(chosen, folder=cases, cells=cells or (64, 128), progress=display)
+    kept = [] if out is None else [result.save(out)]
+    if figure is not None:
+        kept.append(report.write_figure(report.benchmark_figure(result), figure))
+    show(
+        result.verdict(),
+        lambda: result.scalars() | {"written": [str(path) for path in kept]},
+        _rows(result),
+        [f"  left out: {case}: {reason}" for case, reason in result.left_out],
+        written("  Written", *kept) if kept else [],
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _rows(result: "BenchmarkResult") -> Block:
+    """A line a value on the finest cells."""
+    finest = max((row.cells for row in result.rows), default=0)
+    rows = [
+        [
+            row.case,
+            row.quantity,
+            f"{row.certified:.5g}",
+            f"{row.found:.5g}",
+            f"{100.0 * row.error:+.3f}",
+            f"{100.0 * row.uncertainty / abs(row.certified):.2g}",
+            f"{row.seconds:.2f}",
+        ]
+        for row in result.rows
+        if row.cells == finest
+    ]
+    heads = ["case", "quantity", "certified", f"on {finest} cells", "error [%]", "uncertainty [%]", "time [s]"]
+    yield from columns(heads, rows, left=2)

@@ -1,0 +1,145 @@
+"""`asperity check --set DIR`: a folder that is a set of data, and the same with one thing missing at a time."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity import Grid
+from asperity.cli import main
+from asperity.surface import gaussian_surface, write_surface
+from asperity.tracking import check_set
+from support.source import ROOT
+
+STATED = """\
+title = "Rings in VG 100"
+authors = ["A laboratory"]
+licence = "CC-BY-4.0"
+case = "contact.toml"
+recordings = "recordings.csv"
+sensor = "accelerometer on the housing, 20 mm from the contact, radial"
+maps_before = ["maps/ring-before.x3p", "maps/roller-before.x3p"]
+maps_after = ["maps/ring-after.x3p", "maps/roller-after.x3p"]
+"""
+HEADS = ("file", "time_h", "load_n", "speed_m_s", "oil_temperature_c")
+STEPS = [(200, 1.0), (300, 1.5), (500, 2.0), (500, 2.0)]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A set with four recordings and four maps."""
+    folder = tmp_path_factory.mktemp("set")
+    (folder / "set.toml").write_text(STATED, "utf-8")
+    shutil.copy(ROOT / "examples" / "paper.toml", folder / "contact.toml")
+    (folder / "maps").mkdir()
+    grid = Grid((96, 96), (0.0, 0.0), (0.3e-3, 0.3e-3), periodic=(True, True))
+    for number, name in enumerate(("ring-before", "roller-before", "ring-after", "roller-after")):
+        rng = np.random.default_rng(number)
+        write_surface(gaussian_surface(grid, sq=1e-6, correlation_length=20e-6, rng=rng), folder / f"maps/{name}.x3p")
+    rows = [(f"run-{i}.csv", i, load, speed, 40 + i) for i, (load, speed) in enumerate(STEPS)]
+    write_table(folder, rows)
+    for i in range(len(rows)):
+        write_recording(folder / f"run-{i}.csv", seed=i)
+    return folder
+
+
+def write_table(folder, rows, heads=HEADS):
+    with (folder / "recordings.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerows([heads, *rows])
+
+
+def write_recording(path, *, rate=20_000, seconds=10.5, unit="m/s^2", seed=0):
+    values = np.random.default_rng(seed).standard_normal(int(rate * seconds))
+    header = f"sampling rate: {rate} Hz\nacc [{unit}]"
+    np.savetxt(path, values, "%.4g", header=header, comments="")
+
+
+@pytest.fixture
+def copy(whole, tmp_path):
+    return Path(shutil.copytree(whole, tmp_path / "set"))
+
+
+def test_a_whole_set_is_one(whole, capsys):
+    found = check_set(whole)
+    assert found.missing == ()
+    assert (found.whole, found.recordings, found.maps) == (True, 4, 4)
+    with pytest.raises(SystemExit) as end:
+        main(["check", "--set", str(whole), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert (end.value.code or 0, said["whole"], said["title"]) == (0, True, "Rings in VG 100")
+
+
+def without(key):
+    def spoil(folder):
+        text = "".join(line for line in STATED.splitlines(keepends=True) if not line.startswith(f"{key} "))
+        (folder / "set.toml").write_text(text, "utf-8")
+
+    return spoil
+
+
+def replaced(old, new):
+    def spoil(folder):
+        assert old in STATED
+        (folder / "set.toml").write_text(STATED.replace(old, new), "utf-8")
+
+    return spoil
+
+
+def steps(*rows):
+    def spoil(folder):
+        write_table(folder, [(f"run-{i}.csv", i, load, speed, 40) for i, (load, speed) in enumerate(rows)])
+
+    return spoil
+
+
+def coarse_map(folder):
+    grid = Grid((20, 20), (0.0, 0.0), (0.3e-3, 0.3e-3), periodic=(True, True))
+    surface = gaussian_surface(grid, sq=1e-6, correlation_length=60e-6, rng=np.random.default_rng(1))
+    write_surface(surface, folder / "maps/ring-after.x3p")
+
+
+SPOILT = {
+    "set.toml does not state sensor": without("sensor"),
+    "its licence all rights reserved is none of": replaced("CC-BY-4.0", "all rights reserved"),
+    "maps before and after are not of the same number": replaced(', "maps/roller-after.x3p"', ""),
+    "lies outside the set": replaced("maps/ring-after.x3p", "../../ring-after.x3p"),
+    "load_n has 2 steps where 3": steps((200, 1.0), (200, 1.5), (500, 2.0), (500, 2.0)),
+    "speed_m_s has 1 steps where 3": steps((200, 1.0), (300, 1.0), (500, 1.0), (500, 1.0)),
+    "no load and speed were recorded twice": steps((200, 1.0), (300, 1.5), (500, 2.0), (600, 2.0)),
+    "has no column oil_temperature_c": lambda folder: write_table(folder, [("run-0.csv", 0, 1, 1)], HEADS[:-1]),
+    "line 2 of recordings.csv: load_n must": lambda folder: write_table(folder, [("run-0.csv", 0, "", 1, 1)]),
+    "run-1.csv: sampled at 8000 Hz": lambda folder: write_recording(folder / "run-1.csv", rate=8000),
+    "run-2.csv: 3 s long where 10": lambda folder: write_recording(folder / "run-2.csv", seconds=3.0),
+    "run-3.csv: no acceleration (unit V)": lambda folder: write_recording(folder / "run-3.csv", unit="V"),
+    "run-0.csv": lambda folder: (folder / "run-0.csv").unlink(),
+    "ring-after.x3p: pixels of 15 um, coarser": coarse_map,
+    "the case: ": lambda folder: (folder / "contact.toml").write_text("[contact]\nload = 3\n", "utf-8"),
+}
+
+
+@pytest.mark.parametrize(("says", "spoil"), SPOILT.items(), ids=SPOILT)
+def test_what_is_missing_is_said(copy, says, spoil):
+    spoil(copy)
+    found = check_set(copy)
+    assert not found.whole
+    assert any(says in sentence for sentence in found.missing), found.missing
+    assert found.verdict().startswith(f"{copy} is no such set yet: ")
+
+
+def test_the_command_refuses_what_is_no_set(copy, tmp_path, capsys):
+    without("case")(copy)
+    for arguments, says in (
+        (["--set", str(copy)], "no such set yet: set.toml does not state case"),
+        (["--set", str(tmp_path / "absent")], "is not a folder"),
+        (["--set", str(copy / "maps")], "has no set.toml"),
+        (["--set", str(copy), "run-0.csv"], "takes no recordings beside it"),
+        ([], "check takes recordings, or --set"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(["check", *arguments])
+        said = capsys.readouterr()
+        assert end.value.code == 2
+        assert says in said.out + said.err
