@@ -104,17 +104,19 @@ def run_benchmark(
         if case.kind not in solver.kinds:
             left_out.append((case.name, f"{solver.name} takes no case of kind {case.kind}"))
             continue
-        try:
-            if (what := (case.kind, case.given.get("geometry"))) not in warm:
-                solver.solve(case.given, min(cells))  # so that no clock counts what is loaded and compiled once
-                warm.add(what)
-            found = [row for count in sorted(cells) for row in _solved(solver, case, count)]
-        except AsperityError as error:
-            left_out.append((case.name, str(error)))
-            continue
+        found: list[BenchmarkRow] = []
+        reason = f"{solver.name} gives none of its quantities"
+        for count in sorted(cells):
+            try:
+                if (what := (case.kind, case.given.get("geometry"))) not in warm:
+                    solver.solve(case.given, count)  # so that no clock counts what is loaded and compiled once
+                    warm.add(what)
+                found += _solved(solver, case, count)
+            except AsperityError as error:  # of cells that are too few, say; more may do
+                reason = str(error)
         rows += found
         if not found:
-            left_out.append((case.name, f"{solver.name} gives none of its quantities"))
+            left_out.append((case.name, reason))
     return BenchmarkResult(solver.name, tuple(rows), tuple(left_out))
 
 
