@@ -19,6 +19,7 @@ from .errors import BadInput as BadInput
 from .errors import NotConverged as NotConverged
 from .grid import Grid as Grid
 from .history import run_history as run_history
+from .inference import infer_contact as infer_contact
 from .lubricant import Barus as Barus
 from .lubricant import DowsonHigginson as DowsonHigginson
 from .lubricant import Incompressible as Incompressible
