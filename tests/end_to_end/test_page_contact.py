@@ -65,6 +65,17 @@ def ring(tmp_path_factory):
     return path
 
 
+# where the film map begins, in every picture that the browser draws
+TOPS = """() => {
+  window.tops = []
+  const look = () => {
+    window.tops.push(document.querySelector(".block.film").getBoundingClientRect().top + scrollY)
+    requestAnimationFrame(look)
+  }
+  look()
+}"""
+
+
 def tile(page, name="CLR"):
     return page.locator("dl div", has_text=name).locator("dd").first
 
@@ -93,11 +104,13 @@ def turn(page, name, text):
 def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
     page = visit.solved()
     clr, crf, map_before = tile(page).inner_text(), tile(page, "CRF").inner_text(), film(page)
+    page.evaluate(TOPS)
     turn(page, "Load, F", "800 N")
     page.wait_for_function("() => location.search.includes('contact.load=800')")
     assert tile(page).inner_text() != clr
     assert tile(page, "CRF").inner_text() != crf
     assert film(page) != map_before
+    assert page.evaluate("() => Math.max(...window.tops) - Math.min(...window.tops)") < 4  # nothing jumps on the way
     again = tile(page).inner_text()
     page.reload()
     page.get_by_text("Solved on").wait_for()
