@@ -90,7 +90,7 @@ class Maps:
         made = plain_figure("x_m", "y_m", label=title, title=title, x_range=self.x, y_range=self.y, min_height=HEIGHT)
         made.update(sizing_mode="scale_width", aspect_ratio=SHAPES[1])
         made.add_tools(CrosshairTool(overlay=[self.across, self.along]))
-        mapper = LinearColorMapper(palette=palette)
+        mapper = LinearColorMapper(palette=palette, low=0.0, high=1.0)  # with numbers, for which the bar takes room
         source = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
         image = made.image("image", "x", "y", "dw", "dh", source=source, color_mapper=mapper)
         over = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
