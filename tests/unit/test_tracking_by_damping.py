@@ -1,6 +1,8 @@
 """A series whose line narrows and keeps its frequency: what `track` reads from CRF, from damping and from both."""
 
 import json
+import re
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -78,6 +80,16 @@ def test_the_page_shows_each_way_and_the_damping_with_its_break(track):
     assert "Damping (decides)" in page
     assert "By it alone: Severe wear from" in page
     assert "Damping decides stage and alarm" in page
+
+
+def test_the_trend_has_a_drawing_of_its_own_for_telephones(track):
+    found = re.search(
+        r'<source media="([^"]*)" srcset="([^"]*)" width="(\d+)" height="\d+"><img ', render_track_page(track)
+    )
+    assert found[1] == "(max-width: 480px)"
+    assert " " not in found[2]  # which ends an address in a srcset
+    assert unquote(found[2]).startswith("data:image/svg+xml,<svg ")
+    assert int(found[3]) < 480  # of a type that is drawn at its size, nearly
 
 
 def test_a_method_without_a_width_determines_no_damping(series):

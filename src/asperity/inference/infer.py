@@ -37,7 +37,7 @@ def infer_contact(
 
     Parameters
     ----------
-    recordings : files and folders of recordings, or `Observation`s; none at all gives what is known before any
+    recordings : files and folders, or each an `Observation`; none at all gives what is known before any
     case : the contact; its [infer] says what is not known of it
     table : csv of what each file was recorded at, see `listen`
     emulator : one that is there, or the folder to keep it in; None: one in the user's cache. Building it solves

@@ -19,19 +19,23 @@ from matplotlib.figure import Figure
 from asperity.files import require_writable, whole_file
 from asperity.paper import CITATION
 from asperity.quantities import Quantity, quantity, with_deviation
-from asperity.report.style import ON_PAGE, ON_PAPER, Medium, svg, write_figure
+from asperity.report.style import ON_PAGE, ON_PAPER, ON_TELEPHONE, Medium, svg, write_figure
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none';"
 
 
 class Picture(NamedTuple):
-    """A figure as the page embeds it; `width` and `height` in CSS pixels keep its place while it loads."""
+    """A figure as the page embeds it; `width` and `height` in CSS pixels keep its place while it loads.
+
+    `narrow` is the same figure drawn for a telephone, with its own width and height; a wide one may have it.
+    """
 
     uri: str
     width: int
     height: int
     alt: str
     caption: str
+    narrow: "Picture | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,10 @@ class Exhibit:
     def picture(self) -> Picture:
         """As a page embeds it."""
         return self.picture_of(self.figure())
+
+    def picture_and_narrow(self) -> Picture:
+        """As a page embeds it, with a drawing of its own for telephones."""
+        return self.picture()._replace(narrow=self.picture_of(self.figure(ON_TELEPHONE)))
 
     def picture_of(self, figure: Figure) -> Picture:
         """As a page embeds it, once it is drawn."""

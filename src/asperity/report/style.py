@@ -87,6 +87,7 @@ class Medium:
 
 
 ON_PAGE = Medium(4.8, 9.6, titled=True)  # two stand side by side, and one alone is readable on a telephone
+ON_TELEPHONE = Medium(4.8, 4.8, titled=True)
 ON_PAPER = Medium(
     84.0 / 25.4,
     174.0 / 25.4,

@@ -62,7 +62,7 @@ def trend(track: Track) -> Exhibit:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
         _draw_crf(above, track, resonant)
         _draw_severity(below, track)
-        legend_below(figure, 4)
+        legend_below(figure, 4 if medium.double > medium.single else 2)
         return figure
 
     split = track.stages is not None and track.stages.found

@@ -60,7 +60,7 @@ def render_track_page(track: Track) -> str:
         track=track,
         tiles=_tiles(track),
         act=_act(track),
-        trend=_pictures([exhibits.trend(track)] if track.resonance_count else []),
+        trend=[exhibits.trend(track).picture_and_narrow()] if track.resonance_count else [],
         more=_pictures(_details(track)),
         heads=_heads(track),
         rows=[_row(recording, _with_clr(track)) for recording in track.recordings],
