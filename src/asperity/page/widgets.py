@@ -42,7 +42,7 @@ a { color: var(--accent); }
 .soft { color: var(--soft); }
 """
 TILE_STYLES = """
-dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(180px, 1fr)); gap: 8px; margin: 0; }
+dl { display: grid; grid-template-columns: repeat(4, minmax(0, 1fr)); gap: 8px; margin: 0; }
 dl div { background: var(--wash); border-radius: 4px; padding: 6px 10px; }
 dt { font-size: .78rem; line-height: 1.25; color: var(--soft); }
 dd { margin: 1px 0 0; font-size: 1.22rem; font-weight: 650; font-variant-numeric: tabular-nums; line-height: 1.25; }
@@ -50,8 +50,9 @@ dd small { display: block; font-size: .78rem; font-weight: 400; color: var(--sof
 dd small.than { color: var(--accent); }
 dd span { font-size: .95rem; font-weight: 500; white-space: nowrap; }
 dl.old dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
+@media (min-width: 1800px) { dl { grid-template-columns: repeat(8, minmax(0, 1fr)); } }
+@media (max-width: 1100px) { dl { grid-template-columns: 1fr 1fr; } }
 @media (max-width: 480px) {
-  dl { grid-template-columns: 1fr 1fr; }
   dl div { padding: 6px 8px; } dd { font-size: 1.1rem; } dd span { font-size: .78rem; }
 }
 """
