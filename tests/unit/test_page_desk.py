@@ -164,6 +164,7 @@ def test_a_coarse_answer_is_the_averaged_surfaces():
 
 def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monkeypatch):
     case = papers_case().with_overrides({**MUTE, "grid.cells": [128, 128]})
+    monkeypatch.setattr(work, "COLD_STEPS", 200)
     assert work.solve_coarsely(NOBODY, case, None).solution.grid.cells == (64, 64)
     monkeypatch.setattr(work, "COLD_STEPS", 2)
     monkeypatch.setattr(work, "COARSER", 48 * 48)

@@ -6,7 +6,6 @@ are not in use is kept, so that another law can be tried.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
-from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_origin, get_type_hints
 
 from asperity.coupling.excitations import (
@@ -176,7 +175,6 @@ class Choice(NamedTuple):
     unit: str
 
 
-@cache
 def vibration_choices() -> Mapping[str, Choice]:
     """Every keyword that a model can be stated with by names and numbers, laws' parameters behind their law."""
     choices: dict[str, Choice] = {}

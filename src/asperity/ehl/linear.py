@@ -138,6 +138,10 @@ class LineRelaxation:
         return change
 
 
+class SingularFactor(ArithmeticError):
+    """Linearised equations that have no solution, or no single one."""
+
+
 class Blocks:
     """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
 
@@ -186,14 +190,17 @@ class _Pattern(NamedTuple):
         values = np.bincount(self.position, weights=entries, minlength=self.rows.size + 1)[:-1]
         matrix = scipy.sparse.csc_array((values, self.rows, self.columns), shape=(count, count))
         # small panels: these matrices are too sparse for the dense blocks that SuperLU looks for
-        return scipy.sparse.linalg.splu(
-            matrix,
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0,
-            relax=1,
-            panel_size=1,
-            options={"SymmetricMode": True},
-        )
+        try:
+            return scipy.sparse.linalg.splu(
+                matrix,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                relax=1,
+                panel_size=1,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SingularFactor(str(error)) from None
 
     def solve(self, factors: Any, wanted: Field) -> Field:
         """What the factored matrix turns into `wanted`, (cx, cy)."""

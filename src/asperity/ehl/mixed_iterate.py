@@ -8,6 +8,7 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.ehl.iterate import Step
 from asperity.ehl.limit import StepLimit
+from asperity.ehl.linear import SingularFactor
 from asperity.ehl.mixed import FREE, MixedBalance, Pressures, evaluate
 from asperity.ehl.mixed_linear import newton_step
 from asperity.ehl.problem import Problem
@@ -34,7 +35,11 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
-        step = newton_step(balance)
+        try:
+            step = newton_step(balance)
+        except SingularFactor:  # strayed so far that no step leads on
+            yield Step(number + 1, balance, unknowns.approach, np.inf)
+            return
         change = float(np.mean(np.abs(step.total)) / wanted_mean)
         idle += 1
         if balance.residual_rms < PROGRESS * lowest:
