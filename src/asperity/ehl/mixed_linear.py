@@ -23,8 +23,7 @@ from asperity.kernels import reynolds, stencils
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
 from asperity.kernels.stencils import Far, Stencil
 
-LEFT = 0.03  # share to which the linearised equations are left: left more, single cells go round for many steps ...
-LEFT_FAR, FAR_OFF = 0.1, 0.1  # ... but from where more than this is left, and steps follow borders cell by cell ...
+LEFT = 0.1  # share to which the linearised equations are left ...
 LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
 LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... from so little left on, of followed oil that may not be lost: met far closer
 OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
@@ -121,14 +120,6 @@ class MixedLinear:
 
     def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
         """The same, of a change of the oil's unknown and that of the gap."""
-        zero = self.real(0.0)
-        return (
-            np.where(self.lubricated, self.wet(d_oil, d_gap), zero),
-            np.where(self.touching, d_gap * self.real(self.rows.contact_scale), zero),
-        )
-
-    def wet(self, d_oil: Field, d_gap: Field) -> Field:
-        """Changes of the oil's equations where they decide, and anything elsewhere."""
         problem = self.balance.problem
         wet = np.empty(self.cells, self.real)
         spacing, d_pressure, d_height = problem.spacing, self.pressure_of(d_oil), problem.filmed(d_gap)
@@ -145,18 +136,18 @@ class MixedLinear:
         elif self.leans:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
             wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.rows.fluid_scale
-        return wet
+        zero = self.real(0.0)
+        return (
+            np.where(self.lubricated, wet, zero),
+            np.where(self.touching, d_gap * self.real(self.rows.contact_scale), zero),
+        )
 
     def answer(self, wet: Field, closed: Field) -> tuple[Field, Field]:
         """Approximate changes of the oil's pressure and of touching cells' total pressure that answer both rows."""
-        return self.answer_wet(wet), closed
-
-    def answer_wet(self, wet: Field) -> Field:
-        """Approximate change of the oil's pressure that answers its rows."""
         change = self.blocks(wet)
         if self.follows_wedge:
             change *= self.real(OVER)
-        return self.lines(wet, change)
+        return self.lines(wet, change), closed
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
         """Change of the total pressure: the oil's in free cells, their own in touching ones."""
@@ -184,68 +175,49 @@ def newton_step(balance: MixedBalance) -> Pressures:
     dx, dy = problem.spacing
     moves = problem.held is None
     missing = -balance.load_error * problem.load / (dx * dy) - known.sum() if moves else 0.0
-    system = _System(linear)
-    if system.whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
+
+    # unknowns: of the oil, of touching cells and, last, the approach; last equation: the missing load, or none
+    weight = real(1.0 / np.sqrt(count))
+    by_approach = linear.of_gap(np.zeros(cells, real), np.ones(cells, real))
+    response = linear.answer(*by_approach)
+    whole = float(linear.total(*response).sum())
+    if whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
         return Pressures(known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale)
-    wanted = system.joined(wet, closed.ravel()[system.touching], float(system.weight * missing))
-    far = balance.residual_rms > FAR_OFF
-    left = LEFT_SMOOTH if linear.follows_wedge else LEFT_FAR if far else LEFT
-    if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
-        left = LEFT_NEAR
-    solved = gmres(system.product, system.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
-    d_oil = known_oil + np.where(linear.lubricated, solved[:count].reshape(cells), zero)
-    d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
-    d_total.ravel()[system.touching] = solved[count:-1]
-    return Pressures(d_oil, d_total, float(solved[-1]))
 
+    touching = np.flatnonzero(linear.touching)
 
-class _System:
-    """Newton's step as one vector: of the oil in every cell, of the total pressure in touching ones, of the approach.
+    def split(vector: Field) -> tuple[Field, Field]:
+        solid = np.zeros(count, real)
+        solid[touching] = vector[count:-1]
+        return vector[:count].reshape(cells), solid.reshape(cells)
 
-    The last equation is the missing load, or none where the distance of the bodies is held.
-    """
-
-    def __init__(self, linear: MixedLinear) -> None:
-        self.linear, self.cells, self.real = linear, linear.cells, linear.real
-        self.count, self.moves = linear.free.size, linear.balance.problem.held is None
-        self.touching = np.flatnonzero(linear.touching)
-        self.dry = ~linear.lubricated
-        self.bears = (linear.free & linear.full if linear.conserves else linear.free).astype(self.real)
-        self.weight, self.contact_scale = self.real(1.0 / np.sqrt(self.count)), self.real(linear.rows.contact_scale)
-        gap = np.ones(self.cells, self.real)
-        self.by_approach = linear.answer(*linear.of_gap(np.zeros_like(gap), gap))[0]
-        self.whole = self.carried(self.by_approach) + float(self.contact_scale) * self.touching.size
-
-    def joined(self, oil: Field, solid: Field, last: float) -> Field:
-        """One vector."""
-        vector = np.empty(self.count + self.touching.size + 1, self.real)
-        vector[: self.count], vector[self.count : -1], vector[-1] = oil.ravel(), solid, last
+    def joined(oil: Field, solid: Field, last: float) -> Field:
+        vector = np.empty(count + touching.size + 1, real)
+        vector[:count], vector[count:-1], vector[-1] = oil.ravel(), solid.ravel()[touching], last
         return vector
 
-    def carried(self, d_oil: Field) -> float:
-        """Sum of the change of pressure that the oil makes in free cells."""
-        return float(np.vdot(self.bears, d_oil))
+    def product(vector: Field) -> Field:
+        d_oil, d_closed = split(vector)
+        d_total = linear.total(d_oil, d_closed)
+        wet, closed = linear.product(d_oil, d_total, float(vector[-1]))
+        carried = float(weight * d_total.sum()) if moves else float(vector[-1])
+        return joined(np.where(linear.lubricated, wet, d_oil), closed, carried)
 
-    def product(self, vector: Field) -> Field:
-        """The linearised equations."""
-        d_oil, d_closed, d_approach = vector[: self.count].reshape(self.cells), vector[self.count : -1], vector[-1]
-        d_total = d_oil * self.bears
-        carried = float(d_total.sum() + d_closed.sum())
-        d_total.ravel()[self.touching] = d_closed
-        d_gap = self.linear.balance.problem.deflection(d_total)
-        d_gap += d_approach
-        wet = self.linear.wet(d_oil, d_gap)
-        np.copyto(wet, d_oil, where=self.dry)
-        closed = d_gap.ravel()[self.touching] * self.contact_scale
-        return self.joined(wet, closed, float(self.weight * carried) if self.moves else float(d_approach))
+    def precondition(vector: Field) -> Field:
+        d_oil, d_closed = linear.answer(*split(vector))
+        if not moves:
+            return joined(d_oil, d_closed, float(vector[-1]))
+        d_approach = float((linear.total(d_oil, d_closed).sum() - vector[-1] / weight) / whole)
+        return joined(d_oil - d_approach * response[0], d_closed - d_approach * response[1], d_approach)
 
-    def precondition(self, vector: Field) -> Field:
-        """About what answers them."""
-        wet, d_closed, last = vector[: self.count].reshape(self.cells), vector[self.count : -1], float(vector[-1])
-        d_oil = self.linear.answer_wet(wet)
-        if not self.moves:
-            return self.joined(d_oil, d_closed, last)
-        carried = self.carried(d_oil) + float(d_closed.sum())
-        d_approach = self.real((carried - last / self.weight) / self.whole)
-        d_oil -= d_approach * self.by_approach
-        return self.joined(d_oil, d_closed - d_approach * self.contact_scale, float(d_approach))
+    wanted = joined(wet, closed, float(weight * missing))
+    left = LEFT_SMOOTH if linear.follows_wedge else LEFT
+    if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
+        left = LEFT_NEAR
+    solved = gmres(product, precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
+    d_oil, d_closed = split(solved)
+    d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)
+    d_total = np.where(
+        linear.free, linear.pressure_of(d_oil) - balance.solid_residual, np.where(linear.touching, d_closed, known)
+    )
+    return Pressures(d_oil, d_total, float(solved[-1]))

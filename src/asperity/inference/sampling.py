@@ -15,7 +15,7 @@ from scipy.special import logsumexp, ndtri
 from asperity.arrays import Field
 from asperity.errors import BadInput
 
-FIRST, BATCH, ROUNDS = 4096, 2048, 10  # draws from the prior, and of each round after it
+FIRST, BATCH, ROUNDS = 4096, 2048, 30  # draws from the prior, and of each round after it
 ENOUGH = 1000.0  # effective samples: a quantile is then known to a twentieth of the width
 QUICKLY = 200.0  # of one recording more
 FEWEST = 60.0  # below it a posterior was not found
