@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
 from asperity.ehl.iterate import Step
 from asperity.ehl.limit import StepLimit
 from asperity.ehl.linear import SingularFactor
@@ -18,6 +19,28 @@ PATIENCE, PROGRESS = 8, 0.9  # steps without progress, after which halves are ta
 LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
 BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
 FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
+CLOSE, AWAY = 0.1, 1.5  # from less than this left (rms, of p_h), a step that leaves so many times as much is halved ...
+SHORTEST_CUT = 0.1  # ... until it is shorter than this share
+
+
+class _Moves(NamedTuple):
+    """Where to from a balance: changes of all unknowns, as long as the steps before allow, and which share is taken."""
+
+    balance: MixedBalance
+    by: Pressures
+    share: float
+
+    def taken(self, cut: float = 1.0) -> tuple[Pressures, Mask]:
+        """The unknowns after a part of it, and which cells are then to be taken as free."""
+        problem, (_, total, approach), share = self.balance.problem, self.balance.unknowns, cut * self.share
+        free = self.balance.solid == FREE
+        signed = _moved(self.balance, share * self.by.oil)
+        oil = np.clip(signed, 0.0, problem.p_cap)
+        total = np.where(free, oil, np.clip(total + share * self.by.total, 0.0, problem.p_cap))
+        overborne = ~free & (oil > total)
+        freed = overborne & (self.balance.solid != CAPPED)  # in deep overlap it would be pressed shut and freed in turn
+        unknowns = Pressures(np.where(overborne, total, signed), total, approach + share * self.by.approach)
+        return unknowns, freed
 
 
 def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iterator[Step]:
@@ -29,10 +52,10 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     wanted_mean = problem.load / (unknowns.total.size * problem.spacing[0] * problem.spacing[1])
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
-    approach_before, change, freed = 0.0, np.inf, None
+    approach_before, change = 0.0, np.inf
     lowest, idle, share = np.inf, 0, 1.0
+    balance = evaluate(problem, unknowns, second_order=second_order)
     for number in count():
-        balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         try:
@@ -46,22 +69,28 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
             lowest, idle = balance.residual_rms, 0
         elif idle == PATIENCE:
             lowest, idle, share = balance.residual_rms, 0, 1.5 - share
-        free = balance.solid == FREE
-        closed = ~free & (balance.gap <= problem.contact_gap) & (balance.oil_pressure == unknowns.oil)
+        closed = (balance.solid != FREE) & (balance.gap <= problem.contact_gap) & (balance.oil_pressure == unknowns.oil)
         d_oil = np.where(
             closed | (unknowns.oil < 0.0), step.oil, oil_limit.limited(step.oil, np.abs(unknowns.oil), 0.0)
         )
-        signed = _moved(balance, share * d_oil)
-        oil = np.clip(signed, 0.0, problem.p_cap)
-        total = np.clip(unknowns.total + share * limit.limited(step.total, unknowns.total, 0.0), 0.0, problem.p_cap)
-        total = np.where(free, oil, total)
-        overborne = ~free & (oil > total)
-        freed = overborne & (balance.solid != CAPPED)  # in deep overlap it would be pressed shut and freed in turn
+        d_total = limit.limited(step.total, unknowns.total, 0.0)
         turned_back = step.approach * approach_before < 0.0 and abs(step.approach) > 0.5 * furthest
         furthest = 0.5 * furthest if turned_back else min(1.2 * furthest, most)
         approach_before = step.approach
-        approach = unknowns.approach + share * float(np.clip(step.approach, -furthest, furthest))
-        unknowns = Pressures(np.where(overborne, total, signed), total, approach)
+        by = Pressures(d_oil, d_total, float(np.clip(step.approach, -furthest, furthest)))
+        balance = _led(_Moves(balance, by, share), second_order=second_order)
+
+
+def _led(moves: _Moves, *, second_order: bool) -> MixedBalance:
+    """Where a step leads, cut short as long as near a solution it leads away: thin films close and open by turns."""
+    problem, left = moves.balance.problem, moves.balance.residual_rms
+    cut = 1.0
+    while True:
+        unknowns, freed = moves.taken(cut)
+        balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
+        if left >= CLOSE or balance.residual_rms <= AWAY * left or cut <= SHORTEST_CUT:
+            return balance
+        cut *= 0.5
 
 
 def _moved(balance: MixedBalance, step: Field) -> Field:

@@ -7,6 +7,7 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.ehl.dry import dry_contact
+from asperity.ehl.elastic import elastic_contact
 from asperity.ehl.iterate import Step, newton
 from asperity.ehl.locally import smoothed
 from asperity.ehl.mixed import Pressures
@@ -33,17 +34,24 @@ class Lubricated(NamedTuple):
 
 
 def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field, float]:
-    """Pressure and approach without oil, by Newton's steps from those on a `coarser` grid.
+    """Pressure and approach without oil, from those on a `coarser` grid or from Hertz's pressure.
 
-    From Hertz's pressure, or where that led nowhere, by conjugate gradients, and by Newton's steps where the cap is too
-    busy for these.
+    As elastic bodies, if these stay below the cap. Otherwise by Newton's steps from the coarser grid, and where that
+    leads nowhere by conjugate gradients, and by Newton's steps where the cap is too busy for these.
     """
-    dry = replace(problem, lubricant=None, contact_gap=0.0)
+    dry, guess = replace(problem, lubricant=None, contact_gap=0.0), problem.form.hertz(problem.x, problem.y)
     if coarser is not None:
-        step, met = _settled(dry, interpolated(coarser.total, problem.cells), coarser.approach - problem.contact_gap)
+        guess = interpolated(coarser.total, problem.cells)
+    if np.all(guess < problem.p_cap):
+        pressure, approach, met = elastic_contact(dry, guess, COARSE_TOLERANCE)
+        if met and np.all(pressure < problem.p_cap):
+            return pressure, approach
+    if coarser is not None:
+        step, met = _settled(dry, guess, coarser.approach - problem.contact_gap)
         if met:
             return step.balance.pressure, step.approach
-    pressure, approach, met = dry_contact(dry, problem.form.hertz(problem.x, problem.y), most_steps=MOST_GRADIENTS)
+        guess = problem.form.hertz(problem.x, problem.y)
+    pressure, approach, met = dry_contact(dry, guess, most_steps=MOST_GRADIENTS)
     if not met:
         step, _ = _settled(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
