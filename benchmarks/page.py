@@ -1,6 +1,7 @@
 """The live page in headless Chromium: from a turned knob to new maps, first content, three users, a file, memory.
 
 Needs the extra `page`, Playwright and Debian's chromium. Times are by the clock: the machine's load stands beside them.
+So does the processor time of a knob's step: in the server, in what solves, in the browser.
 """
 
 import os
@@ -11,8 +12,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,39 @@ def _resident(process: int) -> float:
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024.0  # type: ignore[index]
 
 
+def _spent(process: int) -> dict[str, float]:
+    """Processor time so far [s] of the page's server, of what solves for it, and of the browser."""
+    server, ours = _descendants(process), _descendants(os.getpid())
+    return {
+        "the server": _seconds([process]),
+        "solving": _seconds(server - {process}),
+        "the browser": _seconds(ours - server - {os.getpid()}),
+    }
+
+
+def _descendants(process: int) -> set[int]:
+    """A process and all that it and they have started."""
+    found, new = {process}, [process]
+    while new:
+        number = new.pop()
+        for task in Path(f"/proc/{number}/task").glob("*/children"):
+            with suppress(OSError):
+                children = {int(text) for text in task.read_text("ascii").split()} - found
+                found |= children
+                new += children
+    return found
+
+
+def _seconds(processes: Iterable[int]) -> float:
+    """Processor time of processes so far [s]; nothing of one that has ended meanwhile."""
+    ticks = 0
+    for number in processes:
+        with suppress(OSError):
+            fields = Path(f"/proc/{number}/stat").read_text("ascii").rpartition(")")[2].split()
+            ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
 def _memory(browser: Any, url: str, process: int, count: int) -> tuple[float, float]:
     """The server's memory before and after so many visits that have gone [MB]; each until its maps are there."""
 
@@ -110,7 +144,7 @@ def lines(*, fast: bool) -> Iterator[str]:
     """What was measured, as markdown."""
     from playwright.sync_api import sync_playwright
 
-    steps = 10 if fast else STEPS
+    steps, parts = 10 if fast else STEPS, dict[int, dict[str, float]]()
     path = shutil.which("chromium")
     if path is None:
         raise SystemExit("the live page is measured in chromium; apt-get install chromium")
@@ -138,7 +172,9 @@ def lines(*, fast: bool) -> Iterator[str]:
             for cells in (128, 256):
                 page.goto(f"{url}contact?grid.cells={cells}+x+{cells}")
                 _solved(page)
+                before = _spent(process)
                 first, whole = _steps(page, steps, cells)
+                parts[cells] = {name: (spent - before[name]) / steps for name, spent in _spent(process).items()}
                 yield _row(f"a knob to new maps, {cells} x {cells}, coarse", first)
                 yield _row(f"a knob to the full answer, {cells} x {cells}", whole)
             yield _row(f"a knob to the full answer, 128 x 128, {USERS} users at once", _crowd(browser, url, steps // 4))
@@ -147,6 +183,11 @@ def lines(*, fast: bool) -> Iterator[str]:
             yield _row(name, [_drop(browser, url, Path(folder), size)])
             before, after = _memory(browser, url, process, 20 if fast else SESSIONS)
             browser.close()
+        yield ""
+        yield "| processor time of a knob's step [s] | 128 x 128 | 256 x 256 |"
+        yield "|---|---|---|"
+        for name in parts[128]:
+            yield f"| {name} | {parts[128][name]:.2f} | {parts[256][name]:.2f} |"
         yield ""
         yield (
             f"{20 if fast else SESSIONS} visits come and gone: the server grew from {before:.0f} to {after:.0f} MB. "

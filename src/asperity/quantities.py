@@ -160,6 +160,17 @@ def with_deviation(value: float, deviation: float | None, form: str = ".4g") -> 
     return (f"({number}){power}" if power and shown else f"{number}{power}").replace("-", "−")
 
 
+def in_print(text: str) -> str:
+    """Prose with 1.3e-05 as 1.3×10⁻⁵, um as µm, and numbers that stay on one line with their unit."""
+    text = re.sub(r"\bum\b|(?<=\d )us\b", lambda unit: f"µ{unit[0][1]}", text)
+    text = re.sub(
+        r"\b\d(\.\d+)?e[+-]\d+",
+        lambda number: with_deviation(float(number[0]), None, f".{len(number[1] or '.') - 1}e"),
+        text,
+    )
+    return re.sub(r"(?<=\d) (?=[%±]|Hz|GPa|[µn]m\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
+
+
 @cache
 def catalogue() -> dict[str, Quantity]:
     """Every quantity by its key, in the order in which tables have them."""

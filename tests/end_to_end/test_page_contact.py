@@ -11,7 +11,7 @@ import x3pio
 
 from asperity.page.knobs import knobs_of
 from asperity.page.opening import paper
-from support.browser import Visit, chromium, serving
+from support.browser import Visit, chromium, require_operable, serving
 
 uploads = pytest.importorskip("asperity.page.uploads", reason="the extra page is not installed")
 
@@ -91,7 +91,7 @@ def film(page):
 
 def opacity(page):
     """How opaque the film map is shown."""
-    return page.locator(".block.film .bk-Column").first.evaluate("element => getComputedStyle(element).opacity")
+    return page.locator(".block.film").evaluate("element => getComputedStyle(element).opacity")
 
 
 def turn(page, name, text):
@@ -131,6 +131,13 @@ def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
     page.wait_for_function("() => location.search.includes('contact.load=530')")
     assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "530 N"
     assert page.get_by_role("textbox", name="Load, F").input_value() == "530 N"
+
+
+def test_every_control_is_named_and_reached_by_the_keyboard(visit):
+    page = visit.solved()
+    page.get_by_role("button", name="More knobs").click()
+    page.get_by_role("button", name="Fewer knobs").wait_for()
+    require_operable(page)
 
 
 def test_a_wrong_value_is_named_beside_its_knob(visit):

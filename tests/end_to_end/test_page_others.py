@@ -11,7 +11,7 @@ from asperity.cli import main
 from asperity.history import run_history
 from asperity.paper import papers_case
 from asperity.study import plan_study, run_study
-from support.browser import Visit, chromium, serving
+from support.browser import Visit, chromium, require_operable, serving
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
@@ -53,6 +53,7 @@ def test_dropped_recordings_show_their_resonance_or_why_not(browser, tmp_path, r
         page.locator("input[type=file]").set_input_files(sorted(rig.glob("*.h5")))
         page.get_by_text("8 recordings read").wait_for()
         page.get_by_text(re.compile("contact resonance found in 7 of 8 recordings")).wait_for()
+        require_operable(page)
         page.get_by_label("Recording", exact=True).select_option(index=1)
         page.wait_for_function("() => true")
         assert page.locator("table tbody tr").count() == 8
@@ -85,9 +86,10 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page = visit.go("study")
         page.get_by_text("Click a point to see its contact.").wait_for()
         page.get_by_label("A contact of the study").select_option(index=4)
-        page.get_by_text(re.compile("^surface.sq 1.5 um.*asperities carry")).wait_for()
+        page.get_by_text(re.compile("^surface.sq 1.5 µm.*asperities carry")).wait_for()
+        require_operable(page)
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
-        page.get_by_text("Turn its knobs").click()
+        page.get_by_role("link", name="Turn its knobs").click()
         page.get_by_text("Solved on 32 × 24 cells").wait_for()
         assert page.get_by_role("textbox", name="Composite roughness, Sq").input_value() == "1.5 um"
         assert page.locator("dl div", has_text="CLR").locator("dd").first.inner_text() == clr
@@ -100,6 +102,8 @@ def test_a_history_moves(browser, tmp_path):
         visit = Visit(browser, server)
         page = visit.go("history")
         page.get_by_text("Step 0, 0 µs, map 1 of 5").wait_for()
+        page.get_by_text(re.compile(r"in motion, .* 4 steps, .* µs\.$")).wait_for()
+        require_operable(page)
         page.get_by_role("slider", name="Step").focus()
         page.keyboard.press("ArrowRight")
         page.get_by_text(re.compile("^Step 1, .* map 2 of 5")).wait_for()

@@ -127,3 +127,36 @@ class Visit:
         self.context.close()
         assert self.foreign == []
         assert self.errors == []
+
+
+CONTROLS = {"button", "checkbox", "combobox", "link", "listbox", "radio", "slider", "spinbutton", "switch", "textbox"}
+FOCUSED = """() => {
+  let element = document.activeElement
+  while (element?.shadowRoot?.activeElement) element = element.shadowRoot.activeElement
+  window.reached ??= new Map()
+  if (!window.reached.has(element)) window.reached.set(element, window.reached.size)
+  return window.reached.get(element)
+}"""
+
+
+def require_operable(page) -> None:
+    """Every control and every picture has a name for a screen reader, and the Tab key comes to all controls."""
+    tree = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
+    roles = {node["nodeId"]: node["role"]["value"] for node in tree if "role" in node}
+    controls = [node for node in tree if not node["ignored"] and roles[node["nodeId"]] in CONTROLS]
+    pictures = [
+        node
+        for node in tree
+        if roles[node["nodeId"]] == "image" and not node["ignored"] and roles.get(node.get("parentId")) != "button"
+    ]  # an icon says what its button says
+    nameless = [node for node in (*controls, *pictures) if not node.get("name", {}).get("value", "").strip()]
+    assert [roles[node["nodeId"]] for node in nameless] == []
+    assert pictures
+    there = len(controls)
+    page.evaluate("() => { document.activeElement.blur(); scrollTo(0, 0) }")
+    for _ in range(2 * there):
+        page.keyboard.press("Tab")
+        reached = page.evaluate(FOCUSED) + 1
+        if reached >= there:
+            return
+    raise AssertionError(f"of {there} controls the Tab key comes to {reached}")

@@ -15,7 +15,7 @@ from asperity.ehl import moving_contact, own_resonance, solve_contact, tangent_s
 from asperity.errors import BadInput
 from asperity.history import history_vibration, load_history, run_history
 from asperity.history.vibration import repeating, resampled, steady_response
-from asperity.report.base import in_print
+from asperity.quantities import in_print
 from asperity.signals import Signal, power_spectrum
 from asperity.surface import MovingSurfaces, Surface, track_grid
 from asperity.vibration import ContactOscillator

@@ -202,6 +202,38 @@ def test_what_is_shown_is_old_until_its_answer_has_come():
     assert desk.status.startswith("Solved on 96 × 64 cells")
 
 
+@pytest.mark.parametrize("first", ["coarse", "full"])
+def test_where_there_is_room_the_full_answer_does_not_wait_for_the_coarse_one(first):
+    coarsely, fully = AtOnce(), AtOnce()
+    coarsely.held = fully.held = fully.has_room = True
+    desk = Desk(Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully)
+    desk.solve()
+    assert (len(coarsely.kept), len(fully.kept)) == (1, 1)
+    if first == "coarse":
+        coarsely.go()
+        assert (desk.answer.coarse, desk.pending, len(fully.kept)) == (True, True, 1)
+        fully.go()
+    else:
+        fully.go()
+        assert not desk.pending
+        coarsely.go()
+    assert (desk.answer.coarse, desk.pending, len(desk.trail)) == (False, False, 1)
+    assert (coarsely.kept, fully.kept) == ([], [])
+
+
+def test_without_room_the_full_answer_is_asked_for_after_the_coarse_one():
+    coarsely, fully = AtOnce(), AtOnce()
+    coarsely.held = fully.held = True
+    fully.has_room = False
+    desk = Desk(Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully)
+    desk.solve()
+    assert fully.kept == []
+    coarsely.go()
+    assert len(fully.kept) == 1
+    fully.go()
+    assert not desk.answer.coarse
+
+
 def test_a_wrong_value_keeps_its_sentence_and_marks_the_picture_until_it_is_mended():
     desk, _, _ = desk_of()
     desk.solve()

@@ -4,6 +4,7 @@ import os
 import queue
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from types import SimpleNamespace
 
 import pytest
 
@@ -33,6 +34,19 @@ class Bench:
     def submit(self, function, *arguments):
         self.begun.append((function, arguments, Future()))
         return self.begun[-1][2]
+
+
+@pytest.mark.parametrize("running", [0, 1, 2])
+def test_a_workshop_has_room_while_a_worker_has_nothing_to_do(monkeypatch, running):
+    workshop, futures = Workshop(workers=2), [Future() for _ in range(running)]
+    waiting = iter(futures)
+    monkeypatch.setattr(workshop, "_pool", SimpleNamespace(submit=lambda *_arguments: next(waiting)))
+    for _ in futures:
+        workshop.submit(str)
+    assert workshop.has_room == (running < 2)
+    for future in futures:
+        future.set_result("")
+    assert workshop.has_room
 
 
 def at_once(function):

@@ -12,7 +12,7 @@ from asperity.page.answer import Answer
 from asperity.page.desk import Desk
 from asperity.page.figures import SPECTRUM_HEIGHT, TRAIL_HEIGHT, Spectrum, Trail
 from asperity.page.jobs import Queue, Workshop
-from asperity.page.pictures import OLD, Pictures, place
+from asperity.page.pictures import Pictures, place
 from asperity.page.settings import Settings, held_in
 from asperity.page.shelf import Shelf
 from asperity.page.uploads import Drop
@@ -24,8 +24,10 @@ from asperity.page.widgets import (
     TILE_STYLES,
     Handout,
     KnobWidget,
+    OldMark,
     button,
     button_row,
+    notes,
     sentences,
     text_block,
     tiles,
@@ -62,7 +64,7 @@ class ContactView:
         self._shelf = shelf
         self._set_address, self._write_report = set_address, write_report
         self._workshop, self._deliver = workshop, deliver
-        self.desk = Desk(settings, Queue(workshop, deliver), self.draw)
+        self.desk = Desk(settings, Queue(workshop, deliver), self.draw, Queue(workshop, deliver))
         self._side = Queue(workshop, deliver)
         self.pictures = Pictures()
         self.hearing, self.share, self.pitch = place(SPECTRUM_HEIGHT), place(TRAIL_HEIGHT), place(TRAIL_HEIGHT)
@@ -71,6 +73,7 @@ class ContactView:
         self._unmade = [*self.pictures.steps(), self._make_spectrum, self._make_trail]
         self.status, self.verdict, self.notes, self.said = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
+        self.old = OldMark(self.status)
         self.handout = Handout()
         self.knobs: dict[str, KnobWidget] = {}
         self._built: Case | None = None
@@ -130,7 +133,7 @@ class ContactView:
         for key, widget in self.knobs.items():
             refusal = desk.refusals.get(key)
             widget.show(refusal.text if refusal else desk.settings.text(key), refusal.sentence if refusal else "")
-        self._mark(desk.stale)
+        self.old.show(desk.stale)
         if desk.answer is not None:
             self.tiles.text = tiles(desk.answer.tiles, desk.answer, desk.pinned, old=desk.pending)
             if (desk.answer, desk.pinned) != self._drawn:
@@ -143,7 +146,7 @@ class ContactView:
         if answer.coarse:
             return
         self.verdict.text = sentences([answer.verdict], "" if answer.converged else "alarm")
-        self.notes.text = sentences(answer.notes, "soft")
+        self.notes.text = notes(answer.notes)
         self._draw_spectrum()
         self._draw_trail()
         self._set_address(self.desk.settings.address)
@@ -166,13 +169,6 @@ class ContactView:
     def _draw_trail(self) -> None:
         if self._trail is not None:
             self._trail.show(self.desk.trail)
-
-    def _mark(self, old: bool) -> None:
-        """Mark a picture that is not of the knobs as they are set."""
-        sheets = [OLD] if old else []
-        self.pictures.mark(sheets)
-        if self.hearing.stylesheets != sheets:
-            self.hearing.stylesheets = sheets
 
     def _say(self, *lines: str) -> None:
         self.said.text = sentences(lines, "alarm")
@@ -297,7 +293,7 @@ def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         {"names": ["change"]},
         {"names": ["cut", "spectrum"]},
         {"names": ["share", "pitch"], "heading": "What was tried"},
-        {"names": ["notes"], "heading": "To read with the numbers"},
+        {"names": ["notes"]},
         {"names": ["handout"]},
     ]
     return parts, [

@@ -1,7 +1,7 @@
 """Desk: one user's contact without its widgets: what is turned, what is solved, pinned and tried.
 
-A turned knob is answered twice, coarsely from the coarse solution before and then in full. Whoever draws a desk is told
-when it changes.
+A turned knob is answered twice, coarsely from the coarse solution before and in full: after that, or at the same time
+where a processor has nothing else to do. Whoever draws a desk is told when it changes.
 """
 
 from collections.abc import Callable
@@ -29,22 +29,29 @@ class Tried:
 
 
 class Desk:
-    """A contact, its knobs and what became of it."""
+    """A contact, its knobs and what became of it.
 
-    def __init__(self, settings: Settings, queue: Queue, changed: Callable[[], None]) -> None:
+    Parameters
+    ----------
+    settings : what is set at first
+    queue : of coarse answers
+    changed : called whenever there is something new to draw
+    ahead : of full answers, which begins them early where it has room; None: `queue` takes them in their turn
+    """
+
+    def __init__(
+        self, settings: Settings, queue: Queue, changed: Callable[[], None], ahead: Queue | None = None
+    ) -> None:
         self.settings = settings
         self.refusals: dict[str, Refusal] = {}
         self.answer: Answer | None = None
         self.problem = ""
         self.pinned: Answer | None = None
         self.trail: list[Tried] = []
-        self._queue, self._changed = queue, changed
+        self._queue, self._changed, self._ahead = queue, changed, ahead
+        self.pending = False  # whether what is shown is not yet the contact that is asked for
+        self._begun = False  # whether the full answer is on its way
         self._start: ContactSolution | None = None
-
-    @property
-    def pending(self) -> bool:
-        """Whether what is shown is not yet the contact that is asked for."""
-        return self._queue.busy
 
     @property
     def status(self) -> str:
@@ -74,8 +81,15 @@ class Desk:
     def solve(self) -> None:
         """Have the contact solved as it is set."""
         self.problem = ""
+        self.pending, self._begun = True, False
         self._queue.ask((solve_coarsely, (self.settings.case, self._start)), self._coarsely)
+        if self._ahead is not None and self._ahead.has_room:
+            self._solve_fully(self._ahead)
         self._changed()
+
+    def _solve_fully(self, queue: Queue) -> None:
+        self._begun = True
+        queue.ask((solve_fully, (self.settings.case,)), self._fully)
 
     def turn(self, key: str, text: str) -> None:
         """Set a knob and have the contact solved, or keep the sentence that says why it cannot be."""
@@ -129,6 +143,8 @@ class Desk:
     def close(self) -> None:
         """Let go of everything that takes memory."""
         self._queue.close()
+        if self._ahead is not None:
+            self._ahead.close()
         self.answer = self.pinned = self._start = None
         self.trail.clear()
 
@@ -139,8 +155,11 @@ class Desk:
         assert isinstance(result, Coarse)
         if result.solution is not None:
             self._start = result.solution
+        if not self.pending:
+            return  # the full answer was there before
         self.answer = result.answer or self.answer
-        self._queue.ask((solve_fully, (self.settings.case,)), self._fully)
+        if not self._begun:
+            self._solve_fully(self._ahead or self._queue)
         self._changed()
 
     def _fully(self, result: Any) -> None:
@@ -148,7 +167,7 @@ class Desk:
             self._refuse(result)
             return
         assert isinstance(result, Answer)
-        self.answer = result
+        self.answer, self.pending = result, False
         if result.converged:
             row = result.row
             tried = Tried(self.settings, row["sq_m"], row["clr"], row.get("crf_hz"), result.determined)
@@ -157,5 +176,5 @@ class Desk:
         self._changed()
 
     def _refuse(self, refused: Refused) -> None:
-        self.problem = refused.sentence
+        self.problem, self.pending = refused.sentence, False
         self._changed()

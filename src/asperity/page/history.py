@@ -10,7 +10,7 @@ from asperity.page.figures import BLUE, VERMILION, plain_figure, shown
 from asperity.page.jobs import Queue, Workshop
 from asperity.page.looking import Moved, open_history
 from asperity.page.pictures import Pictures
-from asperity.page.widgets import BAR, LOOK, button, sentences, text_block
+from asperity.page.widgets import BAR, LOOK, button, notes, sentences, text_block
 from asperity.page.work import Refused
 from asperity.quantities import quantity
 
@@ -59,7 +59,7 @@ class HistoryView:
             return
         moved: Moved = result
         self.moved = moved
-        self.verdict.text, self.notes.text = sentences([moved.verdict]), sentences(moved.notes, "soft")
+        self.verdict.text, self.notes.text = sentences([moved.verdict]), notes(moved.notes)
         self._draw_curves(moved)
         if not moved.pictures:
             self.status.text = sentences(["No maps were kept of this history."], "soft")
@@ -114,9 +114,9 @@ def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         {"names": ["film", "pressure"], "key": key, "first": True},
         {"names": ["cutpressure", "cutfilm"]},
         {"names": ["curves"], "heading": "Over time"},
-        {"names": ["notes"], "heading": "To read with the numbers"},
+        {"names": ["notes"]},
     ]
     return parts, [
-        {"kind": "knobs", "label": "Steps", "blocks": [{"names": ["step"]}, {"names": ["play"]}]},
+        {"kind": "knobs", "label": "Steps", "blocks": [{"names": ["step"], "heading": "Steps"}, {"names": ["play"]}]},
         {"kind": "shown", "label": "The history", "blocks": shown_parts},
     ]

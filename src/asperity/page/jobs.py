@@ -14,7 +14,7 @@ from asperity.page.work import Refused, Superseded, Ticket, set_up, told, warm
 from asperity.processes import cores
 
 MOST_WORKERS = 4
-SLOTS = 4096  # sessions at a time
+SLOTS = 4096  # of queues at a time, three a session
 
 Work = tuple[Callable[..., Any], tuple[Any, ...]]  # what a worker calls, and with what after its ticket
 _log = getLogger(__name__)
@@ -31,6 +31,7 @@ class Workshop:
         self.workers = workers or max(1, min(MOST_WORKERS, cores()))
         self._pool = self._new_pool()
         self.warming: list[Future[float]] = []
+        self._begun: set[Future[Any]] = set()
 
     def _new_pool(self) -> Executor:
         return ProcessPoolExecutor(self.workers, self._context, set_up, (self.newest,))
@@ -47,10 +48,18 @@ class Workshop:
     def submit(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Let a worker do it; what it refuses comes back as `Refused`."""
         try:
-            return self._pool.submit(told, work, *arguments)
+            future = self._pool.submit(told, work, *arguments)
         except (BrokenExecutor, RuntimeError):
             self._pool = self._new_pool()  # a worker died, of memory perhaps: the others are new too
-            return self._pool.submit(told, work, *arguments)
+            future = self._pool.submit(told, work, *arguments)
+        self._begun.add(future)
+        future.add_done_callback(self._begun.discard)
+        return future
+
+    @property
+    def has_room(self) -> bool:
+        """Whether a worker has nothing to do."""
+        return len(self._begun) < self.workers
 
     def slot(self) -> int:
         """A place in the table for a session; -1 where all are taken, and nothing of it can be called back."""
@@ -90,6 +99,11 @@ class Queue:
     def busy(self) -> bool:
         """Whether something is being worked on."""
         return self._running
+
+    @property
+    def has_room(self) -> bool:
+        """Whether what is asked for would be begun at once, or takes the place of what is."""
+        return self._running or self._workshop.has_room
 
     def ask(self, work: Work, arrived: Callable[[Any], None]) -> None:
         """Have something done, and be called with what came of it unless something newer was asked for meanwhile."""

@@ -11,8 +11,6 @@ from asperity.page.answer import Picture
 from asperity.page.figures import CUT_HEIGHT, HEIGHT, Cut, Maps
 from asperity.quantities import quantity
 
-OLD = ":host { opacity: .55; }"
-
 
 def place(height: int) -> Column:
     """Where a figure will stand, so that nothing moves when it comes."""
@@ -47,12 +45,6 @@ class Pictures:
         self._shown = picture, pinned
         self._draw_maps()
         self._draw_cut()
-
-    def mark(self, sheets: list[str]) -> None:
-        """Give all of them these style sheets."""
-        for made in (self.film, self.pressure, self.cut_pressure, self.cut_film):
-            if made.stylesheets != sheets:
-                made.stylesheets = sheets
 
     def _make_maps(self) -> None:
         self._maps = Maps(self._cut_at)

@@ -16,7 +16,7 @@ from asperity.page.figures import BLUE, GREY, VERMILION, plain_figure
 from asperity.page.hearing import Heard, Stated, hear_files, hear_folder
 from asperity.page.jobs import Queue, Workshop
 from asperity.page.uploads import Drop
-from asperity.page.widgets import DROP, LOOK, TABLE, button, sentences, text_block
+from asperity.page.widgets import DROP, LOOK, TABLE, button, notes, sentences, text_block
 from asperity.page.work import Refused
 from asperity.quantities import quantity
 
@@ -183,7 +183,7 @@ class RecordingsView:
         watched = "; the folder is watched" if self.watches else ""
         self._tell(f"{len(heard.rows)} recordings read{waiting}{watched}.")
         self.verdict.text = sentences([heard.verdict], "alarm" if heard.alarm == "alarm" else "")
-        self.notes.text = sentences(heard.notes, "soft")
+        self.notes.text = notes(heard.notes)
         self.table.text = _table(heard)
         self._draw_waterfall(heard)
         self._draw_track(heard)
@@ -272,7 +272,7 @@ def layout(view: RecordingsView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         {"names": ["choice"]},
         {"names": ["one"]},
         {"names": ["table"], "heading": "Recordings"},
-        {"names": ["notes"], "heading": "To read with the numbers"},
+        {"names": ["notes"]},
     ]
     return parts, [
         {"kind": "knobs", "label": "What is stated of the recordings", "blocks": stated},

@@ -13,6 +13,7 @@ from urllib.parse import urlencode
 
 import panel
 from bokeh.models import UIElement
+from tornado.ioloop import PeriodicCallback
 from tornado.iostream import StreamClosedError
 from tornado.web import RedirectHandler
 from tornado.websocket import WebSocketClosedError
@@ -20,6 +21,8 @@ from tornado.websocket import WebSocketClosedError
 from asperity.errors import BadInput
 from asperity.page import contact, history, recordings, study
 from asperity.page.jobs import Workshop
+from asperity.page.leaving import LOOK_MS as SWEPT_MS
+from asperity.page.leaving import Sweeper, settle
 from asperity.page.opening import Opened
 from asperity.page.settings import Settings
 from asperity.page.shelf import Shelf
@@ -31,7 +34,7 @@ PASSWORD = "ASPERITY_PAGE_PASSWORD"
 USER = "asperity"  # under whom everybody comes in; the page for the password says so
 SHORTEST = 8  # characters of a password
 LOOK_MS, FRAME_MS = 5000, 250  # between two looks at a folder, and two steps of a history
-WAIT_MS = 15_000  # for a visitor that has gone
+WAIT_MS = 120_000  # for a visitor that has not come yet: without the document it was sent it would see an empty page
 PING_S = 120  # between two questions whether a visitor is still there, who has as long to answer
 MESSAGE = 24_000_000  # bytes that a browser may send at a time
 
@@ -109,6 +112,7 @@ class House:
         parts, sections = contact.layout(view)
         view.begin(_query(), self.opened.answer)
         _document().on_event("document_ready", lambda _event: view.furnish())
+        _document().js_on_event("document_ready", view.old.tell)
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections)
 
@@ -263,12 +267,14 @@ def serve_page(
             extra_patterns=[("/", RedirectHandler, {"url": f"/{opened.kind}", "permanent": False})],
             keep_alive_milliseconds=0,  # Bokeh's own takes the session from a socket that has still to close
             websocket_ping_interval=PING_S,
-            check_unused_sessions_milliseconds=WAIT_MS // 3,
+            check_unused_sessions_milliseconds=SWEPT_MS,
             unused_session_lifetime_milliseconds=WAIT_MS,
             websocket_max_message_size=MESSAGE,
             **guarded,
         )
         server.start()
+        settle()
+        PeriodicCallback(Sweeper(server.get_sessions).look, SWEPT_MS).start()
         ready(f"http://{f'[{listen}]' if ':' in listen else listen}:{port}/")
         server.io_loop.start()
     finally:

@@ -9,14 +9,15 @@ from bokeh.models import Band, BasicTicker, ColumnDataSource, Select
 from markupsafe import Markup
 
 from asperity.case import Case
+from asperity.page.answer import Answer
 from asperity.page.figures import BLUE, VERMILION, plain_figure, shown
 from asperity.page.jobs import Queue, Workshop
 from asperity.page.looking import Swept, open_study, solve_row
 from asperity.page.pictures import Pictures
 from asperity.page.settings import Settings
-from asperity.page.widgets import LOOK, MAP_KEY, TILE_STYLES, sentences, text_block, tiles
+from asperity.page.widgets import LOOK, MAP_KEY, TILE_STYLES, OldMark, notes, sentences, text_block, tiles
 from asperity.page.work import Refused
-from asperity.quantities import quantity
+from asperity.quantities import in_print, quantity
 from asperity.study import as_written
 
 
@@ -32,6 +33,8 @@ class StudyView:
         self._rows: list[int] = []
         self.status, self.verdict, self.notes, self.chosen, self.way = (text_block() for _ in range(5))
         self.tiles = text_block(TILE_STYLES)
+        self.old = OldMark(self.chosen)
+        self._answer: Answer | None = None
         look: dict[str, Any] = {"sizing_mode": "stretch_width", "stylesheets": [LOOK], "margin": (0, 0, 6, 0)}
         self.across, self.up = Select(title="Over", **look), Select(title="Of the contact", **look)
         self.point = Select(title="A contact of the study", **look)
@@ -56,7 +59,7 @@ class StudyView:
     def close(self) -> None:
         """Give back what the session took."""
         self._queue.close()
-        self.swept = None
+        self.swept = self._answer = None
 
     def _read(self, result: Any) -> None:
         if isinstance(result, Refused):
@@ -64,11 +67,11 @@ class StudyView:
             return
         swept: Swept = result
         self.swept = swept
-        self.verdict.text, self.notes.text = sentences([swept.verdict]), sentences(swept.notes, "soft")
+        self.verdict.text, self.notes.text = sentences([swept.verdict]), notes(swept.notes)
         told = "Click a point to see its contact." if swept.axes else "Nothing was swept; choose a contact below."
         self.status.text = sentences([told], "soft")
         self._rows = list(range(len(swept.numbers)))
-        labels = [(str(row), f"{swept.numbers[row]}: {self._words(row)}") for row in self._rows]
+        labels = [(str(row), in_print(f"{swept.numbers[row]}: {self._words(row)}")) for row in self._rows]
         self.point.update(options=[("", "choose one"), *labels], value="")
         if swept.axes and swept.outputs:
             first = next(iter(swept.outputs))
@@ -91,7 +94,7 @@ class StudyView:
         lows, highs = (np.where(np.isfinite(ends), ends, mean) for ends in (low, high))
         parts: Mapping[str, Any] = {"mean": mean, "low": lows, "high": highs}
         self._means.data = {"x": x, **{name: shown(entry.key, values) for name, values in parts.items()}}
-        self.figure.xaxis.axis_label = f"{axis.key} [{axis.unit}]" if axis.unit else axis.key
+        self.figure.xaxis.axis_label = f"{axis.key} [{in_print(axis.unit)}]" if axis.unit else axis.key
         self.figure.yaxis.axis_label = entry.axis
         ticks = dict(enumerate(axis.names))
         self.figure.xaxis.ticker = list(ticks) if ticks else BasicTicker()
@@ -106,6 +109,7 @@ class StudyView:
         if swept is None or not row.isdigit():
             return
         number = int(row)
+        self._mark(old=True)
         self.chosen.text = sentences([f"Solving {self._words(number)} ..."], "soft")
         self._queue.ask((solve_row, (self._folder, swept.numbers[number])), lambda result: self._solved(result, number))
 
@@ -114,11 +118,18 @@ class StudyView:
             self.chosen.text = sentences([result.sentence], "alarm")
             return
         self.chosen.text = sentences([f"{self._words(row)}: {result.verdict}"])
-        self.tiles.text = tiles(result.tiles, result, None, old=False)
+        self._answer = result
+        self._mark(old=False)
         self.pictures.make()
         self.pictures.show(result)
         link = Markup('<p><a href="contact?{}">Turn its knobs</a></p>')
         self.way.text = link.format(self._address(row))
+
+    def _mark(self, *, old: bool) -> None:
+        """Show the contact's numbers and pictures as those of the chosen point, or of the one before."""
+        if self._answer is not None:
+            self.tiles.text = tiles(self._answer.tiles, self._answer, None, old=old)
+            self.old.show(old)
 
     def _address(self, row: int) -> str:
         """A row's settings as an address of the contact's page; what is no knob there stays as the study has it."""
@@ -155,7 +166,7 @@ def layout(view: StudyView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         {"names": ["tiles"]},
         {"names": ["film", "pressure"], "key": MAP_KEY},
         {"names": ["cutpressure", "cutfilm"]},
-        {"names": ["notes"], "heading": "To read with the numbers"},
+        {"names": ["notes"]},
     ]
     return parts, [
         {"kind": "knobs", "label": "What is shown of the study", "blocks": choices},

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from asperity.page.answer import Answer, Tile, difference
 from asperity.page.knobs import Knob
+from asperity.quantities import in_print
 
 LOOK = """
 :host { color: var(--ink); font: inherit; }
@@ -37,6 +38,7 @@ DROP = """
 WRONG = ".bk-input { border-color: var(--alarm); border-width: 2px; }"
 SENTENCE = """
 p { margin: 2px 0 4px; }
+h2 { font-size: 1rem; margin: 18px 0 6px; }
 a { color: var(--accent); }
 .alarm { color: var(--alarm); font-weight: 600; }
 .soft { color: var(--soft); }
@@ -72,8 +74,13 @@ def text_block(styles: str = SENTENCE) -> Div:
 
 
 def sentences(lines: Iterable[str], kind: str = "") -> Markup:
-    """Sentences as paragraphs, whatever stands in them escaped."""
-    return Markup("").join(Markup('<p class="{}">{}</p>').format(kind, line) for line in lines)
+    """Sentences as paragraphs, their units as in print, whatever stands in them escaped."""
+    return Markup("").join(Markup('<p class="{}">{}</p>').format(kind, in_print(line)) for line in lines)
+
+
+def notes(lines: Sequence[str]) -> Markup:
+    """What is to be read with the numbers, under its heading; nothing where there is nothing."""
+    return Markup("<h2>To read with the numbers</h2>") + sentences(lines, "soft") if lines else Markup("")
 
 
 def tiles(shown: Sequence[Tile], answer: Answer, pinned: Answer | None, *, old: bool) -> Markup:
@@ -166,6 +173,29 @@ def button(words: str, pressed: Callable[[], None]) -> Button:
 def button_row(*buttons: Any) -> Row:
     """Buttons beside one another, in as many lines as they need."""
     return Row(*buttons, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}, stylesheets=[INHERIT])
+
+
+class OldMark:
+    """Says to the page's style sheet whether a picture is of another setting, so that no figure is laid out anew.
+
+    Parameters
+    ----------
+    carrier : a model of the page, whose tags hold what the browser is told by
+    """
+
+    def __init__(self, carrier: Any) -> None:
+        self._source = ColumnDataSource({"old": [False]})
+        self.tell = CustomJS(args={"source": self._source}, code=_MARK)
+        self._source.js_on_change("data", self.tell)
+        carrier.tags = [self._source]
+
+    def show(self, old: bool) -> None:
+        """Mark the picture, or mark it no more."""
+        if self._source.data["old"] != [old]:
+            self._source.data = {"old": [old]}
+
+
+_MARK = 'document.documentElement.toggleAttribute("data-old", source.data.old[0])'
 
 
 class Handout:

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from asperity.files import require_writable, whole_file
 from asperity.paper import CITATION
-from asperity.quantities import Quantity, quantity, with_deviation
+from asperity.quantities import Quantity, in_print, quantity
 from asperity.report.style import ON_PAGE, ON_PAPER, ON_TELEPHONE, Medium, svg, write_figure
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none';"
@@ -116,17 +116,6 @@ def span(quantity: Quantity, values: Collection[float]) -> str:
 def capitalised(text: str) -> str:
     """The text with a capital first letter."""
     return text[:1].upper() + text[1:]
-
-
-def in_print(text: str) -> str:
-    """Prose with 1.3e-05 as 1.3×10⁻⁵, um as µm, and numbers that stay on one line with their unit."""
-    text = re.sub(r"\bum\b|(?<=\d )us\b", lambda unit: f"µ{unit[0][1]}", text)
-    text = re.sub(
-        r"\b\d(\.\d+)?e[+-]\d+",
-        lambda number: with_deviation(float(number[0]), None, f".{len(number[1] or '.') - 1}e"),
-        text,
-    )
-    return re.sub(r"(?<=\d) (?=[%±]|Hz|GPa|[µn]m\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
 
 
 def render(template: str, *, script: str = "", **values: Any) -> str:

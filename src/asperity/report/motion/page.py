@@ -8,9 +8,9 @@ from pathlib import Path
 
 from asperity.errors import BadInput
 from asperity.history import History, HistoryVibration
-from asperity.quantities import quantity
+from asperity.quantities import in_print, quantity
 from asperity.report import moving
-from asperity.report.base import in_print, render, tile, write_page
+from asperity.report.base import render, tile, write_page
 from asperity.report.motion import exhibits
 
 NUMBERS = (

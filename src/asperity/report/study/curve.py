@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 
 from asperity.arrays import Field
 from asperity.paper import PAPER_ANCHORS, RIG_SPLIT_UM, SPLIT_ANCHOR, Anchor, rig_deviation, rig_prediction
-from asperity.quantities import quantity
-from asperity.report.base import Exhibit, in_print
+from asperity.quantities import in_print, quantity
+from asperity.report.base import Exhibit
 from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, SPLIT_COLOUR, VERMILION, Medium
 from asperity.study import StudyOverview, WearCurve

@@ -7,8 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from asperity.quantities import quantity
-from asperity.report.base import in_print
+from asperity.quantities import in_print, quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.study.keys import NAMES
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, STYLE, VERMILION

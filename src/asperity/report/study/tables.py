@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.quantities import NO_VALUE, Quantity, quantity
-from asperity.report.base import in_print
+from asperity.quantities import NO_VALUE, Quantity, in_print, quantity
 from asperity.report.study.curve import stage_names, surfaces_a_point
 from asperity.report.study.keys import axis_label, place_in_words
 from asperity.study import StudyOverview, as_written

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from asperity.arrays import Field
 from asperity.errors import BadInput
-from asperity.quantities import quantity
-from asperity.report.base import Exhibit, in_print
+from asperity.quantities import in_print, quantity
+from asperity.report.base import Exhibit
 from asperity.report.drawing import (
     display,
     draw_intervals,

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.quantities import NO_VALUE, quantity
-from asperity.report.base import Exhibit, Picture, Tile, capitalised, in_print, render, write_page
+from asperity.quantities import NO_VALUE, in_print, quantity
+from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
 from asperity.report.track import exhibits
 from asperity.tracking import Track, TrackedRecording
 from asperity.wear import ALERTS, IN_WORDS

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from asperity.ageing import Frame, WearHistory, of_body
 from asperity.paper import is_papers_contact
-from asperity.quantities import quantity
+from asperity.quantities import in_print, quantity
 from asperity.report import moving
-from asperity.report.base import heading, in_print, render, tile, write_page
+from asperity.report.base import heading, render, tile, write_page
 from asperity.report.wearing import exhibits
 
 TILES = ("sq_m", "clr", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
