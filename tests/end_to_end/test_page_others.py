@@ -86,7 +86,7 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page = visit.go("study")
         page.get_by_text("Click a point to see its contact.").wait_for()
         page.get_by_label("A contact of the study").select_option(index=4)
-        page.get_by_text(re.compile("^surface.sq 1.5 µm.*asperities carry")).wait_for()
+        page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         require_operable(page)
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
         page.get_by_role("link", name="Turn its knobs").click()
