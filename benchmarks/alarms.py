@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.tracking.alarming import CRF_LEAST, LEVEL_LEAST
+from asperity.tracking.operating import ANY_CONTACT, LEVEL, Operating, conditions_of
 from asperity.wear import FALSE_ALARMS, Alarm, Sight, Watched, sequential_alarm, split_stages
 
 SERIES, RECORDINGS = 300, 40
@@ -26,11 +27,16 @@ CYCLES = (6.0, 8.0, 12.0, 24.0)  # recordings a day
 
 
 class Drawn(NamedTuple):
-    """CRF over its first value, logarithm of the level; the recording at which the severe stage begins, if it does."""
+    """CRF over its first value, logarithm of the level; the recording at which the severe stage begins, if it does.
+
+    `load` [N] and `temperature` [degC] as measured, where they are given.
+    """
 
     crf: np.ndarray
     level: np.ndarray
     begins: float = np.nan
+    load: np.ndarray | None = None
+    temperature: np.ndarray | None = None
 
 
 def remembered(rng: np.random.Generator, memory: float) -> np.ndarray:
@@ -97,6 +103,52 @@ def steepening(rng: np.random.Generator) -> Drawn:
     return drawn(rng, 1.0 + 0.012 * np.maximum(NUMBER - rng.integers(10, 30), 0.0))
 
 
+def under_load(rng: np.random.Generator, load: np.ndarray, memory: float = 0.0) -> Drawn:
+    """CRF as load to the power of 0.1 to 0.3, the level as that of 0 to 1; the load measured to 1 %."""
+    ln = np.log(load / load[0])
+    one = drawn(rng, np.exp(rng.uniform(0.1, 0.3) * ln), rng.uniform(0.0, 1.0) * ln, memory)
+    return one._replace(load=load * (1.0 + 0.01 * rng.standard_normal(RECORDINGS)))
+
+
+def given_step(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
+    return under_load(rng, 500.0 * rng.uniform(1.1, 2.0) ** (rng.choice([-1.0, 1.0]) * after(rng)), memory)
+
+
+def in_turns(rng: np.random.Generator) -> Drawn:
+    return under_load(rng, np.where(rng.random(RECORDINGS) < 0.5, 500.0, 800.0))
+
+
+def warmth(rng: np.random.Generator, temperature: np.ndarray, memory: float = 0.0) -> Drawn:
+    """CRF and level as powers of an oil's viscosity: Vogel's, of 30 to 300 mPa s at 40 degC; measured to 0.5 K."""
+    thin = 1000.0 * (1.0 / (temperature + 95.0) - 1.0 / 135.0)
+    size = rng.uniform(0.02, 0.12) / np.ptp(thin)
+    one = drawn(rng, np.exp(-size * (thin - thin[-1])), -rng.uniform(0.0, 0.3) * (thin - thin[-1]), memory)
+    return one._replace(temperature=temperature + 0.5 * rng.standard_normal(RECORDINGS))
+
+
+def given_warm_up(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
+    cold = np.exp(-NUMBER / rng.uniform(2.0, 8.0))
+    return warmth(rng, rng.uniform(50.0, 80.0) - rng.uniform(25.0, 45.0) * cold, memory)
+
+
+def given_days(rng: np.random.Generator) -> Drawn:
+    return warmth(rng, 60.0 + rng.uniform(5.0, 15.0) * np.sin(2.0 * np.pi * (NUMBER / rng.choice(CYCLES))))
+
+
+def given_season(rng: np.random.Generator) -> Drawn:
+    return warmth(rng, 45.0 + rng.uniform(-20.0, 20.0) * NUMBER / RECORDINGS)
+
+
+GIVEN: dict[str, Callable[[np.random.Generator], Drawn]] = {
+    "load step, load given": given_step,
+    "load step, load given, scatter remembers 0.7": lambda rng: given_step(rng, 0.7),
+    "two loads in turns, load given": in_turns,
+    "warm-up, oil temperature given": given_warm_up,
+    "warm-up, oil temperature given, scatter remembers 0.7": lambda rng: given_warm_up(rng, 0.7),
+    "days of 10 to 30 K, oil temperature given": given_days,
+    "season of up to 20 K, oil temperature given": given_season,
+}
+
 WITHOUT_WEAR: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "white scatter": drawn,
     "scatter that remembers 0.7": lambda rng: drawn(rng, memory=0.7),
@@ -125,11 +177,26 @@ def knee(rng: np.random.Generator, scatter_hz: float, memory: float = 0.0) -> Dr
     return Drawn((course + scatter_hz * remembered(rng, memory)) / CRF_HZ, 0.1 * remembered(rng, 0.0), begins)
 
 
+def knee_under_load(rng: np.random.Generator, scatter_hz: float) -> Drawn:
+    """The rig's knee under two loads in turns, which move CRF by 9 %."""
+    one, load = knee(rng, scatter_hz), np.where(rng.random(RECORDINGS) < 0.5, 500.0, 800.0)
+    measured = load * (1.0 + 0.01 * rng.standard_normal(RECORDINGS))
+    return one._replace(crf=one.crf * (load / 500.0) ** (1.0 / 6.0), load=measured)
+
+
+def knee_in_season(rng: np.random.Generator, scatter_hz: float) -> Drawn:
+    """The rig's knee while the oil grows warmer all the time."""
+    one, warm = knee(rng, scatter_hz), warmth(rng, 35.0 + rng.uniform(5.0, 30.0) * NUMBER / RECORDINGS)
+    return one._replace(crf=one.crf * warm.crf, temperature=warm.temperature)
+
+
 KNEES: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "knee, CRF to 5 Hz": lambda rng: knee(rng, 5.0),
     "knee, CRF to 15 Hz": lambda rng: knee(rng, 15.0),
     "knee, CRF to 15 Hz, scatter remembers 0.7": lambda rng: knee(rng, 15.0, 0.7),
     "knee, CRF to 30 Hz": lambda rng: knee(rng, 30.0),
+    "knee, CRF to 15 Hz, two loads in turns, given": lambda rng: knee_under_load(rng, 15.0),
+    "knee, CRF to 15 Hz, a warming season, given": lambda rng: knee_in_season(rng, 15.0),
 }
 
 
@@ -143,15 +210,26 @@ def to_failure(rng: np.random.Generator) -> Drawn:
 
 def judged(one: Drawn) -> Alarm:
     """The alarm as `track` raises it, its stage asked for before an alarm by CRF."""
-    crf = Watched(name="CRF", values=one.crf, least=CRF_LEAST, contact=True, in_words=str)
-    level = Watched(name="level", values=one.level, least=LEVEL_LEAST, contact=False, in_words=str)
+    met = [
+        Operating(load_n=load, temperature_degc=warm)
+        for load, warm in zip(_stated(one.load), _stated(one.temperature), strict=True)
+    ]
+    of_crf, of_level = (conditions_of(met, follows, ANY_CONTACT.oil) for follows in (ANY_CONTACT.crf, LEVEL))
+    choices = {"least": CRF_LEAST, "contact": True, "in_words": str, "relative": True}
+    crf = Watched(name="CRF", values=one.crf, conditions=of_crf, **choices)
+    level = Watched(name="level", values=one.level, least=LEVEL_LEAST, contact=False, in_words=str, conditions=of_level)
 
     def severe(number: int) -> bool:
-        return split_stages(NUMBER[: number + 1], CRF_HZ * one.crf[: number + 1]).kind == "severe"
+        reference = crf.without_conditions(0, number + 1)[0]
+        return split_stages(NUMBER[: number + 1], CRF_HZ * reference).kind == "severe"
 
     sight = Sight() if np.isfinite(one.crf).any() else Sight("cannot-tell", "no contact resonance")
     watched = [crf, level] if np.isfinite(one.crf).any() else [level]
     return sequential_alarm(NUMBER, watched, [sight] * RECORDINGS, confirmed=severe)
+
+
+def _stated(values: np.ndarray | None) -> list[float | None]:
+    return [None] * RECORDINGS if values is None else [*values]
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:

@@ -92,6 +92,12 @@ def make_folder(path: Path) -> None:
         raise BadInput(f"cannot make the folder {path}: {error.strerror}; choose another") from None
 
 
+def user_cache() -> Path:
+    """Where is kept for a user what takes long to work out, and may be deleted."""
+    base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
+    return (Path(base) if base else Path.home() / ".cache") / "asperity"
+
+
 def versions() -> dict[str, str]:
     """Versions of what decides numbers, to stand beside them."""
     from importlib.metadata import version  # here: it takes longer to load than the rest of the room

@@ -101,7 +101,7 @@ def test_refusals_are_one_sentence(asp):
         (("a.wav",), "give --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
         (("empty", "--case", "infer.toml"), "holds no recordings"),
-        (("a.wav", "--case", "infer.toml", "--table", "kilo.csv"), "has a column load_kn; asperity infer takes load_n"),
+        (("a.wav", "--case", "infer.toml", "--table", "kilo.csv"), "has a column load_kn; take load_n"),
         (("a.wav", "--case", "infer.toml", "--table", "nan.csv"), "load_n must be a number"),
         (("a.wav", "--case", "infer.toml", "--sampler", "mcmc"), "--sampler must be one of importance, nested"),
     ):
@@ -114,7 +114,7 @@ def test_refusals_are_one_sentence(asp):
 def test_a_table_of_operating_points_needs_no_x(tmp_path):
     path = tmp_path / "conditions.csv"
     path.write_text("file,load_n,entrainment_m_s,temperature_degc\na.wav,500,1.5,60\nb.wav,,2,61\n", "utf-8")
-    places = read_table(path, operating=True).places
+    places = read_table(path).places
     assert (places["a.wav"].load_n, places["a.wav"].entrainment_m_s, places["a.wav"].temperature_degc) == (500, 1.5, 60)
     assert (places["b.wav"].load_n, places["b.wav"].x) == (None, 2.0)
 

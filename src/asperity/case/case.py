@@ -24,7 +24,7 @@ from asperity.ehl import ACCURACY, Options, auto_grid, inlet_notes, plausibility
 from asperity.errors import BadInput, UnreadableFile
 from asperity.grid import Grid
 from asperity.limits import require_affordable
-from asperity.lubricant import Lubricant, OilFact, Thermal
+from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 from asperity.wearing import WearModel
 
@@ -104,6 +104,11 @@ class Case:
     def _sheet(self) -> SheetSection | None:
         section = self.contents.lubricant
         return section if isinstance(section, SheetSection) else None
+
+    @property
+    def oil_sheet(self) -> OilSheet | None:
+        """The oil's data sheet, which tells it at any temperature; None for one by laws, or none."""
+        return None if self._sheet is None else self._sheet.sheet
 
     @property
     def oil_facts(self) -> tuple[OilFact, ...]:

@@ -6,7 +6,6 @@ averages away. How far the emulator is off is found on points that its processes
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -19,7 +18,7 @@ import pandas
 
 from asperity.arrays import Field
 from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.files import make_folder
+from asperity.files import make_folder, user_cache
 from asperity.inference.outputs import CLR, OUTPUTS, Output
 from asperity.inference.process import Process, fit_process, require_learning
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
@@ -176,8 +175,7 @@ def features_of(setting: Setting) -> Features:
 
 def emulators_folder() -> Path:
     """Where emulators are kept that were given no folder: the user's cache."""
-    base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
-    return (Path(base) if base else Path.home() / ".cache") / "asperity" / "emulators"
+    return user_cache() / "emulators"
 
 
 def build_emulator(

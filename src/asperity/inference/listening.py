@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,10 +12,8 @@ from asperity.coupling import search_band
 from asperity.inference.observations import Observation
 from asperity.inference.settings import LOAD, Setting
 from asperity.study import overrides_at
-from asperity.tracking import OPERATING, Reading, Table, Track, TrackedRecording, read_table, track_recordings
+from asperity.tracking import ZERO_CELSIUS, Reading, Track, read_table, track_recordings
 from asperity.wear import SeriesMethod
-
-ZERO_CELSIUS = 273.15
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,7 @@ def listen(
     BadInput
         for a table or recordings that cannot be used.
     """
-    places = None if table is None else read_table(table, operating=True)
+    places = None if table is None else read_table(table)
     tracked = track_recordings(
         paths,
         case=setting.case,
@@ -77,7 +74,7 @@ def listen(
         workers=workers,
         progress=progress,
     )
-    return observed(tracked, setting.case, places)
+    return observed(tracked, setting.case)
 
 
 def band_of(setting: Setting) -> tuple[float, float]:
@@ -97,7 +94,7 @@ def band_of(setting: Setting) -> tuple[float, float]:
     return low * float(np.sqrt(model.mass / heavy)), high * float(np.sqrt(model.mass / light))
 
 
-def observed(tracked: Track, case: Case, places: Table | None) -> Listened:
+def observed(tracked: Track, case: Case) -> Listened:
     """The resonances of a track with their operating points, and what was taken for granted."""
     observations, silent, assumed = [], [], set()
     for recording in tracked.recordings:
@@ -108,9 +105,9 @@ def observed(tracked: Track, case: Case, places: Table | None) -> Listened:
         if isnan(resonance.crf_std) or resonance.crf_std <= 0.0:
             silent.append((name, f"the method {resonance.method} states no deviation of CRF"))
             continue
-        said = _operating(recording, places)
-        assumed |= {key for key in OPERATING[:2] if said[key] is None}
-        load, speed, celsius = (said[key] for key in OPERATING)
+        met = recording.operating
+        load, speed, celsius = met.load_n, met.entrainment_m_s, met.temperature_degc
+        assumed |= {key for key in ("load_n", "entrainment_m_s") if getattr(met, key) is None}
         damping, damping_std = recording.damping
         high = tracked.comparable and resonance.crfa_std > 0.0
         observations.append(
@@ -134,14 +131,3 @@ def observed(tracked: Track, case: Case, places: Table | None) -> Listened:
         for key in sorted(assumed)
     ]
     return Listened(tracked, tuple(observations), tuple(silent), (*tracked.notes, *notes))
-
-
-def _operating(recording: TrackedRecording, places: Table | None) -> dict[str, Any]:
-    """Load, speed and temperature as the table says, or a sidecar."""
-    place = None if places is None else places.place(Path(recording.file))
-    said: dict[str, Any] = {}
-    for key in OPERATING:
-        value = None if place is None else getattr(place, key)
-        beside = recording.reading.facts.get(key)
-        said[key] = float(beside[0]) if value is None and beside is not None else value
-    return said

@@ -10,5 +10,6 @@ from .model import Recording as Recording
 from .read import open_channels as open_channels
 from .read import open_recording as open_recording
 from .read import read_recording as read_recording
+from .sidecar import OPERATING as OPERATING
 from .sidecar import is_sidecar as is_sidecar
 from .sidecar import names_beside as names_beside

@@ -10,7 +10,7 @@ from asperity.errors import BadInput
 from asperity.recording.common import parse_time
 
 FOLDER_WIDE = "recordings"
-OPERATING = ("load_n", "entrainment_m_s", "temperature_degc")  # of the contact, for `asperity infer`
+OPERATING = ("load_n", "entrainment_m_s", "temperature_degc", "speed_hz")  # what a recording was made at
 KEYS = ("rate_hz", "unit", "channel", "scale", "started", "machine_class", "faults_hz", *OPERATING)
 SUFFIXES = (".toml", ".json")
 MACHINE_CLASSES = ("large-rigid", "large-flexible", "medium-rigid", "medium-flexible")  # of ISO 20816-3

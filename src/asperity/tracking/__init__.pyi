@@ -6,13 +6,14 @@ from .checks import check_recordings as check_recordings
 from .dataset import STATED as STATED
 from .dataset import DataSet as DataSet
 from .dataset import check_set as check_set
-from .files import OPERATING as OPERATING
 from .files import Place as Place
 from .files import Table as Table
 from .files import read_table as read_table
 from .files import recordings_in as recordings_in
 from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording
+from .operating import ZERO_CELSIUS as ZERO_CELSIUS
+from .operating import Operating as Operating
 from .overview import StoreOverview as StoreOverview
 from .overview import acknowledge_in as acknowledge_in
 from .overview import keep_track as keep_track

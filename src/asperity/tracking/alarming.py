@@ -5,6 +5,7 @@ The test is left to `asperity.wear`; which indicators it is given, and from whic
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
-from asperity.wear import Alarm, Said, Sight, Stages, StageSource, Watched, sequential_alarm
+from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, Follows, Response, conditions_of
+from asperity.wear import Alarm, Condition, Said, Sight, Stages, StageSource, Watched, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
 DAMPING_LEAST = 0.2  # of its logarithm
@@ -34,6 +36,7 @@ def raise_alarm(
     acknowledge: str | None = None,
     before: Before | None = None,
     unit: str = "",
+    response: Response = ANY_CONTACT,
 ) -> Alarm:
     """The alarm of a series, in agreement with its stages.
 
@@ -44,16 +47,17 @@ def raise_alarm(
     false_alarm_rate : alarms without wear, a recording
     acknowledge : the recording up to which somebody has looked, by its name; "last" for all
     before : what was said of these recordings before
+    response : how CRF may follow load, speed and temperature
 
     Raises
     ------
     BadInput
         for a recording that is not there, or a rate that is none.
     """
-    contact = _of_the_contact(tracked, source)
+    contact = _of_the_contact(tracked, source, response)
     alarm = sequential_alarm(
         np.array([one.x for one in tracked]),
-        [*contact, *_levels(tracked)],
+        [*contact, *_levels(tracked, response)],
         _sights(tracked, contact),
         false_alarm_rate=false_alarm_rate,
         confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
@@ -78,29 +82,63 @@ def _severe(stages: Stages | None) -> bool:
     return stages is not None and stages.kind == "severe"
 
 
-def _of_the_contact(tracked: Sequence[TrackedRecording], source: StageSource) -> list[Watched]:
+def at_reference(tracked: Sequence[TrackedRecording], response: Response) -> list[TrackedRecording]:
+    """Recordings with CRF and damping ratio as they would be at the load, speed and temperature of the first ones."""
+    crf, damping = _crf(tracked, response), _damping(tracked, response)
+    frequency = np.full(len(tracked), np.nan) if crf is None else _usual(tracked) * crf.without_conditions()[0]
+    ratio = np.full(len(tracked), np.nan) if damping is None else np.exp(-damping.without_conditions()[0])
+    return [
+        replace(one, crf_reference_hz=float(hertz), damping_reference=float(share))
+        for one, hertz, share in zip(tracked, frequency, ratio, strict=True)
+    ]
+
+
+def _usual(tracked: Sequence[TrackedRecording]) -> float:
     crf = np.array([one.resonance.crf_hz for one in tracked])
+    return float(np.median(crf[np.isfinite(crf)][:BASELINE]))
+
+
+def _conditions(tracked: Sequence[TrackedRecording], follows: Follows, response: Response) -> tuple[Condition, ...]:
+    return conditions_of([one.operating for one in tracked], follows, response.oil)
+
+
+def _crf(tracked: Sequence[TrackedRecording], response: Response) -> Watched | None:
+    crf = np.array([one.resonance.crf_hz for one in tracked])
+    if not np.isfinite(crf).any():
+        return None
+    return Watched(
+        name="CRF",
+        values=crf / _usual(tracked),
+        least=CRF_LEAST,
+        contact=True,
+        in_words=_moved,
+        conditions=_conditions(tracked, response.crf, response),
+        relative=True,
+    )
+
+
+def _damping(tracked: Sequence[TrackedRecording], response: Response) -> Watched | None:
     ratio = np.array([one.damping[0] for one in tracked])
-    if source == "both" and not (np.isfinite(crf).any() and np.isfinite(ratio).any()):
+    if not np.isfinite(ratio).any():
+        return None
+    return Watched(
+        name="damping",
+        values=-np.log(ratio),
+        least=DAMPING_LEAST,
+        contact=True,
+        in_words=lambda by: _times(-by),
+        conditions=_conditions(tracked, DAMPING, response),
+    )
+
+
+def _of_the_contact(tracked: Sequence[TrackedRecording], source: StageSource, response: Response) -> list[Watched]:
+    crf, damping = _crf(tracked, response), _damping(tracked, response)
+    if source == "both" and (crf is None or damping is None):
         return []
-    watched = []
-    if source != "damping" and np.isfinite(crf).any():
-        usual = float(np.median(crf[np.isfinite(crf)][:BASELINE]))
-        watched.append(Watched(name="CRF", values=crf / usual, least=CRF_LEAST, contact=True, in_words=_moved))
-    if source != "crf" and np.isfinite(ratio).any():
-        watched.append(
-            Watched(
-                name="damping",
-                values=-np.log(ratio),
-                least=DAMPING_LEAST,
-                contact=True,
-                in_words=lambda by: _times(-by),
-            )
-        )
-    return watched
+    return [one for one in (crf if source != "damping" else None, damping if source != "crf" else None) if one]
 
 
-def _levels(tracked: Sequence[TrackedRecording]) -> list[Watched]:
+def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Watched]:
     """Level and kurtosis of every recording of a running machine in the unit that most have."""
     units = Counter(one.reading.unit for one in tracked if one.reading.quality is not None)
     if not units:
@@ -128,9 +166,18 @@ def _levels(tracked: Sequence[TrackedRecording]) -> list[Watched]:
         "velocity (rms)": lambda one: one.reading.velocity,
     }
     deep = {f"the envelope at {name}": depth_of(name) for name in faults}
+    met = _conditions(tracked, LEVEL, response)
     every = {words: logarithms(value) for words, value in (heard | deep).items()}
     return [
-        Watched(name=words, values=values, least=LEVEL_LEAST, contact=False, in_words=_times, jumps=words in deep)
+        Watched(
+            name=words,
+            values=values,
+            least=LEVEL_LEAST,
+            contact=False,
+            in_words=_times,
+            jumps=words in deep,
+            conditions=met,
+        )
         for words, values in every.items()
         if np.isfinite(values).any()
     ]

@@ -3,21 +3,19 @@
 import csv
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 from asperity.errors import BadInput, UnreadableFile
 from asperity.files import require_file
-from asperity.recording import is_sidecar
+from asperity.recording import OPERATING, is_sidecar
 
 _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
                   ".docx", ".xlsx", ".part", ".filepart",
                   ".crdownload", ".partial", ".download", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
 _ABOUT = {"readme", "liesmich", "license", "licence", "changelog"}  # names of files that are about others
-_KNOWN = ("load_n", "speed_hz")
-OPERATING = ("load_n", "entrainment_m_s", "temperature_degc")  # what the contact was run at
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +32,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table of places by file, as it names them, with or without folders; `x_name` heads its column of x."""
+    """A table of places by file, as it names them, with or without folders; `x_name` heads its column of x, if any."""
 
     name: str
     x_name: str
@@ -104,6 +102,21 @@ def in_time(times: Sequence[datetime | None], heard: Sequence[bool]) -> tuple[li
     return places, x_name
 
 
+def in_their_places(
+    files: Sequence[str],
+    times: Sequence[datetime | None],
+    heard: Sequence[bool],
+    places: Mapping[str, Place] | None,
+    x_name: str,
+) -> tuple[dict[str, Place], str]:
+    """Where each recording stands, and what x is: as a table says it, or by `in_time` where none does."""
+    if x_name and places is not None:
+        return {file: places[file] for file in files}, x_name
+    x, x_name = in_time(times, heard)
+    stated = places or {}
+    return {file: replace(stated.get(file, Place(x=at)), x=at) for file, at in zip(files, x, strict=True)}, x_name
+
+
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:
     """The files named, and those in the folders named, by name with numbers in their order.
 
@@ -137,12 +150,13 @@ def may_be_recording(path: Path) -> bool:
     return path.suffix.lower() not in (".csv", ".tsv", ".txt") or "file" not in _heading(path)
 
 
-def read_table(path: str | Path, *, operating: bool = False) -> Table:
-    """Read a table (csv) of file, x and its deviation, load and speed.
+def read_table(path: str | Path) -> Table:
+    """Read a table (csv) of file, x and its deviation, and what recordings were made at.
 
-    The column of x is the first that is none of file, load_n, speed_hz; its heading names it, such as sq_um. A column
-    of that heading with _std behind is its standard deviation. `operating` reads what the contact was run at too:
-    entrainment_m_s, temperature_degc; then x may be left out, and rows are in their order.
+    The latter are load_n, speed_hz (of the shaft), entrainment_m_s, temperature_degc (of the oil). The column of x is
+    the first that is none of these; its heading names it, such as sq_um. A column of that heading with _std behind is
+    its standard deviation. A table without x says what recordings were made at, and their time or name where they
+    stand.
 
     Raises
     ------
@@ -161,15 +175,13 @@ def read_table(path: str | Path, *, operating: bool = False) -> Table:
     reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
     columns = [(name or "").strip() for name in reader.fieldnames or []]
     reader.fieldnames = columns
-    known = tuple(dict.fromkeys((*_KNOWN, *OPERATING))) if operating else _KNOWN
-    others = [name for name in columns if name not in ("file", *known) and not name.endswith("_std")]
-    if operating:
-        _require_units(path, others)
-    if "file" not in columns or not (others or operating):
+    others = [name for name in columns if name not in ("file", *OPERATING) and not name.endswith("_std")]
+    _require_units(path, others)
+    if "file" not in columns or not (others or set(columns) & set(OPERATING)):
         raise UnreadableFile(
             f"{path} needs a column file and one of x, such as sq_um; got {', '.join(columns) or 'none'}"
         )
-    x_name = "x" if "x" in others or not others else others[0]
+    x_name = "x" if "x" in others else next(iter(others), "")
     places = {}
     for number, row in enumerate(reader, 2):
         name = (row["file"] or "").strip()
@@ -178,10 +190,10 @@ def read_table(path: str | Path, *, operating: bool = False) -> Table:
 
         said = {
             column: _number((row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}")
-            for column in (x_name, f"{x_name}_std", *known)
+            for column in (x_name, f"{x_name}_std", *OPERATING)
         }
         x, x_std = said.pop(x_name), said.pop(f"{x_name}_std")
-        if x is None and operating and not others:
+        if not x_name:
             x = float(number - 1)
         if x is None:
             raise BadInput(f"{path}, line {number}: {x_name} of {name} is missing; fill it in")
@@ -195,11 +207,9 @@ def read_table(path: str | Path, *, operating: bool = False) -> Table:
 def _require_units(path: Path, columns: Sequence[str]) -> None:
     """BadInput for a load, speed or temperature by another name, perhaps in another unit."""
     for name in columns:
-        for meant in OPERATING:
+        for meant in OPERATING[:3]:
             if name.lower().startswith(meant.partition("_")[0]):
-                raise BadInput(
-                    f"{path} has a column {name}; asperity infer takes {meant}, by that name and in that unit"
-                )
+                raise BadInput(f"{path} has a column {name}; take {meant}, by that name and in that unit")
 
 
 def _number(text: str, delimiter: str, where: str) -> float | None:

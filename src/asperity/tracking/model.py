@@ -4,7 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from asperity.files import whole_file, write_csv
 from asperity.kept import netcdf_bytes
 from asperity.quantities import quantity
 from asperity.rating import ZONES, severity_zone
+from asperity.tracking.operating import Operating
 from asperity.tracking.reading import Reading
 from asperity.tracking.target import Target
 from asperity.wear import IN_WORDS, Alarm, AlarmState, CleanSpectrum, Resonance, Stages, StageSource
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crfa", "crfa_std", "damping_ratio", "damping_std",
+NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crf_reference_hz", "crfa", "crfa_std", "damping_ratio", "damping_std",
            "clr", "clr_low", "clr_high", "severe_probability", "duration_s", "rate_hz")  # fmt: skip
 TEXTS = ("file", "reason", "damping_reason", "label", "started")
 ENDINGS = (".csv", ".parquet", ".nc")
@@ -37,8 +38,9 @@ class TrackedRecording:
 
     `resonance` is not found, with its reason, for a recording that could not be used. `clr` and its 90 % interval are
     the contact model's reading of the CRF, nan without one. `damping_reason` says why the width of its line is no
-    damping ratio that can be followed; empty where it is one. `label` is the stage's name; `state` the
-    alarm's after it.
+    damping ratio that can be followed; empty where it is one. `crf_reference_hz` and `damping_reference` are CRF and
+    damping ratio as they would be at the load, speed and temperature of the first recordings. `label` is the stage's
+    name; `state` the alarm's after it.
     """
 
     file: str
@@ -48,8 +50,9 @@ class TrackedRecording:
     clean: CleanSpectrum | None
     resonance: Resonance
     damping_reason: str = ""
-    load_n: float | None = None
-    speed_hz: float | None = None
+    operating: Operating = field(default_factory=Operating)
+    crf_reference_hz: float = np.nan
+    damping_reference: float = np.nan
     clr: float = np.nan
     clr_interval: tuple[float, float] = (np.nan, np.nan)
     severe_probability: float = np.nan
@@ -115,8 +118,8 @@ class TrackedRecording:
             "velocity_rms": finite_or_none(self.reading.velocity),
             "zone": self.zone,
             "depths": {name: finite_or_none(depth) for name, depth in self.reading.depths.items()},
-            "load_n": self.load_n,
-            "speed_hz": self.speed_hz,
+            "crf_reference_hz": finite_or_none(self.crf_reference_hz),
+            **asdict(self.operating),
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
         }
 
@@ -155,6 +158,8 @@ class Track:
         if self.stages is not None:
             seen = f"{self.stages.verdict.rstrip('.')}; contact resonance found in {self.resonance_count} of {several}."
         alarm = self.alarm
+        if alarm.explained:
+            seen = f"{seen} {alarm.explained[0].upper()}{alarm.explained[1:]}."
         if alarm.state == "alarm":
             first = Path(self.recordings[alarm.since or 0].file).name
             return f"ALARM since {first}: {alarm.reason}. {seen}"
@@ -216,6 +221,7 @@ class Track:
             "false_alarm_rate": alarm.false_alarm_rate,
             "reason": alarm.reason,
             "raised_by": alarm.raised_by or None,
+            "explained": alarm.explained or None,
             "verdict": alarm.verdict,
         }
 

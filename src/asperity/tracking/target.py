@@ -1,6 +1,6 @@
 """Which resonance is looked for: a band, how wide its line is, where it ends with all load on asperities."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from asperity.case import Case
 from asperity.coupling import BAND_MARGIN, search_band
@@ -16,7 +16,7 @@ class Target:
 
     `band_hz` its ends; `width_hz` half-power width of a line at the lower end; `full_load_crf_hz` the resonance with
     all load on asperities, None where no contact model is known; `source` a sentence that says who chose the band;
-    `assumed` whether that was nobody.
+    `assumed` whether that was nobody; `case` the contact that was given.
     """
 
     band_hz: tuple[float, float]
@@ -24,6 +24,7 @@ class Target:
     full_load_crf_hz: float | None
     source: str
     assumed: bool = False
+    case: Case | None = field(default=None, repr=False, compare=False)
 
 
 def search_target(case: Case | None = None, band_hz: tuple[float, float] | None = None) -> Target:
@@ -63,4 +64,5 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
         full_load_crf_hz=full_load,
         source=source,
         assumed=case is None and band_hz is None,
+        case=case,
     )

@@ -17,10 +17,11 @@ from asperity.case import Case
 from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
-from asperity.tracking.alarming import raise_alarm
-from asperity.tracking.files import Place, Table, in_time, read_table, recordings_in
+from asperity.tracking.alarming import at_reference, raise_alarm
+from asperity.tracking.files import Place, Table, in_their_places, read_table, recordings_in
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track, TrackedRecording
+from asperity.tracking.operating import operating_of, response_of, unstated
 from asperity.tracking.reading import WINDOW, Reading, common_spacing, read_spectra
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
@@ -141,9 +142,8 @@ def judge(
     """
     require_choice("source of stages", stages_from, get_args(StageSource))
     notes = [f"The band is {target.source}."] if target.assumed else []
-    if places is None:
-        x, x_name = in_time([reading.time for reading in readings], [not reading.refused for reading in readings])
-        places = {reading.file: Place(x=at) for reading, at in zip(readings, x, strict=True)}
+    names, times = [reading.file for reading in readings], [reading.time for reading in readings]
+    places, x_name = in_their_places(names, times, [not reading.refused for reading in readings], places, x_name)
     order = np.argsort(np.array([places[reading.file].x for reading in readings]), kind="stable")
     series, left_out = _on_one_grid(_without_silence([readings[number] for number in order]))
     notes += left_out
@@ -183,8 +183,7 @@ def judge(
                 clean=clean,
                 resonance=resonance,
                 damping_reason=resonance.reason if clean is None else _damping_reason(resonance, clean),
-                load_n=place.load_n,
-                speed_hz=place.speed_hz,
+                operating=operating_of(reading, place),
             )
         )
     alarming = (false_alarm_rate, acknowledge, before)
@@ -206,15 +205,18 @@ def _staged(
     crf = np.array([recording.resonance.crf_hz for recording in tracked])
     crf_std = np.array([recording.resonance.crf_std for recording in tracked])
     crf_std = np.where(np.isfinite(crf_std), crf_std, 0.0)
+    met = [recording.operating for recording in tracked]
+    response = response_of(target.case, met)
+    tracked = at_reference(tracked, response)
     stages_by = _Ways(tracked, staging[0], _unit_of(x_name), comparable)
     stages = stages_by.get(staging[1])
     severe: Field = np.full(x.size, np.nan)
     labels: tuple[str, ...] = ("none",) * x.size
     if stages is not None:
         known = (
-            [np.isfinite(recording.damping[0]) for recording in tracked]
+            [np.isfinite(recording.damping_reference) for recording in tracked]
             if staging[1] == "damping"
-            else np.isfinite(crf)
+            else [np.isfinite(recording.crf_reference_hz) for recording in tracked]
         )
         severe = np.where(known, stages.probability, np.nan)
         labels = stages.labels
@@ -227,6 +229,7 @@ def _staged(
         acknowledge=alarming[1],
         before=alarming[2],
         unit=_unit_of(x_name),
+        response=response,
     )
     if target.full_load_crf_hz is not None:
         share = asperity_load_share(crf, crf_std, target.full_load_crf_hz)
@@ -250,7 +253,7 @@ def _staged(
         alarm=alarm,
         comparable=comparable,
         problems=comparability([_facts_of(recording) for recording in used]),
-        notes=(*notes, *_without_damping(tracked), *_copies(tracked)),
+        notes=(*notes, *filter(None, [response.said]), *unstated(met), *_without_damping(tracked), *_copies(tracked)),
     )
 
 
@@ -264,8 +267,8 @@ def _facts_of(recording: TrackedRecording) -> RecordingFacts:
         window=WINDOW,
         unit=recording.reading.unit,
         duration_s=spectrum.duration_s,
-        speed_hz=recording.speed_hz,
-        load_n=recording.load_n,
+        speed_hz=recording.operating.speed_hz,
+        load_n=recording.operating.load_n,
     )
 
 
@@ -289,10 +292,11 @@ class _Ways(Mapping[StageSource, Stages]):
             raise KeyError(source)
         if source not in self.known:
             resonances = [recording.resonance for recording in self.tracked]
-            damping, damping_std = np.array([recording.damping for recording in self.tracked]).T
+            damping = [recording.damping_reference for recording in self.tracked]
+            damping_std = [recording.damping[1] for recording in self.tracked]
             self.known[source] = split_stages(
                 [recording.x for recording in self.tracked],
-                [resonance.crf_hz for resonance in resonances],
+                [recording.crf_reference_hz for recording in self.tracked],
                 [resonance.crfa for resonance in resonances] if self.comparable else None,
                 crf_std_hz=[resonance.crf_std for resonance in resonances],
                 damping_ratio=damping,

@@ -13,7 +13,6 @@ from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic, sleep, time
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from asperity.case import Case
@@ -22,7 +21,7 @@ from asperity.files import make_folder
 from asperity.recording import ReadOptions, names_beside
 from asperity.tracking.alarming import BASELINE, LAST
 from asperity.tracking.calls import Caller, deliver
-from asperity.tracking.files import Place, Table, in_time, may_be_recording, natural, read_table
+from asperity.tracking.files import Place, Table, in_their_places, may_be_recording, natural, read_table
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, common_spacing, read_spectra
@@ -198,28 +197,28 @@ def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
 
 
 class _Order(NamedTuple):
-    """Recordings in the order in which they are judged, where each stands, and what x is; more of it from a table."""
+    """Recordings in the order in which they are judged, what x is, and where each stands, by its file."""
 
     keys: list[Version]
-    x: list[float]
     x_name: str
-    places: Mapping[str, Place] = MappingProxyType({})
+    places: Mapping[str, Place]
 
     def place(self, number: int) -> Place:
         """Where a recording stands."""
-        return self.places.get(self.keys[number].file) or Place(x=self.x[number])
+        return self.places[self.keys[number].file]
 
 
 def _ordered(known: Sequence[Version], table: Table | None, sensor: Sensor) -> _Order:
     """The recordings that the table knows by now, or all, by x."""
+    places = None
     if table is not None:
         places = table.placed([Path(key.file) for key in known if table.row(Path(key.file)) is not None])
-        keys = sorted((key for key in known if key.file in places), key=lambda key: places[key.file].x)
-        return _Order(keys, [places[key.file].x for key in keys], table.x_name, places)
+        known = [key for key in known if key.file in places]
     kept = [sensor.recordings[key] for key in known]
-    x, x_name = in_time([one.time for one in kept], [not one.refused for one in kept])
-    order = sorted(range(len(known)), key=x.__getitem__)
-    return _Order([known[number] for number in order], [x[number] for number in order], x_name)
+    files, heard = [key.file for key in known], [not one.refused for one in kept]
+    x_name = "" if table is None else table.x_name
+    stand, x_name = in_their_places(files, [one.time for one in kept], heard, places, x_name)
+    return _Order(sorted(known, key=lambda key: stand[key.file].x), x_name, stand)
 
 
 def _window(order: _Order, end: int, sensor: Sensor) -> list[int]:

@@ -20,6 +20,8 @@ from .indicators import contact_resonance as contact_resonance
 from .lines import CleanSpectrum as CleanSpectrum
 from .lines import Line as Line
 from .lines import remove_lines as remove_lines
+from .regressors import Condition as Condition
+from .regressors import Explained as Explained
 from .resonance import Resonance as Resonance
 from .resonance import SeenLine as SeenLine
 from .resonance import damping_objection as damping_objection

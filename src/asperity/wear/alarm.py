@@ -10,14 +10,17 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
-from asperity.wear.sequential import FEWEST, Found, growth, knee, step, threshold
+from asperity.wear.regressors import BASELINE, NOTHING_EXPLAINED, Condition, Explained, explained
+from asperity.wear.sequential import FEWEST, Beside, Found, growth, knee, step, threshold
 
 AlarmState = Literal["none", "alert", "alarm", "blind", "cannot-tell"]
 ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
 FALSE_ALARMS = 1e-3  # a recording
 ALERTS = 10.0  # false alerts for a false alarm
+LATELY = 3  # recordings whose median is where an indicator, or a condition, has come to
+SPOKEN = 0.4  # of the least change: what conditions explain is said from there on, and may be off by this share
 CONTACT_SHARE = 0.8  # of the false alarms allowed, among the contact's indicators; the levels have the rest
 
 
@@ -33,6 +36,8 @@ class Watched:
     contact : whether it is the contact's, whose severe stage is a rise that flattens; otherwise a level, which grows
     in_words : a change of it, in words
     jumps : whether a jump upwards alarms, as neither gain nor a moved sensor makes one
+    conditions : what it may follow without any wear; of the same recordings
+    relative : whether `values` are ratios, of which conditions change the logarithm
     """
 
     name: str
@@ -41,6 +46,18 @@ class Watched:
     contact: bool
     in_words: Callable[[float], str]
     jumps: bool = False
+    conditions: tuple[Condition, ...] = ()
+    relative: bool = False
+
+    def without_conditions(self, first: int = 0, last: int | None = None) -> tuple[Field, Explained]:
+        """The values from one recording up to another as they would be at the baseline's conditions."""
+        part = slice(first, last)
+        values = self.values[part]
+        if not self.conditions:
+            return values, NOTHING_EXPLAINED
+        met = [replace(one, values=one.values[part]) for one in self.conditions]
+        told = explained(np.log(values) if self.relative else values, met, least=self.least)
+        return np.asarray(values * np.exp(-told.effect) if self.relative else values - told.effect), told
 
 
 class Sight(NamedTuple):
@@ -70,6 +87,7 @@ class Alarm:
 
     `states` are those after each recording; `since` is the index of the recording with which the present state began,
     None for "none". `raised_by` names the indicator behind an alert or alarm. `reason` is a sentence without an end.
+    `explained` says which changes load, speed or temperature explain, and is empty where they explain none.
     """
 
     state: AlarmState
@@ -78,6 +96,7 @@ class Alarm:
     false_alarm_rate: float
     reason: str
     raised_by: str = ""
+    explained: str = ""
 
     @property
     def verdict(self) -> str:
@@ -160,6 +179,7 @@ def sequential_alarm(
         false_alarm_rate=false_alarm_rate,
         reason=reason,
         raised_by=raised_by,
+        explained="; ".join(filter(None, (_by_conditions(one, acknowledged) for one in watched))),
     )
 
 
@@ -172,18 +192,47 @@ class _Looked(NamedTuple):
 
 
 def _looked_at(one: Watched, x: Field, first: int, last: int) -> _Looked:
-    at, values = _places(x[first : last + 1], one.values[first : last + 1])
+    values, told = one.without_conditions(first, last + 1)
+    at, (level, *rows) = _places(x[first : last + 1], values, told.rows)
+    beside = Beside(np.array(rows), told.scatter / told.widths) if rows else None
     test = knee if one.contact else growth
-    return _Looked(test(at, values, least=one.least), step(at, values, least=one.least), at.size)
+    return _Looked(
+        test(at, level, least=one.least, beside=beside), step(at, level, least=one.least, beside=beside), at.size
+    )
 
 
-def _places(x: Field, values: Field) -> tuple[Field, Field]:
-    """Repeats at one x averaged, and what is not known left out."""
-    known = np.isfinite(values)
+def _places(x: Field, values: Field, rows: Field) -> tuple[Field, list[Field]]:
+    """Values and rows with repeats at one x averaged, and what is not known left out."""
+    known = np.isfinite(values) & np.isfinite(rows).all(axis=0) if len(rows) else np.isfinite(values)
     if not known.any():
-        return x[:0], values[:0]
+        return x[:0], [values[:0], *rows[:, :0]]
     at, index = np.unique(x[known], return_inverse=True)
-    return at, np.bincount(index, values[known]) / np.bincount(index)
+    many = np.bincount(index)
+    return at, [np.bincount(index, one[known]) / many for one in (values, *rows)]
+
+
+def _by_conditions(one: Watched, first: int) -> str:
+    """That conditions explain how an indicator has changed, in words; nothing where they do not."""
+    _, told = one.without_conditions(first)
+    values = np.log(one.values[first:]) if one.relative else one.values[first:]
+    known = np.isfinite(values) & np.isfinite(told.rows).all(axis=0)
+    if not told.names or known.sum() < FEWEST:
+        return ""
+    change, effect = (
+        float(np.median(part[known][-LATELY:]) - np.median(part[known][:BASELINE])) for part in (values, told.effect)
+    )
+    if abs(effect) < SPOKEN * one.least or abs(change - effect) > SPOKEN * max(abs(change), one.least):
+        return ""
+    words = " and ".join(_went(met, first, known) for met in one.conditions if met.name in told.names)
+    by = np.expm1 if one.relative else float
+    return f"{one.name} {one.in_words(float(by(change)))}, and {words} explains it ({one.in_words(float(by(effect)))})"
+
+
+def _went(met: Condition, first: int, known: Mask) -> str:
+    """From where to where a condition went."""
+    shown = met.shown[first:][known]
+    before, now = (float(np.median(part)) for part in (shown[:BASELINE], shown[-LATELY:]))
+    return f"{met.name} from {before:.4g} to {now:.4g} {met.unit}"
 
 
 def _shares(watched: Sequence[Watched], rate: float) -> list[float]:

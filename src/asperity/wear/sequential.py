@@ -21,8 +21,19 @@ RAMPS = (0, 1, 2, 3)  # recordings between the two levels of a step
 MOST_PLACES = 120  # the latest: what was before is the past of another baseline
 FEWEST_BEFORE, FEWEST_AFTER = 3, 2  # places on either side of a bend
 FLAT = 0.5  # slope after a knee over that before, at most
-CALIBRATION = 0.25  # false alarms a recording times exp(log ratio): docs/theory/alarms.md
+FITTED = 5  # numbers that a course takes from the places: level, slope, turn, where it turns, memory
+CALIBRATION = 0.12  # false alarms a recording times exp(log ratio): docs/theory/alarms.md
 TINY = 1e-12
+
+
+class Beside(NamedTuple):
+    """What conditions may still explain of a series: their rows, (conditions, places), and how little of each.
+
+    `pull` is the series' scatter over the deviation of each coefficient, which a prior holds near 0.
+    """
+
+    rows: Field
+    pull: Field
 
 
 class Found(NamedTuple):
@@ -41,7 +52,7 @@ def threshold(false_alarm_rate: float) -> float:
     return float(np.log(CALIBRATION / false_alarm_rate))
 
 
-def knee(x: Field, y: Field, *, least: float) -> Found:
+def knee(x: Field, y: Field, *, least: float, beside: Beside | None = None) -> Found:
     """A rise by `least` or more that goes on at half its pace or less, against all that bends without a knee.
 
     Against it stand a line, saturating curves, steps and short ramps, and cycles.
@@ -49,20 +60,22 @@ def knee(x: Field, y: Field, *, least: float) -> Found:
     Parameters
     ----------
     x, y : shape (places,), x rising; y in units in which `least` is worth acting on
+    beside : what conditions may explain of it, of every course alike
     """
-    return _judged(x, y, least, rises_first=True)
+    return _judged(x, y, least, beside, rises_first=True)
 
 
-def growth(x: Field, y: Field, *, least: float) -> Found:
+def growth(x: Field, y: Field, *, least: float, beside: Beside | None = None) -> Found:
     """A level that held and then grows, by `least` or more: against holding, saturating, stepping and cycling."""
-    return _judged(x, y, least, rises_first=False)
+    return _judged(x, y, least, beside, rises_first=False)
 
 
-def step(x: Field, y: Field, *, least: float) -> Found:
+def step(x: Field, y: Field, *, least: float, beside: Beside | None = None) -> Found:
     """A jump by `least` or more either way, within a few recordings, which holds: against all that goes smoothly."""
     along, y, scale = _latest(x, y)
     if along.size < FEWEST:
         return NOTHING
+    whites = _whites_beside(along.size, beside)
     jumps = _jumps(along.size)
     levels = jumps @ y / jumps.sum(axis=1) - (1.0 - jumps) @ y / np.maximum((1.0 - jumps).sum(axis=1), TINY)
     settled = jumps.sum(axis=1) >= FEWEST_BEFORE
@@ -70,17 +83,18 @@ def step(x: Field, y: Field, *, least: float) -> Found:
     if not allowed.any():
         return NOTHING
     hinges = np.maximum(along - _breaks(along)[:, None], 0.0)
-    gains = _gains(y, jumps[allowed])
-    smooth = _profiled(y, np.concatenate([along[None], _saturating(along)]), _cycles(along), hinges)
+    gains = _gains(y, jumps[allowed], whites=whites)
+    smooth = _profiled(y, np.concatenate([along[None], _saturating(along)]), _cycles(along), hinges, whites=whites)
     best = int(np.argmax(np.max(gains, axis=0)))
-    ratio = float(np.max(gains)) - smooth
+    ratio = _counted(float(np.max(gains)) - smooth, along.size)
     return Found(ratio, scale.back(along[np.argmax(jumps[allowed][best] > 0.0)]), float(levels[allowed][best]))
 
 
-def _judged(x: Field, y: Field, least: float, *, rises_first: bool) -> Found:
+def _judged(x: Field, y: Field, least: float, beside: Beside | None, *, rises_first: bool) -> Found:
     along, y, scale = _latest(x, y)
     if along.size < FEWEST:
         return NOTHING
+    whites = _whites_beside(along.size, beside)
     places = _breaks(along)
     hinges = np.maximum(along - places[:, None], 0.0)
     if rises_first:
@@ -92,10 +106,16 @@ def _judged(x: Field, y: Field, least: float, *, rises_first: bool) -> Found:
     smooth = np.concatenate([_saturating(along), _jumps(along.size)])
     if rises_first:
         smooth = np.concatenate([along[None], smooth])
-    against = _profiled(y, smooth, _cycles(along))
-    gains = _gains(y, hinges[allowed], beside=along if rises_first else None)
+    against = _profiled(y, smooth, _cycles(along), whites=whites)
+    gains = _gains(y, hinges[allowed], beside=along if rises_first else None, whites=whites)
     best = int(np.argmax(np.max(gains, axis=0)))
-    return Found(float(np.max(gains)) - against, scale.back(places[allowed][best]), float(change[allowed][best]))
+    ratio = _counted(float(np.max(gains)) - against, along.size)
+    return Found(ratio, scale.back(places[allowed][best]), float(change[allowed][best]))
+
+
+def _counted(log_ratio: float, places: int) -> float:
+    """The ratio by as many places as are left when the course is fitted: few places flatter what is fitted to them."""
+    return log_ratio * (places - FITTED) / places
 
 
 class _Scale(NamedTuple):
@@ -170,20 +190,39 @@ def _whitened(memory: float, rows: Field) -> Field:
 
 
 class _White(NamedTuple):
-    """Independent rows beside a constant: the constant's own, taken out of each."""
+    """Independent rows beside a constant and conditions: `taken`, orthonormal, are taken out of each.
 
-    constant: Field
+    Behind the places stands what the prior of each condition's coefficient adds.
+    """
+
+    taken: Field
     memory: float
 
     def __call__(self, rows: Field) -> Field:
         white = _whitened(self.memory, rows)
-        return np.asarray(white - (white @ self.constant)[..., None] * self.constant)
+        more = self.taken.shape[1] - white.shape[-1]
+        if more:
+            white = np.concatenate([white, np.zeros((*white.shape[:-1], more))], axis=-1)
+        return np.asarray(white - (white @ self.taken.T) @ self.taken)
 
 
 @lru_cache(maxsize=2)
 def _whites(places: int) -> list[_White]:
     ones = [_whitened(memory, np.ones(places)) for memory in MEMORY]
-    return [_White(one / np.sqrt(one @ one), float(memory)) for one, memory in zip(ones, MEMORY, strict=True)]
+    return [_White((one / np.sqrt(one @ one))[None], float(memory)) for one, memory in zip(ones, MEMORY, strict=True)]
+
+
+def _whites_beside(places: int, beside: Beside | None) -> list[_White]:
+    if beside is None or not len(beside.rows):
+        return _whites(places)
+    rows = np.concatenate([np.ones((1, places)), beside.rows[:, -places:]])
+    prior = np.concatenate([np.zeros((1, len(beside.pull))), np.diag(beside.pull)])
+    found = []
+    for memory in MEMORY:
+        steady = np.sqrt(1.0 - memory**2)  # what is fresh of the scatter
+        whole = np.concatenate([_whitened(memory, rows), steady * prior], axis=1)
+        found.append(_White(np.linalg.qr(whole.T)[0].T, float(memory)))
+    return found
 
 
 def _log_likelihood(memory: float, left: Field, whole: float, places: int) -> Field:
@@ -191,10 +230,10 @@ def _log_likelihood(memory: float, left: Field, whole: float, places: int) -> Fi
     return np.asarray(0.5 * np.log(1.0 - memory**2) - 0.5 * places * np.log(np.maximum(left, TINY * max(whole, TINY))))
 
 
-def _gains(y: Field, rows: Field, beside: Field | None = None) -> Field:
+def _gains(y: Field, rows: Field, beside: Field | None = None, whites: list[_White] | None = None) -> Field:
     """Log likelihood of a constant and each row (and one beside), (memories, rows)."""
     found = []
-    for white in _whites(y.size):
+    for white in whites or _whites(y.size):
         z, bent = white(y), white(rows)
         whole = float(z @ z)
         if beside is None:
@@ -205,10 +244,17 @@ def _gains(y: Field, rows: Field, beside: Field | None = None) -> Field:
     return np.array(found)
 
 
-def _profiled(y: Field, rows: Field, cycles: tuple[Field, Field], hinges: Field | None = None) -> float:
+def _profiled(
+    y: Field,
+    rows: Field,
+    cycles: tuple[Field, Field],
+    hinges: Field | None = None,
+    *,
+    whites: list[_White],
+) -> float:
     """The greatest log likelihood of a constant with any row, any cycle, or a line and any hinge."""
     best = []
-    for white in _whites(y.size):
+    for white in whites:
         z = white(y)
         taken = [_one(white(rows), z).max(), _two(white(cycles[0]), white(cycles[1]), z).max()]
         if hinges is not None:

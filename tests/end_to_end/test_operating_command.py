@@ -1,0 +1,58 @@
+"""`asperity track` and `watch` where load, speed or oil temperature are stated beside recordings."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+MANY = 24
+
+
+def loud(folder, loads, sidecar=False):
+    """Noise whose level goes with load, a tenth of a second each; the load in a table, or beside each."""
+    Path(folder).mkdir()
+    rows = ["file,load_n,temperature_degc"]
+    for number, load in enumerate(loads):
+        rng = np.random.default_rng(number)
+        name = f"s-{number:03}.npz"
+        values = (load / 500.0) * rng.standard_normal(2000)
+        np.savez(Path(folder) / name, acc=values, fs=20e3, unit="m/s^2")
+        rows.append(f"{name},{load:g},{60 + number % 2}")
+        if sidecar:
+            Path(folder, f"{name}.toml").write_text(f"load_n = {load:g}\ntemperature_degc = {60 + number % 2}\n")
+    Path(f"{folder}.csv").write_text("\n".join(rows))
+
+
+def test_a_load_that_is_stated_explains_a_level_that_steps(asp):
+    loads = [500.0] * 12 + [1200.0] * 12
+    loud("in", loads)
+    unknown = json.loads(asp("track", "in", "--json")[1])
+    code, out, _ = asp("track", "in", "--table", "in.csv", "--json")
+    given = json.loads(out)
+    assert "the level (rms) rose to" in unknown["alarm"]["reason"]
+    assert unknown["alarm"]["explained"] is None
+    assert code == 4  # there is no resonance to see
+    assert "and holds since" not in given["alarm"]["reason"]
+    assert "load from 500 to 1200 N explains it" in given["alarm"]["explained"]
+    assert given["alarm"]["explained"] in given["verdict"].replace("The level", "the level")
+    assert [row["load_n"] for row in given["recordings"]] == loads
+    assert given["recordings"][1]["temperature_degc"] == 61.0
+    loud("beside", loads, sidecar=True)
+    beside = json.loads(asp("track", "beside", "--json")[1])
+    assert beside["alarm"]["explained"] == given["alarm"]["explained"]
+
+
+def test_a_watch_takes_loads_from_a_table_that_grows(asp):
+    loud("in", [500.0] * 12 + [1200.0] * 12)
+    code, out, _ = asp("watch", "in", "--table", "in.csv", "--once", "--settle", "0", "--json")
+    said = json.loads(out)
+    assert code == 4
+    assert "load from 500 to 1200 N explains it" in said["alarm"]["explained"]
+
+
+def test_a_load_by_another_name_or_unit_is_refused(asp):
+    loud("in", [500.0] * 2)
+    Path("kilo.csv").write_text("file,x,load_kn\ns-000.npz,1,0.5\ns-001.npz,2,0.5\n")
+    code, _, err = asp("track", "in", "--table", "kilo.csv")
+    assert code == 2
+    assert "has a column load_kn; take load_n, by that name and in that unit" in err
