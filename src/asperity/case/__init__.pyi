@@ -14,6 +14,7 @@ from .laws import OilSupply as OilSupply
 from .laws import ThermalSection as ThermalSection
 from .machines import MachineCase as MachineCase
 from .machines import load_machine as load_machine
+from .machines import states_machine as states_machine
 from .oils import SheetSection as SheetSection
 from .ratings import RatingSection as RatingSection
 from .refusals import Section as Section

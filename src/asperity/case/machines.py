@@ -242,6 +242,12 @@ def load_machine(path: str | Path, overrides: Mapping[str, object] | None = None
     return _machine_case(tables, path.parent, str(path))
 
 
+def states_machine(path: str | Path) -> bool:
+    """Whether a case file states a [machine] in place of a [contact]; UnreadableFile as `load_machine`."""
+    path = Path(path)
+    return "machine" in parse_toml(read_text(path), str(path))
+
+
 def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineCase:
     if "machine" not in tables:
         raise BadInput(f"{source}: has no [machine]; add one, or solve its one contact by asperity solve")

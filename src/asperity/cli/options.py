@@ -10,7 +10,7 @@ from asperity import case, files, results, wear
 from asperity.errors import BadInput, require_choice
 
 if TYPE_CHECKING:
-    from asperity.case import Case
+    from asperity.case import Case, MachineCase
 
 
 def _hertz(text: str) -> float:
@@ -187,6 +187,13 @@ def read_overrides(overrides: list[str] | None) -> dict[str, object]:
 def case_at(path: Path | None) -> "Case | None":
     """The case of a case file, if one was given."""
     return None if path is None else case.load_case(path)
+
+
+def contact_at(path: Path | None) -> "Case | MachineCase | None":
+    """The case of a contact or a machine, if one was given."""
+    if path is None:
+        return None
+    return case.load_machine(path) if case.states_machine(path) else case.load_case(path)
 
 
 def lengths(option: str, texts: list[str] | None) -> list[float] | None:

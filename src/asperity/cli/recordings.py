@@ -11,7 +11,7 @@ import typer
 from asperity import files, processes, recording, report, tracking
 from asperity.cli import options
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, Quiet, case_at, require_output
+from asperity.cli.options import AsJson, Quiet, contact_at, require_output
 from asperity.cli.show import Block, Row, columns, progress, show, span, table, text, written
 from asperity.errors import BadInput
 from asperity.quantities import NO_VALUE, quantity
@@ -52,7 +52,7 @@ def check(
     if not paths:
         raise BadInput("check takes recordings, or --set and the folder of a set of data; name one")
     checks = tracking.check_recordings(
-        paths, case=case_at(case_file), band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale
+        paths, case=contact_at(case_file), band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale
     )
     if checks.checked or as_json:
         in_full = [_in_full(checked) for checked in checks.checked] if len(checks.checked) <= IN_FULL else []
@@ -155,7 +155,7 @@ def track(
     with _files_read("reading recordings ...", quiet=quiet) as step:
         tracked = tracking.track_recordings(
             paths,
-            case=case_at(case_file),
+            case=contact_at(case_file),
             band_hz=band,
             rate_hz=rate,
             unit=unit,
@@ -229,7 +229,7 @@ def watch(
         updates = tracking.watch_folder(
             folder,
             kept,
-            case=case_at(case_file),
+            case=contact_at(case_file),
             band_hz=band,
             rate_hz=rate,
             unit=unit,

@@ -11,7 +11,7 @@ from asperity.errors import require_choice
 
 LOWEST_HZ, HIGHEST_HZ = 10.0, 1000.0
 COARSEST_HZ = 2.5  # spacing of lines with a Hann taper: at the lower end part of a line falls out of the band
-LIMITS = {  # ends of zones A, B and C [m/s]: ISO 20816-3:2022, annex A, as in ISO 10816-3:2009, tables A.1 and A.2
+LIMITS = {  # ends of zones A, B and C [m/s]: ISO 20816-3:2022, tables A.1 and A.2, the same as in ISO 10816-3:2009
     "large-rigid": (2.3e-3, 4.5e-3, 7.1e-3),
     "large-flexible": (3.5e-3, 7.1e-3, 11.0e-3),
     "medium-rigid": (1.4e-3, 2.8e-3, 4.5e-3),

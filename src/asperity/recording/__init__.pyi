@@ -9,6 +9,7 @@ from .model import ReadOptions as ReadOptions
 from .model import Recording as Recording
 from .read import open_channels as open_channels
 from .read import open_recording as open_recording
+from .read import other_channel as other_channel
 from .read import read_recording as read_recording
 from .sidecar import OPERATING as OPERATING
 from .sidecar import is_sidecar as is_sidecar

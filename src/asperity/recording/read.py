@@ -29,7 +29,7 @@ from asperity.recording.model import (
     ReadOptions,
     Recording,
 )
-from asperity.recording.sidecar import OPERATING, stated_beside
+from asperity.recording.sidecar import OF_THE_MACHINE, OPERATING, stated_beside
 from asperity.recording.units import acceleration_scale
 
 _SAME = 1e-4  # relative difference up to which two stated rates agree
@@ -112,6 +112,12 @@ def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
             return [_chosen(path, contents, options)]
         every = [_chosen(path, contents, replace(options, channel=channel.name)) for channel in contents.channels]
     return [replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")}) for opened in every]
+
+
+def other_channel(path: Path, name: str) -> Channel:
+    """A channel as it is in the file, whatever a sidecar states of the vibration: a tacho, a load, a temperature."""
+    with quietly():
+        return _channel(path, read_contents(path), name)
 
 
 def read_contents(path: Path) -> Contents:
@@ -201,7 +207,7 @@ def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecordi
     elif unit_text == "g":
         unit_text = "gram-force"
         notes.append(f"g is taken as grams of force, because the channel is called {selected.name}")
-    facts |= {key: stated[key] for key in (*OPERATING, "machine_class", "faults_hz") if key in stated}
+    facts |= {key: stated[key] for key in (*OPERATING, *OF_THE_MACHINE) if key in stated}
     named = parse_time(path.name) or parse_time(path.stem)
     if "started" in stated:
         facts["started"] = stated["started"]

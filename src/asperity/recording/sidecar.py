@@ -11,7 +11,10 @@ from asperity.recording.common import parse_time
 
 FOLDER_WIDE = "recordings"
 OPERATING = ("load_n", "entrainment_m_s", "temperature_degc", "speed_hz")  # what a recording was made at
-KEYS = ("rate_hz", "unit", "channel", "scale", "started", "machine_class", "faults_hz", *OPERATING)
+RATES = ("faults_hz", "faults_per_turn")
+SUCH = {"faults_hz": 87.3, "faults_per_turn": 3.58}
+OF_THE_MACHINE = ("machine_class", *RATES, "bands_hz", "tacho", "pulses_per_turn", "condition_channels")
+KEYS = ("rate_hz", "unit", "channel", "scale", "started", *OF_THE_MACHINE, *OPERATING)
 SUFFIXES = (".toml", ".json")
 MACHINE_CLASSES = ("large-rigid", "large-flexible", "medium-rigid", "medium-flexible")  # of ISO 20816-3
 
@@ -65,23 +68,53 @@ def _checked(path: Path) -> dict[str, Any]:
         if key in OPERATING and not (number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING[2])):
             what = "a temperature in degC" if key == OPERATING[2] else "a positive number"
             raise BadInput(f"{path.name}: {key} must be {what}, got {value!r}")
-        if key == "faults_hz":
-            _require_rates(path, value)
+        if key in RATES:
+            _require_rates(path, key, value)
+        if key == "bands_hz":
+            _require_bands(path, value)
+        if key == "condition_channels":
+            _require_channels(path, value)
+        if key == "pulses_per_turn" and not (number and 0.0 < value < float("inf")):
+            raise BadInput(f"{path.name}: pulses_per_turn must be a positive number, got {value!r}")
         if key == "machine_class" and value not in MACHINE_CLASSES:
             raise BadInput(f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got {value!r}")
-        if key in ("unit", "channel") and not isinstance(value, str) and not (key == "channel" and number):
+        if key in ("unit", "channel", "tacho") and not isinstance(value, str) and not (key != "unit" and number):
             raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
     if "started" in stated:
         started = parse_time(stated["started"])
         if started is None:
             raise BadInput(f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00")
         stated["started"] = started
-    if "channel" in stated:
-        stated["channel"] = str(stated["channel"])
+    for key in ("channel", "tacho"):
+        if key in stated:
+            stated[key] = str(stated[key])
     return stated
 
 
-def _require_rates(path: Path, value: Any) -> None:
+def _require_bands(path: Path, value: Any) -> None:
+    """Bands by their names, such as housing = [2000, 5000]."""
+    numbers = isinstance(value, dict) and value
+    for ends in value.values() if numbers else ():
+        two = isinstance(ends, list) and len(ends) == 2
+        numbers = numbers and two and all(type(end) in (int, float) for end in ends) and 0.0 <= ends[0] < ends[1]
+    if not numbers:
+        raise BadInput(
+            f"{path.name}: bands_hz must be two frequencies by name, such as {{ housing = [2000, 5000] }}, "
+            f"got {value!r}"
+        )
+
+
+def _require_channels(path: Path, value: Any) -> None:
+    """Channels by the condition that they hold, such as temperature_degc = "oil"."""
+    known = isinstance(value, dict) and value and all(isinstance(name, str) for name in value.values())
+    if not known or not set(value) <= set(OPERATING):
+        raise BadInput(
+            f"{path.name}: condition_channels must name channels by {', '.join(OPERATING)}, such as "
+            f'{{ temperature_degc = "oil" }}, got {value!r}'
+        )
+
+
+def _require_rates(path: Path, key: str, value: Any) -> None:
     """Rates at which faults pass, by their names, such as BPFO = 87.3."""
     numbers = (
         isinstance(value, dict)
@@ -93,5 +126,5 @@ def _require_rates(path: Path, value: Any) -> None:
     )
     if not numbers:
         raise BadInput(
-            f"{path.name}: faults_hz must be positive rates by name, such as {{ BPFO = 87.3 }}, got {value!r}"
+            f"{path.name}: {key} must be positive rates by name, such as {{ BPFO = {SUCH[key]} }}, got {value!r}"
         )

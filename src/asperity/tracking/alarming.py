@@ -156,16 +156,17 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
     def quality_of(name: str) -> Callable[[TrackedRecording], float]:
         return lambda one: float(getattr(one.reading.quality, name))
 
-    def depth_of(name: str) -> Callable[[TrackedRecording], float]:
-        return lambda one: one.reading.depths.get(name, np.nan)
+    def named(several: str, words: str) -> dict[str, Callable[[TrackedRecording], float]]:
+        names = dict.fromkeys(name for one in tracked for name in getattr(one.reading, several))
+        return {f"{words} {name}": _getter(several, name) for name in names}
 
-    faults = dict.fromkeys(name for one in tracked for name in one.reading.depths)
     heard = {
         "the level (rms)": quality_of("rms"),
         "kurtosis": quality_of("kurtosis"),
         "velocity (rms)": lambda one: one.reading.velocity,
     }
-    deep = {f"the envelope at {name}": depth_of(name) for name in faults}
+    heard |= named("bands", "the level") | named("lines", "the line at")
+    deep = named("depths", "the envelope at")
     met = _conditions(tracked, LEVEL, response)
     every = {words: logarithms(value) for words, value in (heard | deep).items()}
     return [
@@ -181,6 +182,10 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
         for words, values in every.items()
         if np.isfinite(values).any()
     ]
+
+
+def _getter(several: str, name: str) -> Callable[[TrackedRecording], float]:
+    return lambda one: getattr(one.reading, several).get(name, np.nan)
 
 
 def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> Alarm:

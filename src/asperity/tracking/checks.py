@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.errors import BadInput
 from asperity.recording import OpenRecording, Quality, check_recording, open_channels
 from asperity.tracking.files import recordings_in
@@ -75,7 +75,7 @@ class RecordingChecks:
 def check_recordings(
     files: Sequence[Path],
     *,
-    case: Case | None = None,
+    case: Case | MachineCase | None = None,
     band_hz: tuple[float, float] | None = None,
     rate_hz: float | None = None,
     unit: str | None = None,

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crf_reference_hz", "crfa", "crfa_std", "damping_ratio", "damping_std",
            "clr", "clr_low", "clr_high", "severe_probability", "duration_s", "rate_hz")  # fmt: skip
 TEXTS = ("file", "reason", "damping_reason", "label", "started")
+NAMED = {"depths": "depth", "lines": "line", "bands": "band"}  # of a row: several numbers, each by its own name
 ENDINGS = (".csv", ".parquet", ".nc")
 
 
@@ -117,7 +118,10 @@ class TrackedRecording:
             },
             "velocity_rms": finite_or_none(self.reading.velocity),
             "zone": self.zone,
-            "depths": {name: finite_or_none(depth) for name, depth in self.reading.depths.items()},
+            **{
+                name: {key: finite_or_none(value) for key, value in getattr(self.reading, name).items()}
+                for name in NAMED
+            },
             "crf_reference_hz": finite_or_none(self.crf_reference_hz),
             **asdict(self.operating),
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
@@ -304,10 +308,11 @@ class Track:
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A recording's line with a column for each fault's depth."""
-    depths = row.get("depths", {})
-    rest = {name: value for name, value in row.items() if name != "depths"}
-    return rest | {f"depth_{name}": depth for name, depth in depths.items()}
+    """A recording's line with a column for each fault's depth, each line and each band."""
+    rest = {name: value for name, value in row.items() if name not in NAMED}
+    return rest | {
+        f"{kind}_{name}": value for several, kind in NAMED.items() for name, value in row.get(several, {}).items()
+    }
 
 
 def _in_json(stages: Stages) -> dict[str, Any]:

@@ -4,7 +4,7 @@ What the spectra mean together is left to `track`.
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
@@ -23,6 +23,8 @@ from asperity.processes import leave_interrupts_to_the_parent
 from asperity.rating import velocity_rms
 from asperity.recording import Gauge, Quality, ReadOptions, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
+from asperity.tracking.beside import bands, beside, heard_at, lines, rates, steady
+from asperity.tracking.files import Place
 from asperity.tracking.target import Target
 from asperity.vibration import Envelope
 
@@ -37,6 +39,7 @@ WORTH_A_POOL = 32 << 20  # bytes in all; starting processes takes a second
 class Reading:
     """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
+    `bands` are rms in bands, and `lines` at the rates of faults and meshes, each with two harmonics.
     `rate_doubt` is the relative standard deviation of the rate. `facts` are texts by name, each with its source;
     `started` is in ISO form or empty. `depths` are how deep the envelope is modulated at the rates of faults, where a
     sidecar states those; `velocity` is rms, 10 to 1000 Hz [m/s], nan of what is no acceleration or too short to tell.
@@ -52,6 +55,8 @@ class Reading:
     started: str = ""
     velocity: float = np.nan
     depths: dict[str, float] = field(default_factory=dict)
+    lines: dict[str, float] = field(default_factory=dict)
+    bands: dict[str, float] = field(default_factory=dict)
     reason: str = ""
 
     @property
@@ -70,7 +75,9 @@ class Reading:
         return datetime.fromisoformat(self.started) if self.started else None
 
 
-def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: float) -> Reading:
+def read_spectrum(
+    path: Path, options: ReadOptions, target: Target, spacing_hz: float, place: Place | None = None
+) -> Reading:
     """Read a file once: its facts, its quality, its averaged spectrum. What is wrong with it becomes the reason."""
     try:
         opened = open_recording(path, **asdict(options))
@@ -84,16 +91,14 @@ def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: 
         facts={name: (_text(fact.value), fact.source) for name, fact in opened.facts.items()},
         started=opened.started.isoformat() if opened.started else "",
     )
+    told = beside(opened, place)
+    rates_hz = rates(opened, told, target)
     gauge, envelope = Gauge(), Envelope(opened.rate_hz)
-    rates = opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {}
     blocks = gauge.without_stuck(gauge.watch(opened.blocks()))
+    segment = segment_length(opened.rate_hz, spacing_hz)
     try:
         spectrum: Spectrum | None = averaged_spectrum(
-            envelope.watch(blocks) if rates else blocks,
-            opened.rate_hz,
-            opened.unit,
-            segment=segment_length(opened.rate_hz, spacing_hz),
-            window=WINDOW,
+            envelope.watch(blocks) if rates_hz else blocks, opened.rate_hz, opened.unit, segment=segment, window=WINDOW
         )
         failed = ""
     except UnreadableFile as refusal:
@@ -101,12 +106,28 @@ def read_spectrum(path: Path, options: ReadOptions, target: Target, spacing_hz: 
     except BadInput as refusal:
         spectrum, failed = None, str(refusal)
     quality = gauge.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
-    velocity = np.nan
-    if spectrum is not None and opened.comparable:
-        velocity = velocity_rms(spectrum.frequency_hz, spectrum.density)
-    reason = "; ".join(quality.faults) or failed
-    depths = envelope.depths(rates)
-    return replace(known, spectrum=spectrum, quality=quality, velocity=velocity, depths=depths, reason=reason)
+    depths, remarks = envelope.depths(rates_hz), [*quality.remarks, *told.remarks]
+    heard: dict[str, Any] = {}
+    if spectrum is not None:
+        frequency_hz, density = spectrum.frequency_hz, spectrum.density
+        heard = {"bands": bands(opened, frequency_hz, density), "lines": lines(frequency_hz, density, rates_hz)}
+        if opened.comparable:
+            heard["velocity"] = velocity_rms(frequency_hz, density)
+    try:
+        even = steady(opened, told) if rates_hz else None
+        if even is not None:
+            depths, heard["lines"] = heard_at(rates_hz, *even, opened.unit, segment_length(even[1], spacing_hz))
+    except BadInput as refusal:
+        remarks.append(str(refusal))
+    return replace(
+        known,
+        spectrum=spectrum,
+        quality=replace(quality, remarks=tuple(remarks)),
+        facts=known.facts | told.facts,
+        depths=depths,
+        reason="; ".join(quality.faults) or failed,
+        **heard,
+    )
 
 
 def _text(value: object) -> str:
@@ -139,11 +160,12 @@ def read_spectra(
     target: Target,
     spacing_hz: float,
     *,
+    places: Mapping[str, Place] | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Iterator[tuple[int, Reading]]:
     """Number and result of each file, as they are done; in processes of their own where that is worth it."""
-    jobs = [(path, options, target, spacing_hz) for path in paths]
+    jobs = [(path, options, target, spacing_hz, (places or {}).get(str(path))) for path in paths]
     if min(workers, len(paths)) < 2 or sum(_size(path) for path in paths) < WORTH_A_POOL:
         for number, job in enumerate(jobs):
             reading = read_spectrum(*job)

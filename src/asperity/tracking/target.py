@@ -1,12 +1,14 @@
 """Which resonance is looked for: a band, how wide its line is, where it ends with all load on asperities."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.coupling import BAND_MARGIN, search_band
 from asperity.errors import BadInput, require_positive
 from asperity.paper import papers_case
 
+SHAFTS = ("shaft_hz", "pinion_hz", "cam_hz", "disc_1_hz")  # of machines, whose speed the case states
 USUAL_DAMPING = 0.02  # the paper's, where no case states one
 
 
@@ -16,7 +18,9 @@ class Target:
 
     `band_hz` its ends; `width_hz` half-power width of a line at the lower end; `full_load_crf_hz` the resonance with
     all load on asperities, None where no contact model is known; `source` a sentence that says who chose the band;
-    `assumed` whether that was nobody; `case` the contact that was given.
+    `assumed` whether that was nobody; `case` the contact that was given. `rates_per_turn` are what of a machine turns,
+    passes or meshes how often in a turn of its shaft, by name, and `shaft_hz` how fast that turns, where nobody says
+    otherwise.
     """
 
     band_hz: tuple[float, float]
@@ -25,16 +29,23 @@ class Target:
     source: str
     assumed: bool = False
     case: Case | None = field(default=None, repr=False, compare=False)
+    rates_per_turn: Mapping[str, float] = field(default_factory=dict)
+    shaft_hz: float | None = None
 
 
-def search_target(case: Case | None = None, band_hz: tuple[float, float] | None = None) -> Target:
+def search_target(case: Case | MachineCase | None = None, band_hz: tuple[float, float] | None = None) -> Target:
     """The band of a case's contact model, or the one given; else that of the paper's contact, and it says so.
+
+    Of a machine it is that of its most loaded contact, where the case has [vibration].
 
     Raises
     ------
     BadInput
         for a case without [vibration], or a band that is none.
     """
+    if isinstance(case, MachineCase):
+        per_turn, shaft = _rates(case)
+        return replace(search_target(_contact(case), band_hz), rates_per_turn=per_turn, shaft_hz=shaft)
     if band_hz is not None:
         low, high = (require_positive("band", end, "Hz") for end in band_hz)
         if not low < high:
@@ -66,3 +77,25 @@ def search_target(case: Case | None = None, band_hz: tuple[float, float] | None 
         assumed=case is None and band_hz is None,
         case=case,
     )
+
+
+def _contact(machine: MachineCase) -> Case | None:
+    """The contact of a machine that carries most; None where the case does not say how it vibrates."""
+    if not machine.complete or "vibration" not in machine.tables:
+        return None
+    return machine.case(max((one for one in machine.contacts if not one.stands_still), key=lambda one: one.load))
+
+
+def _rates(machine: MachineCase) -> tuple[dict[str, float], float | None]:
+    """What passes how often in a turn, by name, and the shaft's speed [Hz]."""
+    every = machine.machine.frequencies
+    shaft = next((every[name] for name in SHAFTS if every.get(name, 0.0) > 0.0), None)
+    if shaft is None:
+        return {}, None
+    return {_name(key): rate / shaft for key, rate in every.items()}, shaft
+
+
+def _name(key: str) -> str:
+    """Of a rate: BPFO as everybody writes it."""
+    bare = key.removesuffix("_hz")
+    return bare.upper() if bare in ("bpfo", "bpfi", "bsf", "ftf") else bare.replace("_", " ")

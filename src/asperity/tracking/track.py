@@ -13,7 +13,7 @@ from typing import get_args
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
@@ -53,7 +53,7 @@ X_UNITS = ("um", "mm", "nm", "m", "h", "s", "min", "d", "km", "cycles")
 def track_recordings(
     paths: Sequence[str | Path],
     *,
-    case: Case | None = None,
+    case: Case | MachineCase | None = None,
     band_hz: tuple[float, float] | None = None,
     rate_hz: float | None = None,
     unit: str | None = None,
@@ -75,7 +75,8 @@ def track_recordings(
     Parameters
     ----------
     paths : files, and folders of files
-    case : its contact model says where the resonance may lie, and what load share a CRF stands for
+    case : its contact model says where the resonance may lie, and what load share a CRF stands for; a machine's also
+        how often what passes or meshes
     band_hz : where to look instead; without either, the paper's contact stands in, and `notes` say so
     rate_hz, unit, channel, scale : as `read_recording` takes them, for all recordings alike
     x : place of each recording in the series, shape (recordings,); or `table`, a csv as `read_table` takes it
@@ -102,7 +103,7 @@ def track_recordings(
     x_name, places = _stated_places(files, x, stated)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
     spacing = common_spacing(files, options, target)
-    numbered = dict(read_spectra(files, options, target, spacing, workers=workers, progress=progress))
+    numbered = dict(read_spectra(files, options, target, spacing, places=places, workers=workers, progress=progress))
     readings = [numbered[number] for number in range(len(files))]
     if all(reading.spectrum is None and reading.quality is None for reading in readings):
         others = f" (and so on for {len(readings) - 1} more files)" if len(readings) > 1 else ""

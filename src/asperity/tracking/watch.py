@@ -15,7 +15,7 @@ from pathlib import Path
 from time import monotonic, sleep, time
 from typing import Any, NamedTuple
 
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.errors import BadInput
 from asperity.files import make_folder
 from asperity.recording import ReadOptions, names_beside
@@ -56,7 +56,7 @@ def watch_folder(
     folder: str | Path,
     out: str | Path,
     *,
-    case: Case | None = None,
+    case: Case | MachineCase | None = None,
     band_hz: tuple[float, float] | None = None,
     rate_hz: float | None = None,
     unit: str | None = None,
@@ -140,7 +140,7 @@ def _looks(
     acknowledge: str | None,
     asked: Mapping[str, Any],
     pace: _Pace,
-    read: Callable[[list[Version]], tuple[Reading, ...]],
+    read: Callable[[list[Version], Table | None], tuple[Reading, ...]],
 ) -> Iterator[Update]:
     """An update at the start and whenever recordings have arrived."""
     with closing(memory.sensor.store):
@@ -149,11 +149,11 @@ def _looks(
             present = memory.present(folder)
             unread = [key for key in present if key not in memory.sensor.recordings]
             arrived = memory.settled(unread, pace)
-            new = read(arrived)
+            named = None if table is None or not (arrived or memory.sensor.recordings) else read_table(table)
+            new = read(arrived, named)
             known = sorted(memory.sensor.series(), key=lambda key: _sorting(_name(key)))
             waiting = len(unread) - len(arrived)
             if new or first:
-                named = None if table is None or not known else read_table(table)
                 question = _digest(asked, named, known, memory.target)
                 recalled = first and pace.recall and not new and acknowledge is None
                 said = memory.said(question) if recalled else None
@@ -297,7 +297,7 @@ class _Memory:
         return settled + [key for key in ahead if monotonic() - seen[key] >= pace.settle_s and _unchanged(key)]
 
     def read(
-        self, workers: int, progress: Callable[[Reading], None] | None, keys: list[Version]
+        self, workers: int, progress: Callable[[Reading], None] | None, keys: list[Version], table: Table | None
     ) -> tuple[Reading, ...]:
         """Read files, and keep what each gave as soon as it is there."""
         if not keys:
@@ -306,8 +306,15 @@ class _Memory:
         if self.sensor.spacing_hz is None:
             self.sensor.settle_spacing(common_spacing(paths, self.options, self.target))
         assert self.sensor.spacing_hz is not None  # just settled
+        stated = {} if table is None else table.placed([path for path in paths if table.row(path) is not None])
         reader = read_spectra(
-            paths, self.options, self.target, self.sensor.spacing_hz, workers=workers, progress=progress
+            paths,
+            self.options,
+            self.target,
+            self.sensor.spacing_hz,
+            places=stated,
+            workers=workers,
+            progress=progress,
         )
         for number, reading in reader:
             self.sensor.keep(keys[number], reading)

@@ -10,6 +10,10 @@ from .excitation import PatchAverage as PatchAverage
 from .excitation import PatchShape as PatchShape
 from .excitation import SurfaceTrack as SurfaceTrack
 from .excitation import white_noise as white_noise
+from .orders import Turning as Turning
+from .orders import steadied as steadied
+from .orders import turning_by_pulses as turning_by_pulses
+from .orders import turning_by_speed as turning_by_speed
 from .oscillator import RESPONSE_METHODS as RESPONSE_METHODS
 from .oscillator import SUBSTEPS as SUBSTEPS
 from .oscillator import ContactOscillator as ContactOscillator

@@ -1,0 +1,96 @@
+"""Orders of a shaft that does not turn evenly, lines at rates and bands: against closed forms."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.tracking.beside import bands, lines
+from asperity.vibration import Turning, steadied, turning_by_pulses, turning_by_speed
+
+RATE, SECONDS = 20e3, 4.0
+TIME = np.arange(round(RATE * SECONDS)) / RATE
+ANGLE = 20.0 * TIME + 0.5 * 4.0 * TIME**2  # turns, from 20 to 36 Hz
+SPEED = 20.0 + 4.0 * TIME
+MEAN = 28.0
+
+
+def spectrum(values, rate):
+    """One-sided power spectral density of a record, Hann."""
+    weights = np.hanning(values.size)
+    density = 2.0 * np.abs(np.fft.rfft(values * weights)) ** 2 / (rate * np.sum(weights**2))
+    return np.fft.rfftfreq(values.size, 1.0 / rate), density
+
+
+@pytest.mark.parametrize("per_turn", [1, 4])
+def test_the_angle_by_pulses_is_the_shafts(per_turn):
+    noise = 0.01 * np.random.default_rng(1).standard_normal(TIME.size)
+    pulses = np.exp(-200.0 * (((ANGLE * per_turn) % 1.0) - 0.5) ** 2) + noise
+    found = turning_by_pulses(pulses, RATE, per_turn)
+    known = np.isfinite(found.turns)
+    off = found.turns[known] - ANGLE[known]
+    assert known.mean() > 0.95
+    assert np.ptp(off) < 5e-3  # turns: from where on they are counted is open
+    assert found.speed_hz == pytest.approx(MEAN, rel=0.01)
+
+
+def test_the_noise_of_a_tacho_makes_no_pulses():
+    noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
+    assert turning_by_pulses(np.sin(2.0 * np.pi * ANGLE) + noise, RATE).speed_hz == pytest.approx(MEAN, rel=0.01)
+
+
+def test_the_angle_by_a_speed_channel_is_its_integral():
+    found = turning_by_speed(SPEED, RATE)
+    assert found.turns == pytest.approx(ANGLE, abs=1e-9)
+    assert found.speed_hz == pytest.approx(MEAN, rel=1e-4)
+
+
+@pytest.mark.parametrize("order", [3.58, 80.0, 200.0])  # up to 7200 Hz, a third of the rate
+def test_an_order_is_one_line_again(order):
+    values = np.sin(2.0 * np.pi * order * ANGLE)
+    even, rate = steadied(values, turning_by_speed(SPEED, RATE), RATE)
+    found = lines(*spectrum(even, rate), {"it": order * MEAN})["it"]
+    assert found == pytest.approx(np.sqrt(0.5), rel=0.01)
+    frequency, density = spectrum(even, rate)
+    assert frequency[np.argmax(density)] == pytest.approx(order * MEAN, rel=2e-3)
+    assert lines(*spectrum(values, RATE), {"it": order * MEAN})["it"] < 0.5 * found  # as it was recorded
+
+
+def test_a_shaft_that_turns_evenly_leaves_a_vibration_as_it_is():
+    values = np.random.default_rng(2).standard_normal(4000)
+    smooth = np.convolve(values, np.ones(8) / 8.0, mode="same")
+    even, rate = steadied(smooth, turning_by_speed(np.full(4000, 25.0), RATE), RATE)
+    assert rate == pytest.approx(RATE)
+    assert even[100:3900] == pytest.approx(smooth[100:3900], abs=0.02)
+
+
+def test_what_turns_no_shaft_is_refused():
+    with pytest.raises(BadInput, match="shows 0 pulses, and 4 are needed"):
+        turning_by_pulses(np.zeros(1000), RATE)
+    with pytest.raises(BadInput, match="stands still or turns back"):
+        turning_by_speed(np.linspace(-1.0, 30.0, 1000), RATE)
+    with pytest.raises(BadInput, match=r"less than 0\.25 of its mean speed"):
+        steadied(np.zeros(1000), turning_by_speed(np.geomspace(0.1, 30.0, 1000), RATE), RATE)
+    with pytest.raises(BadInput, match="pulses per turn"):
+        turning_by_pulses(np.zeros(10), RATE, 0.0)
+    assert isinstance(turning_by_speed(np.ones(10), RATE), Turning)
+
+
+def test_a_line_is_the_root_of_its_harmonics_squares():
+    parts = [(1.0, 1), (0.5, 2), (0.25, 3), (3.0, 5)]  # the fifth is no part of it
+    values = sum(size * np.sin(2.0 * np.pi * 100.0 * number * TIME) for size, number in parts)
+    found = lines(*spectrum(values, RATE), {"mesh": 100.0, "slow": 0.5, "fast": 11e3})
+    assert found["mesh"] == pytest.approx(np.sqrt(0.5 * (1.0 + 0.25 + 0.0625)), rel=1e-3)
+    assert np.isnan([found["slow"], found["fast"]]).all()
+
+
+def test_bands_share_out_what_is_heard():
+    class Opened:
+        facts = {}  # noqa: RUF012
+        rate_hz = RATE
+
+    frequency = np.arange(0.0, 10_001.0, 5.0)
+    found = bands(Opened, frequency, np.full(frequency.size, 2.0))
+    wide = {"10 to 1000 Hz": 990.0, "1 to 5 kHz": 4000.0, "above 5 kHz": 3000.0}
+    assert {name: value**2 for name, value in found.items()} == pytest.approx(
+        {name: 2.0 * width for name, width in wide.items()}, rel=1e-9
+    )
