@@ -23,17 +23,21 @@ CRF_HZ, RISE_HZ, AFTER = (
 )  # the paper's end, the rig's rise to its knee, slope behind it over before
 SCATTERS = (0.001, 0.003, 0.005, 0.01)  # of CRF, drawn one a series
 LEVEL_SCATTER = 0.1  # of the logarithm of the level: 0.9 dB
+DEPTH_SCATTER = 0.14  # of the logarithm of a depth, as white noise of a second shows it
 CYCLES = (6.0, 8.0, 12.0, 24.0)  # recordings a day
 
 
 class Drawn(NamedTuple):
     """CRF over its first value, logarithm of the level; the recording at which the severe stage begins, if it does.
 
-    `load` [N] and `temperature` [degC] as measured, where they are given.
+    `depth` is the logarithm of how deep the envelope is modulated at a fault's rate, `bands` those of velocity and two
+    bands. `load` [N] and `temperature` [degC] as measured, where they are given.
     """
 
     crf: np.ndarray
     level: np.ndarray
+    depth: np.ndarray
+    bands: np.ndarray
     begins: float = np.nan
     load: np.ndarray | None = None
     temperature: np.ndarray | None = None
@@ -50,11 +54,19 @@ def remembered(rng: np.random.Generator, memory: float) -> np.ndarray:
 
 
 def drawn(
-    rng: np.random.Generator, course: np.ndarray | float = 1.0, level: np.ndarray | float = 0.0, memory: float = 0.0
+    rng: np.random.Generator,
+    course: np.ndarray | float = 1.0,
+    level: np.ndarray | float = 0.0,
+    memory: float = 0.0,
+    source: np.ndarray | float = 0.0,
 ) -> Drawn:
-    """Courses of CRF and level with scatter on them."""
+    """Courses of CRF and levels with scatter on them; `source` is by how much more of a bearing is heard than usual."""
     crf = course + rng.choice(SCATTERS) * remembered(rng, memory)
-    return Drawn(crf, level + LEVEL_SCATTER * remembered(rng, memory))
+    heard = np.exp(2.0 * np.asarray(source))
+    whole = level + 0.5 * np.log(0.5 * (1.0 + heard))
+    depth = np.log(heard / (1.0 + heard)) + DEPTH_SCATTER * remembered(rng, memory)
+    levels = [whole + LEVEL_SCATTER * remembered(rng, memory) for _ in range(4)]
+    return Drawn(crf, levels[0], depth, np.array(levels[1:]))
 
 
 def after(rng: np.random.Generator) -> np.ndarray:
@@ -69,7 +81,7 @@ def daily(rng: np.random.Generator, size: float) -> Drawn:
 
 def load_step(rng: np.random.Generator) -> Drawn:
     there = after(rng)
-    return drawn(rng, 1.0 + rng.uniform(0.02, 0.12) * there, rng.uniform(0.0, 0.7) * there)
+    return drawn(rng, 1.0 + rng.uniform(0.02, 0.12) * there, rng.uniform(0.0, 0.7) * there, 0.0, 0.5 * there)
 
 
 def warm_up(rng: np.random.Generator) -> Drawn:
@@ -79,7 +91,9 @@ def warm_up(rng: np.random.Generator) -> Drawn:
 
 def moved_sensor(rng: np.random.Generator) -> Drawn:
     there = after(rng)
-    return drawn(rng, 1.0 + rng.uniform(-0.02, 0.02) * there, rng.uniform(-1.5, 1.5) * there)
+    return drawn(
+        rng, 1.0 + rng.uniform(-0.02, 0.02) * there, rng.uniform(-1.5, 1.5) * there, 0.0, rng.uniform(-1.5, 1.5) * there
+    )
 
 
 def drift_of_modes(rng: np.random.Generator) -> Drawn:
@@ -174,7 +188,8 @@ def knee(rng: np.random.Generator, scatter_hz: float, memory: float = 0.0) -> Dr
     begins = float(rng.integers(12, 25))
     pace = RISE_HZ / begins
     course = CRF_HZ + np.where(begins > NUMBER, pace * NUMBER, RISE_HZ + AFTER * pace * (NUMBER - begins))
-    return Drawn((course + scatter_hz * remembered(rng, memory)) / CRF_HZ, 0.1 * remembered(rng, 0.0), begins)
+    crf = (course + scatter_hz * remembered(rng, memory)) / CRF_HZ
+    return drawn(rng)._replace(crf=crf, begins=begins)
 
 
 def knee_under_load(rng: np.random.Generator, scatter_hz: float) -> Drawn:
@@ -205,7 +220,11 @@ def to_failure(rng: np.random.Generator) -> Drawn:
     begins = rng.integers(15, 30)
     grown = np.maximum(NUMBER - begins, 0.0) / (RECORDINGS - 1 - begins)
     level = np.log(rng.uniform(15.0, 25.0)) * grown ** rng.uniform(1.0, 2.0)
-    return Drawn(np.full(RECORDINGS, np.nan), level + LEVEL_SCATTER * remembered(rng, 0.5), float(begins))
+    one = drawn(rng, np.nan, level, 0.5)
+    return one._replace(begins=float(begins))
+
+
+CHANNELS = ("level", "velocity", "band 1", "band 2", "depth")
 
 
 def judged(one: Drawn) -> Alarm:
@@ -217,14 +236,19 @@ def judged(one: Drawn) -> Alarm:
     of_crf, of_level = (conditions_of(met, follows, ANY_CONTACT.oil) for follows in (ANY_CONTACT.crf, LEVEL))
     choices = {"least": CRF_LEAST, "contact": True, "in_words": str, "relative": True}
     crf = Watched(name="CRF", values=one.crf, conditions=of_crf, **choices)
-    level = Watched(name="level", values=one.level, least=LEVEL_LEAST, contact=False, in_words=str, conditions=of_level)
+    choices = {"least": LEVEL_LEAST, "contact": False, "in_words": str, "conditions": of_level}
+    every = zip(CHANNELS, (one.level, *one.bands, one.depth), strict=True)
+    levels = [
+        Watched(name=name, values=values, loud=name != "depth", jumps=name == "depth", **choices)
+        for name, values in every
+    ]
 
     def severe(number: int) -> bool:
         reference = crf.without_conditions(0, number + 1)[0]
         return split_stages(NUMBER[: number + 1], CRF_HZ * reference).kind == "severe"
 
     sight = Sight() if np.isfinite(one.crf).any() else Sight("cannot-tell", "no contact resonance")
-    watched = [crf, level] if np.isfinite(one.crf).any() else [level]
+    watched = [crf, *levels] if np.isfinite(one.crf).any() else levels
     return sequential_alarm(NUMBER, watched, [sight] * RECORDINGS, confirmed=severe)
 
 
@@ -238,7 +262,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     yield f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in {1.0 / FALSE_ALARMS:.0f}\n"
     yield "| nothing wears | ever an alarm | ever an alert | ever cannot tell, behind the baseline |"
     yield "|---|---|---|---|"
-    for name, draw in WITHOUT_WEAR.items():
+    for name, draw in (WITHOUT_WEAR | GIVEN).items():
         states = [judged(draw(np.random.default_rng([11, number]))).states[8:] for number in range(series)]
         shares = [100.0 * np.mean([kind in one for one in states]) for kind in ("alarm", "alert", "cannot-tell")]
         yield f"| {name} | {' | '.join(f'{share:.1f} %' for share in shares)} |"

@@ -180,6 +180,19 @@ def test_a_step_of_load_or_gain_is_not_told_from_damage():
     assert judged(HEALTHY["load step"] + scatter(5), acknowledged=15).state == "none"
 
 
+@pytest.mark.parametrize(("level", "state"), [(0.0, "alarm"), (0.4, "cannot-tell")], ids=["fault", "moved sensor"])
+def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(level, state):
+    """A sensor that is moved hears a bearing better: the level moves too, which a fault hardly does."""
+    jump = (NUMBER >= 20).astype(float)
+    series = {"depth": 0.9 * jump + scatter(1, 0.1), "rms": level * jump + scatter(2, 0.05)}
+    watching = [
+        Watched(name=name, values=values, least=np.log(2.0), contact=False, in_words="by {:.2f}".format,
+                loud=name == "rms", jumps=name == "depth")
+        for name, values in series.items()
+    ]  # fmt: skip
+    assert sequential_alarm(NUMBER, watching, [Sight()] * 40).state == state
+
+
 def test_a_smaller_rate_of_false_alarms_takes_longer():
     values = knee_at(15, 15.0, 3)
     delays = [judged(values, false_alarm_rate=rate).states.index("alarm") for rate in (1e-1 - 1e-9, 1e-3, 1e-5)]

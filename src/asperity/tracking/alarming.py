@@ -24,6 +24,7 @@ LEVEL_LEAST = float(np.log(2.0))  # 6 dB, which ISO 13373-1 takes for a change w
 BASELINE = 8  # recordings by which a CRF is counted from 1
 UNSEEN = 3  # recordings without a resonance, from which on nobody sees the contact
 LAST = "last"
+KURTOSIS = "kurtosis"
 
 
 def raise_alarm(
@@ -162,7 +163,7 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
 
     heard = {
         "the level (rms)": quality_of("rms"),
-        "kurtosis": quality_of("kurtosis"),
+        KURTOSIS: quality_of("kurtosis"),
         "velocity (rms)": lambda one: one.reading.velocity,
     }
     heard |= named("bands", "the level") | named("lines", "the line at")
@@ -176,6 +177,7 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
             least=LEVEL_LEAST,
             contact=False,
             in_words=_times,
+            loud=words not in deep and words != KURTOSIS,
             jumps=words in deep,
             conditions=met,
         )

@@ -20,6 +20,8 @@ ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
 FALSE_ALARMS = 1e-3  # a recording
 ALERTS = 10.0  # false alerts for a false alarm
 LATELY = 3  # recordings whose median is where an indicator, or a condition, has come to
+AROUND, FEWEST_AROUND = 12, 3  # places on either side of a jump, by which another indicator is seen to move with it
+MOVED, HEARD = 3.0, 0.1  # deviations of the difference, and 0.9 dB
 SPOKEN = 0.4  # of the least change: what conditions explain is said from there on, and may be off by this share
 CONTACT_SHARE = 0.8  # of the false alarms allowed, among the contact's indicators; the levels have the rest
 
@@ -35,7 +37,8 @@ class Watched:
     least : the change from which on it is worth acting, in units of `values`
     contact : whether it is the contact's, whose severe stage is a rise that flattens; otherwise a level, which grows
     in_words : a change of it, in words
-    jumps : whether a jump upwards alarms, as neither gain nor a moved sensor makes one
+    loud : whether gain changes it
+    jumps : whether a jump upwards alarms, unless all that is loud moves with it: then the sensor may have been moved
     conditions : what it may follow without any wear; of the same recordings
     relative : whether `values` are ratios, of which conditions change the logarithm
     """
@@ -45,6 +48,7 @@ class Watched:
     least: float
     contact: bool
     in_words: Callable[[float], str]
+    loud: bool = False
     jumps: bool = False
     conditions: tuple[Condition, ...] = ()
     relative: bool = False
@@ -184,11 +188,13 @@ def sequential_alarm(
 
 
 class _Looked(NamedTuple):
-    """What an indicator shows up to a recording; `places` where it is known."""
+    """What an indicator shows up to a recording; `places` where it is known, `x` and `values` there."""
 
     change: Found
     step: Found
     places: int
+    x: Field
+    values: Field
 
 
 def _looked_at(one: Watched, x: Field, first: int, last: int) -> _Looked:
@@ -196,9 +202,17 @@ def _looked_at(one: Watched, x: Field, first: int, last: int) -> _Looked:
     at, (level, *rows) = _places(x[first : last + 1], values, told.rows)
     beside = Beside(np.array(rows), told.scatter / told.widths) if rows else None
     test = knee if one.contact else growth
-    return _Looked(
-        test(at, level, least=one.least, beside=beside), step(at, level, least=one.least, beside=beside), at.size
-    )
+    change, stepped = (judge(at, level, least=one.least, beside=beside) for judge in (test, step))
+    return _Looked(change, stepped, at.size, at, level)
+
+
+def _moves_at(looked: _Looked, at: float) -> bool:
+    """Whether a logarithm of a level moves where an indicator has jumped, by more than its scatter."""
+    before, behind = looked.values[looked.x < at][-AROUND:], looked.values[looked.x >= at][:AROUND]
+    if min(before.size, behind.size) < FEWEST_AROUND:
+        return False
+    scatter = np.hypot(before.std(ddof=1) / np.sqrt(before.size), behind.std(ddof=1) / np.sqrt(behind.size))
+    return bool(abs(behind.mean() - before.mean()) > max(MOVED * scatter, HEARD))
 
 
 def _places(x: Field, values: Field, rows: Field) -> tuple[Field, list[Field]]:
@@ -255,6 +269,7 @@ def _decided(
     """State, reason, and who raised it."""
     shares = _shares(watched, rate)
     leaning = ("", "")
+    beside = list(zip(found, watched, strict=True))
     for one, looked, share in zip(watched, found, shares, strict=True):
         where = f"{looked.change.at:.4g} {unit}".rstrip()
         if looked.change.log_ratio < threshold(ALERTS * share):
@@ -265,7 +280,9 @@ def _decided(
             return "alarm", course, one.name
         leaning = (course, one.name)
     for one, looked, share in zip(watched, found, shares, strict=True):
-        if one.jumps and looked.step.change > 0.0 and looked.step.log_ratio >= threshold(share):
+        upwards = one.jumps and looked.step.change > 0.0 and looked.step.log_ratio >= threshold(share)
+        loud = [other for other, heard in beside if heard.loud] if upwards else []
+        if upwards and not (loud and all(_moves_at(other, looked.step.at) for other in loud)):
             return "alarm", _jumped(one, looked, unit), one.name
     if sight.state == "blind":
         return "blind", sight.reason, ""

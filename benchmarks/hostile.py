@@ -1,0 +1,163 @@
+"""`asperity watch` on a folder as loggers leave it, for an hour, killed ten times beside one that is not.
+
+Files come late, in parts, twice, from a clock that is ahead, and from other programs. At the end every file has to be
+accounted for, and both stores have to hold the same. `python -m benchmarks.hostile --minutes 60 [--kills 10]` runs
+this part alone and prints what was found; processor time is small, the clock's is not.
+"""
+
+import argparse
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic, sleep, time
+
+import numpy as np
+
+from asperity.tracking.files import may_be_recording
+
+RATE, SECONDS = 20e3, 0.1
+AHEAD_S = 30 * 86_400.0
+PARTS_S = 3.0  # between the two halves of a file that is still being written
+KINDS = ("plain",) * 6 + ("late", "in parts", "twice", "ahead", "cut", "foreign", "half copied", "empty", "again")
+
+
+def recorded(number: int) -> np.ndarray:
+    return np.random.default_rng(number).standard_normal(round(SECONDS * RATE))
+
+
+def write(path: Path, number: int) -> None:
+    with path.open("wb") as file:
+        np.savez(file, acc=recorded(number), fs=RATE, unit="m/s^2")
+
+
+def arrive(folder: Path, number: int, kind: str) -> None:
+    """One arrival; what is written in parts takes `PARTS_S` twice."""
+    path = folder / f"r-{number:04}.npz"
+    if kind == "late":
+        path = folder / f"r-{max(number - 7, 0):04}-late.npz"
+    if kind == "in parts":
+        write(folder.parent / "whole", number)
+        content = (folder.parent / "whole").read_bytes()
+        path.write_bytes(content[:900])
+        sleep(PARTS_S)
+        path.write_bytes(content)
+        return
+    if kind == "cut":
+        write(folder.parent / "whole", number)
+        path.write_bytes((folder.parent / "whole").read_bytes()[:700])
+    elif kind == "foreign":
+        (folder / f"n-{number:04}.txt").write_text("Nothing of note.\n")
+        (folder / f"p-{number:04}.pdf").write_bytes(b"%PDF-1.4 nothing")
+        Path(os.fsdecode(os.fsencode(folder) + b"/\xff-%04d.npz" % number)).touch()
+    elif kind == "half copied":
+        (folder / f"h-{number:04}.npz.filepart").write_bytes(b"PK")
+    elif kind == "empty":
+        path.touch()
+    else:
+        write(path, number)
+    if kind == "twice":
+        shutil.copy(path, path.with_stem(f"{path.stem}-copy"))
+    if kind == "ahead":
+        os.utime(path, (time() + AHEAD_S,) * 2)
+    if kind == "again":
+        sleep(PARTS_S)
+        write(path, number + 5000)
+
+
+def watch(folder: Path, out: Path, *words: str, every: float, settle: float) -> list[str]:
+    own = ("--out", str(out), "--quiet", "--machine", "Fan 1", "--point", "DE", "--band", "2000", "4000")
+    pace = ("--every", f"{every:g}", "--settle", f"{settle:g}")
+    return [sys.executable, "-m", "asperity", "watch", str(folder), *own, *pace, *words]
+
+
+def latest(store: Path) -> dict[str, tuple[object, ...]]:
+    """Of each file the last version: what was read of it, and that it was judged."""
+    with closing(sqlite3.connect(store)) as connection:
+        rows = connection.execute("SELECT file, refused, reading, state FROM recording ORDER BY id").fetchall()
+    return {Path(file).name: (refused, reading, state) for file, refused, reading, state in rows}
+
+
+def accounted(folder: Path, store: Path) -> tuple[Counter[str], list[str]]:
+    """What became of every file of the folder, and those of which nobody said anything."""
+    held, counts, silent = latest(store), Counter[str](), []
+    for path in folder.iterdir():
+        if path.name in held:
+            counts["refused with a reason" if held[path.name][0] else "heard and judged"] += 1
+        elif not path.name.isprintable() or b"\xff" in os.fsencode(path.name):
+            counts["left out, its name said"] += 1
+        elif not may_be_recording(path):
+            counts["no recording by its name"] += 1
+        elif path.stat().st_size == 0:
+            counts["empty, waited for"] += 1
+        else:
+            silent.append(path.name)
+    return counts, silent
+
+
+def run(
+    minutes: float, kills: int, every: float = 2.0, settle: float = 5.0, say: Callable[[str], None] = print
+) -> Iterator[str]:
+    """Lines of a table."""
+    with TemporaryDirectory() as name:
+        folder = Path(name) / "in"
+        folder.mkdir()
+        rng, began = np.random.default_rng(1), monotonic()
+        end = began + 60.0 * minutes
+        outs = {"left alone": Path(name) / "alone", f"killed {kills} times": Path(name) / "killed"}
+        commands = [watch(folder, out, every=every, settle=settle) for out in outs.values()]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        alone, killed = (subprocess.Popen(command, **quiet) for command in commands)
+        deaths = sorted(rng.uniform(began + 1.0, end, kills))
+        number = 0
+        try:
+            while monotonic() < end or deaths:
+                arrive(folder, number, str(rng.choice(KINDS)))
+                number += 1
+                while deaths and monotonic() > deaths[0]:
+                    deaths.pop(0)
+                    killed.send_signal(signal.SIGKILL)
+                    killed.wait()
+                    killed = subprocess.Popen(commands[1], **quiet)
+                sleep(float(rng.uniform(0.2, 1.8)) * 60.0 * minutes / 120.0)
+                if number % 10 == 0:
+                    say(f"{number} arrivals after {monotonic() - began:.0f} s")
+            sleep(2.0 * settle)
+        finally:
+            for process in (alone, killed):
+                process.kill()
+                process.wait()
+        for out in outs.values():
+            subprocess.run(watch(folder, out, "--once", every=every, settle=settle), check=False, **quiet)
+        stores = [out / "asperity.db" for out in outs.values()]
+        counts, silent = accounted(folder, stores[1])
+        first, second = (latest(store) for store in stores)
+        differ = sorted(file for file in first.keys() | second.keys() if first.get(file) != second.get(file))
+        yield "| a folder as loggers leave it | |"
+        yield "|---|---|"
+        yield f"| minutes, arrivals, kills | {(monotonic() - began) / 60.0:.1f}, {number}, {kills} |"
+        yield from (f"| {what} | {many} |" for what, many in sorted(counts.items()))
+        yield f"| nobody says what became of | {len(silent)} {' '.join(silent[:3])} |"
+        same = len(first.keys() | second.keys()) - len(differ)
+        yield f"| files of which both stores hold the same, and not | {same}, {len(differ)} {' '.join(differ[:3])} |"
+
+
+def lines(*, fast: bool = False) -> Iterator[str]:
+    """Markdown, a line at a time; `fast` takes a minute of it."""
+    yield from run(1.0 if fast else 60.0, 3 if fast else 10)
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(prog="python -m benchmarks.hostile", description=__doc__)
+    arguments.add_argument("--minutes", type=float, default=60.0)
+    arguments.add_argument("--kills", type=int, default=10)
+    given = arguments.parse_args()
+    for line in run(given.minutes, given.kills, say=lambda text: print(text, file=sys.stderr, flush=True)):
+        print(line, flush=True)
