@@ -45,6 +45,24 @@ def test_clipping_is_counted(tmp_path):
     assert checked(tmp_path, sine).clipped == 0.0
 
 
+@pytest.mark.parametrize(
+    ("drive", "piled"), [(3.0, True), (2.0, True), (0.1, False)], ids=["hard driven", "driven", "not driven"]
+)
+def test_soft_clipping_is_noticed(tmp_path, drive, piled):
+    """tanh of Gaussian noise, as an amplifier at its limit has it; by blocks of any size."""
+    found = checked(tmp_path, 5.0 * np.tanh(drive * NOISE / NOISE.std()))
+    assert (found.clipped, any("soft clipping" in remark for remark in found.remarks)) == (0.0, piled)
+    gauge = Gauge()
+    for _ in gauge.watch(np.array_split(5.0 * np.tanh(drive * NOISE / NOISE.std()), 37)):
+        pass
+    assert gauge.piled == piled
+
+
+def test_what_falls_towards_its_extremes_is_not_called_clipped(tmp_path):
+    for values in (NOISE, NOISE**3, np.abs(NOISE) ** 0.5 * np.sign(NOISE), RNG.uniform(-1.0, 1.0, 20_000)):
+        assert not any("clip" in remark for remark in checked(tmp_path, values).remarks)
+
+
 def test_gaps_and_stuck_stretches_are_counted(tmp_path):
     values = NOISE.copy()
     values[100:200] = values[7000:7300] = np.nan

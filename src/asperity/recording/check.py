@@ -16,6 +16,10 @@ QUIET = 0.01  # m/s^2 rms: the noise of an accelerometer, not a machine
 STEPS_OF_NOISE = 1.5  # standard deviation in steps of the converter, below which only its last digit moves
 CLIPPED_RUN = 3  # equal extreme samples in a row that make clipping
 CLIPPED_SHARE = 1e-3  # from which CRFA is off
+HEIGHTS = 1024  # steps in which heights are counted
+TOP, BELOW = 0.95, 0.85  # of the largest value: from there on, and from there to the first
+PILED = 1.5  # times as dense at the top as below it: what is not cut off falls towards its extremes
+FEWEST_AT_TOP = 50  # samples
 STUCK = 50  # equal samples in a row that make a stuck stretch
 MOST_STUCK = 0.5  # of the samples, from which the rest is no recording
 OFFSET = 3.0  # mean over standard deviation, from which the offset eats the converter's range
@@ -71,6 +75,8 @@ class Gauge:
         self.mean = self.squares = self.cubes = self.fourths = 0.0  # sums of powers about the mean
         self.low, self.high = np.inf, -np.inf
         self.step: float | None = None
+        self._heights, self._top = np.zeros((2, HEIGHTS), dtype=np.int64), 0.0
+        self._centre: float | None = None
         self._last = np.zeros(0)
         self._in_gap = False
         self._run = 0
@@ -100,6 +106,7 @@ class Gauge:
             return
         self._moments(values, mean)
         self._extremes(values)
+        self._count_heights(values, mean)
         self._stand_still(values)
         if self.step is None:
             self.step = _converter_step(values[: 1 << 16])
@@ -138,6 +145,27 @@ class Gauge:
             self.clipped_low += _in_runs(values == low)
         if high == self.high:
             self.clipped_high += _in_runs(values == high)
+
+    def _count_heights(self, values: Field, mean: float) -> None:
+        """Counts heights above and below the first mean, in steps that grow with the largest one."""
+        if self._centre is None:
+            self._centre = mean
+        heights = values - self._centre
+        highest = float(np.abs(heights).max())
+        self._top = self._top or highest
+        while highest > self._top > 0.0:
+            halves = self._heights.reshape(2, -1, 2).sum(axis=2)
+            self._heights = np.concatenate([halves, np.zeros_like(halves)], axis=1)
+            self._top *= 2.0
+        if self._top > 0.0:
+            for side, over in enumerate((heights[heights > 0.0], -heights[heights < 0.0])):
+                step = np.minimum((over * (HEIGHTS / self._top)).astype(np.int64), HEIGHTS - 1)
+                self._heights[side] += np.bincount(step, minlength=HEIGHTS)
+
+    @property
+    def piled(self) -> bool:
+        """Whether values pile up below the largest or the least: a range that is left softly, or a tone alone."""
+        return any(_piled(side) for side in self._heights)
 
     def without_stuck(self, blocks: Iterable[Field]) -> Iterator[Field]:
         """Pass the blocks on with stretches that stand still as missing: samples were lost there, and held or filled.
@@ -194,6 +222,10 @@ class Gauge:
             if clipped > 0.0:
                 worth = "CRFA is too low" if clipped > CLIPPED_SHARE else "hardly matters"
                 remarks.append(f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {worth}")
+            elif self.piled:
+                remarks.append(
+                    "values pile up below the largest: soft clipping, which makes CRFA too low, or a tone alone"
+                )
             if 0 < self.stuck <= MOST_STUCK * self.finite:
                 remarks.append(
                     f"stands still for {100 * self.stuck / self.finite:.2g} % of the time: samples lost? Left out"
@@ -236,6 +268,19 @@ def check_recording(
     for _ in gauge.watch(recording.blocks()):
         pass
     return gauge.quality(recording, width_hz=width_hz, band_hz=band_hz)
+
+
+def _piled(heights: Field) -> bool:
+    """Whether counts of heights are denser at their top than below it."""
+    held = np.flatnonzero(heights)
+    if not held.size:
+        return False
+    edge = int(held[-1]) + 1
+    top, below = round(TOP * edge), round(BELOW * edge)
+    at_top, beneath = int(heights[top:edge].sum()), int(heights[below:top].sum())
+    if at_top < FEWEST_AT_TOP or not below < top < edge:
+        return False
+    return at_top / (edge - top) > PILED * beneath / (top - below)
 
 
 def _off(rms: float, step: float | None, *, comparable: bool) -> bool:
