@@ -152,6 +152,12 @@ Mqtt = Annotated[
         envvar="ASPERITY_MQTT", metavar="URL", help="Publish JSON at mqtt://HOST/TOPIC at every change of state."
     ),
 ]
+Tell = Annotated[
+    str | None,
+    typer.Option(
+        metavar="STATES", help="Of which changes: such as alarm,blind, and their end; all of them, unless given."
+    ),
+]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

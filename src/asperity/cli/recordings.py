@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from asperity import files, processes, recording, report, tracking
+from asperity import files, processes, recording, report, tracking, wear
 from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, contact_at, require_output
@@ -18,7 +18,7 @@ from asperity.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
     from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track, Update
-    from asperity.wear import SeriesMethod, StageSource
+    from asperity.wear import AlarmState, SeriesMethod, StageSource
 
 EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # of the alarm's state; the others end with 0
 PAGE = "report.html"
@@ -199,6 +199,10 @@ def watch(
     settle: Annotated[
         float, typer.Option(metavar="SECONDS", min=0.0, help="How long a file must have stayed as it is.")
     ] = 2.0,
+    expect: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", min=0.0, help="Blind, if none comes for so long; else 5 times the usual."),
+    ] = None,
     workers: options.Workers = None,
     rate: options.Rate = None,
     unit: options.Unit = None,
@@ -219,6 +223,7 @@ def watch(
     on_alarm: options.OnAlarm = None,
     webhook: options.WebHook = None,
     mqtt: options.Mqtt = None,
+    tell: options.Tell = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -245,11 +250,13 @@ def watch(
             machine=machine,
             point=point,
             sensor=sensor,
+            tell=wear.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(",")),
             call=tracking.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
             recall=(kept / PAGE).is_file(),
             once=once,
             every_s=every,
             settle_s=settle,
+            expect_s=expect,
             workers=workers or processes.cores(),
             progress=step,
         )

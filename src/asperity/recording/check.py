@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.arrays import Field, Mask
 from asperity.recording.model import UNKNOWN, OpenRecording
@@ -75,7 +76,8 @@ class Gauge:
         self.mean = self.squares = self.cubes = self.fourths = 0.0  # sums of powers about the mean
         self.low, self.high = np.inf, -np.inf
         self.step: float | None = None
-        self._heights, self._top = np.zeros((2, HEIGHTS), dtype=np.int64), 0.0
+        self._heights: NDArray[np.int64] = np.zeros((2, HEIGHTS), dtype=np.int64)
+        self._top = 0.0
         self._centre: float | None = None
         self._last = np.zeros(0)
         self._in_gap = False
@@ -270,7 +272,7 @@ def check_recording(
     return gauge.quality(recording, width_hz=width_hz, band_hz=band_hz)
 
 
-def _piled(heights: Field) -> bool:
+def _piled(heights: NDArray[np.int64]) -> bool:
     """Whether counts of heights are denser at their top than below it."""
     held = np.flatnonzero(heights)
     if not held.size:

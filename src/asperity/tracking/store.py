@@ -6,7 +6,7 @@ left to `track`; what is judged when, to `watch`.
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -19,11 +19,12 @@ from asperity.files import require_writable
 from asperity.tracking.learned import Learned, learned_bytes, learned_from
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, reading_bytes, reading_from
-from asperity.wear import AlarmState
+from asperity.wear import ALARM_STATES, AlarmState
 
 STORE = "asperity.db"
 VERSION = 1
 BUSY_S = 30.0  # another watch may be writing
+SILENCE = "silence"  # who raised a state: recordings that do not come
 ACKNOWLEDGED = "acknowledged"  # state of a judgement that a person has made
 REMEDY = "delete it and its recordings are read again, or choose another store"
 FOLDER = "folder"  # among the settings of a sensor that was not named: nobody else's recordings are to be taken for its
@@ -190,7 +191,7 @@ class Sensor:
     """The recordings of one sensor and what was said of them.
 
     `recordings` are all that the store holds; `acknowledged` names the one up to which somebody has looked, None for
-    none; `standing` is the alarm that stands since.
+    none; `standing` is the alarm that stands since. `tells` are the states of which somebody is told, and of their end.
     """
 
     def __init__(
@@ -212,6 +213,7 @@ class Sensor:
                 "SELECT id, file, version, started, state, refused FROM recording WHERE sensor = ? ORDER BY id", number
             )
         }
+        self.tells: Collection[str] = ALARM_STATES
         self.acknowledged: str | None = None
         self.standing: Standing | None = None
         self.look_up()
@@ -356,8 +358,9 @@ class Sensor:
             last = run(
                 "SELECT state FROM call WHERE sensor = ? AND who = ? ORDER BY id DESC LIMIT 1", (self.number, name)
             ).fetchone()
-            if last is None or last[0] != said["state"]:
-                told = {"id": str(uuid4()), "time": _now(), **self.place._asdict(), "before": last and last[0], **said}
+            before = None if last is None else last[0]
+            if before != said["state"] and {before, said["state"]} & {*self.tells}:
+                told = {"id": str(uuid4()), "time": _now(), **self.place._asdict(), "before": before, **said}
                 run(
                     "INSERT INTO call (sensor, who, state, said, time) VALUES (?, ?, ?, ?, ?)",
                     (self.number, name, said["state"], json.dumps(told), told["time"]),
@@ -367,6 +370,40 @@ class Sensor:
         """Note whom to call who does not know yet what was said last."""
         with self.store.transaction() as run:
             self._call(run, who, _told(said, said["recordings"][-1]["file"]))
+
+    def arrivals(self) -> list[datetime]:
+        """When recordings came, the last ones."""
+        rows = self.store.read(
+            "SELECT time FROM judgement WHERE sensor = ? AND new > 0 ORDER BY id DESC LIMIT 33", self.number
+        )
+        return [datetime.fromisoformat(time) for (time,) in reversed(rows)]
+
+    def fell_silent(self, reason: str, who: Sequence[str]) -> dict[str, Any] | None:
+        """Keep, once, that no recordings come any more; the last judgement as it stands now, None before the first.
+
+        An alarm that nobody has acknowledged stands, and is told with it.
+        """
+        self.look_up()
+        said = self.said()
+        if said is None:
+            return None
+        if self.standing is None:
+            told = {"state": "blind", "since": said["recordings"][-1]["file"], "reason": reason, "raised_by": SILENCE}
+            said["alarm"] |= {**told, "verdict": f"Blind: {reason}."}
+        said["verdict"] = f"Blind: {reason}. {said['verdict']}"
+        last = self.store.read("SELECT raised_by FROM judgement WHERE sensor = ? ORDER BY id DESC LIMIT 1", self.number)
+        if last and last[0][0] == SILENCE:
+            return said
+        alarm = said["alarm"]
+        with self.store.transaction() as run:
+            row = (self.number, _now(), alarm["state"], alarm["since"], reason, SILENCE, said["verdict"])
+            run(
+                "INSERT INTO judgement (sensor, time, state, since, reason, raised_by, verdict, new) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, 0)",
+                row,
+            )
+            self._call(run, who, _told(said, said["recordings"][-1]["file"]))
+        return said
 
     def waiting(self, who: str) -> list[tuple[int, int, float, str]]:
         """Calls that nobody has answered yet: number, attempts, when the next is due [s], what is to be said."""

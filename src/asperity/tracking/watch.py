@@ -16,7 +16,7 @@ from time import monotonic, sleep, time
 from typing import Any, NamedTuple
 
 from asperity.case import Case, MachineCase
-from asperity.errors import BadInput
+from asperity.errors import BadInput, require_choice
 from asperity.files import make_folder
 from asperity.recording import ReadOptions, names_beside
 from asperity.tracking.alarming import BASELINE, LAST
@@ -25,11 +25,12 @@ from asperity.tracking.files import Place, Table, in_their_places, may_be_record
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, common_spacing, read_spectra
+from asperity.tracking.silence import silence
 from asperity.tracking.store import FOLDER, STORE, Sensor, Store, Version
 from asperity.tracking.store import Place as Spot
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
-from asperity.wear import FALSE_ALARMS, AlarmState, Detector, SeriesMethod, StageSource
+from asperity.wear import ALARM_STATES, FALSE_ALARMS, AlarmState, Detector, SeriesMethod, StageSource
 
 SUFFIXES = (".toml", ".json")  # of sidecars
 STRIDE = 80  # recordings that are judged together where many arrive at once
@@ -74,10 +75,12 @@ def watch_folder(
     point: str | None = None,
     sensor: str | None = None,
     call: Sequence[Caller] = (),
+    tell: Sequence[AlarmState] = ALARM_STATES,
     recall: bool = False,
     once: bool = False,
     every_s: float = 5.0,
     settle_s: float = 2.0,
+    expect_s: float | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Iterator[Update]:
@@ -89,12 +92,15 @@ def watch_folder(
     out : folder for the store; made if need be. A later watch with the same store goes on from there
     every_s : seconds between two looks
     settle_s : seconds for which a file must have stayed unchanged before it is read: it may still be written
+    expect_s : time without a recording [s] from which on the sensor is blind; by default five times what is usual, once
+        recordings have come nine times
     acknowledge : as `track_recordings`; kept in the store, and every judgement with it: an alarm stands until then
     store : SQLite file for what was read and said, asperity.db in `out` by default; several watches may share one
     machine, point, sensor : whose recordings these are, in the store; by default the folder above, the folder, the
         channel
     call : who is told when the state is another than they were told last, as `callers` makes them; a call that fails
         is kept in the store and made again
+    tell : states of which they are told, and of their end
     recall : at the start give the last judgement, where neither recordings nor what is asked has changed since
     others : as `track_recordings`; a recording that is not in `table` yet waits until it is
 
@@ -112,7 +118,10 @@ def watch_folder(
     spot = spot_of(folder, machine, point, sensor or channel)
     settings = settings_of(target, options)
     settings |= {} if machine and point else {FOLDER: str(folder)}
+    for state in tell:
+        require_choice("tell", state, ALARM_STATES)
     memory = _Memory(Store(store or out / STORE).sensor(spot, settings), target, options, call)
+    memory.sensor.tells = tell
     asked: dict[str, Any] = {
         "shaft_hz": shaft_hz,
         "method": method,
@@ -120,7 +129,7 @@ def watch_folder(
         "stages_from": stages_from,
         "false_alarm_rate": false_alarm_rate,
     }
-    pace = _Pace(recall, once, every_s, settle_s)
+    pace = _Pace(recall, once, every_s, settle_s, expect_s)
     return _looks(memory, folder, table, acknowledge, asked, pace, partial(memory.read, workers, progress))
 
 
@@ -131,6 +140,7 @@ class _Pace(NamedTuple):
     once: bool
     every_s: float
     settle_s: float
+    expect_s: float | None
 
 
 def _looks(
@@ -144,7 +154,7 @@ def _looks(
 ) -> Iterator[Update]:
     """An update at the start and whenever recordings have arrived."""
     with closing(memory.sensor.store):
-        first = True
+        first, told = True, ""
         while True:
             present = memory.present(folder)
             unread = [key for key in present if key not in memory.sensor.recordings]
@@ -153,12 +163,18 @@ def _looks(
             new = read(arrived, named)
             known = sorted(memory.sensor.series(), key=lambda key: _sorting(_name(key)))
             waiting = len(unread) - len(arrived)
-            if new or first:
+            reason = "" if new or (acknowledge and first) else silence(memory.sensor.arrivals(), pace.expect_s)
+            said = memory.sensor.fell_silent(reason, memory.who) if reason else None
+            if said is not None:
+                failed = deliver(memory.sensor, memory.call, now=first)
+                if not told:
+                    yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
+            elif new or first:
                 question = _digest(asked, named, known, memory.target)
                 recalled = first and pace.recall and not new and acknowledge is None
                 said = memory.said(question) if recalled else None
                 if said is not None:
-                    memory.sensor.tell([caller.name for caller in memory.call], said)
+                    memory.sensor.tell(memory.who, said)
                     failed = deliver(memory.sensor, memory.call, now=True)
                     yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
                 else:
@@ -171,7 +187,7 @@ def _looks(
                 deliver(memory.sensor, memory.call)
             if pace.once:
                 return
-            first = False
+            first, told = False, reason
             sleep(pace.every_s)
 
 
@@ -193,7 +209,8 @@ def version_of(path: Path) -> Version:
 
 def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
     """By what recordings are read: recordings of one sensor are all read alike."""
-    return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options)
+    machine = {"rates_per_turn": dict(target.rates_per_turn)} if target.rates_per_turn else {}
+    return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options) | machine
 
 
 class _Order(NamedTuple):
@@ -254,6 +271,11 @@ class _Memory:
         self._learned: Learned | None = None
         self.unnamed: set[str] = set()
         self._ahead: dict[Version, float] = {}  # files of a clock that is ahead, and when they were first seen
+
+    @property
+    def who(self) -> list[str]:
+        """Names of all who are called."""
+        return [caller.name for caller in self.call]
 
     def present(self, folder: Path) -> list[Version]:
         """Recordings that lie in the folder now, by name with numbers in their order."""
@@ -342,8 +364,7 @@ class _Memory:
         first = max(next(unjudged, len(keys)) + STRIDE, BASELINE + LATEST)
         for end in range(first, len(keys), STRIDE):
             self._judged(judging, order, end, 0, "", again=again, who=())
-        who = [caller.name for caller in self.call]
-        return self._judged(judging, order, len(keys), new, question, again=again, who=who)
+        return self._judged(judging, order, len(keys), new, question, again=again, who=self.who)
 
     def _judged(
         self,

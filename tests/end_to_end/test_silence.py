@@ -1,0 +1,110 @@
+"""`asperity watch` where recordings stop coming: a sensor that delivers nothing is not healthy."""
+
+import json
+import os
+import sqlite3
+import sys
+import time
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.tracking import watch_folder
+from asperity.tracking.silence import silence, spoken
+
+NOON = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
+LOOK = ("--once", "--settle", "0", "--store", "plant.db", "--machine", "Fan 1", "--point", "DE")
+LISTENER = "import sys, pathlib\npathlib.Path(sys.argv[1]).open('a').write(sys.stdin.read() + chr(10))\n"
+
+
+def snapshots(folder, levels, first=0):
+    Path(folder).mkdir(exist_ok=True)
+    for number, level in enumerate(levels, first):
+        values = level * np.random.default_rng(number).standard_normal(2000)
+        np.savez(Path(folder) / f"s-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
+
+
+def judged(column):
+    with closing(sqlite3.connect("plant.db")) as connection:
+        return [value for (value,) in connection.execute(f"SELECT {column} FROM judgement ORDER BY id")]
+
+
+def test_what_is_usual_is_learned_from_when_recordings_came():
+    every_10_min = [NOON + timedelta(minutes=10 * number) for number in range(12)]
+    last = every_10_min[-1]
+    assert silence(every_10_min, None, last + timedelta(minutes=49)) == ""
+    said = silence(every_10_min, None, last + timedelta(minutes=51))
+    assert said == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; one comes every 10 min"
+    assert silence(every_10_min[:5], None, NOON + timedelta(days=300)) == ""  # nobody knows yet
+    assert "for 2 h" in silence(every_10_min[:1], 3600.0, NOON + timedelta(hours=2))
+    assert [spoken(120.0), spoken(3600.0), spoken(7 * 86400.0)] == ["2 min", "60 min", "7 days"]
+    assert silence([], 1.0, NOON) == ""
+    fast = [NOON + timedelta(seconds=number) for number in range(12)]
+    assert silence(fast, None, fast[-1] + timedelta(seconds=59)) == ""  # never before a minute
+
+
+def test_a_sensor_that_delivers_nothing_is_blind_and_told_once(asp):
+    snapshots("in", np.ones(10))
+    Path("listen.py").write_text(LISTENER)
+    command = f"'{sys.executable}' listen.py heard.jsonl"
+    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--quiet")[0] == 4
+    time.sleep(1.2)
+    code, out, _ = asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--json")
+    said = json.loads(out)
+    assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (5, "blind", "silence")
+    assert said["verdict"].startswith("Blind: no recording has come for")
+    assert "0.5 s are allowed" in said["alarm"]["reason"]
+    assert asp("store", "plant.db", "--quiet")[0] == 5
+    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--quiet")[0] == 5
+    assert judged("state") == ["cannot-tell", "blind"]  # said again, kept once
+    snapshots("in", [1.0], first=10)
+    assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "60", "--quiet")[0] == 4
+    told = [json.loads(line) for line in Path("heard.jsonl").read_text().splitlines()]
+    assert [one["state"] for one in told] == ["cannot-tell", "blind", "cannot-tell"]
+    assert told[1]["raised_by"] == "silence"
+
+
+def test_an_alarm_stands_in_silence(asp):
+    snapshots("in", np.exp(np.log(20.0) * np.clip(np.arange(36) - 12, 0, None) / 23))
+    assert asp("watch", "in", *LOOK, "--quiet")[0] == 3
+    time.sleep(0.2)
+    code, out, _ = asp("watch", "in", *LOOK, "--expect", "0.1", "--json")
+    said = json.loads(out)
+    assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (3, "alarm", "the level (rms)")
+    assert said["verdict"].startswith("Blind: no recording has come")
+    assert "ALARM since" in said["verdict"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="clocks of Windows are too coarse for it")
+def test_a_watch_that_runs_says_so_by_itself(tmp_path):
+    snapshots(tmp_path / "in", np.ones(8))
+    looks = watch_folder(tmp_path / "in", tmp_path / "out", every_s=0.05, settle_s=0.0, expect_s=0.6)
+    assert next(looks).track is not None
+    silent = next(looks)
+    assert silent.track is None
+    assert silent.said["alarm"]["state"] == "blind"
+    snapshots(tmp_path / "in", [1.0], first=8)
+    assert len(next(looks).new) == 1
+    looks.close()
+
+
+def test_only_what_somebody_wants_to_be_told_is_told_and_its_end(asp):
+    """`--tell alarm`: neither the first judgement nor silence, but the alarm and that it is over."""
+    Path("listen.py").write_text(LISTENER)
+    tell = ("--on-alarm", f"'{sys.executable}' listen.py heard.jsonl", "--tell", "alarm", "--quiet")
+    snapshots("in", np.ones(12))
+    asp("watch", "in", *LOOK, *tell)
+    time.sleep(0.2)
+    assert asp("watch", "in", *LOOK, *tell, "--expect", "0.1")[0] == 5
+    assert not Path("heard.jsonl").exists()
+    snapshots("in", np.exp(np.log(20.0) * np.arange(1, 25) / 24), first=12)
+    assert asp("watch", "in", *LOOK, *tell)[0] == 3
+    assert asp("watch", "in", *LOOK, *tell, "--acknowledge", "last")[0] == 0
+    told = [json.loads(line)["state"] for line in Path("heard.jsonl").read_text().splitlines()]
+    assert told == ["alarm", "none"]
+    code, _, err = asp("watch", "in", *LOOK, "--tell", "alarm,loud")
+    assert code == 2
+    assert "tell must be one of" in err
