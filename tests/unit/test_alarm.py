@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import BadInput
-from asperity.wear import Sight, Watched, sequential_alarm
+from asperity.wear import Sight, Watched, knee_weight, sequential_alarm
 from asperity.wear.sequential import growth, knee, step, threshold
 
 NUMBER = np.arange(40.0)
@@ -191,6 +191,14 @@ def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(lev
         for name, values in series.items()
     ]  # fmt: skip
     assert sequential_alarm(NUMBER, watching, [Sight()] * 40).state == state
+
+
+def test_a_knee_weighs_much_and_a_step_or_a_bend_little():
+    weights = {name: knee_weight(NUMBER, [watched(HEALTHY[name] + scatter(3))]) for name in HEALTHY}
+    assert max(weights.values()) < 0.25
+    assert knee_weight(NUMBER, [watched(knee_at(18, 5.0, 1))]) > 0.99
+    assert 0.0 < knee_weight(NUMBER[:20], [watched(knee_at(18, 15.0, 1)[:20])]) < 0.9  # barely behind it
+    assert knee_weight(NUMBER[:5], [watched(np.ones(5))]) == 1.0  # nobody can tell
 
 
 def test_a_smaller_rate_of_false_alarms_takes_longer():

@@ -16,7 +16,7 @@ from asperity.errors import BadInput
 from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
 from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, Follows, Response, conditions_of
-from asperity.wear import Alarm, Condition, Said, Sight, Stages, StageSource, Watched, sequential_alarm
+from asperity.wear import Alarm, Condition, Said, Sight, Stages, StageSource, Watched, knee_weight, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
 DAMPING_LEAST = 0.2  # of its logarithm
@@ -92,6 +92,11 @@ def at_reference(tracked: Sequence[TrackedRecording], response: Response) -> lis
         replace(one, crf_reference_hz=float(hertz), damping_reference=float(share))
         for one, hertz, share in zip(tracked, frequency, ratio, strict=True)
     ]
+
+
+def weighed(tracked: Sequence[TrackedRecording], source: StageSource, response: Response) -> float:
+    """The weight of a severe stage against steps, cycles and scatter that remembers, which stages do not look at."""
+    return knee_weight(np.array([one.x for one in tracked]), _of_the_contact(tracked, source, response))
 
 
 def _usual(tracked: Sequence[TrackedRecording]) -> float:

@@ -17,7 +17,7 @@ from asperity.case import Case, MachineCase
 from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
 from asperity.signals import Spectrum
-from asperity.tracking.alarming import at_reference, raise_alarm
+from asperity.tracking.alarming import at_reference, raise_alarm, weighed
 from asperity.tracking.files import Place, Table, in_their_places, read_table, recordings_in
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track, TrackedRecording
@@ -219,7 +219,7 @@ def _staged(
             if staging[1] == "damping"
             else [np.isfinite(recording.crf_reference_hz) for recording in tracked]
         )
-        severe = np.where(known, stages.probability, np.nan)
+        severe = np.where(known, stages.probability * weighed(tracked, staging[1], response), np.nan)
         labels = stages.labels
     alarm = raise_alarm(
         tracked,

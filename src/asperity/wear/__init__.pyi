@@ -6,6 +6,7 @@ from .alarm import AlarmState as AlarmState
 from .alarm import Said as Said
 from .alarm import Sight as Sight
 from .alarm import Watched as Watched
+from .alarm import knee_weight as knee_weight
 from .alarm import sequential_alarm as sequential_alarm
 from .bends import FEWEST_PLACES as FEWEST_PLACES
 from .comparison import INTERVAL as INTERVAL

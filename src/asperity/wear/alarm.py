@@ -23,6 +23,7 @@ LATELY = 3  # recordings whose median is where an indicator, or a condition, has
 AROUND, FEWEST_AROUND = 12, 3  # places on either side of a jump, by which another indicator is seen to move with it
 MOVED, HEARD = 3.0, 0.1  # deviations of the difference, and 0.9 dB
 SPOKEN = 0.4  # of the least change: what conditions explain is said from there on, and may be off by this share
+NO_KNEE = 5.0  # odds of something else before anything is heard, in place of a knee
 CONTACT_SHARE = 0.8  # of the false alarms allowed, among the contact's indicators; the levels have the rest
 
 
@@ -62,6 +63,18 @@ class Watched:
         met = [replace(one, values=one.values[part]) for one in self.conditions]
         told = explained(np.log(values) if self.relative else values, met, least=self.least)
         return np.asarray(values * np.exp(-told.effect) if self.relative else values - told.effect), told
+
+
+def knee_weight(x: Field, watched: Sequence[Watched]) -> float:
+    """The weight of a knee against all that is none (steps, cycles, bends, scatter that remembers), 0 to 1.
+
+    By the indicator that shows it best; 1 where there are too few places to tell. The odds before are measured so that
+    probabilities come true as often as they say (docs/theory/alarms.md).
+    """
+    ratios = [
+        looked.change.log_ratio for one in watched if (looked := _looked_at(one, x, 0, x.size - 1)).places >= FEWEST
+    ]
+    return 1.0 / (1.0 + NO_KNEE * float(np.exp(-max(ratios)))) if ratios else 1.0
 
 
 class Sight(NamedTuple):
