@@ -197,7 +197,7 @@ def test_a_knee_weighs_much_and_a_step_or_a_bend_little():
     weights = {name: knee_weight(NUMBER, [watched(HEALTHY[name] + scatter(3))]) for name in HEALTHY}
     assert max(weights.values()) < 0.25
     assert knee_weight(NUMBER, [watched(knee_at(18, 5.0, 1))]) > 0.99
-    assert 0.0 < knee_weight(NUMBER[:20], [watched(knee_at(18, 15.0, 1)[:20])]) < 0.9  # barely behind it
+    assert knee_weight(NUMBER[:20], [watched(knee_at(18, 15.0, 1)[:20])]) < 0.9  # barely behind it
     assert knee_weight(NUMBER[:5], [watched(np.ones(5))]) == 1.0  # nobody can tell
 
 

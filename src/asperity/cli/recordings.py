@@ -228,35 +228,28 @@ def watch(
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
-    kept = out if out is not None else folder / "asperity-watch"
-    state: str = "cannot-tell"
+    kept, state = out if out is not None else folder / "asperity-watch", "cannot-tell"
+    stated: dict[str, Any] = {"rate_hz": rate, "unit": unit, "channel": channel, "scale": scale}
+    names: dict[str, Any] = {"store": store, "machine": machine, "point": point, "sensor": sensor}
+    pace: dict[str, Any] = {"once": once, "every_s": every, "settle_s": settle, "expect_s": expect}
     with _files_read("watching ...", quiet=quiet) as step:
         updates = tracking.watch_folder(
             folder,
             kept,
             case=contact_at(case_file),
             band_hz=band,
-            rate_hz=rate,
-            unit=unit,
-            channel=channel,
-            scale=scale,
+            **stated,
             table=table_file,
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
             stages_from=cast("StageSource", stages_from),
             false_alarm_rate=false_alarms,
             acknowledge=acknowledge,
-            store=store,
-            machine=machine,
-            point=point,
-            sensor=sensor,
+            **names,
             tell=wear.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(",")),
             call=tracking.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
             recall=(kept / PAGE).is_file(),
-            once=once,
-            every_s=every,
-            settle_s=settle,
-            expect_s=expect,
+            **pace,
             workers=workers or processes.cores(),
             progress=step,
         )

@@ -109,28 +109,36 @@ def watch_folder(
     BadInput
         for a folder that is none, or other settings than those the store was begun with.
     """
+    folder, out = _folders(folder, out, tell)
+    target = search_target(case, band_hz)
+    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
+    opened = _opened(store or out / STORE, folder, (machine, point, sensor or channel), settings_of(target, options))
+    memory = _Memory(opened, target, options, call)
+    memory.sensor.tells = tell
+    asked: dict[str, Any] = {"shaft_hz": shaft_hz, "method": method, "detector": detector}
+    asked |= {"stages_from": stages_from, "false_alarm_rate": false_alarm_rate}
+    pace = _Pace(recall, once, every_s, settle_s, expect_s)
+    return _looks(memory, folder, table, acknowledge, asked, pace, partial(memory.read, workers, progress))
+
+
+def _folders(folder: str | Path, out: str | Path, tell: Sequence[AlarmState]) -> tuple[Path, Path]:
+    """Both folders as they are, once all is known to make sense."""
     folder, out = Path(folder).resolve(), Path(out)
+    for state in tell:
+        require_choice("tell", state, ALARM_STATES)
     if not folder.is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     make_folder(out)
-    target = search_target(case, band_hz)
-    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
-    spot = spot_of(folder, machine, point, sensor or channel)
-    settings = settings_of(target, options)
+    return folder, out
+
+
+def _opened(
+    store: str | Path, folder: Path, names: tuple[str | None, str | None, str | None], settings: dict[str, Any]
+) -> Sensor:
+    """A sensor of the store; one that is not named whole is that of the folder, and of no other."""
+    machine, point, sensor = names
     settings |= {} if machine and point else {FOLDER: str(folder)}
-    for state in tell:
-        require_choice("tell", state, ALARM_STATES)
-    memory = _Memory(Store(store or out / STORE).sensor(spot, settings), target, options, call)
-    memory.sensor.tells = tell
-    asked: dict[str, Any] = {
-        "shaft_hz": shaft_hz,
-        "method": method,
-        "detector": detector,
-        "stages_from": stages_from,
-        "false_alarm_rate": false_alarm_rate,
-    }
-    pace = _Pace(recall, once, every_s, settle_s, expect_s)
-    return _looks(memory, folder, table, acknowledge, asked, pace, partial(memory.read, workers, progress))
+    return Store(store).sensor(spot_of(folder, machine, point, sensor), settings)
 
 
 class _Pace(NamedTuple):
