@@ -36,9 +36,19 @@ DECIDE = ("jump", "run", "contact", "reach", "worn")
 IMAGES = ROOT / "docs" / "images"
 EXAMPLE = ROOT / "examples" / "wear.toml"
 MEASURED = ROOT.parent / "shared" / "data" / "surfaces" / "milled_1.opd"
-KILLS, HOURS_KILLED = 10, 3.0
+KILLS = 10
+COARSE = ("grid.cells=[32,32]", 'surface.correlation_length="30 um"', "wear.patches=4")
+KILLED = {  # what is killed: hours, and what its case differs in from the example
+    "removal alone, 64 x 64 cells, 3 h": (3.0, ()),
+    "removal alone, 32 x 32 cells, 30 h": (30.0, COARSE),
+    "pits, marks, scuffing and flattening, 32 x 32 cells, 2 h": (2.0, (
+        *COARSE, "wear.flattening=true", 'wear.fatigue={ law = "dang-van", limit = "200 MPa" }',
+        'wear.ploughing={ law = "debris", concentration = "1e10 1/m^3" }',
+        'wear.scuffing={ law = "temperature", limit = "20 K" }',
+    )),
+}  # fmt: skip
 ENOUGH = 0.85  # of the time that a part has, that is spent on histories
-MANY = 56  # positions whose mean stands for the mean
+MANY = 28  # positions whose mean stands for the mean
 SEEDS = 20
 RISEN = 12.0  # hours in which pits have made up for what removal smoothed
 
@@ -131,54 +141,72 @@ def solved_at(history: WearHistory, count: int, seed: int) -> list[Solved]:
     return [one for place in places if isinstance(one := ageing.solver(seen(surfaces, place)), Solved)]
 
 
-def end_means(history: WearHistory) -> str:
-    """CLR and the solids' load of the worn surfaces over many positions, which a jump's own have not the number for."""
-    found = solved_at(history, 4 * history.ageing.patches, 99)
-    clr = np.mean([one.state.clr for one in found])
-    return f"{clr:.4f} | {np.mean([one.asperity_pressure.sum() / one.pressure.sum() for one in found]):.4f}"
+def end_mean(history: WearHistory) -> str:
+    """CLR of the worn surfaces over many positions, which a jump's own have not the number for, and its deviation."""
+    clr = [one.state.clr for one in solved_at(history, 4 * history.ageing.patches, 99)]
+    return f"{np.mean(clr):.4f} ± {np.std(clr, ddof=1) / np.sqrt(len(clr)):.4f}"
 
 
 def speed(shelf: Shelf) -> Iterator[str]:
     yield "\n## 1e7 over-rollings of the roller at 128 x 128 cells\n"
-    yield "| hours | jumps | positions | processor time [s] | a jump [s] | sq_m | clr | volume error | jump error |"
-    yield "|---|---|---|---|---|---|---|---|---|"
+    yield (
+        "| hours | jumps | positions | processor time [s] | a jump [s] | of two processes [s] | sq_m | clr | "
+        "volume error | jump error |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|---|"
     whole = 1e7 / 56.25 / 3600.0
-    for _, history, seconds in shelf.all([Plan("speed", whole, {"grid.cells": [128, 128]})]):
-        jumps = len(history.table) - 1
+    for _, history, seconds in shelf.all([Plan("speed", whole, {"grid.cells": [128, 128], "wear.patches": 4})]):
+        jumps, patches = len(history.table) - 1, history.ageing.patches
+        abreast = -(-patches // 2) / patches  # of a jump's positions, that the busier of two solves
         yield (
-            f"| {history.hours:.1f} | {jumps} | {history.ageing.patches} | {seconds:.0f} | {seconds / jumps:.2f} | "
+            f"| {history.hours:.1f} | {jumps} | {patches} | {seconds:.0f} | {seconds / jumps:.2f} | "
+            f"{seconds * abreast:.0f} | "
             f"{row(history, 'sq_m', 'clr')} | {history.volume_error:.1e} | {history.worn.error:.1e} |"
         )
 
 
 def kills() -> Iterator[str]:
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "asperity", "wear", str(EXAMPLE), "--hours", f"{HOURS_KILLED:g}", "--quiet"]
-        began = time.perf_counter()
-        subprocess.run([*command, "--out", f"{folder}/whole"], check=True, stdout=subprocess.DEVNULL)
-        whole, rng = time.perf_counter() - began, np.random.default_rng(11)
-        for _ in range(KILLS):
-            process = subprocess.Popen([*command, "--out", f"{folder}/killed"], stdout=subprocess.DEVNULL)
-            time.sleep(rng.uniform(0.05, 0.6) * whole)
-            process.send_signal(signal.SIGKILL)
-            process.wait()
-        subprocess.run([*command, "--out", f"{folder}/killed"], check=True, stdout=subprocess.DEVNULL)
-        one, other = (load_wear(Path(folder) / name) for name in ("whole", "killed"))
-        same = one.table.equals(other.table) and all(
-            np.array_equal(getattr(one.after, body).heights, getattr(other.after, body).heights)
+    yield "\n## Killed while they ran, at random moments\n"
+    yield "| history | jumps | times killed | numbers and surfaces |"
+    yield "|---|---|---|---|"
+    for name, (hours, overrides) in KILLED.items():
+        with tempfile.TemporaryDirectory() as folder:
+            times, whole, killed = _killed(Path(folder), hours, overrides)
+        same = whole.table.equals(killed.table) and all(
+            np.array_equal(getattr(whole.after, body).heights, getattr(killed.after, body).heights)
             for body in ("first", "second")
         )
-    yield f"\nKilled {KILLS} times at random moments: {'the same to the last bit' if same else 'DIFFERENT'}.\n"
+        told = "the same to the last bit" if same else "DIFFERENT"
+        yield f"| {name} | {len(whole.table) - 1} | {times} | {told} |"
+
+
+def _killed(folder: Path, hours: float, overrides: Sequence[str]) -> tuple[int, WearHistory, WearHistory]:
+    """How often a history was killed as it ran, one that was let alone, and that one at its end."""
+    changes = [word for override in overrides for word in ("--set", override)]
+    command = [sys.executable, "-m", "asperity", "wear", str(EXAMPLE), "--hours", f"{hours:g}", *changes, "--quiet"]
+    command += ["--workers", "1", "--out"]
+    began, rng, times = time.perf_counter(), np.random.default_rng(11), 0
+    subprocess.run([*command, str(folder / "whole")], check=True, stdout=subprocess.DEVNULL)
+    whole = time.perf_counter() - began
+    for _ in range(KILLS):
+        process = subprocess.Popen([*command, str(folder / "killed")], stdout=subprocess.DEVNULL)
+        time.sleep(rng.uniform(0.05, 0.3) * whole)
+        times += process.poll() is None
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    subprocess.run([*command, str(folder / "killed")], check=True, stdout=subprocess.DEVNULL)
+    one, other = (load_wear(folder / name) for name in ("whole", "killed"))
+    return times, one, other
 
 
 def jumps(shelf: Shelf) -> Iterator[str]:
-    yield "\n## Half the jump, and fewer or more positions, 4 h\n"
-    yield "| cells | step | positions | jumps | sq_m | spk_m | clr of many positions | load between solids | seconds |"
-    yield "|---|---|---|---|---|---|---|---|---|"
+    yield "\n## Half the jump, and fewer or more positions, 2 h\n"
+    yield "| cells | step | positions | jumps | sq_m | spk_m | clr of many positions | seconds |"
+    yield "|---|---|---|---|---|---|---|---|"
     ways = [(64, 0.05, 7), (64, 0.025, 7), (64, 0.05, 4), (64, 0.05, 14), (128, 0.05, 7), (128, 0.025, 7)]
     plans = [
         Plan(
-            f"jumps-{cells}-{step}-{count}", 4.0, {"grid.cells": [cells] * 2, "wear.step": step, "wear.patches": count}
+            f"jumps-{cells}-{step}-{count}", 2.0, {"grid.cells": [cells] * 2, "wear.step": step, "wear.patches": count}
         )
         for cells, step, count in ways
     ]
@@ -187,20 +215,20 @@ def jumps(shelf: Shelf) -> Iterator[str]:
         last = history.table.iloc[-1]
         yield (
             f"| {cells} | {step} | {count} | {len(history.table) - 1} | {last['sq_m']:.6g} | {last['spk_m']:.5g} | "
-            f"{end_means(history)} | {seconds:.0f} |"
+            f"{end_mean(history)} | {seconds:.0f} |"
         )
 
 
 def grids(shelf: Shelf) -> Iterator[str]:
-    keys = ("sq_m", "spk_m", "worn_depth_2_m")
-    yield "\n## Grids, 2 h\n"
-    yield f"| cells | {' | '.join(keys)} | clr of many positions | load between solids | jumps | processor time [s] |"
+    keys = ("clr", "sq_m", "spk_m", "worn_depth_2_m")
+    yield "\n## Grids, 1 h\n"
+    yield f"| cells | {' | '.join(keys)} | clr of many positions | jumps | processor time [s] |"
     yield "|---|---|---|---|---|---|---|---|"
-    plans = [Plan(f"grid-{cells}", 2.0, {"grid.cells": [cells] * 2}) for cells in (64, 128, 256)]
+    plans = [Plan(f"grid-{cells}", 1.0, {"grid.cells": [cells] * 2}) for cells in (64, 128, 256)]
     for plan, history, seconds in shelf.all(plans):
         count = len(history.table) - 1
         cells = plan.name.removeprefix("grid-")
-        yield f"| {cells} | {row(history, *keys)} | {end_means(history)} | {count} | {seconds:.0f} |"
+        yield f"| {cells} | {row(history, *keys)} | {end_mean(history)} | {count} | {seconds:.0f} |"
 
 
 def intervals() -> Iterator[str]:
@@ -227,20 +255,22 @@ def intervals() -> Iterator[str]:
     yield f"\nThe interval is {np.mean(widths):.3f} wide on average.\n"
 
 
-PLATEAUS = tuple((sq, k, 6e-15 / k) for k in (1e-16, 3e-17, 3e-16) for sq in ("0.5 um", "1 um", "2 um"))
-TIMES_K = (0.0, 1e-16, 3e-16, 1e-15, 3e-15, 6e-15)  # k of the ring times hours, at which a plateau's curves are told
+LASTING = {"0.5 um": 3e-15, "1 um": 6e-15, "2 um": 9e-15}  # k of the ring times hours [h/Pa], to the plateau
+PLATEAUS = tuple((sq, k, lasting / k) for k in (1e-16, 3e-17, 3e-16) for sq, lasting in LASTING.items())
+TIMES_K = (0.0, 3e-16, 1e-15, 3e-15, 6e-15, 9e-15)  # at which a plateau's curves are told
 
 
 def plateau_plan(sq: str, k: float, hours: float) -> Plan:
     overrides: Overrides = {
         "surface.sq": sq, "surface.correlation_length": "30 um", "wear.k": coefficients(k), "grid.cells": [32, 32],
+        "wear.patches": 4,
     }  # fmt: skip
     return Plan(f"plateau-{sq.replace(' ', '')}-{k:g}", hours, overrides)
 
 
 def plateau(shelf: Shelf) -> Iterator[str]:
     """Removal alone, as long in k times time."""
-    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio")
+    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "h_mean_m")
     yield "\n## Removal alone: three roughnesses, three coefficients (32 x 32 cells, correlation length 30 um)\n"
     yield f"| sq | k of the ring [1/Pa] | hours | k times hours | {' | '.join(keys)} | jumps |"
     yield f"|---|---|---|---|{'---|' * len(keys)}---|"
@@ -264,10 +294,10 @@ def measured(shelf: Shelf) -> Iterator[str]:
         return
     keys = {"sq_m": "sq", "ssk": "ssk", "spk_m": "spk", "svk_m": "svk"}
     surface = {"file": os.path.relpath(MEASURED, EXAMPLE.parent), "fit": "tile"}
-    yield "\n## A measured surface, 10 h at 128 x 128 cells\n"
+    yield "\n## A measured surface, 3 h at 128 x 128 cells\n"
     yield f"| {MEASURED.name} | {' | '.join(keys)} | Sq by SurfaceTopography | Ssk from its heights |"
     yield f"|---|{'---|' * len(keys)}---|---|"
-    for _, history, _ in shelf.all([Plan("measured", 10.0, {"surface": surface, "grid.cells": [128, 128]})]):
+    for _, history, _ in shelf.all([Plan("measured", 3.0, {"surface": surface, "grid.cells": [128, 128]})]):
         for name, when in ((-2, "new"), (-1, "after")):
             line = history.table.iloc[0 if when == "new" else -1]
             theirs = surface_topography().open_topography(str(history.files[name])).topography()
@@ -283,9 +313,12 @@ def rings(shelf: Shelf) -> Iterator[str]:
     yield "\n## The paper's first ring for ten hours, removal alone: 0.87 um are printed then\n"
     yield f"| k of the ring [1/Pa] | {' | '.join(keys)} |"
     yield "|---|---|---|---|---|"
-    for k in (1e-17, 1e-16, 1e-15):
-        for _, history, _ in shelf.all([Plan(f"ring-{k:g}", 10.0, {**PAPERS, "wear.k": coefficients(k)})]):
-            yield f"| {k:g} | {row(history, *keys)} |"
+    most = 1e-15
+    for _, history, _ in shelf.all([Plan("ring", 10.0, {**PAPERS, "wear.k": coefficients(most)})]):
+        new = history.at(0.0)
+        for k in (1e-17, 1e-16, most):  # the same history, as k is its clock
+            then = history.at(10.0 * k / most)
+            yield f"| {k:g} | {' | '.join(f'{new[key]:.4g} to {then[key]:.4g}' for key in keys)} |"
 
 
 PAPERS: Overrides = {
@@ -335,7 +368,7 @@ def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
     """Parameters of both bodies and CLR over k times hours, a colour each Sq, a stroke each k."""
     figure = Figure(figsize=(ON_PAGE.double, 4.8))
     figure.subplots_adjust(left=0.075, right=0.985, top=0.97, bottom=0.18, wspace=0.32, hspace=0.32)
-    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio")
+    keys = ("sq_m", "ssk", "spk_m", "svk_m", "clr", "h_mean_m")
     for axes, key in zip(figure.subplots(2, 3).ravel(), keys, strict=True):
         for name, history in histories.items():
             _, sq, k = name.split("-", 2)
@@ -372,16 +405,10 @@ def draw_rise(history: WearHistory) -> None:
 
 def lines(*, fast: bool, seconds: float) -> Iterator[str]:
     shelf = Shelf(seconds)
-    yield from plateau(shelf)
-    yield from falls_and_rises(shelf)
-    yield from rings(shelf)
-    yield from jumps(shelf)
-    yield from grids(shelf)
-    yield from measured(shelf)
+    for part in (speed, plateau, falls_and_rises, debris_rings, rings, jumps, grids, measured):
+        yield from part(shelf)
     if not fast:
         yield from intervals()
         yield from kills()
-    yield from speed(shelf)
-    yield from debris_rings(shelf)
     if shelf.left:
         yield f"\nNot at their end for want of time; the same command goes on with them: {', '.join(shelf.left)}.\n"

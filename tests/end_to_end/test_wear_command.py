@@ -11,7 +11,7 @@ COARSE = ("--set", "grid.cells=[32, 16]", "--set", "surface.correlation_length='
 KEYS = [
     *("verdict", "hours", "overrollings", "worn_volume_m3", "worn_volume_interval_m3", "worn_depth_m", "volume_error"),
     *("jump_error", "jumps", "computed", "failed", "patches", "seconds", "folder", "table", "surfaces", "notes"),
-    *("sq_m", "clr", "car", "solid_load_ratio", "h_mean_m", "friction_coefficient", "crf_hz", "crfa"),
+    *("sq_m", "clr", "car", "h_mean_m", "friction_coefficient", "crf_hz", "crfa"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "stage", "report"),
     *("clr_mean_low", "clr_mean_high", "crf_mean_low_hz", "crf_mean_high_hz"),
 ]

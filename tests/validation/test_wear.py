@@ -33,11 +33,11 @@ def worn(hours: float, overrides: dict[str, object] | None = None) -> WearHistor
 
 
 def jump_by_jump(history: WearHistory, body: int) -> float:
-    """The sum of k times the load between solids times the sliding distance, from the table's own columns."""
+    """The sum of k times the load of touching cells times the sliding distance, from the table's own columns."""
     case, table = history.case, history.table
     load, sliding = case.conditions.load, case.conditions.sliding_speed
-    k, ratio = history.ageing.model.coefficients[body].k, table["solid_load_ratio"].to_numpy()[:-1]
-    return float(np.sum(k * ratio * load * sliding * 3600.0 * np.diff(table["hours"])))
+    k, clr = history.ageing.model.coefficients[body].k, table["clr"].to_numpy()[:-1]
+    return float(np.sum(k * clr * load * sliding * 3600.0 * np.diff(table["hours"])))
 
 
 @pytest.mark.parametrize("rough", ["first", "both"])
@@ -58,9 +58,10 @@ def test_worn_volume_is_k_times_load_times_sliding_distance(rough):
 def test_depth_a_passage_is_the_line_load_slid_over_the_speed():
     history = worn(0.01)
     assert len(history.table) == 2  # one jump, all at the pressure of the new surfaces
-    conditions, ratio = history.case.conditions, float(history.table["solid_load_ratio"].iloc[0])
+    conditions, clr = history.case.conditions, float(history.table["clr"].iloc[0])
+    assert 0.1 < clr < 0.99  # oil bears some of it
     for body, k in ((0, 1e-17), (1, 3e-17)):
-        a_passage = k * 5e4 * ratio * conditions.sliding_speed / conditions.surface_speeds[body]
+        a_passage = k * 5e4 * clr * conditions.sliding_speed / conditions.surface_speeds[body]
         depth = float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
         assert depth == pytest.approx(a_passage, rel=3e-4, abs=0.0)
 

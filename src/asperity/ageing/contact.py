@@ -6,7 +6,7 @@ Each is solved from nothing, so that neither the order nor the process changes a
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from typing import Protocol
 
@@ -23,13 +23,17 @@ from asperity.lubricant import Lubricant, Thermal
 from asperity.processes import cores, set_up_worker
 from asperity.surface import Surface
 
+LOOSELY = 2e-2, 5e-3  # tolerances of a first solve, from which Newton's steps at once then meet the case's own
+AT_ONCE = 30  # of these steps: where they lead anywhere, it takes some ten
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solved:
     """A contact at one position, on its own grid; or `failure`, why there is none.
 
-    Maps: `pressure`, `asperity_pressure` and `shear` on body 1 [Pa], `film` and `overlap` (None unless asked for) [m],
-    `temperatures` of both surfaces [K above ambient], None where heat could not be shared between the bodies.
+    Maps: `pressure`, `asperity_pressure` (that of touching cells, what the oil there bears counted, as CLR counts it)
+    and `shear` on body 1 [Pa], `film` and `overlap` (None unless asked for) [m], `temperatures` of both surfaces
+    [K above ambient], None where heat could not be shared between the bodies.
     """
 
     pressure: Field
@@ -78,21 +82,43 @@ class PositionSolver:
         """The contact there; one thread does the algebra, as two would sum in another order."""
         with threadpool_limits(1):
             try:
-                solution = ehl.solve_thermal_contact(
-                    self.conditions,
-                    self.lubricant,
-                    surface,
-                    boundary_friction=self.boundary_friction,
-                    thermal=self.thermal,
-                    options=self.options,
-                )
+                solution = self._solved(surface)
             except AsperityError as refusal:
                 return Failed(reason=str(refusal).rstrip("."))
             return self._read(solution)
 
+    def _solved(self, surface: Surface) -> ContactSolution:
+        """Loosely first, and to the tolerance from there.
+
+        On plateaus that wear has left, the first way gets near the solution and then goes round, cells of a closed land
+        opening and closing in turn, and a second way begins anew; from what the first has found, all cells follow.
+        """
+        few = replace(self.options, max_iterations=min(AT_ONCE, self.options.max_iterations))
+        if self.lubricant is not None and np.any(surface.heights):
+            for tolerance in (one for one in LOOSELY if one > self.options.tolerance):
+                loose = replace(self.options, tolerance=tolerance)
+                near = ehl.solve_contact(self.conditions, self.lubricant, surface, options=loose, strict=False)
+                found = self._with_heat(surface, few, replace(near, options=few), strict=False)
+                if found.convergence.converged:
+                    return found
+        return self._with_heat(surface, self.options)
+
+    def _with_heat(
+        self, surface: Surface, options: Options, start: ContactSolution | None = None, *, strict: bool = True
+    ) -> ContactSolution:
+        return ehl.solve_thermal_contact(
+            self.conditions,
+            self.lubricant,
+            surface,
+            boundary_friction=self.boundary_friction,
+            thermal=self.thermal,
+            options=options,
+            start=start,
+            strict=strict,
+        )
+
     def _read(self, solution: ContactSolution) -> Solved:
-        touching, oil = solution.in_contact, 0.0 if solution.oil is None else solution.oil.pressure
-        borne = np.where(touching, np.maximum(solution.pressure - oil, 0.0), 0.0)
+        borne = np.where(solution.in_contact, np.maximum(solution.pressure, 0.0), 0.0)
         rubbing: Friction | None = None
         temperatures, flash = None, np.nan
         try:

@@ -28,7 +28,7 @@ from asperity.wear import Stages, split_stages
 HOUR = 3600.0
 FEWEST_ROWS = 4  # that a drift is read from
 MOST_PLACES = 60  # that stages are read from
-ENDS = ("sq_m", "clr", "car", "solid_load_ratio", "h_mean_m", "friction_coefficient", "crf_hz", "crfa")
+ENDS = ("sq_m", "clr", "car", "h_mean_m", "friction_coefficient", "crf_hz", "crfa")
 
 
 class _Slope(NamedTuple):

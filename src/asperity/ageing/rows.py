@@ -104,7 +104,6 @@ def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
     """
     share = load_share(solved)
     low, high = share.interval or (math.nan, math.nan)
-    borne = [float(one.asperity_pressure.sum() / one.pressure.sum()) for one in solved]
     flashes = [one.flash_temperature for one in solved]
     row: Row = {"sq_m": sq}
     for name, key in STATE.items():
@@ -120,7 +119,6 @@ def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
         "clr_high": high,
         "clr_mean_low": of_mean[0] if len(shares) > 1 else math.nan,
         "clr_mean_high": of_mean[1] if len(shares) > 1 else math.nan,
-        "solid_load_ratio": float(np.mean(borne)),
         "friction_coefficient": float(np.mean([one.friction_coefficient for one in solved])),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
     }

@@ -44,7 +44,7 @@ from asperity.kept import (
 )
 from asperity.surface import MovingSurfaces, write_surface
 
-FORMAT = 2  # counts up when a reader of the format before could not read the folder
+FORMAT = 3  # counts up when a reader of the format before could not read the folder
 TABLE, MEMORY, END, LOCK = "wear.parquet", "memory.npz", "end.npz", ".lock"
 SURFACES, FRAMES = "surfaces", "frames"
 KEPT_EVERY_S = 2.0  # what a crash may cost

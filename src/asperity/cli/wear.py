@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 STARTS = "the start; after installation the first solve compiles the solver, up to a minute ..."
 CONTACT = (
-    "sq_m", "ssk", "spk_m", "svk_m", "clr", "solid_load_ratio", "car", "h_mean_m", "friction_coefficient",
+    "sq_m", "ssk", "spk_m", "svk_m", "clr", "car", "h_mean_m", "friction_coefficient",
     "flash_temperature_max_k", "crf_hz", "crfa",
 )  # fmt: skip
 OF_BODIES = ("overrollings", "worn_depth_m", "worn_depth_max_m", "worn_volume_m3", "sq_m", "spk_m", "svk_m")

@@ -270,8 +270,8 @@ def _notes(trace: FrictionTrace, scar: Scar) -> tuple[str, ...]:
     elif share > 0.05:
         notes.append(f"{share:.0%} of what is missing stands beside it; whose it is the profile cannot tell")
     notes.append(
-        "the energy coefficient is over all friction work; the energy law counts that of the load between solids: it "
-        "may be put there as it is only if the test ran dry"
+        "the energy coefficient is over all friction work; the energy law counts that of touching asperities: put it "
+        "there as it is if the test ran dry, and over the share that was theirs if not"
     )
     notes.append("one profile stands for the whole track; the ball's own wear is not in it")
     return tuple(notes)

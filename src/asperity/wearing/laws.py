@@ -1,7 +1,7 @@
 """Laws of removal: how fast a body loses depth where asperities of the other one rub over it, dw/dt = k times a law.
 
 k is a wear coefficient in 1/Pa, each body's own: 1e-15 1/Pa is 1e-6 mm^3/(N m). Archard's dimensionless K is k times
-the hardness. What carries oil alone does not wear: a law is told the pressure that bodies press on one another with.
+the hardness. What only oil parts does not wear: a law is told the pressure where bodies touch, and 0 elsewhere.
 """
 
 import math
@@ -30,8 +30,8 @@ NORMAL = 1.6448536269514722  # standard deviations on either side of 90 % of a n
 class Rubbing:
     """What happens to one body where the other rubs over it; maps of any shape.
 
-    `pressure` of the asperities, the oil's left out [Pa]; `shear` the friction that it causes [Pa], 0 or more;
-    `temperature` of this body's surface [K], None unless the law asks for it; `sliding_speed` [m/s].
+    `pressure` where bodies touch [Pa], the oil there counted as CLR counts it; `shear` the friction that it causes
+    [Pa], 0 or more; `temperature` of this body's surface [K], None unless the law asks for it; `sliding_speed` [m/s].
     """
 
     pressure: Field
@@ -58,7 +58,7 @@ class RemovalLaw(Protocol):
 class Archard(Parametric):
     """Wear in proportion to asperity pressure and sliding: dw/dt = k p_a |u_s|.
 
-    Source: J. F. Archard, J. Appl. Phys. 24 (1953) 981; on the solid pressure of mixed contacts D. Zhu, A. Martini,
+    Source: J. F. Archard, J. Appl. Phys. 24 (1953) 981; on the contact pressure of mixed contacts D. Zhu, A. Martini,
     W. Wang, Y. Hu, B. Lisowsky, Q. J. Wang, J. Tribol. 129 (2007) 544.
     """
 
@@ -77,10 +77,9 @@ class Archard(Parametric):
 class DissipatedEnergy(Parametric):
     """Wear in proportion to the friction work of the asperities: dw/dt = k τ_a |u_s|, k in m^3/J.
 
-    τ_a is the boundary friction times the asperities' pressure. Friction and heat of a contact count it on all pressure
-    of touching cells, the oil's in them too: that work is the law's only where the contact is dry. 1 mm^3/J is
-    1e-9 m^3/J. Source: S. Fouvry, T. Liskiewicz, Ph. Kapsa, S. Hannel, E. Sauger, Wear 255 (2003) 287;
-    A. Ramalho, J. C. Miranda, Wear 260 (2006) 361.
+    τ_a is the boundary friction times the asperities' pressure, as in friction and heat of a contact; shearing the film
+    wears nothing. 1 mm^3/J is 1e-9 m^3/J. Source: S. Fouvry, T. Liskiewicz, Ph. Kapsa, S. Hannel, E. Sauger, Wear 255
+    (2003) 287; A. Ramalho, J. C. Miranda, Wear 260 (2006) 361.
     """
 
     needs_temperature: ClassVar[bool] = False

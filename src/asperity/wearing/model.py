@@ -35,7 +35,7 @@ class Patch:
     """The contact, solved at one position of the track.
 
     Maps have the track's shape and lie in the body's own frame, rolled by whole cells: 0 beside the contact. `pressure`
-    oil and asperities together, `asperity_pressure` the part that bodies press on one another where they touch,
+    oil and asperities together, `asperity_pressure` that of cells where bodies touch, 0 elsewhere,
     `shear` what the other body drags along +x with [Pa]; `film` [m], infinite beside the contact; `temperature`
     [K above ambient] of this body's surface, None unless a law or mechanism asks for it (`needs_temperature`).
     """
@@ -84,11 +84,6 @@ class Passage:
     boundary_friction: float
     rng: np.random.Generator
     state: State = field(default_factory=dict)
-
-    @property
-    def mean_asperity_pressure(self) -> Field:
-        """A point's asperity pressure, averaged over all positions of the track [Pa]."""
-        return np.asarray(np.mean([patch.asperity_pressure for patch in self.patches], axis=0))
 
     @property
     def film_inside(self) -> float:

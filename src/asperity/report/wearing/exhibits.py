@@ -23,7 +23,7 @@ PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # over hours: the axis, and i
     ("sk_m", ("sk_m", "spk_m", "svk_m")),
     ("ssk", ("ssk",)),
     ("sku", ("sku",)),
-    ("share", ("clr", "solid_load_ratio", "car")),
+    ("share", ("clr", "car")),
     ("film_thickness_m", ("h_mean_m", "h_central_m")),
     ("friction_coefficient", ("friction_coefficient",)),
     ("flash_temperature_max_k", ("flash_temperature_max_k",)),

@@ -12,7 +12,7 @@ from asperity.report.wearing import exhibits
 
 TILES = ("sq_m", "clr", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
 CONTACT = (
-    "sq_m", "sa_m", "ssk", "sku", "sk_m", "spk_m", "svk_m", "clr", "solid_load_ratio", "car", "h_mean_m", "h_min_m",
+    "sq_m", "sa_m", "ssk", "sku", "sk_m", "spk_m", "svk_m", "clr", "car", "h_mean_m", "h_min_m",
     "friction_coefficient", "flash_temperature_max_k", "crf_hz", "crfa",
 )  # fmt: skip
 OF_BODIES = (
