@@ -39,16 +39,19 @@ def dense_line(given: Given, nodes: int = 1601) -> Found:
     scale = np.sqrt(load * radius / e)  # a length that the half-width is near
     x = np.linspace(-1.6, 1.6, nodes)
     matrix = 2.0 * compliance(x)  # -(2/(pi E*)) ln|x|, pressures in E* scale/R
+    shape = x**2 / 2.0
+    for amplitude, along, _, phase in given.get("waves", []):
+        shape = shape - amplitude * radius / scale**2 * np.cos(2.0 * np.pi * along * scale * x + phase)
     pressure, active = np.zeros(nodes), np.abs(x) < 1.0
     for _ in range(200):
         inside = np.flatnonzero(active)
         rows = np.block(
             [[matrix[np.ix_(inside, inside)], np.ones((inside.size, 1))], [np.ones((1, inside.size)), np.zeros((1, 1))]]
         )
-        solved = np.linalg.solve(rows, np.append(-(x[inside] ** 2) / 2.0, 1.0 / (x[1] - x[0])))
+        solved = np.linalg.solve(rows, np.append(-shape[inside], 1.0 / (x[1] - x[0])))
         pressure[:] = 0.0
         pressure[inside] = solved[:-1]
-        gap = x**2 / 2.0 + matrix @ pressure + solved[-1]
+        gap = shape + matrix @ pressure + solved[-1]
         following = (pressure > 0.0) | ((gap < -1e-12) & ~active)
         if np.array_equal(following, active):
             break
@@ -72,13 +75,20 @@ def sneddon(given: Given) -> Found:
     """Axisymmetric contact by Sneddon's integrals of the profile's slope, all by quadrature."""
     e, radius, load = modulus(given), given["radius_m"], given["load_n"]
 
+    height, length = given.get("rings", (0.0, 1.0))
+    number = 2.0 * np.pi / length
+
+    def rises(r: float) -> float:
+        return r / radius + height * number * np.sin(number * r)
+
     def depth(x: float) -> float:
-        return x * quad(lambda turn: x * np.sin(turn) / radius, 0.0, np.pi / 2.0)[0]
+        return x * quad(lambda turn: rises(x * np.sin(turn)), 0.0, np.pi / 2.0)[0]
 
     def force(a: float) -> float:
         return 2.0 * e * quad(lambda x: depth(a) - depth(x), 0.0, a)[0]
 
-    a = brentq(lambda a: force(a) / load - 1.0, 1e-7, radius / 2.0, xtol=1e-16)
+    hertz_a = (0.75 * load * radius / e) ** (1.0 / 3.0)
+    a = brentq(lambda a: force(a) / load - 1.0, 0.3 * hertz_a, 3.0 * hertz_a, xtol=1e-16)
     step = 1e-4 * a
 
     def pressure(r: float) -> float:
@@ -88,7 +98,7 @@ def sneddon(given: Given) -> Found:
         ends = np.sqrt(a**2 - r**2)
         return e / np.pi * quad(lambda s: slope(np.hypot(r, s)) / np.hypot(r, s), 0.0, ends)[0]
 
-    nodes, weights = np.polynomial.legendre.leggauss(24)
+    nodes, weights = np.polynomial.legendre.leggauss(80 if height else 24)
     r = a * np.sqrt((nodes + 1.0) / 2.0)  # even in area
     p = np.array([pressure(one) for one in r])
     return {"p_max_pa": pressure(0.0), "p_weighted_pa": weights @ p**2 / (weights @ p), "contact_area_m2": np.pi * a**2}
@@ -187,12 +197,8 @@ def refined(solver: str, given: Given, cells: tuple[int, ...]) -> tuple[Found, F
     return value, step
 
 
-def only(found: tuple[Found, Found], *keys: str) -> tuple[Found, Found]:
-    return tuple({key: part[key] for key in keys} for part in found)
-
-
-def newton_on_nodes(given: Given) -> Found:
-    """The tests' dense Newton on 401 and 801 nodes, extrapolated at second order."""
+def newton_on_nodes(given: Given, grids: tuple[int, int] = (401, 801)) -> Found:
+    """The tests' dense Newton, extrapolated at second order."""
     oil, radius, speed = given["oil"], given["radius_m"], float(np.mean(given["surface_speeds_m_s"]))
     found = hertz.line_contact(given["line_load_n_m"], 1.0, radius, modulus(given))
     a, p_h = found.half_widths[0], found.p_max
@@ -210,8 +216,7 @@ def newton_on_nodes(given: Given) -> Found:
     laws = Oil(*thickening, lambda p: 1.0 + c1 * p / (1.0 + c2 * p), lambda p: c1 / (1.0 + c2 * p) ** 2)
     number = 12.0 * eta0 * speed * radius**2 / (a**3 * p_h)
     films = [
-        line_contact(given["inlet_half_widths"], given["outlet_half_widths"], nodes, number, laws)
-        for nodes in (401, 801)
+        line_contact(given["inlet_half_widths"], given["outlet_half_widths"], nodes, number, laws) for nodes in grids
     ]
     unit = a**2 / radius
     return {

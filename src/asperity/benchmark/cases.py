@@ -9,7 +9,7 @@ from typing import Any
 
 from asperity.errors import BadInput
 
-KINDS = ("dry", "wave", "ehl", "slider")
+KINDS = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 _BESIDE = Path(__file__).with_name("cases")  # in a wheel
 _IN_REPOSITORY = Path(__file__).parents[3] / "benchmark" / "cases"
 

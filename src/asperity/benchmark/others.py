@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.benchmark.ours import pressures, waves_on
+from asperity.benchmark.ours import dry_roughness, pressures
 from asperity.conditions import ElasticPair
 from asperity.errors import AsperityError
 from asperity.grid import Grid
@@ -35,8 +35,7 @@ class Pressed(ABC):
         x, y = (given["side_m"] / 2.0,) * 2 if "side_m" in given else (1.5 * a, 1.5 * b)
         grid = Grid((cells, cells), (-x, -y), (x, y), periodic=(False, False))
         heights = -(grid.x[:, None] ** 2) / (2.0 * radii[0]) - grid.y[None, :] ** 2 / (2.0 * radii[1])
-        if "waves" in given:
-            heights = heights + waves_on(grid, given)
+        heights = heights + dry_roughness(grid, given)
         side = grid.extent[0]
         pressure, _ = self.pressed(heights / side, (1.0, grid.extent[1] / side), load / np.prod(grid.extent) / modulus)
         return pressures(pressure * modulus, grid.spacing[0] * grid.spacing[1])

@@ -1,17 +1,27 @@
 """asperity's own adapter: contacts, waves and sliders of the benchmark by the solvers of `asperity.ehl`."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import Options, solve_contact, solve_film
-from asperity.errors import BadInput
+from asperity.ehl import (
+    ContactModel,
+    ContactSolution,
+    Options,
+    contact_state,
+    moving_contact,
+    solve_contact,
+    solve_film,
+)
+from asperity.errors import AsperityError, BadInput
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.surface import Surface, flat_surface
+from asperity.surface import MovingSurfaces, Surface, flat_surface
 
 LENGTH = 0.01  # of a line contact, which no certified value hangs on [m]
 TIGHT = Options(tolerance=1e-6)
@@ -21,12 +31,11 @@ class Ours:
     """asperity, at a tight tolerance."""
 
     name = "asperity"
-    kinds = ("dry", "wave", "ehl", "slider")
+    kinds = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 
     def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
         """Quantities by key."""
-        solve = {"dry": _dry, "wave": _wave, "ehl": _ehl, "slider": _slider}[given["kind"]]
-        return solve(given, cells)
+        return _SOLVES[given["kind"]](given, cells)
 
 
 def _conditions(given: Mapping[str, Any], speed: float = 1.0) -> ContactConditions:
@@ -51,6 +60,16 @@ def waves_on(grid: Grid, given: Mapping[str, Any]) -> Field:
     )
 
 
+def dry_roughness(grid: Grid, given: Mapping[str, Any]) -> Field:
+    """Heights [m] of a dry ball's or ellipse's roughness: waves, rings, or none."""
+    if "waves" in given:
+        return waves_on(grid, given)
+    if "rings" in given:
+        amplitude, length = given["rings"]
+        return np.asarray(amplitude * np.cos(2.0 * np.pi * np.hypot(grid.x[:, None], grid.y[None, :]) / length))
+    return np.zeros(grid.cells)
+
+
 def pressures(pressure: Field, cell_area: float) -> dict[str, float]:
     """Largest pressure, and the mean of the pressure weighted by itself, which hangs less on single cells."""
     return {
@@ -68,10 +87,13 @@ def _dry(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     else:
         x, y = (given["side_m"] / 2.0,) * 2 if "side_m" in given else (1.5 * a, 1.5 * b)
         grid = Grid((cells, cells), (-x, -y), (x, y), periodic=(False, False))
-    surface = Surface(waves_on(grid, given), grid) if "waves" in given else flat_surface(grid)
+    if given["geometry"] == "line" and "waves" in given:
+        surface = _oiled_waves(given, grid)
+    else:
+        surface = Surface(dry_roughness(grid, given), grid)
     solution = solve_contact(conditions, None, surface, options=TIGHT)
     found = pressures(solution.pressure, grid.spacing[0] * grid.spacing[1])
-    if given["geometry"] == "line":
+    if given["geometry"] == "line" and "waves" not in given:
         found["half_width_m"] = _half_width(grid.x, solution.pressure[:, 0])
     return found
 
@@ -114,13 +136,74 @@ def _oil(given: Mapping[str, Any]) -> Lubricant:
     return Lubricant(viscosity=thick, density=DowsonHigginson(oil["rho0_kg_m3"]), rheology=Newtonian())
 
 
-def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
-    conditions = _conditions(given, float(np.mean(given["surface_speeds_m_s"])))
-    a = conditions.hertz.half_widths[0]
+def _ehl_grid(given: Mapping[str, Any], a: float, cells: int) -> Grid:
     low, high = given["inlet_half_widths"] * a, given["outlet_half_widths"] * a
-    grid = Grid((cells, 8), (low, 0.0), (high, 8 * (high - low) / cells))
-    gap = solve_contact(conditions, _oil(given), flat_surface(grid), options=TIGHT).gap[:, 0]
-    return {"h_central_m": float(np.interp(0.0, grid.x, gap)), "h_min_m": _least(gap)}
+    if given["geometry"] == "point":
+        side = given["side_half_widths"] * a
+        return Grid((cells, cells), (low, -side), (high, side), periodic=(False, False))
+    if "width_m" in given:
+        return Grid((cells, max(8, cells // 4)), (low, 0.0), (high, given["width_m"]))
+    return Grid((cells, 8), (low, 0.0), (high, 8 * (high - low) / cells))
+
+
+def _oiled_waves(given: Mapping[str, Any], grid: Grid) -> Surface:
+    """Waves of (amplitude [m], waves a metre along x, waves over the width along y, phase [rad])."""
+    x, y = grid.x[:, None], grid.y[None, :] / given.get("width_m", 1.0)
+    heights = [a * np.cos(2.0 * np.pi * (along * x + across * y) + phase) for a, along, across, phase in given["waves"]]
+    return Surface(np.broadcast_to(np.sum(heights, axis=0), grid.cells).copy(), grid)
+
+
+def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    """Smooth, with standing waves (which may touch), and with no oil lost."""
+    conditions = _conditions(given, float(np.mean(given["surface_speeds_m_s"])))
+    grid = _ehl_grid(given, conditions.hertz.half_widths[0], cells)
+    surface = _oiled_waves(given, grid) if "waves" in given else flat_surface(grid)
+    options = TIGHT
+    if "touching_film_m" in given:
+        model: ContactModel = "conserving" if given["kind"] == "conserving" else "mixed"
+        options = Options(tolerance=1e-6, contact_film=given["touching_film_m"], model=model)
+    return _films(given, solve_contact(conditions, _oil(given), surface, options=options))
+
+
+def _films(given: Mapping[str, Any], solution: ContactSolution) -> dict[str, float]:
+    grid, gap, pressure = solution.grid, solution.gap, solution.pressure
+    if given["geometry"] == "point":
+        state = contact_state(solution)
+        return {"h_central_m": state.h_central, "h_min_m": state.h_min}
+    middle = gap[:, 0] if grid.y[0] == 0.0 or "width_m" not in given else 0.5 * (gap[:, 0] + gap[:, -1])
+    inside = np.linspace(-1.0, 1.0, 4001) * solution.conditions.hertz.half_widths[0]
+    found = {
+        "h_central_m": float(np.interp(0.0, grid.x, middle)),
+        "h_min_m": _least(gap[:, 0]),
+        "h_mean_m": float(np.interp(inside, grid.x, gap.mean(axis=1)).mean()),
+        "p_weighted_pa": float((pressure**2).sum() / pressure.sum()),
+        "load_share": float((pressure * solution.in_contact).sum() / pressure.sum()),
+    }
+    if solution.oil is not None and given["kind"] == "conserving":
+        speed = float(np.mean(given["surface_speeds_m_s"]))
+        found["flux_m2_s"] = speed * float((solution.oil.content * gap)[-1].mean())  # nothing drives it there but u
+    return found
+
+
+def _moving(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    """Waves of the first surface that run through: the film at x = 0 over their last period."""
+    speeds = tuple(given["surface_speeds_m_s"])
+    conditions = replace(_conditions(given), surface_speeds=speeds)
+    a = conditions.hertz.half_widths[0]
+    grid = _ehl_grid(given, a, cells)
+    surfaces = MovingSurfaces.one_rough(_oiled_waves(given, grid), speeds)
+    ((amplitude, along, _, _),) = given["waves"]
+    step, rough = grid.spacing[0], speeds[0] / float(np.mean(speeds))
+    period = round(1.0 / (along * rough * step))
+    last = round(given["settles_half_widths"] * a / step) + period
+    films = []
+    for snapshot in islice(moving_contact(conditions, _oil(given), surfaces, options=TIGHT), last + 1):
+        if not snapshot.solution.convergence.converged:
+            raise AsperityError(f"step {snapshot.number} of {last} did not converge; take other cells")
+        films.append(float(np.interp(0.0, grid.x, snapshot.solution.gap[:, 0])))
+    heard = np.array(films[-period:])
+    turns = np.exp(2j * np.pi * np.arange(period) / period)
+    return {"amplitude_ratio": float(2.0 * abs(turns @ heard) / period / amplitude), "h_mean_m": float(heard.mean())}
 
 
 def _least(gap: Field) -> float:
@@ -148,3 +231,14 @@ def _slider(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     )
     load = {} if journal else {"load_n_m": float(film.load)}
     return {"p_max_pa": float(film.pressure.max()), "flux_m2_s": float(film.flux.mean()), **load}
+
+
+_SOLVES = {
+    "dry": _dry,
+    "wave": _wave,
+    "ehl": _ehl,
+    "mixed": _ehl,
+    "conserving": _ehl,
+    "moving": _moving,
+    "slider": _slider,
+}

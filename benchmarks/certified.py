@@ -1,0 +1,49 @@
+"""Solvers held against the benchmark's certified values: error and time by family of cases, and the figure of both."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+
+from asperity import report
+from asperity.benchmark import BenchmarkResult, run_benchmark, solver_named
+
+FIGURE = Path(__file__).parents[1] / "docs" / "images" / "benchmark-error.png"
+SOLVERS = ("asperity", "tamaas", "contactmechanics")
+CELLS = (64, 128, 256)
+
+
+def lines(*, fast: bool) -> Iterator[str]:
+    results = [run_benchmark(solver_named(name), cells=CELLS[:2] if fast else CELLS) for name in SOLVERS]
+    yield "## The benchmark's certified values"
+    yield ""
+    yield "Relative to the certified value; processor time of a case, all that is loaded and compiled once apart."
+    yield ""
+    yield "| solver | cases | cells | values | median error [%] | largest [%] | of | median time [s] | largest [s] |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for result in results:
+        yield from _rows(result)
+    yield ""
+    yield "Left out, or given up:"
+    yield ""
+    yield "| solver | case | reason |"
+    yield "|---|---|---|"
+    for result in results:
+        if result.solver == "asperity":
+            yield from (f"| asperity | {case} | {reason} |" for case, reason in result.left_out)
+    report.write_figure(report.benchmark_figure(*results), FIGURE)
+
+
+def _rows(result: BenchmarkResult) -> Iterator[str]:
+    for family in dict.fromkeys(row.case.partition("-")[0] for row in result.rows):
+        for cells in dict.fromkeys(row.cells for row in result.rows):
+            rows = [row for row in result.rows if row.case.startswith(f"{family}-") and row.cells == cells]
+            if not rows:
+                continue
+            worst = max(rows, key=lambda row: abs(row.error))
+            seconds = list({row.case: row.seconds for row in rows}.values())
+            middle = 100 * median(abs(row.error) for row in rows)
+            yield (
+                f"| {result.solver} | {family} | {cells} | {len(rows)} | {middle:.2g} | "
+                f"{100 * abs(worst.error):.2g} | {worst.case} {worst.quantity} | {median(seconds):.2g} | "
+                f"{max(seconds):.2g} |"
+            )
