@@ -13,7 +13,7 @@ from typing import Any, get_args
 
 from support.source import PACKAGE, ROOT, Function, functions, modules
 
-FOLDERS = (PACKAGE, ROOT / "tests", ROOT / "benchmarks")
+FOLDERS = (PACKAGE, ROOT / "tests", ROOT / "benchmarks", ROOT / "benchmark")
 ELSEWHERE = ("scipy", "numpy", "np", "concurrent", "itertools", "pathlib")  # other people's modules that the docs name
 TIMES = {"seconds", "solve_seconds"}  # left out of golden numbers, as no two runs share them
 GOLDEN = {  # command: where its JSON lies in the golden numbers

@@ -110,7 +110,7 @@ def _wave(given: Mapping[str, Any], cells: int) -> dict[str, float]:
     pair = ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"]))
     length, amplitude = given["wavelength_m"], given["amplitude_m"]
     p_mean = given["pressure_over_full"] * np.pi * pair.reduced_modulus * amplitude / length
-    a = 10.0 * length
+    a = 30.0 * length
     wide = {
         "geometry": "line",
         "radius_m": a * pair.reduced_modulus / (2.0 * p_mean),
