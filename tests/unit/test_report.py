@@ -138,6 +138,12 @@ class Page(HTMLParser):
         return [attributes for tag, attributes in self.tags if tag == "img"]
 
 
+@pytest.fixture
+def unprinted(monkeypatch):
+    """Figures are drawn and not printed, which is most of a page's time, where its words are what is asked for."""
+    monkeypatch.setattr(base, "svg", lambda figure: f"<svg>{figure.get_label()}</svg>")
+
+
 @pytest.fixture(scope="module")
 def single():
     return Page(page.render_page([run_like(notes=("filled 0.2 % missing cells",))]))
@@ -195,6 +201,7 @@ def test_every_number_is_there_with_its_unit(single, name, value, unit):
     assert row[1:] == [value, unit]
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
     made_up = replace(quantity("clr"), key="made_up", symbol="", name="made-up share", deviation="")
     known = {**catalogue(), "made_up": made_up}
@@ -203,6 +210,7 @@ def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
     assert row[1:] == ["54.2", "%"]
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_a_resonance_is_not_given_with_its_record_s_deviation_alone(single):
     """The fit to one record knows its frequency to some hertz where the load share's error bar is worth a hundred."""
     resonance = run_like().vibration.resonance
@@ -276,6 +284,7 @@ def test_several_runs_are_drawn_against_roughness(single, several):
     assert "20.0 to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_figures_carry_their_error_where_it_shows():
     run = run_like()
     errors = Figures(car=0.0123, clr=0.0456, h_min=1e-12, h_central=7.1e-9)
@@ -290,6 +299,7 @@ def test_figures_carry_their_error_where_it_shows():
     assert next(value for name, value in rows.items() if name.startswith("Smallest film")) == "0.005"
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_runs_of_one_roughness_are_not_drawn_against_it():
     shown = Page(page.render_page([run_like(), run_like()]))
     assert not any("Load and area share of asperities" in unquote(image["src"]) for image in shown.images())
@@ -321,6 +331,7 @@ def test_says_what_was_done_what_is_left_out_and_whom_to_cite(single):
     assert run_like().case.text in single.text
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_what_is_left_out_follows_what_the_run_took():
     thinning = CASE.replace('law = "newtonian"', 'law = "ree-eyring", tau0 = "5 MPa"')
     assert thinning != CASE
@@ -400,6 +411,7 @@ def test_prose_is_set_as_in_print(written, shown):
     assert base.in_print(written) == shown.replace("~", "\N{NO-BREAK SPACE}")
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_load_on_capped_oil_is_not_hidden():
     shown = page.render_page([run_like(capped_oil_load_ratio=0.5)])
     assert "without touching carry 50.0\N{NO-BREAK SPACE}% of the load" in shown
@@ -511,6 +523,7 @@ def test_friction_heat_and_stress_are_numbers_of_the_page(single):
     assert "bair-winer" in next(rows[name] for name in rows if name.startswith("Friction of the film"))
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
     rolling = Page(page.render_page([run_like(CASE.replace("slip = 0.2", "slip = 0.0"))]))
     assert "both surfaces move at the same speed" in rolling.text
@@ -525,6 +538,7 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
     assert next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
 
 
+@pytest.mark.usefixtures("unprinted")
 def test_heat_that_acts_back_is_not_left_out():
     assert "Isothermal film." in Page(page.render_page([run_like()])).text
     warm = CASE + "[thermal]\nfeedback = true\n"
