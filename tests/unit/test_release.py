@@ -67,6 +67,32 @@ def test_the_recipe_needs_what_the_project_needs():
     assert dict(map(split, stated("recipe/recipe.yaml")["requirements"]["run"])) == wanted
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("", ""),
+        ("requirements:", "requirments:"),
+        ("noarch: python", "noarch: snake"),
+        ("- numpy >=2.1", "- numpy >=>2"),
+    ],
+)
+def test_the_recipe_is_one_to_conda_forges_builder(right, wrong):
+    """Read and rendered by rattler-build; that a wrong one is refused shows that it is read."""
+    builder = pytest.importorskip("rattler_build", reason="a package of the development group")
+    text = (ROOT / "recipe" / "recipe.yaml").read_text("utf-8")
+    assert right in text
+
+    def rendered() -> tuple[str, str]:
+        (variant,) = builder.Stage0Recipe.from_yaml(text.replace(right, wrong)).render(builder.VariantConfig())
+        return str(variant.recipe.package.name), str(variant.recipe.package.version)
+
+    if not right:
+        assert rendered() == ("asperity", PROJECT["version"])
+        return
+    with pytest.raises(builder.RecipeParseError):
+        rendered()
+
+
 def split(requirement: str) -> tuple[str, str]:
     name, bound = re.fullmatch(r"([\w-]+) ?(>=[\d.]+)", requirement).groups()
     return name, bound
