@@ -38,11 +38,22 @@ def main(wanted: Collection[str]) -> None:
         (HERE / "cases" / f"{name}.toml").write_text(text, "utf-8")
     with (HERE / "certified.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["case", "quantity", "unit", "value", "uncertainty", "first way", "second way"])
+        writer.writerow(["case", "quantity", "unit", "value", "uncertainty", "first way", "second way", "found by it"])
         for path in sorted((HERE / "cases").glob("*.toml")):
             for entry in tomllib.loads(path.read_text("utf-8"))["certified"]:
-                told = [entry[key] for key in ("quantity", "unit", "value", "uncertainty")]
-                writer.writerow([path.stem, *told, *(way["by"] for way in entry["ways"])])
+                first, second = entry["ways"]
+                writer.writerow(
+                    [
+                        path.stem,
+                        entry["quantity"],
+                        entry["unit"],
+                        f"{entry['value']:.8g}",
+                        f"{entry['uncertainty']:.2g}",
+                        first["by"],
+                        second["by"],
+                        f"{second['value']:.8g}",
+                    ]
+                )
 
 
 def _certified(

@@ -61,8 +61,16 @@ def test_every_value_has_two_ways_and_an_uncertainty_of_at_most_two_per_cent():
 
 def test_the_table_is_that_of_the_cases():
     with (ROOT / "benchmark" / "certified.csv").open(encoding="utf-8", newline="") as file:
-        rows = [(row["case"], row["quantity"], float(row["value"])) for row in csv.DictReader(file)]
-    assert rows == [(case.name, entry.quantity, entry.value) for case in CASES.values() for entry in case.certified]
+        rows = list(csv.DictReader(file))
+    entries = [(case.name, entry) for case in CASES.values() for entry in case.certified]
+    assert [(row["case"], row["quantity"], row["unit"]) for row in rows] == [
+        (name, entry.quantity, entry.unit) for name, entry in entries
+    ]
+    for row, (_, entry) in zip(rows, entries, strict=True):
+        assert float(row["value"]) == pytest.approx(entry.value, rel=1e-7)
+        assert float(row["uncertainty"]) == pytest.approx(entry.uncertainty, rel=0.06)
+        assert (row["first way"], row["second way"]) == entry.ways
+        assert float(row["found by it"]) == pytest.approx(entry.value, rel=1e-7, abs=1.06 * entry.uncertainty)
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if ways_of(name) and name not in SLOW])
