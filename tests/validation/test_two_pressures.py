@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
-from asperity.ehl import Options, contact_state, solve_contact, starts
+from asperity.ehl import Options, contact_state, mixed_iterate, solve_contact, starts
 from asperity.ehl.dry import dry_contact
 from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.mixed_iterate import newton
@@ -98,6 +98,32 @@ def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
     followed = dry_start(fine, Pressures(np.zeros_like(total), total, approach + coarse.contact_gap))
     assert followed[1] == pytest.approx(alone[1], abs=0.01)
     assert np.sqrt(np.mean((followed[0] - alone[0]) ** 2)) < 0.02 * np.sqrt(np.mean(alone[0] ** 2))
+
+
+def test_a_hard_dry_start_needs_no_steps_that_bear_the_cap(monkeypatch):
+    """Newton's from the coarser grid's pressures stood still at a hundredth of p_h on this ellipse, for seconds."""
+    hard = contact(geometry="elliptic", radius=(19.5e-3, 0.233), load=9460.0, length=None, speed=0.03, hardness=6.3e9)
+    a, b = hard.hertz.half_widths
+    on = Grid((528, 288), (-1.6 * a, -1.3 * b), (1.3 * a, 1.3 * b), periodic=(False, False))
+    surface = gaussian_surface(on, sq=0.184e-6, correlation_length=(153e-6, 552e-6), rng=np.random.default_rng(2))
+    fine, coarse = grid_levels(contact_problem(hard, barus(), surface, MIXED))[2:4]
+    total, approach = dry_start(coarse)
+    monkeypatch.setattr(starts, "dry_contact", None)
+    start = dry_start(fine, Pressures(np.zeros_like(total), total, approach + coarse.contact_gap))
+    left = replace(fine, lubricant=None, contact_gap=0.0).evaluate(*start)
+    assert left.residual_rms < 1e-3
+    assert abs(left.load_error) < 1e-3
+
+
+def test_a_step_that_leads_away_from_a_solution_is_cut_short():
+    """A sixteenth of it at least is taken, and all of it from afar."""
+    case = load_case(PAPER).with_overrides({"grid.cells": "[64, 64]", "model": "mixed"})
+    surface = case.surface()
+    solved = balance_of(solve_contact(case.conditions, case.lubricant, surface, options=case.options))
+    still = np.zeros_like(solved.unknowns.total)
+    for balance, share in ((solved, 0.0625), (replace(solved, oil_residual=solved.oil_residual + 1.0), 1.0)):
+        led = mixed_iterate._led(mixed_iterate._Moves(balance, Pressures(still, still, -0.2), 1.0), second_order=True)
+        assert solved.unknowns.approach - led.unknowns.approach == pytest.approx(0.2 * share)
 
 
 def test_a_cell_in_deep_overlap_is_not_freed_again_and_again():
