@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from asperity import coupling, ehl
 from asperity.arrays import Field
 from asperity.case import Case
-from asperity.coupling import oscillator
-from asperity.ehl import contact_state, solve_contact
 from asperity.errors import AsperityError, BadInput
 from asperity.files import make_folder, user_cache, write_text
 from asperity.lubricant import OilSheet
@@ -30,7 +29,9 @@ from asperity.tracking.reading import Reading
 from asperity.wear import Condition
 
 ZERO_CELSIUS = 273.15
-USUAL_OIL = OilSheet(grade="VG 100")  # logarithms of oils' viscosities are much alike over temperature but for a factor
+USUAL_OIL = OilSheet(
+    viscosity_40=1e-4, viscosity_100=1.11e-5
+)  # VG 100; over temperature oils differ by little but a factor
 COLDEST, HOTTEST = -20.0, 150.0  # degC, of the table of viscosities
 WORTH_SOLVING = 0.05  # of a condition: how it must differ for the case's contact to be solved
 MOSTLY = 0.5  # of the recordings, for which a condition must be known to be used
@@ -208,5 +209,6 @@ def _about(load: float, film: float) -> Follows:
 
 def _resonance(case: Case) -> float:
     assert case.vibration is not None  # asked by the target
-    solution = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
-    return oscillator(contact_state(solution), case.conditions, case.vibration, solution=solution).natural_frequency_hz
+    solution = ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
+    state = ehl.contact_state(solution)
+    return coupling.oscillator(state, case.conditions, case.vibration, solution=solution).natural_frequency_hz
