@@ -48,6 +48,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
     ("intervals",),
     ("indicators",),
     ("alarms",),
+    ("hostile",),
     ("motion_table",),
     ("robustness",),
     ("vibration",),
