@@ -295,3 +295,16 @@ def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
     assert code == 4
     assert out
     assert "is left out: its name is not UTF-8; rename it" in err
+
+
+def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch):
+    """`python -m benchmarks.hostile` in seconds: an untidy folder, two watches, one of them killed."""
+    from benchmarks import hostile
+
+    monkeypatch.setattr(hostile, "PARTS_S", 0.4)
+    rows = [line.split("|")[1:3] for line in hostile.run(0.12, 2, every=0.2, settle=0.3, say=lambda _: None)]
+    told = {name.strip(): value.strip() for name, value in rows}
+    assert told["nobody says what became of"] == "0"
+    same, differ = told["files of which both stores hold the same, and not"].split(",")
+    assert (int(same) > 10, int(differ)) == (True, 0)
+    assert int(told["heard and judged"]) > 10
