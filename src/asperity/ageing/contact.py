@@ -23,8 +23,8 @@ from asperity.lubricant import Lubricant, Thermal
 from asperity.processes import cores, set_up_worker
 from asperity.surface import Surface
 
-LOOSELY = 2e-2, 5e-3  # tolerances of a first solve, from which Newton's steps at once then meet the case's own
-AT_ONCE = 30  # of these steps: where they lead anywhere, it takes some ten
+LOOSELY = 5e-2, 1e-2  # tolerances of a first solve, from which Newton's steps at once then meet the case's own
+NEARLY, AT_ONCE = 80, 30  # steps of the first solve on each grid, and at once: where these lead anywhere, some ten
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,10 +93,11 @@ class PositionSolver:
         On plateaus that wear has left, the first way gets near the solution and then goes round, cells of a closed land
         opening and closing in turn, and a second way begins anew; from what the first has found, all cells follow.
         """
-        few = replace(self.options, max_iterations=min(AT_ONCE, self.options.max_iterations))
+        most = self.options.max_iterations
+        few = replace(self.options, max_iterations=min(AT_ONCE, most))
         if self.lubricant is not None and np.any(surface.heights):
             for tolerance in (one for one in LOOSELY if one > self.options.tolerance):
-                loose = replace(self.options, tolerance=tolerance)
+                loose = replace(self.options, tolerance=tolerance, max_iterations=min(NEARLY, most))
                 near = ehl.solve_contact(self.conditions, self.lubricant, surface, options=loose, strict=False)
                 found = self._with_heat(surface, few, replace(near, options=few), strict=False)
                 if found.convergence.converged:

@@ -38,8 +38,8 @@ def of_cells(ageing: Ageing) -> str | None:
     told = " by ".join("many" if math.isnan(one) else f"{one:.2g}" for one in along)
     return (
         f"The roughness has {told} cells along its correlation lengths, where {WANTED:g} are wanted: on "
-        "so few CLR comes out too high, and what wears too fast (examples/wear.toml begins with a CLR of 0.71, 0.63 "
-        f'and 0.61 on 64, 128 and 256 cells); state grid.cells = {wanted}, or "auto".'
+        "so few CLR comes out too high, and what wears too fast (examples/wear.toml begins with a CLR of 0.71, 0.64 "
+        f'and 0.60 on 64, 128 and 256 cells); state grid.cells = {wanted}, or "auto".'
     )
 
 
