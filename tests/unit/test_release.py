@@ -53,6 +53,13 @@ def test_one_version_stands_everywhere():
     assert versions == dict.fromkeys(versions, PROJECT["version"])
 
 
+def test_one_date_stands_everywhere_that_of_the_changelogs_heading():
+    versions = re.findall(r"^## \[([\d.]+)\] - (\d{4}-\d{2}-\d{2})$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
+    assert versions[0][0] == PROJECT["version"]
+    assert str(stated("CITATION.cff")["date-released"]) == stated("codemeta.json")["datePublished"] == versions[0][1]
+    assert [version for version, _ in versions] == sorted((version for version, _ in versions), reverse=True)
+
+
 def test_one_paper_and_one_licence():
     doi = stated("CITATION.cff")["preferred-citation"]["doi"]
     assert stated("codemeta.json")["referencePublication"]["@id"] == f"https://doi.org/{doi}"
