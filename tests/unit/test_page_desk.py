@@ -221,6 +221,22 @@ def test_where_there_is_room_the_full_answer_does_not_wait_for_the_coarse_one(fi
     assert (coarsely.kept, fully.kept) == ([], [])
 
 
+def test_an_answer_to_what_was_set_before_is_none_to_what_is_set_now():
+    coarsely, fully = AtOnce(), AtOnce()
+    coarsely.held = fully.held = fully.has_room = True
+    desk = Desk(Settings(papers_case().with_overrides(MUTE)), coarsely, lambda: None, fully)
+    desk.solve()
+    coarsely.go()
+    fully.has_room = False  # busy with what was set before
+    desk.turn("contact.load", "600 N")
+    fully.go()
+    assert (desk.pending, desk.trail) == (True, [])
+    coarsely.go()
+    fully.go()
+    assert (desk.pending, desk.answer.text) == (False, desk.settings.case.text)
+    assert "600 N" in desk.answer.text
+
+
 def test_without_room_the_full_answer_is_asked_for_after_the_coarse_one():
     coarsely, fully = AtOnce(), AtOnce()
     coarsely.held = fully.held = True

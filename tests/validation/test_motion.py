@@ -64,7 +64,7 @@ def standing(surface):
 @pytest.mark.parametrize("time_step", [1.0, 0.5])
 def test_where_nothing_moves_the_snapshot_stays(time_step):
     on = paper.grid((64, 64))
-    conditions, tight = paper.contact(hardness=2e9), Options(tolerance=1e-6)
+    conditions, tight = paper.contact(hardness=2e9), Options(tolerance=1e-7)
     surface = paper.rough(on, 1e-6)
     taken = moving_contact(conditions, paper.barus(), standing(surface), options=tight, time_step=time_step)
     start, *_, last = islice(taken, 9)

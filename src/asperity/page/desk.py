@@ -82,14 +82,24 @@ class Desk:
         """Have the contact solved as it is set."""
         self.problem = ""
         self.pending, self._begun = True, False
-        self._queue.ask((solve_coarsely, (self.settings.case, self._start)), self._coarsely)
+        self._queue.ask((solve_coarsely, (self.settings.case, self._start)), self._if_still_set(self._coarsely))
         if self._ahead is not None and self._ahead.has_room:
             self._solve_fully(self._ahead)
         self._changed()
 
     def _solve_fully(self, queue: Queue) -> None:
         self._begun = True
-        queue.ask((solve_fully, (self.settings.case,)), self._fully)
+        queue.ask((solve_fully, (self.settings.case,)), self._if_still_set(self._fully))
+
+    def _if_still_set(self, then: Callable[[Any], None]) -> Callable[[Any], None]:
+        """What is done with an answer, unless the knobs have been turned meanwhile: it is no answer to what is set."""
+        asked = self.settings
+
+        def told(result: Any) -> None:
+            if self.settings is asked:
+                then(result)
+
+        return told
 
     def turn(self, key: str, text: str) -> None:
         """Set a knob and have the contact solved, or keep the sentence that says why it cannot be."""
