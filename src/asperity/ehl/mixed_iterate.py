@@ -19,8 +19,8 @@ PATIENCE, PROGRESS = 8, 0.9  # steps without progress, after which halves are ta
 LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
 BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
 FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
-CLOSE, AWAY = 0.03, 1.5  # from less than this left (rms, of p_h), a step that leaves so many times as much is halved ...
-SHORTEST_CUT = 0.1  # ... until it is shorter than this share
+CLOSE, AWAY = 0.03, 1.5  # from less left than this (rms, of p_h), a step that leaves so many times as much is halved
+SHORTEST_CUT = 0.1  # until it is shorter than this share
 
 
 class _Moves(NamedTuple):
