@@ -78,6 +78,20 @@ def test_conditions_are_read_from_channels_in_their_units(asp):
     assert "channel oil is in degC, and load_n takes n, kn, mn" in row["remarks"]
 
 
+def test_a_speed_channel_without_a_number_is_told_beside_its_recording(asp):
+    Path("in").mkdir()
+    rows = np.stack([np.arange(4000) / RATE, np.random.default_rng(3).standard_normal(4000)])
+    text = "\n".join(f"{time:.6f},{value:.6f}," for time, value in rows.T)
+    Path("in/a.csv").write_text(f"time [s],acc [m/s^2],shaft [rpm]\n{text}")
+    beside = {"channel": "acc", "condition_channels": {"speed_hz": "shaft"}, "faults_per_turn": {"BPFO": 3.58}}
+    Path("in/a.csv.json").write_text(json.dumps(beside))
+    code, out, err = asp("track", "in", *BAND, "--json")
+    assert "Traceback" not in err
+    assert "shaft" in out + err
+    if code == 0:
+        assert json.loads(out)["recordings"][0]["speed_hz"] is None
+
+
 @pytest.mark.parametrize(
     ("stated", "refusal"),
     [

@@ -8,10 +8,12 @@ from scipy.linalg import toeplitz
 
 from asperity.case import load_case
 from asperity.lubricant import OilSheet
+from asperity.tracking import operating
 from asperity.tracking.operating import (
     ANY_CONTACT,
     CRF,
     LEVEL,
+    PULSES,
     Operating,
     conditions_of,
     contact_follows,
@@ -170,12 +172,28 @@ def test_a_dry_contact_follows_its_load_as_hertz_has_it_and_no_speed(tmp_path, m
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     follows = contact_follows(load_case('lubricant = "none"\n' + SMALL))
     assert follows.load == pytest.approx((1.0 / 12.0, 1.0 / 4.0), abs=1e-3)
-    assert follows.viscosity == follows.speed == pytest.approx((-0.05, 0.0), abs=1e-3)
+    assert follows.viscosity == follows.speed == pytest.approx((-0.05, 0.05), abs=1e-3)
+
+
+def test_a_contact_that_follows_far_is_taken_at_its_word():
+    """Clipped to what most contacts do, the span had no width and nothing could be fitted."""
+    follows = operating._about(0.9, -1.58)
+    assert follows.load == pytest.approx((0.45, 1.35))
+    assert follows.speed == pytest.approx((-2.37, -0.79))
+    speeds = np.where(NUMBER < 18, 1.0, 1.1)
+    told = judged(crf(speeds**-1.5 + scatter(1), follows, entrainment_m_s=speeds))
+    assert told.state == "none"
+
+
+def test_a_fault_that_heats_its_oil_alarms_all_the_same():
+    """A level that grows fourfold while the oil warms from 60 to 85 degC is hardly the oil's doing."""
+    warm = np.interp(NUMBER, [15.0, 39.0], [60.0, 85.0])
+    louder = np.interp(NUMBER, [15.0, 39.0], [0.0, np.log(4.0)]) + scatter(2, 0.03)
+    assert judged(replace(crf(louder, LEVEL, temperature_degc=warm), contact=False, relative=False)).state == "alarm"
+    assert conditions_of([Operating(temperature_degc=value) for value in warm], PULSES, ANY_CONTACT.oil) == ()
 
 
 def test_the_contact_of_a_case_says_how_crf_follows_and_is_solved_once(tmp_path, monkeypatch):
-    from asperity.tracking import operating
-
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     case = load_case(SMALL + OIL)
     follows = contact_follows(case)

@@ -38,6 +38,18 @@ def test_the_noise_of_a_tacho_makes_no_pulses():
     assert turning_by_pulses(np.sin(2.0 * np.pi * ANGLE) + noise, RATE).speed_hz == pytest.approx(MEAN, rel=0.01)
 
 
+def test_pulses_of_two_samples_a_turn_are_pulses():
+    pulses = 0.001 * np.random.default_rng(0).standard_normal(51_200)
+    pulses[2559::2560] += 5.0
+    pulses[2560::2560] += 5.0
+    assert turning_by_pulses(pulses, 25_600.0).speed_hz == pytest.approx(10.0, rel=1e-3)
+
+
+def test_edges_that_come_as_no_shaft_turns_are_refused():
+    with pytest.raises(BadInput, match="as no shaft turns; name another channel"):
+        turning_by_pulses(np.random.default_rng(0).standard_normal(5_000), 25_600.0)
+
+
 def test_the_angle_by_a_speed_channel_is_its_integral():
     found = turning_by_speed(SPEED, RATE)
     assert found.turns == pytest.approx(ANGLE, abs=1e-9)

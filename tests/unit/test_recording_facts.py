@@ -65,6 +65,17 @@ def test_a_file_with_two_rows_is_refused(tmp_path):
         folders(tmp_path, "a.npz,7\na.npz,8\n")
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "least"),
+    [("load_n", -5, "0"), ("speed_hz", 0, "0"), ("entrainment_m_s", -1, "0"), ("temperature_degc", -400, "-273.15")],
+)
+def test_a_table_says_nothing_impossible(tmp_path, column, value, least):
+    table = tmp_path / "table.csv"
+    table.write_text(f"file,x,{column}\na.npz,1,{value}\n")
+    with pytest.raises(BadInput, match=rf"line 2: {column} must be above {least}, got {value}; leave it empty"):
+        read_table(table)
+
+
 def test_a_header_against_its_own_times_is_said(tmp_path):
     times = np.arange(4000) / 20e3
     lines = [f"{t:.6f},{v:.5f}" for t, v in zip(times, np.random.default_rng(0).standard_normal(4000), strict=True)]

@@ -15,7 +15,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
-from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, Follows, Response, conditions_of
+from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, PULSES, Follows, Response, conditions_of
 from asperity.wear import Alarm, Condition, Said, Sight, Stages, StageSource, Watched, knee_weight, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
@@ -171,9 +171,9 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
         KURTOSIS: quality_of("kurtosis"),
         "velocity (rms)": lambda one: one.reading.velocity,
     }
-    heard |= named("bands", "the level") | named("lines", "the line at")
-    deep = named("depths", "the envelope at")
-    met = _conditions(tracked, LEVEL, response)
+    lines, deep = named("lines", "the line at"), named("depths", "the envelope at")
+    heard |= named("bands", "the level") | lines
+    met, of_pulses = (_conditions(tracked, follows, response) for follows in (LEVEL, PULSES))
     every = {words: logarithms(value) for words, value in (heard | deep).items()}
     return [
         Watched(
@@ -184,7 +184,7 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
             in_words=_times,
             loud=words not in deep and words != KURTOSIS,
             jumps=words in deep,
-            conditions=met,
+            conditions=of_pulses if words in deep or words in lines or words == KURTOSIS else met,
         )
         for words, values in every.items()
         if np.isfinite(values).any()

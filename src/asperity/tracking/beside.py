@@ -54,6 +54,8 @@ def beside(opened: OpenRecording, place: Place | None) -> Beside:
     for key, name in named.items():
         try:
             values = _channel_in(opened.path, key, name)
+            if not np.isfinite(values).any():
+                raise BadInput(f"{opened.path}: channel {name} has no number; leave it out")
             facts[key] = (f"{np.nanmean(values):.10g}", f"file (channel {name})")
             if key == "speed_hz" and values.size == opened.samples:
                 turning = turning_by_speed(values[:MOST], opened.rate_hz)
@@ -81,6 +83,8 @@ def rates(opened: OpenRecording, told: Beside, target: Target) -> dict[str, floa
     per_turn = dict(target.rates_per_turn)
     if "faults_per_turn" in opened.facts:
         per_turn |= opened.facts["faults_per_turn"].value
+    if told.turning is not None:
+        speed = told.turning.speed_hz  # what the vibration is steadied to
     speed = speed or target.shaft_hz
     found = {} if speed is None else {name: times * speed for name, times in per_turn.items()}
     return found | (opened.facts["faults_hz"].value if "faults_hz" in opened.facts else {})

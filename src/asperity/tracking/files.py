@@ -15,6 +15,7 @@ from asperity.recording import OPERATING, is_sidecar
 _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log", ".py", ".m", ".xml", ".yaml", ".yml",
                   ".docx", ".xlsx", ".part", ".filepart",
                   ".crdownload", ".partial", ".download", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
+ABSOLUTE_ZERO = -273.15  # degC
 _ABOUT = {"readme", "liesmich", "license", "licence", "changelog"}  # names of files that are about others
 
 
@@ -192,6 +193,7 @@ def read_table(path: str | Path) -> Table:
             column: _number((row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}")
             for column in (x_name, f"{x_name}_std", *OPERATING)
         }
+        _require_possible(said, f"{path}, line {number}")
         x, x_std = said.pop(x_name), said.pop(f"{x_name}_std")
         if not x_name:
             x = float(number - 1)
@@ -210,6 +212,16 @@ def _require_units(path: Path, columns: Sequence[str]) -> None:
         for meant in OPERATING[:3]:
             if name.lower().startswith(meant.partition("_")[0]):
                 raise BadInput(f"{path} has a column {name}; take {meant}, by that name and in that unit")
+
+
+def _require_possible(said: Mapping[str, float | None], where: str) -> None:
+    """BadInput for a load or speed that is not positive, and a temperature below absolute zero."""
+    for column in OPERATING:
+        value, least = said[column], ABSOLUTE_ZERO if column == "temperature_degc" else 0.0
+        if value is not None and value <= least:
+            raise BadInput(
+                f"{where}: {column} must be above {least:g}, got {value:g}; leave it empty if it is not known"
+            )
 
 
 def _number(text: str, delimiter: str, where: str) -> float | None:

@@ -74,7 +74,9 @@ class Follows(NamedTuple):
 # CRF goes with (CLR F)^(1/6): a load share may rise with the load, as fast at most, and falls as the film grows
 CRF = Follows(load=(0.0, 1.0 / 3.0), speed=(-1.0 / 3.0, 0.0), viscosity=(-1.0 / 3.0, 0.0))
 DAMPING = Follows(load=(-1.0, 1.0), speed=(-1.0, 1.0), viscosity=(-1.0, 1.0))
-LEVEL = Follows(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(-1.0, 1.0))
+# warm oil is often what a fault does, so that it explains little of a level, and nothing of what no oil makes
+LEVEL = Follows(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(-0.3, 0.3))
+PULSES = Follows(load=(-1.0, 2.0), speed=(-1.0, 4.0), viscosity=(0.0, 0.0))
 
 
 class Response(NamedTuple):
@@ -107,7 +109,7 @@ def conditions_of(met: Sequence[Operating], follows: Follows, oil: OilSheet) -> 
                 Condition(name=name, values=np.log(shown), low=powers[0], high=powers[1], shown=shown, unit=unit)
             )
     shown = _known(met, attrgetter("temperature_degc"))
-    if shown is not None:
+    if shown is not None and follows.viscosity != (0.0, 0.0):
         degrees, logarithms = _viscosities(oil)
         values = np.interp(shown, degrees, logarithms)
         low, high = follows.viscosity
@@ -200,11 +202,10 @@ def contact_follows(case: Case) -> Follows:
 
 
 def _about(load: float, film: float) -> Follows:
-    """The contact's powers, with the doubt about them, within what any contact can do."""
+    """The contact's powers, with the doubt about them."""
     spans = [max(DOUBT * abs(power), LEAST_SPAN) for power in (load, film)]
-    ends = [(power - span, power + span) for power, span in zip((load, film), spans, strict=True)]
-    (low, high), (thin, thick) = (np.clip(end, *sound) for end, sound in zip(ends, (CRF.load, CRF.speed), strict=True))
-    return Follows(load=(low, high), speed=(thin, thick), viscosity=(thin, thick))
+    loaded, filmed = ((power - span, power + span) for power, span in zip((load, film), spans, strict=True))
+    return Follows(load=loaded, speed=filmed, viscosity=filmed)
 
 
 def _resonance(case: Case) -> float:

@@ -15,6 +15,7 @@ FINER = 2  # samples in place of one before the spline, which is good to a third
 FEWEST_PULSES = 4
 SLOWEST = 0.25  # of the mean speed: what turned more slowly is left out, or samples would have to be ever finer
 LEVELS = (0.25, 0.75)  # of a tacho's range: it has to pass both to count, so that its noise makes no pulses
+UNEVEN = 4.0  # times the median interval, or a share of it so small, between pulses: these are no shaft's
 
 
 class Turning(NamedTuple):
@@ -30,12 +31,18 @@ def turning_by_pulses(pulses: Field, rate_hz: float, per_turn: float = 1.0) -> T
     Raises
     ------
     BadInput
-        for fewer than four pulses, or pulses per turn that are not positive.
+        for fewer than four pulses, pulses that come at no shaft's intervals, or pulses per turn that are not positive.
     """
     require_positive("pulses per turn", per_turn)
     edges = _rising(pulses)
     if edges.size < FEWEST_PULSES:
         raise BadInput(f"the tacho shows {edges.size} pulses, and {FEWEST_PULSES} are needed; name another channel")
+    between = np.diff(edges) / np.median(np.diff(edges))
+    if between.min() < 1.0 / UNEVEN or between.max() > UNEVEN:
+        raise BadInput(
+            f"the tacho's pulses come at {between.min():.2g} to {between.max():.2g} times their median interval, as no "
+            "shaft turns; name another channel"
+        )
     angle = scipy.interpolate.PchipInterpolator(edges, np.arange(edges.size) / per_turn, extrapolate=False)
     turns = angle(np.arange(pulses.size))
     return Turning(turns, float((edges.size - 1) / per_turn / (edges[-1] - edges[0]) * rate_hz))
@@ -77,7 +84,7 @@ def steadied(values: Field, turning: Turning, rate_hz: float) -> tuple[Field, fl
 
 def _rising(pulses: Field) -> Field:
     """Places of rising edges, in samples, between which the signal has gone low again."""
-    low, high = (float(end) for end in np.nanquantile(pulses, (0.001, 0.999)))
+    low, high = float(np.nanmin(pulses)), float(np.nanmax(pulses))  # a pulse may be two samples of ten thousand
     middle, (under, over) = 0.5 * (low + high), (low + level * (high - low) for level in LEVELS)
     state = np.where(pulses > over, 1, np.where(pulses < under, -1, 0))
     told = np.flatnonzero(state)

@@ -40,9 +40,9 @@ class Condition:
 class Explained(NamedTuple):
     """What conditions explain of an indicator.
 
-    `effect` is to be taken off, shape (recordings,), 0 at the baseline. `rows` are the conditions that count, counted
-    from the baseline, (conditions, recordings); `widths` by how much their `coefficients` may still be off; `scatter`
-    is the deviation of a recording.
+    `effect` is to be taken off, shape (recordings,), 0 at the baseline, nan where a condition is not stated. `rows` are
+    the conditions that count, counted from the baseline, (conditions, recordings); `widths` by how much their
+    `coefficients` may still be off; `scatter` is the deviation of a recording.
     """
 
     effect: Field
@@ -83,6 +83,6 @@ def explained(values: Field, conditions: Sequence[Condition], *, least: float) -
     coefficients = fitted.x / size
     left = change - coefficients @ along
     scatter = float(np.sqrt(np.mean(left**2) / 2.0))  # of a difference twice that of one
-    effect = coefficients @ np.where(np.isfinite(rows), rows, 0.0)
+    effect = coefficients @ rows  # nan where a condition is not stated
     names = tuple(one.name for one in counted)
     return Explained(effect, rows, WIDTH * (high - low), coefficients, names, scatter)
