@@ -46,6 +46,15 @@ def test_what_is_usual_is_learned_from_when_recordings_came():
     assert silence(fast, None, fast[-1] + timedelta(seconds=59)) == ""  # never before a minute
 
 
+@pytest.mark.parametrize("time", ["nan", "0", "inf"])
+def test_a_time_that_nobody_can_wait_is_refused(asp, time):
+    snapshots("in", np.ones(1))
+    code, _, err = asp("watch", "in", *LOOK, "--expect", time)
+    assert code == 2
+    assert "the time without a recording (--expect) must be positive and finite" in err
+    assert not Path("plant.db").exists()
+
+
 def test_a_sensor_that_delivers_nothing_is_blind_and_told_once(asp):
     snapshots("in", np.ones(10))
     Path("listen.py").write_text(LISTENER)

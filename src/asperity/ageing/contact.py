@@ -5,7 +5,7 @@ Each is solved from nothing, so that neither the order nor the process changes a
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from typing import Protocol
@@ -98,10 +98,11 @@ class PositionSolver:
         if self.lubricant is not None and np.any(surface.heights):
             for tolerance in (one for one in LOOSELY if one > self.options.tolerance):
                 loose = replace(self.options, tolerance=tolerance, max_iterations=min(NEARLY, most))
-                near = ehl.solve_contact(self.conditions, self.lubricant, surface, options=loose, strict=False)
-                found = self._with_heat(surface, few, replace(near, options=few), strict=False)
-                if found.convergence.converged:
-                    return found
+                with suppress(AsperityError):  # what is wrong with the contact, the case's own way says
+                    near = ehl.solve_contact(self.conditions, self.lubricant, surface, options=loose, strict=False)
+                    found = self._with_heat(surface, few, replace(near, options=few), strict=False)
+                    if found.convergence.converged:
+                        return found
         return self._with_heat(surface, self.options)
 
     def _with_heat(

@@ -16,7 +16,7 @@ from time import monotonic, sleep, time
 from typing import Any, NamedTuple
 
 from asperity.case import Case, MachineCase
-from asperity.errors import BadInput, require_choice
+from asperity.errors import BadInput, require_choice, require_positive
 from asperity.files import make_folder
 from asperity.recording import ReadOptions, names_beside
 from asperity.tracking.alarming import BASELINE, LAST
@@ -107,8 +107,10 @@ def watch_folder(
     Raises
     ------
     BadInput
-        for a folder that is none, or other settings than those the store was begun with.
+        for a folder that is none, a time that is not positive, or other settings than those the store was begun with.
     """
+    if expect_s is not None:
+        require_positive("the time without a recording (--expect)", expect_s, "s")
     folder, out = _folders(folder, out, tell)
     target = search_target(case, band_hz)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
