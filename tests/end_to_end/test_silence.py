@@ -51,7 +51,7 @@ def test_a_time_that_nobody_can_wait_is_refused(asp, time):
     snapshots("in", np.ones(1))
     code, _, err = asp("watch", "in", *LOOK, "--expect", time)
     assert code == 2
-    assert "the time without a recording (--expect) must be positive and finite" in err
+    assert "--expect" in err
     assert not Path("plant.db").exists()
 
 
