@@ -21,14 +21,17 @@ def taken_apart(lines: Iterable[str]) -> tuple[list[str], list[Table]]:
     """Sentences and headings of Markdown lines, each table among them as its number in braces; and the tables."""
     said: list[str] = []
     tables: list[Table] = []
-    for line in (line for text in lines for line in text.splitlines()):
+    within = False  # a table, which any other line ends, an empty one too
+    for line in (line for text in lines for line in text.splitlines() or [""]):
         if not line.startswith("|"):
             said += [line] if line.strip() else []
-        elif said and said[-1] == f"{{{len(tables)}}}":
+            within = False
+        elif within:
             tables[-1].append(cells(line))
         else:
             tables.append([cells(line)])
             said.append(f"{{{len(tables)}}}")
+            within = True
     return said, [[row for row in table if not all(set(cell) <= set("-: ") for cell in row)] for table in tables]
 
 

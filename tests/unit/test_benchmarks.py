@@ -27,6 +27,12 @@ def test_lines_come_back_as_a_page(tmp_path):
     assert "\n\n## Cost\n\n| cells | time [s] |\n| --- | --- |\n| 256 | 0.50 |\n| 512 | 2.0 ± 0.1 |\n\nMedian" in page
 
 
+def test_a_line_of_nothing_parts_two_tables(tmp_path):
+    kept.keep("cost", [*LINES[:5], "", "| what | first | second |", "|---|---|---|", "| a | 1 | 2 |", ""], tmp_path)
+    assert kept.read(tmp_path / "cost.csv")[-1] == ["512", "2.0 ± 0.1"]
+    assert kept.read(tmp_path / "cost-2.csv") == [["what", "first", "second"], ["a", "1", "2"]]
+
+
 def test_two_tables_have_a_file_each_and_one_that_is_gone_leaves_none(tmp_path):
     kept.keep("cost", [*LINES, "| a |", "|---|", "| 1 |"], tmp_path)
     assert kept.read(tmp_path / "cost-2.csv") == [["a"], ["1"]]
