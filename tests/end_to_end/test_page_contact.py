@@ -11,7 +11,7 @@ import x3pio
 
 from asperity.page.knobs import knobs_of
 from asperity.page.opening import paper
-from support.browser import Visit, chromium, require_operable, serving
+from support.browser import Visit, chromium, click_mark, require_operable, serving
 
 uploads = pytest.importorskip("asperity.page.uploads", reason="the extra page is not installed")
 
@@ -168,6 +168,19 @@ def test_a_pinned_contact_is_compared_with(visit):
     assert re.search(r"[−-][\d.]+ % against pinned", tile(page).inner_text())
     page.get_by_role("button", name="Unpin").click()
     page.get_by_text("against pinned").first.wait_for(state="hidden")
+
+
+def test_a_setting_that_was_tried_is_clicked_back(visit):
+    page = visit.solved()
+    first, speed = tile(page).inner_text(), page.get_by_role("textbox", name="Entrainment speed, u").input_value()
+    turn(page, "Entrainment speed, u", "3 m/s")
+    page.wait_for_function("() => location.search.includes('entrainment')")
+    changed(page, first)
+    page.get_by_text(re.compile("^Solved on")).wait_for()
+    click_mark(page, "Load share over roughness of what was tried", 0)
+    page.wait_for_function("() => !location.search.includes('entrainment')")
+    assert page.get_by_role("textbox", name="Entrainment speed, u").input_value() == speed
+    assert tile(page).inner_text() == first
 
 
 def test_case_file_and_lines_are_taken_away(visit):

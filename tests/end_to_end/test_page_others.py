@@ -11,7 +11,7 @@ from asperity.cli import main
 from asperity.history import run_history
 from asperity.paper import papers_case
 from asperity.study import plan_study, run_study
-from support.browser import Visit, chromium, require_operable, serving
+from support.browser import Visit, chromium, click_mark, require_operable, serving
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
@@ -88,6 +88,10 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page.get_by_label("A contact of the study").select_option(index=4)
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         require_operable(page)
+        click_mark(page, "A study's results over what was swept", 1)
+        page.get_by_text(re.compile(r"^surface.sq 0.5\sµm, surface.seed .*asperities carry")).wait_for()
+        click_mark(page, "A study's results over what was swept", 3)
+        page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
         page.get_by_role("link", name="Turn its knobs").click()
         page.get_by_text("Solved on 32 × 24 cells").wait_for()

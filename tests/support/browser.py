@@ -170,3 +170,23 @@ def require_operable(page) -> None:
         if reached >= there:
             return
     raise AssertionError(f"of {there} controls the Tab key comes to {reached}")
+
+
+MARK = """([label, number]) => {
+  const named = view => view.model.type === "Figure" && view.model.html_attributes["aria-label"] === label
+  const figure = [...Bokeh.index.query(named)][0]
+  const {glyph, data_source} = figure.model.renderers.find(drawn => drawn.glyph.type === "Scatter")
+  const {left, top} = figure.canvas_view.el.getBoundingClientRect()
+  const across = figure.frame.x_scale.compute(data_source.data[glyph.x.field][number])
+  return [left + across, top + figure.frame.y_scale.compute(data_source.data[glyph.y.field][number])]
+}"""
+
+
+def click_mark(page, label, number):
+    """Click one of the marks in the figure that screen readers call so."""
+    page.get_by_role("img", name=label).scroll_into_view_if_needed()
+    before, place = None, page.evaluate(MARK, [label, number])
+    while place != before:  # until what comes above it has come
+        page.wait_for_timeout(300)
+        before, place = place, page.evaluate(MARK, [label, number])
+    page.mouse.click(*place)

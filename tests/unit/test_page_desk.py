@@ -87,7 +87,8 @@ def test_tiles_have_the_intervals_that_the_verdict_has(run, answer):
     assert doubts["clr"] in run.verdict()
     assert doubts["crf_hz"] in run.verdict()
     assert doubts["car"].startswith("± ")
-    assert doubts["lambda_ratio"] == ""
+    assert doubts["lambda_ratio"] == ""  # by a formula
+    assert doubts["friction_coefficient"] == doubts["flash_temperature_max_k"] == NOT_DETERMINED
 
 
 def test_a_grid_that_cannot_tell_says_so_in_the_tiles(answer):
@@ -158,8 +159,10 @@ def test_a_coarse_answer_is_the_averaged_surfaces():
     heights = (along[:, ::2] + along[:, 1::2]) / 2
     np.testing.assert_allclose(coarse.solution.surface.heights, heights)
     alone = Surface(heights, coarse.solution.grid)
-    solved = solve_contact(case.conditions, case.lubricant, alone, options=Options(tolerance=1e-3, max_iterations=40))
-    assert coarse.answer.row["clr"] == pytest.approx(contact_state(solved).clr)
+    solved = solve_contact(case.conditions, case.lubricant, alone, options=Options())
+    assert coarse.answer.row["clr"] == pytest.approx(
+        contact_state(solved).clr, abs=2e-3
+    )
 
 
 def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monkeypatch):

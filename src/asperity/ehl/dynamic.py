@@ -8,7 +8,7 @@ be negative where the film is carried through just late enough (the entraining m
 import math
 from dataclasses import dataclass
 
-from asperity.ehl.oscillating import Oscillating, elastic
+from asperity.ehl.oscillating import Answer, Oscillating, elastic
 from asperity.ehl.outcome import CONSERVING
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
@@ -18,6 +18,7 @@ from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.hertz import line_stiffness
 
 TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
+AT_RESONANCE = 3e-5  # of those where a mass resonates: a damping ratio of 0.003 to 1 %
 ROUGHLY = 1e-2  # of those of a trial frequency: stiffness to 1 %
 SAME_FREQUENCY = 0.005  # a resonance is found when its own stiffness moves it by less
 STANDING = 10.0  # tolerances that a solution may miss by
@@ -96,15 +97,18 @@ class ShakenContact:
         """
         if not 0.0 <= frequency_hz < math.inf:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
+        return self._at(frequency_hz, tolerance, None)[0]
+
+    def _at(self, frequency_hz: float, tolerance: float, start: Answer | None) -> tuple[DynamicStiffness, Answer]:
         omega = 2.0 * math.pi * frequency_hz
-        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=tolerance)
+        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=tolerance, start=start)
         if not answer.left < 2.0 * tolerance:
             raise AsperityError(
                 f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
                 f"{answer.left:.1e} of the linear equations, wanted {tolerance:.0e}"
             )
         response = self._from_reference(complex(answer.total.sum()) * self._newtons_per_metre())
-        return DynamicStiffness(
+        found = DynamicStiffness(
             frequency_hz=frequency_hz,
             stiffness=response.real,
             damping=response.imag / omega if omega > 0.0 else math.nan,
@@ -112,6 +116,7 @@ class ShakenContact:
             reference_depth=self.depth,
             left=answer.left,
         )
+        return found, answer
 
     def per_crossing(self, frequency_hz: float) -> float:
         """Angular frequency times the time that oil takes across a half-width."""
@@ -122,15 +127,18 @@ class ShakenContact:
         """Where a mass [kg] resonates on this contact, k = m ω², to 0.5 % of its frequency; or AsperityError."""
         require_positive("mass", mass, "kg")
         stiffness, tolerance = self._bodies(), ROUGHLY
+        roughly: Answer | None = None
         for _ in range(MOST_TRIALS):
-            found = self.at(math.sqrt(stiffness / mass) / (2.0 * math.pi), tolerance=tolerance)
+            found, answer = self._at(math.sqrt(stiffness / mass) / (2.0 * math.pi), tolerance, roughly)
             if found.stiffness <= 0.0:
                 break
             stiffness, frequency = found.stiffness, math.sqrt(found.stiffness / mass) / (2.0 * math.pi)
             off = abs(frequency - found.frequency_hz) / frequency
-            if off <= SAME_FREQUENCY and tolerance == TOLERANCE:
+            if off <= SAME_FREQUENCY and tolerance == AT_RESONANCE:
                 return found
-            tolerance = TOLERANCE if off <= NEAR else tolerance
+            if off <= NEAR:
+                roughly = answer if tolerance == ROUGHLY else None
+                tolerance = AT_RESONANCE
         raise AsperityError(f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere")
 
     def _bodies(self) -> float:
@@ -180,7 +188,8 @@ class OwnResonance:
 def own_resonance(solution: ContactSolution, mass: float, *, reference_depth: float | None = None) -> OwnResonance:
     """Stiffness and damping that a mass [kg] meets on a solved contact; raises what `ShakenContact` does."""
     shaken = ShakenContact(solution, reference_depth=reference_depth).resonance(mass)
-    virgin = dynamic_stiffness(solution, shaken.frequency_hz, yielded=FLOWING, reference_depth=reference_depth)
+    yielding = ShakenContact(solution, yielded=FLOWING, reference_depth=reference_depth)
+    virgin = yielding.at(shaken.frequency_hz, tolerance=AT_RESONANCE)
     return OwnResonance(elastic=shaken, virgin=virgin)
 
 

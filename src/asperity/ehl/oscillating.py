@@ -31,13 +31,14 @@ Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 class Answer(NamedTuple):
     """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
 
-    `left` is the share of the equations that was left, `steps` those of GMRES.
+    `left` is the share of the equations that was left, `steps` those of GMRES, `unknowns` the equations' own.
     """
 
     oil: Waves
     total: Waves
     left: float
     steps: int
+    unknowns: Waves
 
 
 class _Equations(Protocol):
@@ -138,17 +139,20 @@ class Oscillating:
         self.rough = self.exact if one_line else _equations(balance, np.float32)
         self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(self, frequency: float, *, tolerance: float) -> Answer:
+    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
         """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
 
-        From nothing: from the answer at a frequency near by there is so little left that the oil's lag would stay its.
+        `start` is a much rougher answer at a frequency near by. One as exact leaves so little that the oil's lag would
+        stay that of its own frequency.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
         wanted = rows + 1j * frequency * stored
         size = float(np.linalg.norm(wanted))
-        vector = np.zeros(self.exact.size, complex)
-        left, share = wanted, 1.0
+        vector, left, share = np.zeros(self.exact.size, complex), wanted, 1.0
+        if start is not None:
+            vector = start.unknowns
+            left, share = self._left(wanted, vector, frequency, size)
         for _ in range(MOST_ROUNDS):
             if share <= tolerance:
                 break
@@ -163,7 +167,7 @@ class Oscillating:
                 vector, share = vector + change, now
             else:
                 left, share = self._left(wanted, vector, frequency, size)
-        return Answer(*self.exact.pressures(vector), share, steps)
+        return Answer(*self.exact.pressures(vector), share, steps, vector)
 
     def _left(self, wanted: Waves, vector: Waves, frequency: float, size: float) -> tuple[Waves, float]:
         """What of the equations is left, and its share of all."""

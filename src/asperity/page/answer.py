@@ -21,6 +21,7 @@ TILES = (
 )  # fmt: skip
 OPEN, TOUCHING, RUPTURED = 0, 1, 2  # what a cell is
 NOT_DETERMINED = "± not determined"
+BY_FORMULA = ("lambda_ratio",)  # of the tiles: what no solution enters
 MOST_POINTS = 500  # of a spectrum's curve
 CLEAR_SHARE = 99.0  # per cent of the Hertz zone's gaps that a map's colours show
 
@@ -128,7 +129,7 @@ class Answer(Picture):
                 return NOT_DETERMINED
             _, _, spread = entry.number(value, deviation).partition(" ± ")
             return f"± {spread.rstrip(')')} {entry.display}".rstrip() if spread else ""
-        return ""
+        return "" if entry.key in BY_FORMULA else NOT_DETERMINED
 
 
 def numbers_of(run: Run) -> dict[str, Any]:

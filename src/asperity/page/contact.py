@@ -258,7 +258,9 @@ def _heard(answer: Answer) -> str:
         return "No vibration asked for"
     if sound.crf_hz is None:
         return f"No contact resonance: {sound.reason}"
-    return f"Contact resonance at {quantity('crf_hz').text(sound.crf_hz, sound.crf_std_hz)}"
+    crf = quantity("crf_hz")
+    fitted = f", fitted to ± {crf.text(sound.crf_std_hz)}" if sound.crf_std_hz is not None else ""
+    return f"Contact resonance at {crf.text(sound.crf_hz)}{fitted}"
 
 
 def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:
