@@ -160,9 +160,7 @@ def test_a_coarse_answer_is_the_averaged_surfaces():
     np.testing.assert_allclose(coarse.solution.surface.heights, heights)
     alone = Surface(heights, coarse.solution.grid)
     solved = solve_contact(case.conditions, case.lubricant, alone, options=Options())
-    assert coarse.answer.row["clr"] == pytest.approx(
-        contact_state(solved).clr, abs=2e-3
-    )
+    assert coarse.answer.row["clr"] == pytest.approx(contact_state(solved).clr, abs=2e-3)
 
 
 def test_a_coarse_answer_that_takes_too_many_steps_is_sought_on_fewer_cells(monkeypatch):
