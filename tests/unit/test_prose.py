@@ -1,0 +1,78 @@
+"""One idea a sentence: no sentence of the pages is long. What is told is counted in words, not in names or formulas."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from support.pages import SPAN, Page, pages
+from support.source import ROOT
+
+MOST = 40  # words
+KEYS = "`--json`"  # a list of keys is no sentence
+LATER = {"docs/page.md": 1, "docs/theory/inference.md": 4}  # how many longer ones these two still have
+APART = re.compile(r"#|\||:::|<|\$\$|\([^)]*\)=$")  # headings, tables, directives: no prose
+ITEM = re.compile(r"^(?:[-*]|\d+\.)\s+")
+END = re.compile(r"(?<=[.!?])[\"')*\]]*\s+(?=[^a-z])|(?<=[.!?][*\")])\s+")
+
+
+def paragraphs(page: Page) -> Iterator[tuple[int, str]]:
+    """Each with the number of its first line."""
+    number, parts, last = 0, [], 0
+    for line in page.prose:
+        text = line.text.strip()
+        apart = not text or APART.match(text)
+        if parts and (apart or ITEM.match(text) or line.number != last + 1):
+            yield number, " ".join(parts)
+            parts = []
+        if not apart:
+            number, parts = (number if parts else line.number), [*parts, ITEM.sub("", text, count=1)]
+        last = line.number
+    if parts:
+        yield number, " ".join(parts)
+
+
+def sentences(text: str) -> list[str]:
+    text = re.sub(r"\]\([^)]*\)", "]", SPAN.sub(lambda span: span[0] if span[0] == KEYS else "`", text))
+    return END.split(re.sub(r"\$[^$]*\$", "$", text))
+
+
+def words(sentence: str) -> int:
+    return sum(bool(re.search(r"[^\W\d_]", word)) for word in sentence.split())
+
+
+def long_ones(page: Page) -> list[str]:
+    return [
+        f"{number}: {words(sentence)} words: {sentence}"
+        for number, text in paragraphs(page)
+        for sentence in sentences(text)
+        if KEYS not in sentence and words(sentence) > MOST
+    ]
+
+
+PAGES = pytest.mark.parametrize("page", pages(), ids=lambda page: page.path.relative_to(ROOT).as_posix())
+
+
+@PAGES
+def test_no_sentence_is_long(page):
+    wrong = long_ones(page)
+    name = page.path.relative_to(ROOT).as_posix()
+    assert len(wrong) <= LATER.get(name, 0), "\n".join(wrong)
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        (f"{'word ' * 41}.", 1),
+        (f"{'word ' * 40}.", 0),
+        (f"{'word ' * 30}. {'Word ' * 30}.", 0),
+        (f"{'word ' * 30}; {'word ' * 30}.", 1),
+        (f"{'word ' * 30}\n{'word ' * 30}", 1),
+        (f"- {'word ' * 30}\n- {'word ' * 30}", 0),
+        (f"{'`name` ' * 60}", 0),
+        (f"{'word ' * 30}\n\n{'word ' * 30}", 0),
+        (f"{'word ' * 30}\n```sh\nls\n```\n{'word ' * 30}", 0),
+    ],
+)
+def test_what_counts(text, count):
+    assert len(long_ones(Page(ROOT / "page.md", text))) == count
