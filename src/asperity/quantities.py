@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 from asperity.errors import require_positive
 
 NO_VALUE = "–"
+BOUNDED = ("load", "film")  # groups of what is never negative: shares, at most 1, and films
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units over their SI unit; any other display unit is the SI unit itself
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
@@ -124,11 +125,18 @@ class Quantity:
     def number_in(self, values: Mapping[str, Any]) -> str:
         """Its number in a row, a run's or a table's: "61.3 (44 to 78)", or "61.3 ± 2.4".
 
-        One that has a whole interval, known or not, bears no deviation: that would be a part of the doubt alone.
+        One that has a whole interval, known or not, bears no deviation: that would be a part of the doubt alone. A share
+        or film whose deviation reaches beyond what it can be has the interval that is left: "0.2 (0.0 to 7.1)".
         """
         value, (low, high) = values.get(self.key), (values.get(end) for end in self.ends)
         if self.ends[0] not in values:
-            return self.number(value, values.get(self.deviation))
+            deviation = values.get(self.deviation)
+            most = 1.0 if (self.unit, self.display) == ("1", "%") else math.inf
+            if self.group in BOUNDED and value is not None and deviation and math.isfinite(value + deviation):
+                low, high = max(0.0, value - deviation), min(most, value + deviation)
+                if (low, high) != (value - deviation, value + deviation):
+                    return f"{self.number(value)} ({self._span(low, high)})"
+            return self.number(value, deviation)
         if value is None or low is None or high is None:
             return self.number(value)
         return f"{self.number(value)} ({self._span(low, high)})"

@@ -11,7 +11,7 @@ from asperity.ehl.plausible import ridge_radii
 from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import Surface, flat_surface, gaussian_surface, ground_surface
-from support.paper import barus, contact, grid
+from support.paper import barus, contact, grid, rough
 
 HARD = {"load": 20000.0, "hardness": 7e9}
 
@@ -90,6 +90,16 @@ def test_a_film_far_from_its_fits_is_told_with_the_reason():
     assert any("nearest fit's" in note and "the inlet starves it" in note for note in solution_notes(starved))
     flooded = replace(smooth, grid=grid((256, 8), (-12.0, 2.0)), heights=np.zeros((256, 8)))
     assert solution_notes(solve_contact(contact(), oil, flooded)) == ()
+
+
+def test_asperities_that_bear_nothing_at_a_small_film_ratio_are_told():
+    """At Sq 2.5 um the paper's film ratio is 0.25, and asperities carry nine tenths: the note is for when they do not."""
+    solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
+    assert not any("film ratio" in note for note in solution_notes(solved))
+    untouched = replace(solved, in_contact=np.zeros_like(solved.in_contact))
+    assert any("film ratio of 0.2" in note and "asperity run" in note for note in solution_notes(untouched))
+    smooth = replace(untouched, surface=flat_surface(solved.grid))
+    assert not any("film ratio" in note for note in solution_notes(smooth))
 
 
 def test_ridges_without_a_radius_are_told():

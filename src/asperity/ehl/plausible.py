@@ -6,6 +6,7 @@ import numpy as np
 
 from asperity.conditions import ContactConditions
 from asperity.ehl.ends import BEARING, along_roller
+from asperity.ehl.films import least_film
 from asperity.ehl.gridding import (
     CELLS_IN_INLET,
     WIDEST_BAR,
@@ -15,6 +16,7 @@ from asperity.ehl.gridding import (
     missing_inlet,
 )
 from asperity.ehl.regime import far_from_fits
+from asperity.ehl.shares import carried_share
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.uncertainty import Uncertainty
 from asperity.grid import Grid
@@ -30,6 +32,7 @@ LARGEST_BARUS = 15.0  # alpha p_h
 HALF_SPACE = 20.0  # E' over a pressure below which bodies are no elastic half-spaces of small strain
 STARVED = 0.03  # loss of film that is said
 EDGED, FEWEST_RIDGES = 1.6, 20  # radius of ridges over that on the cells as they are, on cells twice as wide
+THIN, NOTHING = 0.5, 0.01  # film ratio below which no film is expected, and a load share that is none
 FILM_BY_PRESSURE = 0.75  # relative loss of film over the share of the inlet's pressure that is missing
 
 
@@ -158,6 +161,14 @@ def _of_solution(solution: ContactSolution) -> Iterator[str]:
             "twice as wide. Each finer grid shows the oil other inlets, so that CLR may have no limit that a grid "
             "could show; its interval holds the next finer grid and no more."
         )
+    if lubricant is not None and np.any(solution.surface.heights):
+        ratio = least_film(conditions, lubricant) / solution.surface.sq
+        if ratio < THIN and carried_share(solution.pressure, solution.in_contact) < NOTHING:
+            yield (
+                f"By its film ratio of {ratio:.2g} this contact would be called mixed or boundary lubricated, and its "
+                "asperities bear next to nothing: oil that flows past standing roughness presses it flat. What moves "
+                "need not be pressed so; asperity run tells."
+            )
     if (along := along_roller(solution)) is not None:
         yield from along.undetermined
     if (far := far_from_fits(solution)) is not None:
