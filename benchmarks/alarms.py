@@ -184,9 +184,9 @@ WITHOUT_WEAR: dict[str, Callable[[np.random.Generator], Drawn]] = {
 }
 
 
-def knee(rng: np.random.Generator, scatter_hz: float, memory: float = 0.0) -> Drawn:
-    """The rig's course of CRF over recordings, its knee drawn among the 12th to the 24th."""
-    begins = float(rng.integers(12, 25))
+def knee(rng: np.random.Generator, scatter_hz: float, memory: float = 0.0, *, between: bool = False) -> Drawn:
+    """The rig's course of CRF over recordings, its knee drawn among the 12th to the 24th, or anywhere between them."""
+    begins = float(rng.uniform(12.0, 24.0) if between else rng.integers(12, 25))
     pace = RISE_HZ / begins
     course = CRF_HZ + np.where(begins > NUMBER, pace * NUMBER, RISE_HZ + AFTER * pace * (NUMBER - begins))
     crf = (course + scatter_hz * remembered(rng, memory)) / CRF_HZ
@@ -285,26 +285,58 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     yield from reliability_lines(10 * series)
 
 
-def last_probability(one: Drawn, recordings: int) -> float:
-    """P(severe) of the last recording, as `track` gives it."""
+BETWEEN: tuple[Callable[[np.random.Generator], Drawn], ...] = (
+    lambda rng: knee(rng, 5.0, between=True),
+    lambda rng: knee(rng, 15.0, between=True),
+    lambda rng: knee(rng, 15.0, 0.7, between=True),
+    lambda rng: knee(rng, 30.0, between=True),
+)
+
+
+def probabilities(one: Drawn, recordings: int) -> np.ndarray:
+    """P(severe) of each recording, as `track` gives it after the last."""
     at, crf = NUMBER[:recordings], one.crf[:recordings]
     watched = Watched(name="CRF", values=crf, least=CRF_LEAST, contact=True, in_words=str)
-    return float(split_stages(at, CRF_HZ * crf).probability[-1]) * knee_weight(at, [watched])
+    return split_stages(at, CRF_HZ * crf).probability * knee_weight(at, [watched])
 
 
 def reliability_lines(series: int) -> Iterator[str]:
-    """How often a last recording is severe that is said to be so with some probability; half of the series wear."""
-    said, true = [], []
-    rows = [[draw for name, draw in WITHOUT_WEAR.items() if name in RELIABLE], list(KNEES.values())[:4]]
+    """How often a recording is severe that is said to be so with some probability; half of the series wear."""
+    said: list[np.ndarray] = []
+    true: list[np.ndarray] = []
+    rows = [[draw for name, draw in WITHOUT_WEAR.items() if name in RELIABLE], BETWEEN]
     for number in range(series):
         for several in rows:
             rng = np.random.default_rng([77, number, len(several)])
             one = several[number % len(several)](rng)
             recordings = int(rng.integers(14, RECORDINGS + 1))
-            said.append(last_probability(one, recordings))
-            true.append(bool(NUMBER[recordings - 1] > one.begins))
-    chance, severe = np.array(said), np.array(true)
-    yield "\n| P(severe) of the last recording | series | mean of P | severe indeed |"
+            said.append(probabilities(one, recordings))
+            true.append(NUMBER[:recordings] > one.begins)
+    yield from _bins("last recording", *(np.array([one[-1] for one in both]) for both in (said, true)))
+    yield from _bins("earlier recordings", *(np.concatenate([one[:-1] for one in both]) for both in (said, true)))
+    yield from held_lines(series)
+
+
+def held_lines(series: int) -> Iterator[str]:
+    """How often the break's 90 % interval holds it, where a severe stage is found."""
+    yield "\n| the break of the stages | severe found | 90 % interval holds it | its length, median |"
+    yield "|---|---|---|---|"
+    for scatter_hz in (5.0, 15.0, 30.0):
+        for memory in (0.0, 0.7):
+            held, lengths = [], []
+            for number in range(series // 10):
+                one = knee(np.random.default_rng([13, number]), scatter_hz, memory, between=True)
+                found = split_stages(NUMBER, CRF_HZ * one.crf)
+                if found.kind == "severe":
+                    held.append(found.interval[0] <= one.begins <= found.interval[1])
+                    lengths.append(found.interval[1] - found.interval[0])
+            shares = (1000.0 * len(held) / series, 100.0 * np.mean(held))
+            scatters = f"scatter {scatter_hz:g} Hz{', remembers 0.7' if memory else ''}"
+            yield f"| {scatters} | {shares[0]:.0f} % | {shares[1]:.0f} % | {np.median(lengths):.2g} |"
+
+
+def _bins(whose: str, chance: np.ndarray, severe: np.ndarray) -> Iterator[str]:
+    yield f"\n| P(severe) of the {whose} | recordings | mean of P | severe indeed |"
     yield "|---|---|---|---|"
     for low, high in pairwise(BINS):
         inside = (chance >= low) & (chance < high)

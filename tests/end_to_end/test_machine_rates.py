@@ -75,21 +75,34 @@ def test_conditions_are_read_from_channels_in_their_units(asp):
     assert row["temperature_degc"] == pytest.approx(60.1, abs=0.01)
     Path("in/a.csv.json").write_text(json.dumps({"channel": "acc", "condition_channels": {"load_n": "oil"}}))
     row = json.loads(asp("track", "in", *BAND, "--json")[1])["recordings"][0]
-    assert "channel oil is in degC, and load_n takes n, kn, mn" in row["remarks"]
+    assert "channel oil is in degC, and load_n takes N, kN, mN, MN" in row["remarks"]
+
+
+def heard_beside(asp, stated, **channels):
+    """What `track` says of a recording with other channels, and what is stated beside it."""
+    Path("in").mkdir()
+    acceleration = np.random.default_rng(3).standard_normal(40_000)
+    np.savez("in/a.npz", acc=acceleration, fs=RATE, **channels)
+    Path("in/a.npz.json").write_text(
+        json.dumps({"channel": "acc", "unit": "m/s^2", "faults_per_turn": {"BPFO": 3.58}} | stated)
+    )
+    code, out, _ = asp("track", "in", *BAND, "--json")
+    assert code == 4
+    (row,) = json.loads(out)["recordings"]
+    return row
 
 
 def test_a_speed_channel_without_a_number_is_told_beside_its_recording(asp):
-    Path("in").mkdir()
-    rows = np.stack([np.arange(4000) / RATE, np.random.default_rng(3).standard_normal(4000)])
-    text = "\n".join(f"{time:.6f},{value:.6f}," for time, value in rows.T)
-    Path("in/a.csv").write_text(f"time [s],acc [m/s^2],shaft [rpm]\n{text}")
-    beside = {"channel": "acc", "condition_channels": {"speed_hz": "shaft"}, "faults_per_turn": {"BPFO": 3.58}}
-    Path("in/a.csv.json").write_text(json.dumps(beside))
-    code, out, err = asp("track", "in", *BAND, "--json")
-    assert "Traceback" not in err
-    assert "shaft" in out + err
-    if code == 0:
-        assert json.loads(out)["recordings"][0]["speed_hz"] is None
+    row = heard_beside(asp, {"condition_channels": {"speed_hz": "shaft"}}, shaft=np.full(40_000, np.nan))
+    assert "channel shaft has no number; leave it out" in row["remarks"]
+    assert row["speed_hz"] is None
+    assert row["depths"] == {}
+
+
+def test_a_tacho_of_other_samples_is_not_laid_beside_the_vibration(asp):
+    row = heard_beside(asp, {"tacho": "pulse"}, pulse=(np.arange(20_000) % 800 < 80).astype(float))
+    assert "the tacho in channel pulse has 20000 samples and the vibration 40000" in row["remarks"]
+    assert row["speed_hz"] is None
 
 
 @pytest.mark.parametrize(

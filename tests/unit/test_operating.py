@@ -103,6 +103,8 @@ def test_recordings_without_a_condition_are_left_out_where_most_state_it():
     assert unstated(met) == ["The load is not stated for 2 of 40 recordings; these are left out of trend and alarm."]
     few = [replace(one, load_n=None) for one in met[5:]] + met[:5]
     assert unstated(few)[0].endswith("36 of 40 recordings; it is not taken into account.")
+    spun = [Operating(speed_hz=25.0)] * 30 + [Operating()] * 10
+    assert unstated(spun) == ["The speed is not stated for 10 of 40 recordings; these are left out of trend and alarm."]
     assert conditions_of(few, CRF, ANY_CONTACT.oil) == ()
 
 

@@ -9,6 +9,7 @@ from asperity.wear import learn_series, series_resonances
 from asperity.wear.resonance import line_shape
 from asperity.wear.separation import Blocks, Parameters, _costs, _point
 from asperity.wear.series import _Line, _objection
+from asperity.wear.transfer import through
 
 BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 6000.0, 1.0)
@@ -25,11 +26,12 @@ def machine() -> np.ndarray:
     return 0.1 * (f / 2000.0) ** -0.7 + modes
 
 
-def series(contact_height=0.7, *, averages=100.0, seed=0, truth=TRUTH, damping=0.02):
+def series(contact_height=0.7, *, averages=100.0, seed=0, truth=TRUTH, damping=0.02, passed=1.0):
     rng = np.random.default_rng(seed)
     gains = np.exp(0.2 * rng.standard_normal(truth.size))
     densities = [
-        g * machine() + contact_height * line_shape(FREQUENCY, f, damping) for g, f in zip(gains, truth, strict=True)
+        g * machine() + passed * contact_height * line_shape(FREQUENCY, f, damping)
+        for g, f in zip(gains, truth, strict=True)
     ]
     return [
         Spectrum(
@@ -90,8 +92,10 @@ def test_the_score_is_the_slope_of_the_cost():
     own = np.column_stack(
         [rng.normal(0, 1, 7), np.log(rng.uniform(2500, 3500, 7)), rng.normal(-4, 0.3, 7), rng.normal(0, 1, 7)]
     )
-    at = Parameters(own, rng.normal(0.0, 0.5, 50), 0.3)
-    point, d = _point(blocks, at), 1e-6
+    passed = through(1900.0, 4100.0)
+    passed = passed._replace(coefficients=rng.normal(0.0, 0.3, passed.coefficients.size))
+    at = Parameters(own, rng.normal(0.0, 0.5, 50), passed)
+    point, d = _point(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
         shift = np.zeros_like(own)
         shift[row, column] = d
@@ -102,6 +106,24 @@ def test_the_score_is_the_slope_of_the_cost():
     shift[20] = d
     up, down = (np.sum(_costs(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0))
     assert point.base_score[20] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
+    for number in (0, 7, 30):
+        shift = np.zeros(passed.coefficients.size)
+        shift[number] = d
+        ends = [passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)]
+        up, down = (np.sum(_costs(blocks, at._replace(transfer=end))) for end in ends)
+        assert point.passed_score[number] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
+
+
+def test_a_line_heard_through_a_structure_is_held_by_its_interval():
+    """What is passed on more at one frequency than at another draws the line there, alike in all recordings."""
+    mode = 1.0 + 0.8 * 0.03j / (1.0 - (FREQUENCY / 3150.0) ** 2 + 0.03j * FREQUENCY / 3150.0)
+    pulls = []
+    for seed in range(6):
+        truth = TRUTH + 20.0 * np.random.default_rng(seed).standard_normal(TRUTH.size)
+        heard = series(truth=truth, seed=seed, passed=np.abs(mode) ** 2)
+        for one, f in zip(series_resonances(heard, band_hz=BAND), truth, strict=True):
+            pulls.append((one.crf_hz - f) / one.crf_std)
+    assert 0.85 <= np.mean(np.abs(pulls) < 1.645) <= 1.0
 
 
 def test_a_recording_without_the_contact_is_said_to_have_none():

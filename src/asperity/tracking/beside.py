@@ -23,12 +23,13 @@ HARMONICS = 3
 NEAR = 0.015  # of a rate, either way: rolling elements slip
 FEWEST_LINES = 4  # of the spectrum below a rate, for its line to be told from the others
 UNITS: dict[str, dict[str, float]] = {  # of channels, as factors to the unit of a key
-    "load_n": {"n": 1.0, "kn": 1e3, "mn": 1e6},
+    "load_n": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6},
     "entrainment_m_s": {"m/s": 1.0, "mm/s": 1e-3},
-    "speed_hz": {"hz": 1.0, "1/s": 1.0, "rps": 1.0, "rpm": 1.0 / 60.0, "1/min": 1.0 / 60.0, "min-1": 1.0 / 60.0},
-    "temperature_degc": {"degc": 1.0, "°c": 1.0, "c": 1.0},
+    "speed_hz": {"Hz": 1.0, "1/s": 1.0, "rps": 1.0, "rpm": 1.0 / 60.0, "1/min": 1.0 / 60.0, "min-1": 1.0 / 60.0},
+    "temperature_degc": {"degC": 1.0, "°C": 1.0, "C": 1.0},
 }
 OWN_BANDS = {"10 to 1000 Hz": (10.0, 1000.0), "1 to 5 kHz": (1000.0, 5000.0), "above 5 kHz": (5000.0, np.inf)}
+SAME = 1e-6  # of a rate, within which two are one
 USABLE = 0.4  # of the sampling rate: above, the anti-alias filter has cut
 
 
@@ -65,6 +66,7 @@ def beside(opened: OpenRecording, place: Place | None) -> Beside:
         name = opened.facts["tacho"].value
         per_turn = opened.facts["pulses_per_turn"].value if "pulses_per_turn" in opened.facts else 1.0
         try:
+            _require_beside(opened, name)
             pulses = _values(opened.path, name, MOST)
             turning = turning_by_pulses(pulses, opened.rate_hz, per_turn)
             facts["speed_hz"] = (f"{turning.speed_hz:.10g}", f"file (tacho, channel {name})")
@@ -147,10 +149,30 @@ def bands(opened: OpenRecording, frequency_hz: Field, density: Field) -> dict[st
 def _channel_in(path: Path, key: str, name: str) -> Field:
     """The values of a channel in the unit of a condition's key."""
     channel = other_channel(path, name)
-    unit = (channel.unit or "").strip().lower()
-    if unit and unit not in UNITS[key]:
-        raise BadInput(f"{path.name}: channel {name} is in {channel.unit}, and {key} takes {', '.join(UNITS[key])}")
-    return _values(path, name, None) * UNITS[key].get(unit, 1.0)
+    return _values(path, name, None) * (_factor(channel.unit.strip(), key, path, name) if channel.unit else 1.0)
+
+
+def _factor(unit: str, key: str, path: Path, name: str) -> float:
+    """What a unit is of that of a key: as it is written, or in another case where that leaves no doubt."""
+    factors = UNITS[key]
+    alike = [unit] if unit in factors else [one for one in factors if one.lower() == unit.lower()]
+    if len(alike) != 1:
+        raise BadInput(f"{path.name}: channel {name} is in {unit}, and {key} takes {', '.join(factors)}")
+    return factors[alike[0]]
+
+
+def _require_beside(opened: OpenRecording, name: str) -> None:
+    """BadInput for a tacho whose samples are not those of the vibration."""
+    tacho = other_channel(opened.path, name)
+    for what, its, vibrations in (
+        ("Hz", tacho.rate_hz, opened.channel.rate_hz),
+        ("samples", tacho.samples, opened.samples),
+    ):
+        if its is not None and vibrations is not None and abs(its - vibrations) > SAME * vibrations:
+            raise BadInput(
+                f"the tacho in channel {name} has {its:.10g} {what} and the vibration {vibrations:.10g}; record both "
+                "with the same clock, or state speed_hz"
+            )
 
 
 def _values(path: Path, name: str, most: int | None) -> Field:

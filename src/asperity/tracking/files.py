@@ -16,6 +16,12 @@ _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log",
                   ".docx", ".xlsx", ".part", ".filepart",
                   ".crdownload", ".partial", ".download", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
 ABSOLUTE_ZERO = -273.15  # degC
+_CONDITION_WORDS = {  # in headings of what recordings were made at
+    "load_n": {"load", "force", "last", "kraft"},
+    "speed_hz": {"speed", "rpm", "drehzahl"},
+    "entrainment_m_s": {"speed", "entrainment"},
+    "temperature_degc": {"temperature", "temp", "temperatur", "degc"},
+}
 _ABOUT = {"readme", "liesmich", "license", "licence", "changelog"}  # names of files that are about others
 
 
@@ -209,9 +215,13 @@ def read_table(path: str | Path) -> Table:
 def _require_units(path: Path, columns: Sequence[str]) -> None:
     """BadInput for a load, speed or temperature by another name, perhaps in another unit."""
     for name in columns:
-        for meant in OPERATING[:3]:
-            if name.lower().startswith(meant.partition("_")[0]):
-                raise BadInput(f"{path} has a column {name}; take {meant}, by that name and in that unit")
+        words = set(re.split(r"[\W_]+", name.lower()))
+        meant = [key for key, said in _CONDITION_WORDS.items() if words & said]
+        if meant:
+            raise BadInput(
+                f"{path} has a column {name}; take {' or '.join(meant)}, by that name and in that unit, or another "
+                "name if it is where recordings stand"
+            )
 
 
 def _require_possible(said: Mapping[str, float | None], where: str) -> None:

@@ -89,5 +89,7 @@ def learned_from(content: bytes, since: int) -> Learned:
             arrays = {name: stored[name] for name in stored.files if name != "told"}
     except UnreadableFile:
         return Learned()
-    low, high = told.pop("band_hz")
-    return Learned(Shared(band_hz=(low, high), **told, **arrays), since)
+    if {*told, *arrays} != {one.name for one in fields(Shared)}:  # of another version
+        return Learned()
+    band, reach = (told.pop(name) for name in ("band_hz", "reach"))
+    return Learned(Shared(band_hz=(band[0], band[1]), reach=(reach[0], reach[1]), **told, **arrays), since)

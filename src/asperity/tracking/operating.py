@@ -29,6 +29,7 @@ from asperity.tracking.reading import Reading
 from asperity.wear import Condition
 
 ZERO_CELSIUS = 273.15
+TEMPERATURE = ("temperature_degc",)
 USUAL_OIL = OilSheet(
     viscosity_40=1e-4, viscosity_100=1.11e-5
 )  # VG 100; over temperature oils differ by little but a factor
@@ -126,10 +127,11 @@ def _known(met: Sequence[Operating], read: Callable[[Operating], float | None]) 
 def unstated(met: Sequence[Operating]) -> list[str]:
     """A sentence on each condition that some recordings state and some do not."""
     notes = []
-    for key, words in (("load_n", "load"), ("temperature_degc", "oil temperature")):
-        missing = sum(getattr(one, key) is None for one in met)
+    known_by = (("load", ("load_n",)), ("speed", ("entrainment_m_s", "speed_hz")), ("oil temperature", TEMPERATURE))
+    for words, keys in known_by:
+        missing = min(sum(getattr(one, key) is None for one in met) for key in keys)
         if 0 < missing < len(met):
-            used = _known(met, attrgetter(key)) is not None
+            used = any(_known(met, attrgetter(key)) is not None for key in keys)
             done = "these are left out of trend and alarm" if used else "it is not taken into account"
             notes.append(f"The {words} is not stated for {missing} of {len(met)} recordings; {done}.")
     return notes

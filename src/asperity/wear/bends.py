@@ -14,6 +14,9 @@ from asperity.arrays import Field
 FEWEST_PLACES = 7  # different x: three on either side of a break, and one to contradict
 MOST_PLACES = 240  # recordings of a long watch are averaged in neighbouring groups down to so many
 BREAKS, SCATTERS, CURVATURES = 161, 15, 48  # grid points of break, scatter and bend of the smooth curves
+ROUNDS = 6  # of weights by the slope
+MEMORIES = (0.0, 0.4, 0.65, 0.85)  # correlation of neighbouring places' scatter
+ALIKE = np.array([0.7, 0.1, 0.1, 0.1])  # how likely each of them is beforehand: mostly there is none
 STICK, CONSTANT = "broken stick", "no change"
 
 
@@ -40,7 +43,10 @@ class _Candidate(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """Over the grid of bends and scatters: log likelihood, the same with linear parameters integrated out, those."""
+    """Over the grid of bends and scatters: log likelihood, the same with linear parameters integrated out, those.
+
+    Scatters are of every size and memory, by memory first.
+    """
 
     best: Field  # (grid,), greatest log likelihood over the scatters
     marginal: Field  # (grid, scatters)
@@ -73,7 +79,7 @@ def compared(places: Places, breaks: Field) -> Compared:
         for candidate in candidates
     }
     best = fits[min(bic, key=lambda name: bic[name])]
-    scatter = float(scatters[int(np.argmax(np.max(best.marginal, axis=0)))])
+    scatter = float(scatters[int(np.argmax(np.max(best.marginal, axis=0))) % scatters.size])
     return Compared(places=places, breaks=breaks, fits=fits, bic=bic, scatter=scatter)
 
 
@@ -154,34 +160,68 @@ def _constant(_: Field, at: Places) -> tuple[Field, Field]:
 
 def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
     """Weighted least squares at every bend and scatter; the error of x counts with the slope there (iterated)."""
-    columns, slopes = candidate.model(candidate.bends, places)  # (bends, places, linear)
-    own = places.variance + scatters[:, None] ** 2  # (scatters, places)
-    if not np.any(places.x_std > 0.0):
-        return _surely(columns, places.y, own)
-    columns, slopes = columns[:, None], slopes[:, None]
-    variance = np.broadcast_to(own, (columns.shape[0], *own.shape))
-    for _ in range(6):
-        information = np.einsum("bsp,btpi,btpj->bsij", 1.0 / variance, columns, columns, optimize=True)
-        right = np.einsum("bsp,btpi->bsi", places.y / variance, columns, optimize=True)
-        linear, determinant = _solved(information, right)
-        steepness = np.einsum("btpi,bsi->bsp", slopes, linear, optimize=True)
-        variance = own + (steepness * places.x_std) ** 2
-    off = places.y - np.einsum("btpi,bsi->bsp", columns, linear, optimize=True)
-    likelihood = -0.5 * np.sum(off**2 / variance + np.log(2.0 * np.pi * variance), axis=-1)
+    columns, slopes = candidate.model(candidate.bends, places)  # (bends, places, linear), the first of them a constant
+    middle = float(np.mean(places.y))
+    products = _products(columns, places.y - middle)
+    own = np.tile(places.variance + scatters[:, None] ** 2, (len(MEMORIES), 1))  # (scatters, places)
+    memory = np.repeat(MEMORIES, scatters.size)
+    precision = _precision(own, memory)
+    linear, squares, determinant = _least_squares(precision, products)
+    for _ in range(ROUNDS if np.any(places.x_std > 0.0) else 0):
+        steepness = linear @ np.swapaxes(slopes, 1, 2)
+        precision = _precision(own + (steepness * places.x_std) ** 2, memory)
+        linear, squares, determinant = _least_squares(precision, products)
+    likelihood = np.log(np.repeat(ALIKE, scatters.size)) - 0.5 * (squares + precision.log_determinant)
+    linear[..., 0] += middle
     return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
 
 
-def _surely(columns: Field, y: Field, variance: Field) -> Fitted:
-    """The same where x is certain, so that no variance (scatters, places) depends on the fit."""
-    weight = 1.0 / variance
-    bends, places, size = columns.shape
-    products = (columns[..., None] * columns[:, :, None]).reshape(bends, places, size**2)
-    information = (weight @ products).reshape(bends, weight.shape[0], size, size)
-    linear, determinant = _solved(information, weight @ (columns * y[:, None]))
-    off = y - linear @ np.swapaxes(columns, 1, 2)
-    squares = np.einsum("bsp,sp->bs", off**2, weight)
-    likelihood = -0.5 * (squares + np.sum(np.log(2.0 * np.pi * variance), axis=-1))
-    return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
+class _Precision(NamedTuple):
+    """The inverse covariance of scatter that remembers the place before, and -ln of its determinant, with 2π.
+
+    It has two diagonals: `own` and `next`, (..., scatters, places) each, the second that of a place and the one before.
+    """
+
+    own: Field
+    next: Field
+    log_determinant: Field
+
+
+def _precision(variance: Field, memory: Field) -> _Precision:
+    """Of scatter of a variance (..., scatters, places), each with a memory (scatters,)."""
+    fresh = 1.0 - memory[:, None] ** 2
+    inner = np.ones(variance.shape[-1])
+    inner[1:-1] = 0.0
+    own = (1.0 + memory[:, None] ** 2 * (1.0 - inner)) / fresh / variance
+    following = -memory[:, None] / fresh / np.sqrt(variance * _before(variance, first=np.inf))
+    of_memory = (variance.shape[-1] - 1) * np.log(fresh[:, 0])
+    return _Precision(own, following, np.sum(np.log(2.0 * np.pi * variance), axis=-1) + of_memory)
+
+
+def _before(values: Field, first: float = 0.0) -> Field:
+    """At each place what is at the one before, along the last axis."""
+    shifted = np.roll(values, 1, axis=-1)
+    shifted[..., 0] = first
+    return shifted
+
+
+def _products(columns: Field, y: Field) -> Field:
+    """Of each column with each and with y, at a place and across to the one before; (bends, 2 places, pairs)."""
+    whole = np.concatenate([columns, np.broadcast_to(y[:, None], (*columns.shape[:2], 1))], axis=-1)
+    behind = _before(np.swapaxes(whole, 1, 2)).swapaxes(1, 2)
+    here, across = whole[..., None] * whole[:, :, None], whole[..., None] * behind[:, :, None]
+    products = np.concatenate([here, across + np.swapaxes(across, -1, -2)], axis=1)
+    return products.reshape(*products.shape[:2], -1)
+
+
+def _least_squares(precision: _Precision, products: Field) -> tuple[Field, Field, Field]:
+    """What fits best (bends, scatters, linear), the squares it leaves, and ln of the determinant of its information."""
+    found = np.concatenate([precision.own, precision.next], axis=-1) @ products
+    size = round(np.sqrt(products.shape[-1]))
+    found = found.reshape(*found.shape[:2], size, size)
+    right = found[..., :-1, -1]
+    linear, determinant = _solved(found[..., :-1, :-1], right)
+    return linear, found[..., -1, -1] - np.sum(linear * right, axis=-1), determinant
 
 
 def _solved(information: Field, right: Field) -> tuple[Field, Field]:

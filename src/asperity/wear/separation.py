@@ -13,6 +13,7 @@ import numpy.typing as npt
 from asperity.arrays import Field, Mask
 from asperity.wear.resonance import line_and_slopes, line_shape
 from asperity.wear.scoring import damped_scoring
+from asperity.wear.transfer import Transfer, rises, through
 
 MOST_TOGETHER = 100  # recordings of a longer series that settle what all of them share
 COARSE_BLOCKS = 160
@@ -25,7 +26,8 @@ LONGEST_STEP = np.array([1.0, 0.03, 0.5, 1.0])  # of ln A, ln f, ln ζ, ln g
 MOST_STEPS = 60
 SETTLED = 1e-3  # ln likelihood that the next step promises
 LOOSE = 1e-4  # information of everything before the data, so that a line of no height has a defined place
-SLOPE_STEP, STEEPEST = 0.1, 2.0
+PACES = (0.3, 1e-4)  # of the transfer from spline to spline: the first guess, and the least
+SAME_PACE, MOST_PACES = 0.1, 8  # change of its logarithm that no longer counts
 
 
 class Blocks(NamedTuple):
@@ -37,19 +39,23 @@ class Blocks(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """A_i, f_i, ζ_i, g_i as logarithms (recordings, 4), ln B (blocks,), and the slope t of what excites the lines."""
+    """A_i, f_i, ζ_i, g_i as logarithms (recordings, 4), ln B (blocks,), and what the lines come through."""
 
     own: Field
     base: Field
-    slope: float = 0.0
+    transfer: Transfer = Transfer()
 
 
 class Joint(NamedTuple):
-    """Where the joint fit ended: parameters, -ln likelihood, and standard deviations of the recordings' own."""
+    """Where the joint fit ended: parameters, -ln likelihood, and standard deviations of the recordings' own.
+
+    `doubt` is the covariance of the transfer's coefficients.
+    """
 
     parameters: Parameters
     cost: float
     std: Field  # (recordings, 4)
+    doubt: Field
 
 
 class Templates(NamedTuple):
@@ -145,20 +151,32 @@ def _best(cost: Field, values: Field, templates: Templates) -> Field:
 
 
 def beside(
-    blocks: Blocks, base: Field, slope: float, templates: Templates, prepared: Iterable[Model]
+    blocks: Blocks,
+    base: Field,
+    transfer: Transfer,
+    doubt: Field,
+    templates: Templates,
+    prepared: Iterable[Model],
 ) -> tuple[Joint, Field]:
-    """Lines of recordings beside what others have settled: ln B (blocks,) and slope; the fit, and `elsewhere`."""
+    """Lines of recordings beside what others have settled: ln B (blocks,) and transfer; the fit, and `elsewhere`."""
     coarse = coarser(blocks)
     cost, values = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, base)), templates, prepared)
-    return _each(blocks, Parameters(_best(cost, values, templates), base, slope)), cost
+    return _each(blocks, Parameters(_best(cost, values, templates), base, transfer), doubt), cost
 
 
 def lines_and_slopes(centre: Field, at: Parameters) -> tuple[Field, Field, Field]:
-    """A L (f/f_i)^t, and its derivatives by ln f_i and ln ζ_i, (recordings, blocks)."""
+    """A L T(f)/T(f_i), and its derivatives by ln f_i and ln ζ_i, (recordings, blocks)."""
     level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
     line, by_f0, by_damping = line_and_slopes(centre[None, :], f0, damping)
-    tilt = level * (centre[None, :] / f0) ** at.slope
-    return tilt * line, tilt * (by_f0 - at.slope * line), tilt * by_damping
+    passed = level * np.exp(_away(centre, at) @ at.transfer.coefficients)
+    steep = at.transfer.steepness(f0[:, 0])[:, None]
+    return passed * line, passed * (by_f0 - steep * line), passed * by_damping
+
+
+def _away(centre: Field, at: Parameters) -> Field:
+    """What the transfer's coefficients stand at, less that at each line's place; (recordings, blocks, coefficients)."""
+    here = at.transfer.columns(np.exp(at.own[:, 1]))
+    return np.asarray(at.transfer.columns(centre)[None] - here[:, None])
 
 
 def _settled_base(blocks: Blocks, own: Field, base: Field) -> Field:
@@ -197,7 +215,7 @@ def separate(blocks: Blocks) -> Separation:
         shared = joint.parameters
         own = _tracks(coarse, np.exp(np.interp(coarse.centre, blocks.centre, shared.base)), templates)
         own[chosen] = shared.own
-        joint = _each(blocks, shared._replace(own=own))
+        joint = _each(blocks, shared._replace(own=own), joint.doubt)
     elsewhere, _ = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base)), templates)
     return Separation(joint, templates, elsewhere, chosen)
 
@@ -227,11 +245,13 @@ def _together(blocks: Blocks, coarse: Blocks, templates: Templates) -> Joint:
         best = joint
     base = np.exp(np.interp(blocks.centre, coarse.centre, best.parameters.base))
     base = _settled_base(blocks, best.parameters.own, base)
-    return _sloped(blocks, _scored(blocks, Parameters(best.parameters.own, np.log(base))))
+    low, high = _bounds(blocks)
+    passed = through(float(np.exp(low[1])), float(np.exp(high[1])))
+    return _passed_on(blocks, Parameters(best.parameters.own, np.log(base), passed))
 
 
 class _Point(NamedTuple):
-    """Where a scoring step stands: cost, score and information, the base's part apart."""
+    """Where a scoring step stands: cost, score and information; the base's part and the transfer's apart."""
 
     cost: float
     own_score: Field  # (recordings, 4)
@@ -239,6 +259,10 @@ class _Point(NamedTuple):
     base_score: Field  # (blocks,)
     base_information: Field  # (blocks,)
     coupling: Field  # (recordings, 4, blocks)
+    passed_score: Field  # (coefficients,)
+    passed_information: Field  # (coefficients, coefficients)
+    passed_own: Field  # (recordings, 4, coefficients)
+    passed_coupling: Field  # (coefficients, blocks)
 
 
 def expected_density(blocks: Blocks, at: Parameters) -> Field:
@@ -260,7 +284,7 @@ def _prior(own: Field) -> Field:
     return np.asarray(0.5 * ((own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD) ** 2)
 
 
-def _point(blocks: Blocks, at: Parameters) -> _Point:
+def _point(blocks: Blocks, at: Parameters, stiff: Field) -> _Point:
     line, by_f0, by_damping = lines_and_slopes(blocks.centre, at)
     common = np.exp(at.own[:, 3, None] + at.base)
     expected = line + common
@@ -272,32 +296,45 @@ def _point(blocks: Blocks, at: Parameters) -> _Point:
     own_information = np.einsum("npb,nqb->npq", weighted, relative, optimize=True)
     own_information[:, 2, 2] += DAMPING_SPREAD**-2
     base_part = relative[:, 3]
+    passed = relative[:, 0, :, None] * _away(blocks.centre, at)
+    coefficients = at.transfer.coefficients
+    flat, weights = passed.reshape(blocks.weight.size, coefficients.size), blocks.weight.reshape(-1, 1)
+    fit = float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own)))
     return _Point(
-        cost=float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own))),
+        cost=fit + 0.5 * float(coefficients @ stiff @ coefficients),
         own_score=own_score,
         own_information=own_information + LOOSE * np.eye(4),
         base_score=np.sum(base_part * off, axis=0),
         base_information=np.sum(blocks.weight * base_part**2, axis=0) + LOOSE,
         coupling=weighted * base_part[:, None],
+        passed_score=off.ravel() @ flat - stiff @ coefficients,
+        passed_information=flat.T @ (weights * flat) + stiff,
+        passed_own=np.matmul(weighted, passed),
+        passed_coupling=np.einsum("nb,nbc->cb", blocks.weight * base_part, passed, optimize=True),
     )
 
 
-def _reduced(point: _Point, damping: Field | float) -> tuple[Field, Field]:
-    """Information of the recordings' own parameters once the base is eliminated, and that of the base; both damped.
+def _reduced(point: _Point, damping: Field | float) -> tuple[Field, Field, Field]:
+    """Information of the recordings' own parameters and the transfer once the base is eliminated; that of the base.
 
-    Levels of g and B are fixed against one another by Σ ln g = 0.
+    Both damped; and their coupling. Levels of g and B are fixed against one another by Σ ln g = 0.
     """
     recordings, own, _ = point.own_information.shape
     base_information = point.base_information * (1.0 + damping)
-    flat = point.coupling.reshape(recordings * own, -1)
+    size = recordings * own
+    flat = np.concatenate([point.coupling.reshape(size, -1), point.passed_coupling])
     reduced = -(flat / base_information) @ flat.T
     diagonal = np.einsum("npp->np", point.own_information)
     for i in range(recordings):
         at = slice(i * own, (i + 1) * own)
         reduced[at, at] += point.own_information[i] + damping * np.diag(diagonal[i])
     gauge = np.tile([0.0, 0.0, 0.0, 1.0], recordings)
-    reduced += float(np.mean(diagonal[:, 3])) * np.outer(gauge, gauge) / recordings
-    return reduced, base_information
+    reduced[:size, :size] += float(np.mean(diagonal[:, 3])) * np.outer(gauge, gauge) / recordings
+    beside = point.passed_own.reshape(size, -1)
+    reduced[:size, size:] += beside
+    reduced[size:, :size] += beside.T
+    reduced[size:, size:] += point.passed_information + damping * np.diag(np.diag(point.passed_information))
+    return reduced, base_information, flat
 
 
 def _bounds(blocks: Blocks) -> tuple[Field, Field]:
@@ -306,42 +343,49 @@ def _bounds(blocks: Blocks) -> tuple[Field, Field]:
     return np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0]), np.array([60.0, high, np.log(MOST_DAMPING), 60.0])
 
 
-def _scored(blocks: Blocks, start: Parameters) -> Joint:
+def _scored(blocks: Blocks, start: Parameters, pace: float = PACES[0]) -> Joint:
     """Damped Fisher scoring of everything at once; the base, whose blocks do not couple, is eliminated first."""
     lower, upper = _bounds(blocks)
+    stiff = start.transfer.stiffness(pace)
 
     def placed(at: Parameters) -> tuple[Parameters, _Point]:
-        return at, _point(blocks, at)
+        return at, _point(blocks, at, stiff)
 
     def propose(
         state: tuple[Parameters, _Point], damping: Field
     ) -> tuple[Mask, Callable[[Mask], tuple[Parameters, _Point]]] | None:
         at, point = state
-        reduced, base_information = _reduced(point, damping)
-        flat = point.coupling.reshape(reduced.shape[0], -1)
-        right = point.own_score.ravel() - flat @ (point.base_score / base_information)
-        step = np.linalg.solve(reduced, right)
+        reduced, base_information, flat = _reduced(point, damping)
+        score = np.concatenate([point.own_score.ravel(), point.passed_score])
+        step = np.linalg.solve(reduced, score - flat @ (point.base_score / base_information))
         base_step = (point.base_score - flat.T @ step) / base_information
-        promised = 0.5 * float(step @ point.own_score.ravel() + base_step @ point.base_score)
+        promised = 0.5 * float(step @ score + base_step @ point.base_score)
         if promised < SETTLED:
             return None
-        step = np.clip(step.reshape(at.own.shape), -LONGEST_STEP, LONGEST_STEP)
-        trial = at._replace(own=np.clip(at.own + step, lower, upper), base=at.base + np.clip(base_step, -2.0, 2.0))
-        return np.array([np.sum(_costs(blocks, trial)) < point.cost]), lambda _: placed(trial)
+        own, passed = step[: at.own.size].reshape(at.own.shape), step[at.own.size :]
+        trial = Parameters(
+            np.clip(at.own + np.clip(own, -LONGEST_STEP, LONGEST_STEP), lower, upper),
+            at.base + np.clip(base_step, -2.0, 2.0),
+            at.transfer._replace(coefficients=at.transfer.coefficients + np.clip(passed, -1.0, 1.0)),
+        )
+        stretch = 0.5 * float(trial.transfer.coefficients @ stiff @ trial.transfer.coefficients)
+        return np.array([np.sum(_costs(blocks, trial)) + stretch < point.cost]), lambda _: placed(trial)
 
     start = start._replace(own=np.clip(start.own, lower, upper))
     (at, point), _ = damped_scoring(placed(start), propose, steps=MOST_STEPS, least=1e-7, most=1e6)
-    reduced, _ = _reduced(point, 0.0)
-    std = np.sqrt(np.diag(np.linalg.inv(reduced))).reshape(at.own.shape)
-    return Joint(at, point.cost, std)
+    covariance = np.linalg.inv(_reduced(point, 0.0)[0])
+    own = at.own.size
+    std = np.sqrt(np.diag(covariance)[:own]).reshape(at.own.shape)
+    return Joint(at, point.cost, std, covariance[own:, own:])
 
 
-def _each(blocks: Blocks, start: Parameters) -> Joint:
-    """Damped Fisher scoring of every recording's own parameters beside a base that is known."""
+def _each(blocks: Blocks, start: Parameters, doubt: Field) -> Joint:
+    """Damped Fisher scoring of every recording's own parameters beside a base and a transfer that are known."""
     lower, upper = _bounds(blocks)
+    stiff = np.zeros_like(doubt)
 
     def placed(own: Field, costs: Field) -> tuple[Field, Field, _Point]:
-        return own, costs, _point(blocks, start._replace(own=own))
+        return own, costs, _point(blocks, start._replace(own=own), stiff)
 
     def propose(
         state: tuple[Field, Field, _Point], damping: Field
@@ -361,24 +405,23 @@ def _each(blocks: Blocks, start: Parameters) -> Joint:
     own = np.clip(start.own, lower, upper)
     state = placed(own, _costs(blocks, start._replace(own=own)))
     (own, costs, point), _ = damped_scoring(state, propose, steps=MOST_STEPS, least=1e-7, most=1e6, fits=own.shape[0])
-    std = np.sqrt(np.einsum("npp->np", np.linalg.inv(point.own_information)))
-    return Joint(start._replace(own=own), float(np.sum(costs)), std)
+    inverse = np.linalg.inv(point.own_information)
+    dragged = np.matmul(inverse, point.passed_own)  # by each coefficient of the transfer
+    variance = np.einsum("npp->np", inverse) + np.einsum("npc,cd,npd->np", dragged, doubt, dragged, optimize=True)
+    return Joint(start._replace(own=own), float(np.sum(costs)), np.sqrt(variance), doubt)
 
 
-def _sloped(blocks: Blocks, joint: Joint) -> Joint:
-    """The separation with the likeliest slope t, by parabolas through three of them; its error counts in all others."""
-    for _ in range(3):
-        slope = joint.parameters.slope
-        below, above = (
-            _scored(blocks, joint.parameters._replace(slope=slope + step)) for step in (-SLOPE_STEP, SLOPE_STEP)
-        )
-        bend = below.cost - 2.0 * joint.cost + above.cost
-        if bend <= 0.0:
-            return joint
-        change = 0.5 * SLOPE_STEP * (below.cost - above.cost) / bend
-        change = min(max(change, -STEEPEST - slope), STEEPEST - slope)
-        joint = _scored(blocks, joint.parameters._replace(slope=slope + change))
-        if abs(change) < SLOPE_STEP:
+def _passed_on(blocks: Blocks, start: Parameters) -> Joint:
+    """The separation beside the likeliest pace of the transfer (MacKay's evidence); its error counts in all others."""
+    pace, least = PACES
+    joint = _scored(blocks, start, pace)
+    for _ in range(MOST_PACES):
+        change = rises(joint.doubt.shape[0] - 1)
+        steps = change @ joint.parameters.transfer.coefficients[1:]
+        told = steps.size - float(np.trace(change @ joint.doubt[1:, 1:] @ change.T)) / pace**2
+        likelier = max(float(np.sqrt(steps @ steps / max(told, 1e-3))), least)
+        if abs(np.log(likelier / pace)) < SAME_PACE:
             break
-    dragged = (above.parameters.own - below.parameters.own) / (2.0 * np.sqrt(bend))  # by one deviation of t
-    return joint._replace(std=np.hypot(joint.std, dragged))
+        pace = likelier
+        joint = _scored(blocks, joint.parameters, pace)
+    return joint

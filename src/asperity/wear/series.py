@@ -32,6 +32,7 @@ from asperity.wear.separation import (
     templates_on,
     whittle_costs,
 )
+from asperity.wear.transfer import Transfer
 
 SeriesMethod = Literal["joint", IndicatorMethod]
 
@@ -54,8 +55,9 @@ class Shared:
     """What all recordings of a series share, as some of them have settled it: enough to judge another beside them.
 
     `first`, `size` and `spacing_hz` say which lines stand in which blocks; `centre` [Hz] and `base` (ln density) are of
-    blocks, shape (blocks,); `slope` of what excites the lines; `stands` whether the line keeps its place; `counts`,
-    `change`, `by_chance` how far the recordings that settled it are from it, shape (recordings, blocks).
+    blocks, shape (blocks,); `reach` [Hz], `transfer` and `doubt` of what the lines come through; `stands` whether the
+    line keeps its place; `counts`, `change`, `by_chance` how far the recordings that settled it are from it, shape
+    (recordings, blocks).
     """
 
     band_hz: tuple[float, float]
@@ -64,7 +66,9 @@ class Shared:
     spacing_hz: float
     centre: Field
     base: Field
-    slope: float
+    reach: tuple[float, float]
+    transfer: Field
+    doubt: Field
     stands: bool
     counts: Mask
     change: Field
@@ -101,7 +105,7 @@ class Shared:
         lines = self.first + np.arange(self.size * self.centre.size)
         blocks = _blocked(spectra, lines, self.size, kept)
         templates, ready = self._search
-        joint, elsewhere = beside(blocks, self.base, self.slope, templates, ready)
+        joint, elsewhere = beside(blocks, self.base, Transfer(*self.reach, self.transfer), self.doubt, templates, ready)
         witnesses = _Witnesses(self.counts, self.change, self.by_chance)
         found = _Found(joint, templates, elsewhere, witnesses, self.stands)
         return _judged(blocks, found, self.band_hz)
@@ -182,7 +186,9 @@ def learn_series(
         spacing_hz=first.spacing_hz,
         centre=blocks.centre,
         base=joint.parameters.base,
-        slope=joint.parameters.slope,
+        reach=joint.parameters.transfer[:2],
+        transfer=joint.parameters.transfer.coefficients,
+        doubt=joint.doubt,
         stands=stands,
         counts=witnesses.counts,
         change=witnesses.change,
