@@ -67,6 +67,9 @@ def test_a_sensor_that_delivers_nothing_is_blind_and_told_once(asp):
     assert said["verdict"].startswith("Blind: no recording has come for")
     assert "0.5 s are allowed" in said["alarm"]["reason"]
     assert asp("store", "plant.db", "--quiet")[0] == 5
+    page = Path(said["results"], "report.html").read_text("utf-8")
+    assert "Blind: no recording has come for" in page
+    assert "Check that the machine runs, then sensor, cable and supply" in page
     assert asp("watch", "in", *LOOK, "--on-alarm", command, "--expect", "0.5", "--quiet")[0] == 5
     assert judged("state") == ["cannot-tell", "blind"]  # said again, kept once
     snapshots("in", [1.0], first=10)
@@ -85,6 +88,9 @@ def test_an_alarm_stands_in_silence(asp):
     assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (3, "alarm", "the level (rms)")
     assert said["verdict"].startswith("Blind: no recording has come")
     assert "ALARM since" in said["verdict"]
+    page = Path(said["results"], "report.html").read_text("utf-8")
+    assert "ALARM since" in page
+    assert "No recording has come for" in page
 
 
 @pytest.mark.skipif(os.name == "nt", reason="clocks of Windows are too coarse for it")
@@ -93,8 +99,8 @@ def test_a_watch_that_runs_says_so_by_itself(tmp_path):
     looks = watch_folder(tmp_path / "in", tmp_path / "out", every_s=0.05, settle_s=0.0, expect_s=0.6)
     assert next(looks).track is not None
     silent = next(looks)
-    assert silent.track is None
-    assert silent.said["alarm"]["state"] == "blind"
+    assert silent.said["alarm"]["state"] == silent.track.alarm.state == "blind"
+    assert silent.track.alarm.since == 7
     snapshots(tmp_path / "in", [1.0], first=8)
     assert len(next(looks).new) == 1
     looks.close()

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asperity.report.style import ON_PAGE
+from asperity.report.track.exhibits import levels, trend
 from asperity.report.track.page import NEXT, render_track_page
 from asperity.tracking import track_recordings
 from asperity.wear import ALARM_STATES
@@ -42,6 +44,38 @@ def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
     assert "velocity not determined" in said["Severity"].lower()
     assert said["How sure"] == "Set to be said without wear once in 1000 recordings."
     assert said["What next"].startswith("Look for what grew")
+
+
+def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing):
+    struck = [
+        replace(one, reading=replace(one.reading, depths={"BPFO": 0.1 * 1.1**number, "BSF": np.nan}))
+        for number, one in enumerate(failing.recordings)
+    ]
+    figure = levels(replace(failing, recordings=tuple(struck))).draw(ON_PAGE)
+    drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].get_lines()}
+    assert set(drawn) == {"rms", "kurtosis", "envelope BPFO", "least that alarms"}
+    assert drawn["rms"][-1] == pytest.approx(20.0, rel=0.1)
+    assert drawn["envelope BPFO"][-1] == pytest.approx(1.1**31.5, rel=0.01)
+    assert drawn["kurtosis"] == pytest.approx(np.ones(36), abs=0.2)
+    assert drawn["least that alarms"][0] == pytest.approx(2.0)
+    assert "Levels, bands, rates of faults" in render_track_page(failing)
+    assert levels(replace(failing, recordings=failing.recordings[:1])) is None
+
+
+def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
+    """Where it would be at the first load, speed and temperature, beside where it is."""
+    moved = [
+        replace(one, resonance=replace(one.resonance, found=True, crf_hz=3e3 + 10.0 * number, crf_std=5.0))
+        for number, one in enumerate(failing.recordings)
+    ]
+    steadied = [replace(one, crf_reference_hz=3e3) for one in moved]
+    track = replace(failing, recordings=tuple(steadied))
+    (shown,) = (
+        line
+        for line in trend(track).draw(ON_PAGE).axes[0].get_lines()
+        if line.get_label() == "at the first load, speed, temperature"
+    )
+    assert np.asarray(shown.get_ydata()) == pytest.approx(np.full(35, 3e3))
 
 
 @pytest.mark.parametrize("state", [state for state in ALARM_STATES if state != "alarm"])

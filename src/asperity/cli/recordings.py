@@ -271,7 +271,7 @@ def _end(state: str) -> None:
 
 def _written_and_shown(update: "Update", kept: Path, *, as_json: bool, quiet: bool) -> str | None:
     """Write and show what an update says; the alarm's state, None without any recording."""
-    said = update.said if update.track is None else update.track.scalars()
+    said = update.said or (None if update.track is None else update.track.scalars())
     if update.track is not None:
         _write(update.track, [kept / "track.csv", kept / "track.nc"], kept / PAGE)
     _show_update(update.new, said, update.waiting, kept, as_json=as_json, quiet=quiet)

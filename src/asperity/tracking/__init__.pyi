@@ -1,3 +1,5 @@
+from .alarming import BASELINE as BASELINE
+from .alarming import LEVEL_LEAST as LEVEL_LEAST
 from .calls import Caller as Caller
 from .calls import callers as callers
 from .checks import CheckedRecording as CheckedRecording

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 
 from asperity.errors import BadInput, UnreadableFile
@@ -256,6 +257,16 @@ def _heading(path: Path) -> list[str]:
     return [field.strip().strip('"') for field in re.split(r"[,;\t]", first.strip())]
 
 
+@lru_cache(maxsize=1 << 16)
 def natural(name: str) -> list[tuple[int, int | str]]:
     """By what names are sorted so that their numbers stand in order."""
     return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", name) if part]
+
+
+def utf8(name: str) -> bool:
+    """Whether a file's name can be written down."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -4,7 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from asperity.quantities import quantity
 from asperity.rating import ZONES, severity_zone
 from asperity.tracking.operating import Operating
 from asperity.tracking.reading import Reading
+from asperity.tracking.silence import SILENCE
 from asperity.tracking.target import Target
 from asperity.wear import IN_WORDS, Alarm, AlarmState, CleanSpectrum, Resonance, Stages, StageSource
 
@@ -153,6 +154,18 @@ class Track:
     def resonance_count(self) -> int:
         """In how many recordings a contact resonance was found."""
         return sum(recording.resonance.found for recording in self.recordings)
+
+    def silent(self, reason: str) -> "Track":
+        """The same where no recording comes any more, for a `reason`: blind, unless an alarm stands."""
+        noted = replace(self, notes=(*self.notes, f"{reason[:1].upper()}{reason[1:]}."))
+        if self.alarm.state == "alarm":
+            return noted
+        states: tuple[AlarmState, ...] = (*self.alarm.states[:-1], "blind")
+        since = len(states) - 1
+        blind = replace(
+            self.alarm, state="blind", states=states, since=since, reason=reason, raised_by=SILENCE, explained=""
+        )
+        return replace(noted, alarm=blind)
 
     def verdict(self) -> str:
         """One sentence: the stage with its confidence, or that these recordings cannot tell, and why."""

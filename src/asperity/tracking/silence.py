@@ -11,6 +11,7 @@ from statistics import median
 ENOUGH = 8  # times between arrivals, from which on one knows how often recordings come
 LONGER = 5.0  # than usual, before anybody is called
 LEAST_S = 60.0
+SILENCE = "silence"  # who raised a state: recordings that do not come
 
 
 def silence(arrivals: Sequence[datetime], expected_s: float | None, now: datetime | None = None) -> str:

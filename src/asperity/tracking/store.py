@@ -19,12 +19,12 @@ from asperity.files import require_writable
 from asperity.tracking.learned import Learned, learned_bytes, learned_from
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, reading_bytes, reading_from
+from asperity.tracking.silence import SILENCE
 from asperity.wear import ALARM_STATES, AlarmState
 
 STORE = "asperity.db"
 VERSION = 1
 BUSY_S = 30.0  # another watch may be writing
-SILENCE = "silence"  # who raised a state: recordings that do not come
 ACKNOWLEDGED = "acknowledged"  # state of a judgement that a person has made
 REMEDY = "delete it and its recordings are read again, or choose another store"
 FOLDER = "folder"  # among the settings of a sensor that was not named: nobody else's recordings are to be taken for its

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
-from functools import lru_cache, partial
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic, sleep, time
@@ -21,7 +21,7 @@ from asperity.files import make_folder
 from asperity.recording import ReadOptions, names_beside
 from asperity.tracking.alarming import BASELINE, LAST
 from asperity.tracking.calls import Caller, deliver
-from asperity.tracking.files import Place, Table, in_their_places, may_be_recording, natural, read_table
+from asperity.tracking.files import Place, Table, in_their_places, may_be_recording, natural, read_table, utf8
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
 from asperity.tracking.reading import Reading, common_spacing, read_spectra
@@ -42,8 +42,8 @@ class Update:
     """What is new: files just read, and the series with them; None as long as there is none.
 
     `failed` are sentences on calls that have not worked, and on files that could not be taken.
-    `waiting` files have changed so lately that they may still be written. Where nothing was new, `track` is None and
-    `said` the last judgement, as `Track.scalars` gave it.
+    `waiting` files have changed so lately that they may still be written. Where nothing was new, `said` is the last
+    judgement, as `Track.scalars` gave it, and `track` None, but for a sensor that has fallen silent.
     """
 
     new: tuple[Reading, ...]
@@ -171,14 +171,15 @@ def _looks(
             arrived = memory.settled(unread, pace)
             named = None if table is None or not (arrived or memory.sensor.recordings) else read_table(table)
             new = read(arrived, named)
-            known = sorted(memory.sensor.series(), key=lambda key: _sorting(_name(key)))
+            known = sorted(memory.sensor.series(), key=lambda key: natural(_name(key)))
             waiting = len(unread) - len(arrived)
             reason = "" if new or (acknowledge and first) else silence(memory.sensor.arrivals(), pace.expect_s)
             said = memory.sensor.fell_silent(reason, memory.who) if reason else None
             if said is not None:
                 failed = deliver(memory.sensor, memory.call, now=first)
                 if not told:
-                    yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
+                    track = memory.silent(partial(judge, **asked), _ordered(known, named, memory.sensor), reason)
+                    yield Update(new=(), track=track, waiting=waiting, said=said, failed=failed)
             elif new or first:
                 question = _digest(asked, named, known, memory.target)
                 recalled = first and pace.recall and not new and acknowledge is None
@@ -297,13 +298,13 @@ class _Memory:
                     stamps[entry.name] = (entry, f"{status.st_size} {status.st_mtime_ns}")
         sidecars = {name for name in stamps if name.endswith(SUFFIXES)}
         for entry, stamp in stamps.values():
-            if not _utf8(entry.name):
+            if not utf8(entry.name):
                 self.unnamed.add(entry.name)
                 continue
             beside = next((name for name in names_beside(entry.name) if name in sidecars), None) if sidecars else None
             key = Version(entry.path, stamp if beside is None else f"{stamp} {stamps[beside][1]}")
             if key in self.sensor.recordings or may_be_recording(Path(key.file)):
-                versions.append((_sorting(entry.name), key))
+                versions.append((natural(entry.name), key))
         return [key for _, key in sorted(versions)]
 
     def left_out(self) -> Iterator[str]:
@@ -387,7 +388,20 @@ class _Memory:
         again: bool,
         who: Sequence[str],
     ) -> Track:
-        """A judgement of the series up to an end."""
+        """A judgement of the series up to an end, kept."""
+        track, keys = self._looked_at(judging, order, end, again=again)
+        return self.sensor.judged(track, {key.file: key for key in keys}, new, question, self._learned, who)
+
+    def silent(self, judging: Callable[..., Track], order: _Order, reason: str) -> Track | None:
+        """The series as it is when no recording comes any more; nothing of it is kept. None where none is known."""
+        if not order.keys:
+            return None
+        return self._looked_at(judging, order, len(order.keys), again=False)[0].silent(reason)
+
+    def _looked_at(
+        self, judging: Callable[..., Track], order: _Order, end: int, *, again: bool
+    ) -> tuple[Track, list[Version]]:
+        """The series up to an end as it is judged beside what was said, and what of it was looked at."""
         window = {order.keys[number]: order.place(number) for number in _window(order, end, self.sensor)}
         held = {key: self._readings.get(key) or self.sensor.reading(key) for key in window}
         self._readings = {key: reading for key, reading in held.items() if reading is not None}
@@ -410,7 +424,7 @@ class _Memory:
             learned=self._learned,
             before=before,
         )
-        return self.sensor.judged(track, {key.file: key for key in window}, new, question, self._learned, who)
+        return track, [*window]
 
 
 def _named(acknowledge: str, keys: Sequence[Version]) -> str:
@@ -421,19 +435,6 @@ def _named(acknowledge: str, keys: Sequence[Version]) -> str:
         if acknowledge in (key.file, _name(key)):
             return _name(key)
     raise BadInput(f"{acknowledge} is not among the {len(keys)} recordings; acknowledge one of them, or {LAST}")
-
-
-@lru_cache(maxsize=1 << 16)
-def _sorting(name: str) -> list[tuple[int, int | str]]:
-    return natural(name)
-
-
-def _utf8(name: str) -> bool:
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _unchanged(key: Version) -> bool:

@@ -23,9 +23,11 @@ from asperity.report.drawing import (
     plain_powers,
 )
 from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
-from asperity.tracking import Track, TrackedRecording
+from asperity.tracking import BASELINE, LEVEL_LEAST, Track, TrackedRecording
 from asperity.wear import INTERVAL, Stages
 
+STEADIED = 1e-3  # of a CRF: what conditions explain of it is drawn from there on
+MARKS = "osv^Dp*hXP<>"
 MOST_ROWS = 400  # of a waterfall; more recordings are thinned out
 SEVERITY = LinearSegmentedColormap.from_list("severity", ["#0072b2", "#e69f00", "#d55e00"])
 UNITS = {"um": "µm"} | {unit: unit for unit in ("h", "s", "min", "d", "mm", "nm", "m", "km")}
@@ -86,6 +88,13 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
     axes.scatter(x, crf, c=colours, s=22, zorder=2, edgecolors="white", linewidths=0.4, label=label)
+    steadied = np.array([recording.crf_reference_hz for recording in resonant])
+    moved = np.abs(steadied - crf) > STEADIED * crf
+    if moved.any():
+        axes.plot(
+            x[moved], steadied[moved], "o", markersize=5, markerfacecolor="none", color=GREEN, zorder=3,
+            label="at the first load, speed, temperature",
+        )  # fmt: skip
     full = track.target.full_load_crf_hz
     if full is not None:
         axes.axhline(full, color="black", linestyle=":", linewidth=1.0, label="all load on asperities")
@@ -161,6 +170,52 @@ def damping(track: Track) -> Exhibit:
         f"throughout, it falls as asperities take the load over from the oil.{said}",
         f"Trend of the damping ratio over {x_label(track)}.{said}",
     )
+
+
+def levels(track: Track) -> Exhibit | None:
+    """Level, velocity, kurtosis, bands, lines and envelope over x, each over its first; None with fewer than two."""
+    courses = _courses(track)
+    if not courses:
+        return None
+
+    @one_panel(4.2)
+    def draw(axes: Axes) -> None:
+        x = np.array([recording.x for recording in track.recordings])
+        for number, (name, values) in enumerate(courses.items()):
+            mark = MARKS[number % len(MARKS)]
+            axes.plot(x, values, mark, markersize=4, linestyle=":", linewidth=0.8, label=name)
+        axes.axhline(np.exp(LEVEL_LEAST), color=VERMILION, linestyle=DASHED, linewidth=1.0, label="least that alarms")
+        axes.set(yscale="log", xlabel=x_label(track), ylabel="over the first", title="Levels, bands, rates of faults")
+        plain_powers(axes)
+
+    return Exhibit(
+        "levels",
+        draw,
+        f"Each over the median of its first {BASELINE}. Lines are the rms at a rate and its next two harmonics; the "
+        "envelope is how deep it is modulated there. None of it says anything of the contact by itself.",
+        f"Levels over {x_label(track)}, relative to the first recordings.",
+    )
+
+
+def _courses(track: Track) -> dict[str, Field]:
+    """By name, every level that at least two recordings have, relative to the first."""
+    readings = [recording.reading for recording in track.recordings]
+    heard: dict[str, list[float]] = {
+        name: [np.nan if one.quality is None else float(getattr(one.quality, name)) for one in readings]
+        for name in ("rms", "kurtosis")
+    }
+    heard["velocity"] = [one.velocity for one in readings]
+    for several, word in (("bands", "rms"), ("lines", "line"), ("depths", "envelope")):
+        for name in dict.fromkeys(name for one in readings for name in getattr(one, several)):
+            heard[f"{word} {name}"] = [getattr(one, several).get(name, np.nan) for one in readings]
+    courses: dict[str, Field] = {}
+    for name, values in heard.items():
+        known = [value for value in values if value > 0.0]
+        if len(known) > 1:
+            courses[name] = np.array([value if value > 0.0 else np.nan for value in values]) / np.median(
+                known[:BASELINE]
+            )
+    return courses
 
 
 def asperity_load_share(track: Track) -> Exhibit:

@@ -168,7 +168,8 @@ def _pictures(chosen: list[Exhibit]) -> list[Picture]:
 
 def _details(track: Track) -> list[Exhibit]:
     """What is shown below the trend."""
-    details = [exhibits.amplitude(track)] if track.resonance_count else []
+    heard = exhibits.levels(track)
+    details = [*([] if heard is None else [heard]), *([exhibits.amplitude(track)] if track.resonance_count else [])]
     if _with_damping(track):
         details.append(exhibits.damping(track))
     if track.resonance_count and _with_clr(track):
