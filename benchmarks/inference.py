@@ -2,15 +2,17 @@
 
 Truths are contacts solved anew (never the emulator's), means over several surfaces, with unknowns drawn from the case's
 priors; their recordings are the rig's, with structural modes, noise and tones, and go through the joint separation.
-`python -m benchmarks.inference` runs this part alone; contacts, emulator and rows are kept in build/inference and gone
-on from. `--machines 40` draws more.
+Emulator, contacts and rows are kept in build/inference and gone on from. `python -m benchmarks.inference` runs this
+part alone, `--machines 60` with more of them, `--finer 10` with as many whose truth is solved on twice the cells.
 """
 
 import argparse
 import csv
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -29,8 +31,9 @@ from asperity.inference import (
     infer_observations,
     setting_of,
 )
-from asperity.inference.inference import stages
+from asperity.inference.inference import STAGES, stages
 from asperity.inference.listening import band_of
+from asperity.inference.outputs import OUTPUTS
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
 from asperity.study import load_study, overrides_at, plan_points, run_study
@@ -38,164 +41,178 @@ from asperity.wear import remove_lines, series_resonances
 
 CASE = Path(__file__).parents[1] / "examples" / "infer.toml"
 KEPT = Path(__file__).parents[1] / "build" / "inference"
-MACHINES, SURFACES, SEED = 40, 6, 20
-LOADS, SPEEDS = (300.0, 500.0, 900.0), (0.8, 2.5)
-ONE = 2  # the operating point of those inferred from one: 500 N, 0.8 m/s
+MACHINES, FEW, BATCH, SURFACES, SEED = 60, 6, 5, 6, 20
+KEYS = ("clr", "car", "h_mean_m")
+PLACES = tuple((load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5))
+ONE = PLACES[2]  # the operating point of those inferred from one: 500 N, 0.8 m/s
 TESTS = 2  # recordings at each operating point
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
 LEAST_SHARE = 0.01  # CLR below which there is no line to be found
-OUTSIDE = ("exponent 1/5", "stiffer by 5 % at 900 N")  # truths that neither law has
+INSIDE, FINER = "as the emulator has it", "on twice the cells"
+OUTSIDE = ("exponent 1/5", "5 % stiffer at 900 N")  # truths that neither law has
+LEFT_S = 60.0  # of the time given, for what is written at the end
+
+
+@dataclass(frozen=True)
+class OfFewSurfaces(Emulator):
+    """An emulator that is asked for means over few surfaces: what these scatter by is part of its deviation."""
+
+    scatter: Mapping[str, tuple[Field, Field]] = field(default_factory=dict)
+
+    def __call__(self, shares: Field, wanted: Sequence[str]) -> dict[str, tuple[Field, Field]]:
+        """Mean and standard deviation, that of as many surfaces as a truth has included."""
+        return {
+            key: (mean, np.sqrt(std**2 + np.interp(mean, *self.scatter[key]) / SURFACES))
+            for key, (mean, std) in super().__call__(shares, wanted).items()
+        }
+
+    @classmethod
+    def of(cls, emulator: Emulator) -> "OfFewSurfaces":
+        """From the surfaces of the emulator's own points: variance of one about its point's mean, by tenths."""
+        table = load_study(emulator.folder).table
+        groups = table[table["status"] == "done"].groupby("point")[list(OUTPUTS)]
+        scatter = {}
+        for key, output in OUTPUTS.items():
+            mean, variance = groups.mean()[key].to_numpy(), groups.var()[key].to_numpy()
+            scaled, spread = output.forward(mean), variance * output.slope(mean) ** 2
+            tenths = np.array_split(np.argsort(scaled), 10)
+            scatter[key] = tuple(np.array([values[part].mean() for part in tenths]) for values in (scaled, spread))
+        return cls(**vars(emulator), scatter=scatter)
 
 
 def main() -> None:
     """Solve, listen, infer, and say how often intervals hold."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--machines", type=int, default=MACHINES)
-    arguments.add_argument("--fast", action="store_true", help="six machines")
+    arguments.add_argument("--finer", type=int, default=0, help="machines whose truth is on twice the cells")
+    arguments.add_argument("--fast", action="store_true", help=f"{FEW} machines")
     arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps everything")
     wanted = arguments.parse_args()
-    run(6 if wanted.fast else wanted.machines, wanted.kept)
+    with threadpool_limits(1):
+        judge_all(FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept)
+    print("\n".join(tables(wanted.kept)))
 
 
-def run(machines: int, kept: Path) -> None:
-    """Every machine, in turn; a row each as it is done."""
+def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
+    """What `python -m benchmarks inference` prints: all machines judged so far, as many more as there is time for."""
+    end = perf_counter() + seconds - LEFT_S
+    judge_all(FEW if fast else MACHINES, 0, KEPT, end=end)
+    yield from tables(KEPT)
+
+
+def judge_all(machines: int, finer: int, kept: Path, *, end: float = float("inf")) -> None:
+    """Every machine, in turn; its rows as it is done."""
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
-    emulator = replace(
-        emulator, grid={}
-    )  # truths are solved on its own grid: what a finer one changes is no part of them
-    truths = solved(setting, machines, kept / "truth")
-    rows = kept / "rows.csv"
-    done = {} if not rows.exists() else {(row["machine"], row["law"]): True for row in csv.DictReader(rows.open())}
-    for number, (z, states) in enumerate(truths):
-        for law in ("inside", *outside(number)):
-            if (str(number), law) in done:
-                continue
-            with threadpool_limits(1):
-                found = list(judged(setting, emulator, number, law, z, states))
-            with rows.open("a", newline="") as file:
-                writer = csv.DictWriter(file, list(found[0]))
-                if file.tell() == 0:
-                    writer.writeheader()
-                writer.writerows(found)
-    report(rows)
+    whole = OfFewSurfaces.of(emulator)
+    on_its_grid = replace(whole, grid={})  # truths on its own grid: what a finer one changes is no part of them
+    rows = Rows(kept / "rows.csv")
+    for number in range(machines):
+        for law in (INSIDE, *((FINER,) if number < finer else ()), OUTSIDE[number % len(OUTSIDE)]):
+            if perf_counter() > end:
+                return
+            if (str(number), law) not in rows.done:
+                truth = _truth(setting, number, kept, finer=law == FINER)
+                began = process_time()
+                found = list(judged(setting, whole if law == FINER else on_its_grid, Machine(number, law, *truth)))
+                rows.write([row | {"seconds": f"{process_time() - began:.1f}"} for row in found])
 
 
-def outside(number: int) -> tuple[str, ...]:
-    """Laws that neither model has, of every third machine one."""
-    return () if number % 3 else (OUTSIDE[number // 3 % len(OUTSIDE)],)
+class Rows:
+    """The csv that keeps what was found of each machine."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        read = list(csv.DictReader(path.open())) if path.exists() else []
+        self.done = {(row["machine"], row["law"]) for row in read}
+
+    def write(self, rows: list[dict[str, Any]]) -> None:
+        """Put rows behind those that are there."""
+        with self.path.open("a", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            if file.tell() == 0:
+                writer.writeheader()
+            writer.writerows(rows)
 
 
-def solved(setting: Setting, machines: int, folder: Path) -> Iterator[tuple[Field, dict[str, Field]]]:
-    """Unknowns of each machine, and its contact's state at each operating point: the mean over its surfaces."""
+# Truths --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A simulated machine: unknowns, and its contact's states at `PLACES`; None where one could not be solved."""
+
+    number: int
+    law: str
+    z: Field
+    states: Mapping[str, Field] | None
+
+
+def machines_of(setting: Setting) -> Iterator[Field]:
+    """Unknowns of one machine after the other, each a standard normal number: drawn from the case's priors."""
     rng = np.random.default_rng(SEED)
-    unknowns = [rng.standard_normal(len(setting.unknowns)) for _ in range(MACHINES)][:machines]
+    while True:
+        yield rng.standard_normal(len(setting.unknowns))
+
+
+def _truth(setting: Setting, number: int, kept: Path, *, finer: bool) -> tuple[Field, dict[str, Field] | None]:
+    if finer:
+        twice = setting.case.with_overrides({"grid.cells": [2 * count for count in setting.case.grid.cells]})
+        setting = replace(setting, case=twice)
+    return solved(setting, number // BATCH, kept / ("truth-finer" if finer else "truth"))[number % BATCH]
+
+
+def solved(setting: Setting, batch: int, folder: Path) -> list[tuple[Field, dict[str, Field] | None]]:
+    """A batch of machines: unknowns, and the contact's states at each operating point, means over surfaces."""
+    unknowns = list(islice(machines_of(setting), BATCH * batch, BATCH * (batch + 1)))
     points = []
     for z in unknowns:
         shares = [float(unknown.share(z[place])) for place, unknown in enumerate(setting.contact)]
         base = overrides_at(setting.case, [unknown.range for unknown in setting.contact], shares)
         points += [
             {**base, "contact.load": f"{load:g} N", "contact.entrainment_speed": f"{speed:g} m/s"}
-            for load in LOADS
-            for speed in SPEEDS
+            for load, speed in PLACES
         ]
-    plan = plan_points(setting.case, points, seeds=SURFACES, kind="still")
-    finished = load_study(folder) if (folder / "manifest.json").exists() else None
-    wanted = {case.id for case in plan.cases}
-    if finished is None or not wanted <= set(finished.table["case_id"]):
-        finished = run_study(plan, out=folder, workers=1)
-    table = finished.table[finished.table["status"] == "done"]
-    means = table.groupby("point")[["clr", "car", "h_mean_m"]].agg(["mean", "count"])
+    unheard = setting.case.with_overrides({"vibration": "none"})  # no stiffness of its own, which takes as long again
+    plan = plan_points(unheard, points, seeds=SURFACES, kind="solve")
+    there = folder / f"{batch:03d}"
+    finished = load_study(there) if (there / "table.parquet").exists() else None
+    if finished is None or finished.missing:
+        finished = run_study(plan, out=there, workers=1)
+    done = finished.table[finished.table["status"] == "done"]
+    means = done.groupby("point")[list(KEYS)].agg(["mean", "count"])
+    found = []
     for number, z in enumerate(unknowns):
-        own = [number * len(LOADS) * len(SPEEDS) + place for place in range(len(LOADS) * len(SPEEDS))]
-        if all(place in means.index and means.loc[place, ("clr", "count")] >= SURFACES - 1 for place in own):
-            yield z, {key: means.loc[own, (key, "mean")].to_numpy() for key in ("clr", "car", "h_mean_m")}
+        own = [number * len(PLACES) + place for place in range(len(PLACES))]
+        whole = all(place in means.index and means.loc[place, ("clr", "count")] == SURFACES for place in own)
+        found.append((z, {key: means.loc[own, (key, "mean")].to_numpy() for key in KEYS} if whole else None))
+    return found
 
 
-def judged(
-    setting: Setting, emulator: Emulator, number: int, law: str, z: Field, states: dict[str, Field]
-) -> Iterator[dict[str, Any]]:
-    """A row for the machine heard at one operating point, and one at all of them."""
-    heard = recordings(setting, number, law, z, states)
-    sq = float(setting.unknowns[0].value(z[:1])[0])
-    places = [(load, speed) for load in LOADS for speed in SPEEDS]
-    at_one = [one for one in heard if (one.load_n, one.entrainment_m_s) == places[ONE]]
-    for points, observations in ((1, at_one), (len(places), heard)):
-        row: dict[str, Any] = {"machine": number, "law": law, "points": points, "heard": len(observations)}
-        if not observations:
-            yield row | dict.fromkeys(HELD, "")
-            continue
-        found = infer_observations(setting, emulator, observations, seed=number)
-        yield row | held(found, places[ONE] if points == 1 else observations[0].place[:2], places, sq, states)
-
-
-HELD = (
-    "sq_true", "sq_low", "sq_high", "sq_exact_low", "sq_exact_high", "sq_bits", "clr_true", "clr_low", "clr_high",
-    "clr_exact_low", "clr_exact_high", "clr_bits", "stage_true", "stage_probability", "law_error", "exact_probability",
-    "own_probability",
-)  # fmt: skip
-
-
-def held(
-    found: Inference,
-    at: tuple[float, float],
-    places: Sequence[tuple[float, float]],
-    sq: float,
-    states: dict[str, Field],
-) -> dict[str, Any]:
-    """Truth and intervals of Sq, and of CLR and stage at one operating point that was heard."""
-    place = next(
-        number for number, point in enumerate(found.forward.points)
-        if number and (point.load_n, point.entrainment_m_s) == at
-    )  # fmt: skip
-    clr = float(states["clr"][list(places).index(at)])
-    ends = {}
-    for name, draws in (("", found.draws), ("exact_", found.exact)):
-        for key, values in (("sq", found.values(draws)["sq_m"]), ("clr", found.values(draws, place)["clr"])):
-            low, high = np.quantile(values, (0.05, 0.95))
-            ends |= {f"{key}_{name}low": float(low), f"{key}_{name}high": float(high)}
-    own = found.at_points()[place - 1]
-    true_stage = max(stages(np.array([clr])).items(), key=lambda entry: entry[1])[0]
-    return {
-        key: {
-            **ends,
-            "sq_true": sq,
-            "sq_bits": found.posterior()["sq_m"].information_bits,
-            "clr_true": clr,
-            "clr_bits": own.state["clr"].information_bits,
-            "stage_true": true_stage,
-            "stage_probability": own.stages[true_stage],
-            "law_error": found.law_error,
-            "exact_probability": found.models[1].probability,
-            "own_probability": found.law_probability("own"),
-        }[key]
-        for key in HELD
-    }
-
-
-def recordings(setting: Setting, number: int, law: str, z: Field, states: dict[str, Field]) -> list[Observation]:
+def recordings(setting: Setting, machine: Machine) -> list[Observation]:
     """What the rig hears of a machine, by the joint separation of all its recordings."""
-    values = {unknown.key: float(unknown.value(z[i : i + 1])[0]) for i, unknown in enumerate(setting.unknowns)}
+    assert machine.states is not None
+    values = {unknown.key: float(unknown.value(machine.z[i : i + 1])[0]) for i, unknown in enumerate(setting.unknowns)}
     stated = setting.case.vibration
     assert stated is not None
     model = stated.with_choices(
         mass=values["mass_kg"], damping_ratio=values["damping_ratio"], cutoff_exponent=values["cutoff_exponent"]
     )
-    rng = np.random.default_rng([SEED, number])
+    rng = np.random.default_rng([SEED, machine.number])
     frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
     band = band_of(setting)
     background = draw_background(frequency, band, Disturbance(), rng)
     spectra, places = [], []
-    for place, (load, speed) in enumerate((load, speed) for load in LOADS for speed in SPEEDS):
-        clr = float(states["clr"][place])
-        if clr < LEAST_SHARE or states["car"][place] == 0.0:
+    for place, (load, speed) in enumerate(PLACES):
+        clr, car = (float(machine.states[key][place]) for key in ("clr", "car"))
+        if clr < LEAST_SHARE or car == 0.0:
             continue  # nothing resonates
         conditions = setting.case.with_overrides({"contact.load": f"{load:g} N"}).conditions
-        state = replace(dry_full_load(conditions, values["sq_m"]), clr=clr, car=float(states["car"][place]))
-        line = contact_line(state, conditions, wrongly(model, law, clr, load), frequency, RATE_HZ)
+        state = replace(dry_full_load(conditions, values["sq_m"]), clr=clr, car=car)
+        line = contact_line(state, conditions, wrongly(model, machine.law, clr, load), frequency, RATE_HZ)
         for test in range(TESTS):
-            ring = RigTest(number + 1, test + 1, values["sq_m"], 1e-8, RATE_HZ, DURATION_S)
+            ring = RigTest(machine.number + 1, test + 1, values["sq_m"], 1e-8, RATE_HZ, DURATION_S)
             spectra.append(background.recorded(ring, line, Disturbance(), rng).spectrum(SEGMENT))
             places.append((load, speed))
     if len(spectra) < 6:
@@ -220,43 +237,132 @@ def wrongly(model: VibrationModel, law: str, clr: float, load: float) -> Vibrati
     if law == OUTSIDE[0]:  # CRF ~ (CLR F)^(1/5), the same as by 1/6 at 250 N
         factor = (clr * load / 250.0) ** (1.0 / 5.0 - 1.0 / 6.0)
     elif law == OUTSIDE[1]:
-        factor = 1.05 if load == LOADS[-1] else 1.0
+        factor = 1.05 if load == PLACES[-1][0] else 1.0
     else:
         return model
     return model.with_choices(mass=model.mass / factor**2)
 
 
-def report(path: Path) -> None:
-    """Shares of intervals that hold, with 90 % of the binomial, and widths."""
-    rows = [row for row in csv.DictReader(path.open()) if row["sq_true"]]
-    for law in dict.fromkeys(row["law"] for row in rows):
-        for points in ("1", "6"):
-            own = [row for row in rows if row["law"] == law and row["points"] == points]
-            if not own:
-                continue
-            said = [f"{law}, {points} point{'s' if points != '1' else ''}, {len(own)} machines:"]
-            for key in ("clr", "sq"):
-                for name in ("", "exact_"):
-                    low, high, true = (np.array([float(row[f"{key}_{end}"]) for row in own])
-                                       for end in (f"{name}low", f"{name}high", "true"))  # fmt: skip
-                    inside = int(np.sum((low <= true) & (true <= high)))
-                    width = np.median(100.0 * (high - low)) if key == "clr" else np.median(high / low)
-                    unit = "points wide" if key == "clr" else "times from end to end"
-                    said.append(
-                        f"{key}{' if exact' if name else ''} held {share(inside, len(own))}, {width:.2f} {unit};"
-                    )
-            bits = [np.median([float(row[f"{key}_bits"]) for row in own]) for key in ("clr", "sq")]
-            stage = int(np.sum([float(row["stage_probability"]) > 0.05 for row in own]))
-            error = np.median([float(row["law_error"]) for row in own])
-            said.append(f"stage held {share(stage, len(own))}; {bits[0]:.1f} and {bits[1]:.1f} bits of CLR and Sq;")
-            said.append(f"law's error {100 * error:.1f} % of CRF (median)")
-            print(" ".join(said), flush=True)
+# Judged --------------------------------------------------------------------------------------------------------------
+
+ENDS = tuple(f"{key}_{name}{end}" for key in ("clr", "sq") for name in ("", "exact_") for end in ("low", "high"))
+HELD = (
+    "clr_true", "sq_true", *ENDS, "clr_bits", "sq_bits", "stage_true", "stage_held", "stage_probability",
+    "likeliest", "likeliest_probability", "law_error", "exact_probability", "own_probability", "identifiable",
+)  # fmt: skip
 
 
-def share(inside: int, count: int) -> str:
+def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[dict[str, Any]]:
+    """A row for the machine heard at one operating point, and one at all of them."""
+    heard = [] if machine.states is None else recordings(setting, machine)
+    at_one = [one for one in heard if one.place[:2] == ONE]
+    for points, observations in ((1, at_one), (len(PLACES), heard)):
+        row = {"machine": machine.number, "law": machine.law, "points": points, "heard": len(observations)}
+        if not observations:
+            yield row | dict.fromkeys(HELD, "")
+            continue
+        found = infer_observations(setting, emulator, observations, seed=machine.number)
+        yield row | held(found, observations[0].place[:2], machine)
+
+
+def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[str, Any]:
+    """Truth and intervals of Sq, and of CLR and stage at one operating point that was heard."""
+    assert machine.states is not None
+    place = next(
+        number for number, point in enumerate(found.forward.points)
+        if number and (point.load_n, point.entrainment_m_s) == at
+    )  # fmt: skip
+    clr = float(machine.states["clr"][PLACES.index(at)])
+    ends = {}
+    for name, draws in (("", found.draws), ("exact_", found.exact)):
+        for key, values in (("sq", found.values(draws)["sq_m"]), ("clr", found.values(draws, place)["clr"])):
+            low, high = np.quantile(values, (0.05, 0.95))
+            ends |= {f"{key}_{name}low": float(low), f"{key}_{name}high": float(high)}
+    own = found.at_points()[place - 1]
+    true_stage = max(stages(np.array([clr])).items(), key=lambda entry: entry[1])[0]
+    ordered = sorted(STAGES, key=lambda stage: -own.stages[stage])
+    reached = np.cumsum([own.stages[stage] for stage in ordered])
+    needed = ordered[: int(np.searchsorted(reached, 0.9)) + 1]
+    return {
+        **{key: ends[key] for key in ENDS},
+        "clr_true": clr,
+        "sq_true": float(found.setting.unknowns[0].value(machine.z[:1])[0]),
+        "clr_bits": own.state["clr"].information_bits,
+        "sq_bits": found.posterior()["sq_m"].information_bits,
+        "stage_true": true_stage,
+        "stage_held": int(true_stage in needed),
+        "stage_probability": own.stages[true_stage],
+        "likeliest": ordered[0],
+        "likeliest_probability": own.stages[ordered[0]],
+        "law_error": found.law_error,
+        "exact_probability": found.models[1].probability,
+        "own_probability": found.law_probability("own"),
+        "identifiable": int(found.identifiable),
+    }
+
+
+# Told ----------------------------------------------------------------------------------------------------------------
+
+
+def tables(kept: Path) -> Iterator[str]:
+    """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown."""
+    every = list(csv.DictReader((kept / "rows.csv").open()))
+    yield "## Intervals of 90 % that hold the truth, of simulated machines"
+    yield (
+        "| truth | points | machines | CLR held | CLR held, laws exact | Sq held | Sq held, laws exact | stage held "
+        "| likeliest stage right (said) |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|"
+    groups = {(row["law"], row["points"]): [] for row in every}
+    for row in every:
+        groups[row["law"], row["points"]].append(row)
+    told = {key: [row for row in rows if row["clr_true"]] for key, rows in sorted(groups.items())}
+    told = {key: rows for key, rows in told.items() if rows}
+    for (law, points), rows in told.items():
+        inside = [share([within(row, key, name) for row in rows]) for key in ("clr", "sq") for name in ("", "exact_")]
+        right = np.mean([row["likeliest"] == row["stage_true"] for row in rows])
+        said = np.mean([float(row["likeliest_probability"]) for row in rows])
+        stage = share([row["stage_held"] == "1" for row in rows])
+        cells = (law, points, len(rows), *inside, stage, f"{100 * right:.0f} % ({100 * said:.0f} %)")
+        yield f"| {' | '.join(map(str, cells))} |"
+    yield "## What such an interval is wide, and what was learned (medians)"
+    yield (
+        "| truth | points | CLR, points of load | laws exact | Sq, upper end over lower | laws exact | bits of CLR "
+        "| bits of Sq | law's error, % of CRF | ln evidence of an error over none |"
+    )
+    yield "|---|---|---|---|---|---|---|---|---|---|"
+    for (law, points), rows in told.items():
+        clr = [f"{100 * median(rows, f'clr_{name}high', f'clr_{name}low', np.subtract):.0f}" for name in ("", "exact_")]
+        sq = [f"{median(rows, f'sq_{name}high', f'sq_{name}low', np.divide):.2f}" for name in ("", "exact_")]
+        bits = [f"{np.median([float(row[f'{key}_bits']) for row in rows]):.1f}" for key in ("clr", "sq")]
+        error = f"{100 * np.median([float(row['law_error']) for row in rows]):.1f}"
+        exact = np.clip([float(row["exact_probability"]) for row in rows], 1e-300, 1.0 - 1e-9)
+        odds = f"{np.median(np.log(1.0 / exact - 1.0)):.1f}"
+        yield f"| {' | '.join((law, points, *clr, *sq, *bits, error, odds))} |"
+    machines = {row["machine"] for row in every}
+    silent = {row["machine"] for row in every if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"}
+    yield (
+        f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of {len(silent)} too few "
+        "recordings show a line, and nothing is said."
+    )
+
+
+def within(row: Mapping[str, str], key: str, name: str) -> bool:
+    """Whether an interval holds the truth."""
+    low, high, true = (float(row[f"{key}_{end}"]) for end in (f"{name}low", f"{name}high", "true"))
+    return low <= true <= high
+
+
+def median(rows: Sequence[Mapping[str, str]], high: str, low: str, how: np.ufunc) -> float:
+    """Of what `how` makes of two columns."""
+    return float(np.median(how([float(row[high]) for row in rows], [float(row[low]) for row in rows])))
+
+
+def share(inside: Sequence[bool]) -> str:
     """A share with its 90 % interval, were it the true one."""
-    low, high = binom.interval(0.9, count, inside / count)
-    return f"{100 * inside / count:.0f} % ({100 * low / count:.0f} to {100 * high / count:.0f})"
+    found = float(np.mean(inside))
+    low, high = binom.interval(0.9, len(inside), found)
+    return f"{100 * found:.0f} % ({100 * low / len(inside):.0f} to {100 * high / len(inside):.0f})"
 
 
 if __name__ == "__main__":

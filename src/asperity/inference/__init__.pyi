@@ -1,3 +1,6 @@
+from .design import Design as Design
+from .design import Lever as Lever
+from .design import design_contact as design_contact
 from .emulator import Emulator as Emulator
 from .emulator import Features as Features
 from .emulator import GridError as GridError
@@ -5,6 +8,10 @@ from .emulator import Quality as Quality
 from .emulator import build_emulator as build_emulator
 from .emulator import emulators_folder as emulators_folder
 from .estimates import Estimate as Estimate
+from .forecast import Forecast as Forecast
+from .forecast import Interval as Interval
+from .forecast import Limit as Limit
+from .forecast import forecast_observations as forecast_observations
 from .forward import LAWS as LAWS
 from .forward import Forward as Forward
 from .forward import Law as Law

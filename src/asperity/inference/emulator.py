@@ -66,10 +66,7 @@ class GridError:
 
 @dataclass(frozen=True)
 class Emulator:
-    """Means over patches of what a contact shows, anywhere in its ranges, each with a standard deviation.
-
-    `scatter` is that of one patch, a line (intercept, slope) of its logarithm over that of c (1 - c), for shares.
-    """
+    """Means over patches of what a contact shows, anywhere in its ranges, each with a standard deviation."""
 
     ranges: tuple[ParameterRange, ...]
     features: "Features"
@@ -90,7 +87,12 @@ class Emulator:
 
     def values(self, shares: Field, key: str) -> Field:
         """The mean of one output in its own unit."""
-        return OUTPUTS[key].back(self(shares, [key])[key][0])
+        return OUTPUTS[key].back(self.means(shares, [key])[key])
+
+    def means(self, shares: Field, wanted: Iterable[str]) -> dict[str, Field]:
+        """The means alone, on the outputs' scales: what is asked along a course."""
+        x = self.features(shares)
+        return {key: self.processes[key].mean(x) for key in wanted}
 
     def scalars(self) -> dict[str, Any]:
         """What is told of an emulator beside what it was used for."""

@@ -6,7 +6,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -70,6 +70,12 @@ class Forward:
     def _place(self) -> Mapping[str, int]:
         return {unknown.key: number for number, unknown in enumerate(self.setting.unknowns)}
 
+    @cached_property
+    def heard(self) -> "Forward":
+        """The same at those operating points alone where something was heard; at all of them where nothing was."""
+        heard = tuple(point for point in self.points if not math.isnan(point.crf.value))
+        return replace(self, points=heard) if heard else self
+
     def unknown(self, z: Field, key: str, known: float) -> Field:
         """Values of an unknown, SI, shape (n,); those of the case where it is known."""
         if key not in self._place:
@@ -90,11 +96,15 @@ class Forward:
                 shares[:, place, number] = np.clip(share_of(entry, value), 0.0, 1.0)
         return shares
 
-    def emulated(self, z: Field, keys: Sequence[str]) -> dict[str, tuple[Field, Field]]:
-        """Mean and deviation of outputs, on their scales, shape (n, points)."""
+    def emulated(self, z: Field, keys: Sequence[str], *, deviations: bool = True) -> dict[str, tuple[Field, Field]]:
+        """Mean and deviation of outputs, on their scales, shape (n, points); zeros where no `deviations` are wanted."""
         shares = self.shares(z)
         rows, places, ranges = shares.shape
-        answers = self.emulator(shares.reshape(-1, ranges), keys)
+        flat = shares.reshape(-1, ranges)
+        if deviations:
+            answers = self.emulator(flat, keys)
+        else:
+            answers = {key: (mean, np.zeros(len(mean))) for key, mean in self.emulator.means(flat, keys).items()}
         z_grid = self.unknown(z, GRID_ERROR, 0.0)[:, None]
         found: dict[str, tuple[Field, Field]] = {}
         for key, (mean, std) in answers.items():
@@ -106,13 +116,16 @@ class Forward:
         """Outputs in their own units, shape (n, points)."""
         return {key: OUTPUTS[key].back(mean) for key, (mean, _) in self.emulated(z, keys).items()}
 
-    def shown(self, z: Field, law: Law, *, heights: bool = True) -> Shown:
-        """What recordings show at unknowns z, shape (n, dims), by a law; nan for CRFA where no `heights` are wanted."""
+    def shown(self, z: Field, law: Law, *, heights: bool = True, deviations: bool = True) -> Shown:
+        """What recordings show at unknowns z, shape (n, dims), by a law.
+
+        CRFA is nan where no `heights` are wanted, deviations are 0 where none are.
+        """
         model = self.setting.case.vibration
         assert model is not None
         heights = heights and isinstance(model.excitation, NoiseExcitation)
         outputs = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
-        emulated = self.emulated(z, (*outputs, CAR) if heights else outputs)
+        emulated = self.emulated(z, (*outputs, CAR) if heights else outputs, deviations=deviations)
         mass = self.unknown(z, "mass_kg", model.mass)[:, None]
         rest = self.unknown(z, "damping_ratio", model.damping_ratio)[:, None]
         loads = np.array([point.load_n for point in self.points])

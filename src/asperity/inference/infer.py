@@ -98,7 +98,9 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
     before = inference.forward
     points = (before.points[0], *points_of(observations))
     forward, pools = replace(before, points=points), dict(inference.pools)
-    if len(points) > len(before.points):
+    if not inference.observations:
+        pools = new_pools(forward, inference.seed)
+    elif len(points) > len(before.points):
         pools = with_point(pools, forward, replace(before, points=points[-1:]))
     else:
         pools = {law: pool.with_columns(_again(forward, law), pool.shown) for law, pool in pools.items()}
@@ -107,7 +109,7 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
 
 
 def _again(forward: Forward, law: Law) -> Callable[..., object]:
-    return lambda z: forward.shown(z, law)
+    return lambda z: forward.heard.shown(z, law)
 
 
 def _inferred(

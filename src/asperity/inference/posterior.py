@@ -5,7 +5,7 @@ A model is a law of the contact's spring, with or without a term for its error. 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from scipy.special import logsumexp
@@ -69,6 +69,7 @@ def sample_models(
     AsperityError
         where the posterior of a model that counts was not found.
     """
+    forward = forward.heard
     sampled: dict[tuple[Law, bool], Sampled] = {}
     how: dict[str, Any] = {"enough": QUICKLY} if quickly else {}
     best = -np.inf
@@ -113,12 +114,12 @@ def _evaluate(forward: Forward, law: Law) -> Callable[[Field], Shown]:
 
 def new_pools(forward: Forward, seed: int) -> dict[Law, Pool]:
     """Draws from the prior, for each law."""
-    return {law: Pool(_evaluate(forward, law), joined, _taken, forward.dims, seed) for law in LAWS}
+    return {law: Pool(_evaluate(forward.heard, law), joined, taken, forward.dims, seed) for law in LAWS}
 
 
 def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> dict[Law, Pool]:
     """The draws that count, with one more operating point, `added`, behind those of before; `forward` has them all."""
-    extended = {}
+    extended, forward = {}, forward.heard
     before = forward.points[: -len(added.points)]
     for law, whole in pools.items():
         pool = whole.reduced([_target(before, discrepancy=flag)(whole.shown) for flag in (True, False)])
@@ -128,13 +129,17 @@ def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> d
     return extended
 
 
-def _taken(shown: Shown, rows: Field) -> Shown:
-    return Shown(*(column[rows] for column in shown))
+Columns = TypeVar("Columns", bound=tuple[Field, ...])
 
 
-def joined(first: Shown, second: Shown) -> Shown:
+def taken(shown: Columns, rows: Field) -> Columns:
+    """Some rows of each column."""
+    return type(shown)(*(column[rows] for column in shown))
+
+
+def joined(first: Columns, second: Columns) -> Columns:
     """Rows of one behind those of the other."""
-    return Shown(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+    return type(first)(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
 
 
 # Draws ---------------------------------------------------------------------------------------------------------------

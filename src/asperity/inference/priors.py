@@ -7,13 +7,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from asperity.arrays import Field
 from asperity.case import to_si
 from asperity.study import ParameterRange
 
 REACH = 3.5  # standard deviations of a stated value that its range goes to
+END = 1e-6  # share of a range from its ends, where a normal number is infinite
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +59,17 @@ class Unknown:
         else:
             values = self.mean * np.exp(z * math.log(high / self.mean) / REACH)
         return np.asarray(np.clip(values, low, high))
+
+    def at_share(self, share: Field) -> Field:
+        """The z at which its value lies so far along its range: the inverse of `share`, within the range."""
+        share = np.clip(share, END, 1.0 - END)
+        if self.bounded:
+            return np.asarray(ndtri(share))
+        low, high = self.range.low, self.range.high
+        value = low * (high / low) ** share if self.range.log else low + share * (high - low)
+        if self.mean - REACH * self.std > 0.0 or self.mean <= 0.0:
+            return np.asarray((value - self.mean) / self.std)
+        return np.asarray(np.log(value / self.mean) * REACH / math.log(high / self.mean))
 
     def value(self, z: Field) -> Field:
         """Values at z, SI."""

@@ -1,6 +1,7 @@
 """A Gaussian process over the unit cube: fitted by scikit-learn, asked by a few lines of algebra.
 
-scikit-learn finds the lengths and levels; what is asked a million times a second needs neither its checks nor itself.
+scikit-learn finds the lengths and levels; what is asked a million times a second needs neither its checks nor itself,
+and no more than single precision: 1e-5 of a deviation.
 """
 
 import warnings
@@ -18,7 +19,7 @@ LENGTHS = (0.1, 30.0)  # of the kernel, in widths of the cube
 LEVELS = (1e-2, 1e2)  # variance of the process over that of the data
 ROUGHNESS = (1e-5, 1.0)  # white noise beside the stated one: what the process does not follow
 TREND_NOISE = 0.02  # least variance of a point in the fit of the trend
-AT_ONCE = 8192  # points asked at a time
+AT_ONCE = 512  # points asked at a time: their kernel stays in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -50,28 +51,52 @@ class Process:
 
     @cached_property
     def _solved(self) -> tuple[Field, Field]:
-        """Inverse of the covariance, and that times the data."""
+        """The transposed inverse of the covariance's lower factor, and the inverse of the whole times the data."""
         rest = (self.y - _basis(self.x) @ self._trend) / self._scale
-        covariance = self._kernel(self.x) + np.diag(self.noise / self._scale**2 + self.rough)
-        inverse = scipy.linalg.cho_solve(scipy.linalg.cho_factor(covariance, lower=True), np.eye(rest.size))
-        return inverse, inverse @ rest
+        covariance = self._kernel(self.x, float) + np.diag(self.noise / self._scale**2 + self.rough)
+        lower = scipy.linalg.cholesky(covariance, lower=True)
+        whitener = scipy.linalg.solve_triangular(lower, np.eye(rest.size), lower=True).T
+        return whitener, whitener @ (whitener.T @ rest)
 
-    def _kernel(self, x: Field) -> Field:
+    @cached_property
+    def _single(self) -> tuple[Field, Field]:
+        """Both in single precision."""
+        whitener, weights = self._solved
+        return whitener.astype(np.float32), weights.astype(np.float32)
+
+    def _kernel(self, x: Field, precision: type = np.float32) -> Field:
         near, far = x / self.lengths, self.x / self.lengths
-        square = np.sum(near**2, axis=1)[:, None] + np.sum(far**2, axis=1) - 2.0 * near @ far.T
-        distance = np.sqrt(5.0 * np.maximum(square, 0.0))
-        return np.asarray(self.level * (1.0 + distance + distance**2 / 3.0) * np.exp(-distance))
+        square = near @ (-2.0 * far.T)
+        square += np.sum(near**2, axis=1)[:, None]
+        square += np.sum(far**2, axis=1)
+        distance = np.maximum(5.0 * square, 0.0).astype(precision)
+        np.sqrt(distance, out=distance)
+        kernel = distance / 3.0
+        kernel += 1.0
+        kernel *= distance
+        kernel += 1.0
+        np.negative(distance, out=distance)
+        kernel *= np.exp(distance, out=distance)
+        kernel *= self.level
+        return np.asarray(kernel)
 
     def __call__(self, x: Field) -> tuple[Field, Field]:
         """Mean and standard deviation at points, shape (n, d): of the mean over surfaces, not of one surface."""
-        inverse, weights = self._solved
+        whitener, weights = self._single
         means, stds = [], []
         for part in np.array_split(x, max(1, -(-len(x) // AT_ONCE))):
             kernel = self._kernel(part)
-            known = np.einsum("ij,ij->i", kernel @ inverse, kernel)
+            white = kernel @ whitener
+            known = np.einsum("ij,ij->i", white, white).astype(float)
             means.append(_basis(part) @ self._trend + self._scale * (kernel @ weights))
             stds.append(self._scale * np.sqrt(np.maximum(self.level - known, 0.0) + self.rough))
         return np.concatenate(means), np.concatenate(stds)
+
+    def mean(self, x: Field) -> Field:
+        """The mean alone, in a third of the time."""
+        weights = self._single[1]
+        parts = np.array_split(x, max(1, -(-len(x) // AT_ONCE)))
+        return np.concatenate([_basis(p) @ self._trend + self._scale * (self._kernel(p) @ weights) for p in parts])
 
     def settings(self) -> dict[str, Any]:
         """What `fit_process` found, in numbers."""

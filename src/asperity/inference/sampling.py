@@ -204,8 +204,12 @@ def _proposal(z: Field, weights: Field, rng: np.random.Generator) -> tuple[Calla
 
     def density(at: Field) -> Field:
         own = at @ inverse.T
-        square = np.sum(own**2, axis=1)[:, None] + np.sum(whitened**2, axis=1) - 2.0 * own @ whitened.T
-        parts = logsumexp(-0.5 * square, axis=1) - np.log(CENTRES) + log_norm
+        minus = own @ whitened.T  # of half the square of the distance to each centre, in place
+        minus -= 0.5 * np.sum(whitened**2, axis=1)
+        minus -= 0.5 * np.sum(own**2, axis=1)[:, None]
+        peak = minus.max(axis=1)
+        minus -= peak[:, None]
+        parts = peak + np.log(np.exp(minus, out=minus).mean(axis=1)) + log_norm
         return np.asarray(np.logaddexp(np.log1p(-FROM_PRIOR) + parts, np.log(FROM_PRIOR) + _log_normal(at)))
 
     drawn = centres[rng.integers(CENTRES, size=BATCH)] + rng.standard_normal((BATCH, len(mean))) @ lower.T

@@ -1,0 +1,281 @@
+"""When a limit is crossed: the courses of all possible contacts, let run on."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.special import logsumexp
+
+from asperity.arrays import Field
+from asperity.errors import AsperityError, BadInput
+from asperity.inference.course import Course, Extra, Walked, between_knots, tabulated
+from asperity.inference.emulator import Emulator
+from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law
+from asperity.inference.observations import Observation
+from asperity.inference.outputs import CLR, OUTPUTS
+from asperity.inference.posterior import joined, taken
+from asperity.inference.sampling import FEWEST, Pool, Sampled, importance
+from asperity.inference.settings import Setting
+from asperity.inference.visits import Series, series_of
+from asperity.quantities import quantity
+
+ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
+HORIZON, STEPS = 2.0, 80  # how far, over the span of the series; in so many steps
+ODDS = 100.0  # of a change over none, from which on it is told: chance gets there once in a hundred series, at most
+ENDS = (0.05, 0.5, 0.95)
+
+
+class Limit(NamedTuple):
+    """A value [SI] of the load share or of what drifts, that is not to be crossed."""
+
+    key: str
+    value: float
+
+
+class Interval(NamedTuple):
+    """Ends of 90 % and the median, SI."""
+
+    low: float
+    median: float
+    high: float
+
+    @classmethod
+    def of(cls, values: Field) -> "Interval":
+        """Of equally probable values; nan where there are none."""
+        return cls(*(float(end) for end in np.quantile(values, ENDS))) if len(values) else cls(*[float("nan")] * 3)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """When a limit is crossed, as far as a series of recordings tells.
+
+    Parameters
+    ----------
+    limit, drifting : what is asked, and which unknown changes
+    series : what was heard, and when
+    rising : whether the limit is reached from below
+    log_odds : ln evidence of a change over none
+    already, within : probability that the limit is crossed by the last visit, and that it will be within `horizon`
+    time : after the last visit, in the series' unit, of those courses that cross it within the horizon
+    horizon : how far ahead was looked
+    clr, value : load share and what drifts, at the last visit
+    bands : ends and median of the limit's quantity at each visit and ahead, by x
+    """
+
+    limit: Limit
+    drifting: str
+    series: Series
+    rising: bool
+    log_odds: float
+    already: float
+    within: float
+    time: Interval
+    horizon: float
+    clr: Interval
+    value: Interval
+    bands: Mapping[str, Field] = field(repr=False)
+
+    @property
+    def told(self) -> bool:
+        """Whether the contact changes: a hundred to one."""
+        return self.log_odds >= np.log(ODDS)
+
+    @property
+    def alarm(self) -> bool:
+        """Whether it changes, and is past the limit or more likely than not to cross it within the horizon."""
+        return self.told and self.already + self.within >= 0.5
+
+    def sentence(self) -> str:
+        """In words."""
+        entry, x = quantity(self.limit.key), self.series.x
+        what = f"{entry.short} {entry.text(self.limit.value)}"
+        if not self.told:
+            return (
+                f"No change of the contact is told over {len(x)} visits (odds {np.exp(min(self.log_odds, 50.0)):.2g} "
+                f"to 1): nothing is said of when {what} is crossed."
+            )
+        way = "rises above" if self.rising else "falls below"
+        if self.already >= 0.5:
+            return f"{entry.short} is past {entry.text(self.limit.value)} (probability {self.already:.2f})."
+        said = f"{entry.short} {way} {entry.text(self.limit.value)} within {self.horizon:.3g} after the last recording"
+        said += f" with a probability of {self.already + self.within:.2f}"
+        if self.within < 0.05:
+            return said + "."
+        return said + f", if so after {self.time.low:.3g} to {self.time.high:.3g} (90 %; {self.time.median:.3g})."
+
+    def scalars(self) -> dict[str, Any]:
+        """As JSON has it; times in the series' own unit, after its last recording."""
+        return {
+            "limit": {"key": self.limit.key, "value": self.limit.value, "rising": self.rising},
+            "drifting": self.drifting,
+            "changes": self.told,
+            "log_odds": self.log_odds,
+            "alarm": self.alarm,
+            "already": self.already,
+            "within": self.within,
+            "horizon": self.horizon,
+            "time": {key: None if np.isnan(end) else end for key, end in self.time._asdict().items()},
+            "clr": self.clr._asdict(),
+            "value": self.value._asdict(),
+            "x": list(self.series.x),
+            "sentence": self.sentence(),
+        }
+
+
+class _Model(NamedTuple):
+    course: Course
+    moving: bool
+    sampled: Sampled
+
+
+def forecast_observations(
+    setting: Setting,
+    emulator: Emulator,
+    observations: Sequence[Observation],
+    *,
+    limit: Limit | tuple[str, float] = (CLR, 0.5),
+    drifting: str = "sq_m",
+    drift: tuple[float, float] | None = None,
+    laws: Sequence[Law] = LAWS,
+    seed: int = 0,
+) -> Forecast:
+    """When the load share, or what drifts, crosses a limit, with its interval.
+
+    Parameters
+    ----------
+    setting, emulator : what is not known, and what answers
+    observations : resonances, each with its x
+    limit : key and value [SI], the key "clr" or that of what drifts
+    drifting : key of the unknown that changes; all others stay as they are
+    drift : mean and standard deviation of the first drift, in shares of the range of what drifts over the series, as a
+        wear model may foretell it; by default none, and up to half the range either way
+    laws : of the spring
+    seed : of all that is drawn
+
+    Raises
+    ------
+    BadInput
+        for a limit that is neither, recordings without x, or fewer than four visits.
+    AsperityError
+        where no course was found.
+    """
+    limit = Limit(*limit)
+    if limit.key not in (CLR, drifting):
+        raise BadInput(f"a limit must be of {CLR} or {drifting}, which changes, got {limit.key!r}")
+    if limit.key == CLR and not 0.0 < limit.value < 1.0:
+        raise BadInput(f"a limit of CLR must lie between 0 and 1, got {limit.value:g}")
+    series = series_of(observations)
+    forward = Forward(setting, emulator, series.places)
+    models, best = [], -np.inf
+    for law in laws:
+        course = Course(forward, series, law, drifting, *([drift] if drift else []))
+        pool = Pool(course, joined, taken, course.dims, seed)
+        for moving in (True, False):
+            sampled = importance(pool, _target(moving=moving), enough=ENOUGH, best=best)
+            best = max(best, sampled.log_evidence)
+            models.append(_Model(course, moving, sampled))
+    if max(model.sampled.effective for model in models) < FEWEST:
+        raise AsperityError(
+            "no course of the contact was found that these recordings fit; state wider priors in [infer]"
+        )
+    return _forecast(models, limit, seed)
+
+
+def _target(*, moving: bool) -> Callable[[Any], Field]:
+    return lambda followed: followed.moving if moving else followed.steady
+
+
+def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
+    rng = np.random.default_rng([seed, 8])
+    logs = np.array([model.sampled.log_evidence for model in models])
+    changing = np.array([model.moving for model in models])
+    odds = float(logsumexp(logs[changing]) - logsumexp(logs[~changing]))
+    counts = np.round(COURSES * np.exp(logs - logsumexp(logs))).astype(int)
+    parts = [_let_run(model, int(count), limit, rng) for model, count in zip(models, counts, strict=True) if count >= 1]
+    past, ahead, clr, value = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    series = models[0].course.series
+    rising = bool(np.mean(ahead[:, -1] >= past[:, 0]) >= 0.5)
+    reached = ahead >= limit.value if rising else ahead <= limit.value
+    first = np.argmax(reached, axis=1)
+    already, will = reached[:, 0], reached.any(axis=1) & ~reached[:, 0]
+    rows = np.flatnonzero(will)
+    before, after = ahead[rows, first[rows] - 1], ahead[rows, first[rows]]
+    step = HORIZON * series.span / STEPS
+    times = step * (first[rows] - 1 + (limit.value - before) / (after - before))
+    x_ahead = series.x[-1] + step * np.arange(1, STEPS + 1)
+    whole = np.hstack([past, ahead[:, 1:]])
+    return Forecast(
+        limit=limit,
+        drifting=models[0].course.drifting,
+        series=series,
+        rising=rising,
+        log_odds=odds,
+        already=float(np.mean(already)),
+        within=float(np.mean(will)),
+        time=Interval.of(times),
+        horizon=HORIZON * series.span,
+        clr=Interval.of(clr),
+        value=Interval.of(value),
+        bands={"x": np.concatenate([series.x, x_ahead]), "ends": np.quantile(whole, ENDS, axis=0)},
+    )
+
+
+def _let_run(model: _Model, count: int, limit: Limit, rng: np.random.Generator) -> tuple[Field, Field, Field, Field]:
+    """The limit's quantity at the visits and ahead, (count, times); load share and what drifts, at the last visit."""
+    course, weights = model.course, model.sampled.weights
+    places = (rng.random() + np.arange(count)) / count
+    z = model.sampled.z[np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)]
+    extra, walked = Extra.of(z[:, course.forward.dims :]), course.walk(z, moving=model.moving)
+    share, speed, error = _drawn(walked, rng)
+    ahead = _run_on(share, speed, extra.restless if model.moving else np.zeros(count), rng)
+    unknown = course.forward.setting.unknowns[course.column]
+    if not model.moving:
+        ahead = np.repeat(share[:, None], STEPS + 1, axis=1)
+    scale, std = tabulated(course.forward, z, course.column, course.series.usual)
+    off = _offset(course, scale, std, share, error, extra.size, rng)[:, None]
+
+    def shown(key: str, shares: Field) -> Field:
+        if key == CLR:
+            return OUTPUTS[CLR].back(between_knots(scale, shares)[0] + off)
+        return unknown.value(unknown.at_share(shares))
+
+    now = share[:, None]
+    return (
+        shown(limit.key, walked.path),
+        shown(limit.key, ahead),
+        shown(CLR, now)[:, 0],
+        shown(course.drifting, now)[:, 0],
+    )
+
+
+def _drawn(walked: Walked, rng: np.random.Generator) -> Field:
+    """Share, drift and error of each contact at the last visit, (3, n)."""
+    values, axes = np.linalg.eigh(walked.covariance)
+    drawn = np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(values.shape)
+    return np.asarray((walked.mean + np.einsum("nij,nj->ni", axes, drawn)).T)
+
+
+def _run_on(share: Field, speed: Field, restless: Field, rng: np.random.Generator) -> Field:
+    """Shares from the last visit on, (n, steps + 1): an integrated Wiener process, exactly."""
+    time = HORIZON / STEPS
+    path = [share]
+    for _ in range(STEPS):
+        one, other = rng.standard_normal((2, len(share)))
+        share = share + time * speed + restless * time**1.5 * (0.5 * one + other / np.sqrt(12.0))
+        speed = speed + restless * np.sqrt(time) * one
+        path.append(share)
+    return np.stack(path, axis=1)
+
+
+def _offset(
+    course: Course, scale: Field, std: Field, share: Field, error: Field, size: Field, rng: np.random.Generator
+) -> Field:
+    """By how much the emulator is off in the load share: its part of the error that CRF showed, and what is left."""
+    lever = np.zeros(len(share))
+    if course.law == "hertz-point":
+        clr = np.maximum(OUTPUTS[CLR].back(between_knots(scale, share)[0]), LEAST_SHARE)
+        lever = 1.0 / (6.0 * clr * OUTPUTS[CLR].slope(clr))  # d ln CRF / d scale
+    heard = (std * lever) ** 2 + size**2
+    left = np.sqrt(np.maximum(std**2 * (1.0 - (std * lever) ** 2 / heard), 0.0))
+    return np.asarray(std**2 * lever / heard * error + left * rng.standard_normal(len(share)))
