@@ -3,6 +3,7 @@
 import json
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,15 @@ from scipy.io import wavfile
 
 from asperity.case import load_case
 from asperity.errors import BadInput
-from asperity.inference import Observation, build_emulator, infer_observations, listen, setting_of
+from asperity.inference import (
+    Observation,
+    build_emulator,
+    design_contact,
+    forecast_observations,
+    infer_observations,
+    listen,
+    setting_of,
+)
 from asperity.report import write_inference_report
 from asperity.tracking import read_table
 from support.emulated import formula_emulator, formula_setting
@@ -89,6 +98,17 @@ def test_noise_cannot_be_told_by_command(asp, small):
     assert len(said["silent"]) == 2
     assert "<script" not in Path("page.html").read_text("utf-8")
     assert asp(*command, "--quiet")[1] == said["verdict"] + "\n"
+    assert (said["forecast"], said["design"]) == (None, None)
+    code, out, err = asp(*command, "--forecast", "clr=0.5")
+    assert (code, out) == (2, "")
+    assert "a forecast takes resonances of 4 recordings at different times or more, got 0" in err
+    code, out, _ = asp("infer", "--case", "infer.toml", "--emulator", str(folder), "--design", "0.6", "--json")
+    design = json.loads(out)["design"]
+    assert code == 0
+    assert design["sentence"].startswith("CLR stays below 60.0 % with a probability of")
+    assert [lever["key"] for lever in design["levers"]] == ["sq_m", "load_n", "entrainment_speed_m_s"]
+    smooth, rough = (design["levers"][0]["chances"][end] for end in (0, -1))
+    assert smooth > rough + 0.3
 
 
 def test_refusals_are_one_sentence(asp):
@@ -100,6 +120,7 @@ def test_refusals_are_one_sentence(asp):
     for arguments, said in (
         (("a.wav",), "give --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
+        (("a.wav", "--case", "infer.toml", "--forecast", "crf=3 kHz"), "--forecast takes a limit such as clr=0.5"),
         (("empty", "--case", "infer.toml"), "holds no recordings"),
         (("a.wav", "--case", "infer.toml", "--table", "kilo.csv"), "has a column load_kn; take load_n"),
         (("a.wav", "--case", "infer.toml", "--table", "nan.csv"), "load_n must be a number"),
@@ -137,7 +158,23 @@ def test_a_page_shows_what_was_heard(tmp_path):
     heard = [Observation(load_n=load, entrainment_m_s=1.0, crf_hz=3300.0 * (load / 500.0) ** 0.2, crf_std_hz=5.0,
                          name=f"{load:g}.wav") for load in (300.0, 500.0, 900.0)]  # fmt: skip
     found = infer_observations(setting, formula_emulator(setting), heard, notes=("A note of its own.",))
-    text = write_inference_report(found, tmp_path / "page.html").read_text("utf-8")
-    for words in ("Verdict", "A note of its own.", "Against what was heard", "to run next", "hertz-point"):
+    series = [replace(heard[1], x=10.0 * number, crf_hz=3300.0 + 12.0 * number) for number in range(8)]
+    path = write_inference_report(
+        found,
+        tmp_path / "page.html",
+        forecast=forecast_observations(setting, found.emulator, series, limit=("clr", 0.5), laws=("hertz-point",)),
+        design=design_contact(found.forward, found.draws.z, clr=0.3),
+    )
+    text = path.read_text("utf-8")
+    for words in (
+        "In time",
+        "What keeps CLR below a value",
+        "stays below 30.0",
+        "Verdict",
+        "A note of its own.",
+        "Against what was heard",
+        "to run next",
+        "hertz-point",
+    ):
         assert words in text
-    assert text.count("<img") == 4
+    assert text.count("<img") == 6

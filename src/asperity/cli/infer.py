@@ -9,12 +9,13 @@ from asperity import inference, processes, report
 from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Overrides, Page, Quiet, chosen_case, require_output
+from asperity.cli.recordings import EXIT_CODES
 from asperity.cli.show import Block, columns, progress, show, table, written
 from asperity.errors import BadInput, require_choice
 from asperity.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.inference import Emulator, Inference, Sampler, Setting
+    from asperity.inference import Design, Emulator, Forecast, Inference, Sampler, Setting
     from asperity.study import StudyProgress
     from asperity.wear import SeriesMethod
 
@@ -39,7 +40,13 @@ def infer(
         Path | None, typer.Option(metavar="DIR", help="Folder of the emulator; else one in the user's cache.")
     ] = None,
     sampler: Annotated[str, typer.Option(help="importance, or nested (dynesty), which takes minutes.")] = "importance",
-    seed: Annotated[int, typer.Option(metavar="SEED", min=0, help="Of all that is drawn.")] = 0,
+    forecast: Annotated[
+        str | None, typer.Option(metavar="LIMIT", help="When clr=0.5, or sq='2 um', is crossed; of a series.")
+    ] = None,
+    design: Annotated[
+        float | None, typer.Option(metavar="CLR", help="What keeps the load share below it, such as 0.3; alone, too.")
+    ] = None,
+    seed: options.SampleSeed = 0,
     rate: options.Rate = None,
     unit: options.Unit = None,
     channel: options.Channel = None,
@@ -53,45 +60,59 @@ def infer(
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
-    if case_file is None or not paths:
+    if case_file is None or not (paths or design is not None):
         lacks = "the contact; give --case CASE.toml" if case_file is None else "recordings; name files, or their folder"
         raise BadInput(f"asperity infer needs {lacks}")
     require_choice("--sampler", sampler, inference.SAMPLERS)
-    chosen = chosen_case(case_file, overrides)
-    setting = inference.setting_of(chosen)
+    setting = inference.setting_of(chosen_case(case_file, overrides))
+    limit = None if forecast is None else inference.read_limit(forecast, setting)
     require_output(page, ".html", option="--report")
     count = workers or processes.cores()
-    with progress("recordings", "reading recordings ...", quiet=quiet):
-        heard = inference.listen(
-            paths,
-            setting,
-            table=table_file,
-            band_hz=band,
-            rate_hz=rate,
-            unit=unit,
-            channel=channel,
-            scale=scale,
-            shaft_hz=shaft or None,
-            method=cast("SeriesMethod | None", method),
-            workers=count,
-        )
+    heard = inference.Listened()
+    if paths:
+        with progress("recordings", "reading recordings ...", quiet=quiet):
+            heard = inference.listen(
+                paths,
+                setting,
+                table=table_file,
+                band_hz=band,
+                rate_hz=rate,
+                unit=unit,
+                channel=channel,
+                scale=scale,
+                shaft_hz=shaft or None,
+                method=cast("SeriesMethod | None", method),
+                workers=count,
+            )
     emulated = _emulated(setting, emulator, count, quiet=quiet)
-    found = inference.infer_observations(
-        setting,
-        emulated,
-        heard.observations,
-        sampler=cast("Sampler", sampler),
-        seed=seed,
-        silent=heard.silent,
-        notes=heard.notes,
-    )
-    blocks = (_told(found), _points(found), _models(found), _notes(found))
+    found = inference.infer_heard(setting, emulated, heard, sampler=cast("Sampler", sampler), seed=seed)
+    ahead = None if limit is None else inference.forecast_heard(setting, emulated, heard, limit, seed=seed)
+    kept = None if design is None else inference.design_contact(found.forward, found.draws.z, clr=design)
     if page is not None:
-        report.write_inference_report(found, page)
-    told = {"report": None if page is None else str(page)}
-    show(
-        found.verdict(), lambda: found.scalars() | told, *blocks, written("report", page), as_json=as_json, quiet=quiet
-    )
+        report.write_inference_report(found, page, forecast=ahead, design=kept)
+    _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
+    if ahead is not None and ahead.alarm:
+        raise typer.Exit(EXIT_CODES["alarm"])
+
+
+def _show(
+    found: "Inference",
+    ahead: "Forecast | None",
+    kept: "Design | None",
+    page: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """The verdict, first that of what was asked, and the tables; or all as JSON."""
+    asked = [one.sentence() for one in (ahead, kept) if one is not None]
+    told = {
+        "forecast": None if ahead is None else ahead.scalars(),
+        "design": None if kept is None else kept.scalars(),
+        "report": None if page is None else str(page),
+    }
+    blocks = (_told(found), _points(found), _models(found), _notes(found), written("report", page))
+    show([*asked, found.verdict()], lambda: found.scalars() | told, *blocks, as_json=as_json, quiet=quiet)
 
 
 def _emulated(setting: "Setting", folder: Path | None, workers: int, *, quiet: bool) -> "Emulator":
@@ -130,22 +151,9 @@ def _told(found: "Inference") -> Block:
 
 def _points(found: "Inference") -> Block:
     """A row an operating point that was recorded."""
-    rows = []
-    for one in found.at_points():
-        clr, film = one.state["clr"], one.state["h_mean_m"]
-        stage, probability = max(one.stages.items(), key=lambda entry: entry[1])
-        rows.append(
-            [
-                quantity("load_n").number(one.point.load_n),
-                quantity("entrainment_speed_m_s").number(one.point.entrainment_m_s),
-                str(len(one.point.names)),
-                quantity("clr").interval(clr.low, clr.high),
-                quantity("h_mean_m").interval(film.low, film.high),
-                f"{stage} ({probability:.2f})",
-            ]
-        )
+    rows = [one.cells() for one in found.at_points()]
     if rows:
-        yield from columns(["F [N]", "u [m/s]", "recordings", "CLR, 90 %", "film, 90 %", "stage"], rows, left=0)
+        yield from columns(found.at_points()[0].HEADS, rows)
 
 
 def _notes(found: "Inference") -> Block:

@@ -12,12 +12,15 @@ from .forecast import Forecast as Forecast
 from .forecast import Interval as Interval
 from .forecast import Limit as Limit
 from .forecast import forecast_observations as forecast_observations
+from .forecast import read_limit as read_limit
 from .forward import LAWS as LAWS
 from .forward import Forward as Forward
 from .forward import Law as Law
 from .forward import Shown as Shown
 from .infer import SAMPLERS as SAMPLERS
+from .infer import forecast_heard as forecast_heard
 from .infer import infer_contact as infer_contact
+from .infer import infer_heard as infer_heard
 from .infer import infer_observations as infer_observations
 from .infer import with_observation as with_observation
 from .inference import CRUCIAL as CRUCIAL

@@ -223,7 +223,7 @@ class _State:
         for turn in range(PASSES):
             value, slope = table.at(channel, place, share)
             said = value + slope * (self.mean[:, SHARE] - share) + self.mean[:, error]
-            with_share, spread = slope * self.covariance[:, SHARE], self.covariance[:, error].copy()
+            with_share, spread = slope[:, None] * self.covariance[:, SHARE], self.covariance[:, error].copy()
             if channel == "crf":
                 spread += table.lever[:, place, None] * self.covariance[:, LEVER]
                 said = said + table.lever[:, place] * self.mean[:, LEVER]

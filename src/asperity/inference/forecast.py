@@ -1,13 +1,15 @@
 """When a limit is crossed: the courses of all possible contacts, let run on."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
 from asperity.arrays import Field
+from asperity.case import read_amount
 from asperity.errors import AsperityError, BadInput
 from asperity.inference.course import Course, Extra, Walked, between_knots, tabulated
 from asperity.inference.emulator import Emulator
@@ -61,6 +63,7 @@ class Forecast:
     horizon : how far ahead was looked
     clr, value : load share and what drifts, at the last visit
     bands : ends and median of the limit's quantity at each visit and ahead, by x
+    x_name : what x is
     """
 
     limit: Limit
@@ -75,11 +78,12 @@ class Forecast:
     clr: Interval
     value: Interval
     bands: Mapping[str, Field] = field(repr=False)
+    x_name: str = ""
 
     @property
     def told(self) -> bool:
         """Whether the contact changes: a hundred to one."""
-        return self.log_odds >= np.log(ODDS)
+        return self.log_odds >= math.log(ODDS)
 
     @property
     def alarm(self) -> bool:
@@ -98,8 +102,11 @@ class Forecast:
         way = "rises above" if self.rising else "falls below"
         if self.already >= 0.5:
             return f"{entry.short} is past {entry.text(self.limit.value)} (probability {self.already:.2f})."
-        said = f"{entry.short} {way} {entry.text(self.limit.value)} within {self.horizon:.3g} after the last recording"
-        said += f" with a probability of {self.already + self.within:.2f}"
+        unit = f" in {self.x_name}" if self.x_name else ""
+        said = (
+            f"{entry.short} {way} {entry.text(self.limit.value)} within {self.horizon:.3g} after the last recording"
+            f"{unit} with a probability of {self.already + self.within:.2f}"
+        )
         if self.within < 0.05:
             return said + "."
         return said + f", if so after {self.time.low:.3g} to {self.time.high:.3g} (90 %; {self.time.median:.3g})."
@@ -123,6 +130,26 @@ class Forecast:
         }
 
 
+def read_limit(text: str, setting: Setting) -> Limit:
+    """A limit as it is written: "clr=0.5", or an unknown's bare name and amount, "sq=2 um".
+
+    Raises
+    ------
+    BadInput
+        for a name that is neither, or no amount.
+    """
+    name, _, amount = (part.strip() for part in text.partition("="))
+    known = {unknown.range.key.rpartition(".")[2]: unknown.key for unknown in setting.contact}
+    if name not in (CLR, *known):
+        raise BadInput(f"--forecast takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}")
+    if name != CLR:
+        return Limit(known[name], read_amount(f"--forecast {name}", quantity(known[name]).unit, amount))
+    try:
+        return Limit(CLR, float(amount))
+    except ValueError:
+        raise BadInput(f"--forecast clr takes a share of the load such as clr=0.5, got {text!r}") from None
+
+
 class _Model(NamedTuple):
     course: Course
     moving: bool
@@ -135,10 +162,11 @@ def forecast_observations(
     observations: Sequence[Observation],
     *,
     limit: Limit | tuple[str, float] = (CLR, 0.5),
-    drifting: str = "sq_m",
+    drifting: str | None = None,
     drift: tuple[float, float] | None = None,
     laws: Sequence[Law] = LAWS,
     seed: int = 0,
+    x_name: str = "",
 ) -> Forecast:
     """When the load share, or what drifts, crosses a limit, with its interval.
 
@@ -147,11 +175,12 @@ def forecast_observations(
     setting, emulator : what is not known, and what answers
     observations : resonances, each with its x
     limit : key and value [SI], the key "clr" or that of what drifts
-    drifting : key of the unknown that changes; all others stay as they are
+    drifting : key of the unknown that changes, all others stay as they are; by default the limit's, of CLR that of Sq
     drift : mean and standard deviation of the first drift, in shares of the range of what drifts over the series, as a
         wear model may foretell it; by default none, and up to half the range either way
     laws : of the spring
     seed : of all that is drawn
+    x_name : what x is, for words and figures
 
     Raises
     ------
@@ -161,6 +190,7 @@ def forecast_observations(
         where no course was found.
     """
     limit = Limit(*limit)
+    drifting = drifting or ("sq_m" if limit.key == CLR else limit.key)
     if limit.key not in (CLR, drifting):
         raise BadInput(f"a limit must be of {CLR} or {drifting}, which changes, got {limit.key!r}")
     if limit.key == CLR and not 0.0 < limit.value < 1.0:
@@ -179,7 +209,7 @@ def forecast_observations(
         raise AsperityError(
             "no course of the contact was found that these recordings fit; state wider priors in [infer]"
         )
-    return _forecast(models, limit, seed)
+    return replace(_forecast(models, limit, seed), x_name=x_name)
 
 
 def _target(*, moving: bool) -> Callable[[Any], Field]:

@@ -116,16 +116,31 @@ class Forward:
         """Outputs in their own units, shape (n, points)."""
         return {key: OUTPUTS[key].back(mean) for key, (mean, _) in self.emulated(z, keys).items()}
 
+    def outputs(self, law: Law, *, heights: bool = True) -> tuple[str, ...]:
+        """What a law asks the emulator for."""
+        own: tuple[str, ...] = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
+        return (*own, CAR) if heights and self._noisy else own
+
+    @property
+    def _noisy(self) -> bool:
+        """Whether the case's excitation is one whose height is known but for a gain."""
+        model = self.setting.case.vibration
+        return model is not None and isinstance(model.excitation, NoiseExcitation)
+
     def shown(self, z: Field, law: Law, *, heights: bool = True, deviations: bool = True) -> Shown:
         """What recordings show at unknowns z, shape (n, dims), by a law.
 
         CRFA is nan where no `heights` are wanted, deviations are 0 where none are.
         """
+        emulated = self.emulated(z, self.outputs(law, heights=heights), deviations=deviations)
+        return self.shown_by(z, law, emulated, heights=heights)
+
+    def shown_by(
+        self, z: Field, law: Law, emulated: Mapping[str, tuple[Field, Field]], *, heights: bool = True
+    ) -> Shown:
+        """The same of outputs that are emulated already: those of `outputs` at least."""
         model = self.setting.case.vibration
         assert model is not None
-        heights = heights and isinstance(model.excitation, NoiseExcitation)
-        outputs = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
-        emulated = self.emulated(z, (*outputs, CAR) if heights else outputs, deviations=deviations)
         mass = self.unknown(z, "mass_kg", model.mass)[:, None]
         rest = self.unknown(z, "damping_ratio", model.damping_ratio)[:, None]
         loads = np.array([point.load_n for point in self.points])
@@ -141,7 +156,7 @@ class Forward:
             damping, damping_std = np.log(total), own_std / scale.slope(scale.back(own)) / total
         crf = 0.5 * (stiffness - np.log(mass)) - math.log(2.0 * math.pi)
         crfa = np.full(crf.shape, np.nan)
-        if heights:
+        if heights and self._noisy:
             crfa = self._height(z, crf, damping, np.maximum(OUTPUTS[CAR].back(emulated[CAR][0]), LEAST_SHARE))
         return Shown(crf, 0.5 * stiffness_std, damping, damping_std, crfa, lever)
 

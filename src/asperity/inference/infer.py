@@ -8,12 +8,21 @@ from pathlib import Path
 from asperity.case import Case
 from asperity.errors import BadInput, require_choice
 from asperity.inference.emulator import Emulator, build_emulator
+from asperity.inference.forecast import Forecast, Limit, forecast_observations
 from asperity.inference.forward import Forward, Law
 from asperity.inference.inference import Inference
-from asperity.inference.listening import listen
+from asperity.inference.listening import Listened, listen
 from asperity.inference.next_point import candidate_points, expected_information
 from asperity.inference.observations import Observation, Point, points_of
-from asperity.inference.posterior import Sampler, new_pools, posterior_draws, prior_draws, sample_models, with_point
+from asperity.inference.posterior import (
+    Draws,
+    Sampler,
+    new_pools,
+    posterior_draws,
+    prior_draws,
+    sample_models,
+    with_point,
+)
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting, setting_of
 from asperity.study import StudyProgress
@@ -59,14 +68,25 @@ def infer_contact(
     files = [one for one in recordings if not isinstance(one, Observation)]
     if given and files:
         raise BadInput("recordings must be files or observations, got both; infer one after the other")
-    silent: tuple[tuple[str, str], ...] = ()
-    notes: tuple[str, ...] = ()
-    if files:
-        heard = listen(files, setting, table=table)
-        given, silent, notes = list(heard.observations), heard.silent, heard.notes
+    heard = listen(files, setting, table=table) if files else Listened(observations=tuple(given))
     if not isinstance(emulator, Emulator):
         emulator = build_emulator(setting, folder=emulator, executor=executor, workers=workers, progress=progress)
-    return infer_observations(setting, emulator, given, sampler=sampler, seed=seed, silent=silent, notes=notes)
+    return infer_heard(setting, emulator, heard, sampler=sampler, seed=seed)
+
+
+def infer_heard(
+    setting: Setting, emulator: Emulator, heard: Listened, *, sampler: Sampler = "importance", seed: int = 0
+) -> Inference:
+    """The same, of what `listen` heard."""
+    return infer_observations(
+        setting, emulator, heard.observations, sampler=sampler, seed=seed, silent=heard.silent, notes=heard.notes
+    )
+
+
+def forecast_heard(setting: Setting, emulator: Emulator, heard: Listened, limit: Limit, *, seed: int = 0) -> Forecast:
+    """`forecast_observations` of what `listen` heard; where the case has a [wear], by its drift."""
+    x_name = heard.track.x_name if heard.track is not None else ""
+    return forecast_observations(setting, emulator, heard.observations, limit=limit, seed=seed, x_name=x_name)
 
 
 def infer_observations(
@@ -105,7 +125,7 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
     else:
         pools = {law: pool.with_columns(_again(forward, law), pool.shown) for law, pool in pools.items()}
     told = inference.silent, inference.notes
-    return _inferred(forward, observations, pools, "importance", inference.seed, *told, quickly=True)
+    return _inferred(forward, observations, pools, "importance", inference.seed, *told, prior=inference.prior)
 
 
 def _again(forward: Forward, law: Law) -> Callable[..., object]:
@@ -121,9 +141,9 @@ def _inferred(
     silent: tuple[tuple[str, str], ...],
     notes: tuple[str, ...],
     *,
-    quickly: bool = False,
+    prior: Draws | None = None,
 ) -> Inference:
-    models, sampled = sample_models(forward, pools, sampler=sampler, seed=seed, quickly=quickly)
+    models, sampled = sample_models(forward, pools, sampler=sampler, seed=seed, quickly=prior is not None)
     draws = posterior_draws(forward, sampled, discrepancy=True, seed=seed)
     candidates = expected_information(forward, draws, candidate_points(forward.setting), seed=seed)
     return Inference(
@@ -131,7 +151,7 @@ def _inferred(
         observations=observations,
         silent=silent,
         models=models,
-        prior=prior_draws(forward, seed),
+        prior=prior_draws(forward, seed, prior),
         draws=draws,
         exact=posterior_draws(forward, sampled, discrepancy=False, seed=seed),
         candidates=tuple(candidates),

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from asperity.inference.estimates import Estimate, estimates
 from asperity.inference.forward import LAWS, Forward, Law
 from asperity.inference.next_point import NextPoint
 from asperity.inference.observations import Observation, Point
-from asperity.inference.outputs import CLR, FILM
+from asperity.inference.outputs import CLR, FILM, OUTPUTS
 from asperity.inference.posterior import Draws, Model
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting
@@ -31,9 +31,24 @@ UNLIKELY = 0.1  # probability of the case's law, below which it is said to be wr
 class PointEstimates:
     """An operating point: its conditions, the contact's state there, and the stage with its probabilities."""
 
+    HEADS: ClassVar[tuple[str, ...]] = ("load", "speed", "recordings", "CLR, 90 %", "mean film, 90 %", "stage")
+
     point: Point
     state: Mapping[str, Estimate]
     stages: Mapping[str, float]
+
+    def cells(self) -> list[str]:
+        """A row of `HEADS`, in words."""
+        clr, film = self.state[CLR], self.state[FILM]
+        stage, probability = max(self.stages.items(), key=lambda entry: entry[1])
+        return [
+            quantity("load_n").text(self.point.load_n),
+            quantity("entrainment_speed_m_s").text(self.point.entrainment_m_s),
+            str(len(self.point.names)),
+            quantity(CLR).interval(clr.low, clr.high),
+            quantity(FILM).interval(film.low, film.high),
+            f"{stage} ({100.0 * probability:.0f} %)",
+        ]
 
     def scalars(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -182,6 +197,14 @@ class Inference:
         names = [quantity(self.setting.unknowns[int(number)].key).name for number in (first, second)]
         return names[0], names[1]
 
+    @property
+    def grid_points(self) -> tuple[float, float]:
+        """What twice the cells change of CLR at its median, and half the width of its interval; shares of the load."""
+        one, scale = self.posterior()[CLR], OUTPUTS[CLR]
+        moved = self.emulator.grid[CLR].rms if CLR in self.emulator.grid else 0.0
+        at = scale.forward(np.array(one.median))
+        return float(abs(scale.back(at + moved) - scale.back(at - moved)) / 2.0), 0.5 * (one.high - one.low)
+
     def warnings(self) -> tuple[str, ...]:
         """What makes the intervals doubtful: a posterior against its prior's end, a law that does not fit."""
         said = []
@@ -194,6 +217,12 @@ class Inference:
                 )
         if not self.observations:
             return tuple(said)
+        by_grid, half = self.grid_points
+        if by_grid > half:
+            said.append(
+                f"The emulator's own grid is off by {100 * by_grid:.1f} points of CLR, more than half the interval's "
+                f"width ({100 * half:.1f}); state more infer.cells."
+            )
         paper = self.law_probability("hertz-point")
         if paper < UNLIKELY:
             said.append(

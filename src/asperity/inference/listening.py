@@ -18,15 +18,15 @@ from asperity.wear import SeriesMethod
 
 @dataclass(frozen=True)
 class Listened:
-    """What a series of recordings gave.
+    """What a series of recordings gave: by default nothing.
 
     `silent` are the names of recordings without a usable resonance, and why; `notes` what was taken for granted.
     """
 
-    track: Track
-    observations: tuple[Observation, ...]
-    silent: tuple[tuple[str, str], ...]
-    notes: tuple[str, ...]
+    track: Track | None = None
+    observations: tuple[Observation, ...] = ()
+    silent: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def listen(

@@ -71,7 +71,7 @@ def sample_models(
     """
     forward = forward.heard
     sampled: dict[tuple[Law, bool], Sampled] = {}
-    how: dict[str, Any] = {"enough": QUICKLY} if quickly else {}
+    how: dict[str, Any] = {"enough": QUICKLY, "probed": 0} if quickly else {}
     best = -np.inf
     for law, discrepancy in _likeliest_first(forward, pools):
         target = _target(forward.points, discrepancy=discrepancy)
@@ -164,14 +164,18 @@ def posterior_draws(
     return replace(whole, effective=effective)
 
 
-def prior_draws(forward: Forward, seed: int) -> Draws:
-    """Equally probable contacts before any recording."""
-    rng = np.random.default_rng([seed, 5])
-    z = rng.standard_normal((DRAWS, forward.dims))
-    emulated = forward.emulated(z, STATE)
-    states = {
-        key: OUTPUTS[key].back(mean + std * rng.standard_normal(mean.shape)) for key, (mean, std) in emulated.items()
-    }
+def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draws:
+    """Equally probable contacts before any recording; those `known` with more operating points behind theirs."""
+    there = 0 if known is None else known.states[CLR].shape[1]
+    rng = np.random.default_rng([seed, 5, *([there] if there else [])])
+    z = rng.standard_normal((DRAWS, forward.dims)) if known is None else known.z
+    states = {}
+    if there < len(forward.points):
+        emulated = replace(forward, points=forward.points[there:]).emulated(z, STATE)
+        states = {key: OUTPUTS[key].back(mean + std * rng.standard_normal(mean.shape))
+                  for key, (mean, std) in emulated.items()}  # fmt: skip
+    if known is not None:
+        states = {key: np.hstack([known.states[key], *([states[key]] if states else [])]) for key in STATE}
     zero = np.zeros(DRAWS)
     return Draws(z, zero.astype(int), zero, states, float(DRAWS))
 
@@ -182,11 +186,12 @@ def _drawn(
     places = (rng.random() + np.arange(count)) / count
     chosen = np.minimum(np.searchsorted(np.cumsum(sampled.weights), places), len(sampled.weights) - 1)
     z = sampled.z[chosen]
-    shown = forward.shown(z, law)
+    emulated = forward.emulated(z, tuple(dict.fromkeys((*STATE, *forward.outputs(law)))))
+    shown = forward.shown_by(z, law, emulated)
     size: Field = _sizes(shown, forward.points, rng) if discrepancy else np.zeros(count)
-    emulated = forward.emulated(z, STATE)
     states = {}
-    for key, (mean, std) in emulated.items():
+    for key in STATE:
+        mean, std = emulated[key]
         scaled: Field = mean + std * rng.standard_normal(mean.shape)
         if key == CLR and law == "hertz-point":
             scaled = _corrected(scaled, mean, std, shown, forward.points, size, rng)

@@ -69,7 +69,7 @@ class Process:
         square = near @ (-2.0 * far.T)
         square += np.sum(near**2, axis=1)[:, None]
         square += np.sum(far**2, axis=1)
-        distance = np.maximum(5.0 * square, 0.0).astype(precision)
+        distance: Field = np.maximum(5.0 * square, 0.0).astype(precision)
         np.sqrt(distance, out=distance)
         kernel = distance / 3.0
         kernel += 1.0

@@ -25,7 +25,7 @@ NARROWER = 0.6  # width of a proposal's parts over the width of the whole
 FROM_PRIOR = 0.1
 HOPELESS = 40.0  # in ln evidence below another model, and no more draws are spent on it
 PROBED = 4  # rounds before that is believed
-NEGLIGIBLE = 1e-7  # weight over the largest, of a draw that need not be kept
+NEGLIGIBLE = 1e-5  # weight over the largest, of a draw that need not be kept
 LIVE = 400  # points of nested sampling
 
 Target = Callable[[Any], Field]  # what was computed for draws, to the logarithm of their likelihood
@@ -124,16 +124,22 @@ class Sampled:
 
 
 def importance(
-    pool: Pool, log_target: Target, *, enough: float = ENOUGH, rounds: int = ROUNDS, best: float = -np.inf
+    pool: Pool,
+    log_target: Target,
+    *,
+    enough: float = ENOUGH,
+    rounds: int = ROUNDS,
+    best: float = -np.inf,
+    probed: int = PROBED,
 ) -> Sampled:
     """Sample a target from better and better proposals, until the draws are worth `enough` or for so many rounds.
 
-    `best` is the ln evidence of another model: beside one that is far better, no draws are spent.
+    `best` is the ln evidence of another model: beside one that is far better, no draws are spent after `probed` rounds.
     """
     for number in range(rounds + 1):
         target = log_target(pool.shown)
         weights = pool.log_weights(target)
-        hopeless = number >= PROBED and float(logsumexp(weights)) - np.log(pool.drawn) < best - HOPELESS
+        hopeless = number >= probed and float(logsumexp(weights)) - np.log(pool.drawn) < best - HOPELESS
         if _effective(weights) >= enough or number == rounds or hopeless:
             break
         pool.learn(weights)

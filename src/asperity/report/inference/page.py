@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from asperity.inference import CRUCIAL, Inference
+from asperity.inference import CRUCIAL, Design, Forecast, Inference, PointEstimates
 from asperity.quantities import quantity
 from asperity.report.base import Tile, heading, render, write_page
 from asperity.report.inference import exhibits
@@ -20,19 +20,27 @@ class Line(NamedTuple):
     remark: str
 
 
-def write_inference_report(found: Inference, path: str | Path) -> Path:
+def write_inference_report(
+    found: Inference, path: str | Path, *, forecast: Forecast | None = None, design: Design | None = None
+) -> Path:
     """Write one self-contained HTML page about what recordings say, whole or not at all.
+
+    Parameters
+    ----------
+    found : what they say
+    path : of the page
+    forecast, design : when a limit is crossed, and what keeps the load share below a value, where they were asked
 
     Raises
     ------
     BadInput
         for a path that cannot be written to.
     """
-    return write_page(path, lambda: render_inference_page(found))
+    return write_page(path, lambda: render_inference_page(found, forecast, design))
 
 
-def render_inference_page(found: Inference) -> str:
-    """The page as HTML text."""
+def render_inference_page(found: Inference, forecast: Forecast | None = None, design: Design | None = None) -> str:
+    """The page as HTML text; see `write_inference_report`."""
     known = found.posterior()
     return render(
         "inference/page.html.j2",
@@ -49,7 +57,12 @@ def render_inference_page(found: Inference) -> str:
         predicted=exhibits.predicted(found).picture() if found.observations else None,
         following=exhibits.following(found).picture(),
         lines=_lines(found),
-        points=_points(found),
+        heads=PointEstimates.HEADS,
+        points=[one.cells() for one in found.at_points()],
+        forecast=forecast,
+        design=design,
+        ahead=None if forecast is None else exhibits.ahead(forecast).picture(),
+        levers=None if design is None else exhibits.levers(design).picture(),
         models=[
             (model.law, "with its error" if model.discrepancy else "exact",
              quantity("log_evidence").number(model.log_evidence, model.log_evidence_std),
@@ -78,21 +91,3 @@ def _lines(found: Inference) -> list[Line]:
             )
         )
     return lines
-
-
-def _points(found: Inference) -> list[list[str]]:
-    rows = []
-    for one in found.at_points():
-        clr, film = one.state["clr"], one.state["h_mean_m"]
-        stage, probability = max(one.stages.items(), key=lambda entry: entry[1])
-        rows.append(
-            [
-                quantity("load_n").text(one.point.load_n),
-                quantity("entrainment_speed_m_s").text(one.point.entrainment_m_s),
-                str(len(one.point.names)),
-                quantity("clr").interval(clr.low, clr.high),
-                quantity("h_mean_m").interval(film.low, film.high),
-                f"{stage} ({100 * probability:.0f} %)",
-            ]
-        )
-    return rows

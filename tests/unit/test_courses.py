@@ -1,0 +1,206 @@
+"""Contacts that change: the filter against a normal distribution written out, forecasts, and what keeps CLR low."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from asperity.errors import BadInput
+from asperity.inference import Forward, Observation, Point, design_contact, forecast_observations, read_limit
+from asperity.inference.course import DRIFT_STD, KNOTS, WEIGHTS, Course, Extra, Table, between_knots
+from asperity.inference.likelihood import EMULATED_HEIGHT_STD, GAIN_STD
+from asperity.inference.visits import MOST, series_of
+from support.emulated import formula, formula_emulator, formula_setting
+
+TIMES = np.array([0.0, 0.15, 0.4, 0.75, 1.0])
+SIZE, RESTLESS, SCATTER = 0.02, 0.2, 0.003
+
+
+@pytest.fixture(scope="module")
+def setting():
+    return formula_setting()
+
+
+@pytest.fixture(scope="module")
+def emulator(setting):
+    return formula_emulator(setting)
+
+
+def recording(x, crf=3000.0, std=6.0, **more):
+    return Observation(load_n=500.0, entrainment_m_s=1.91, crf_hz=crf, crf_std_hz=std, x=x, **more)
+
+
+def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
+    """What a contact in the middle of its priors shows while its Sq goes along its range."""
+    rng = np.random.default_rng(seed)
+    forward = Forward(setting, emulator, (Point(500.0, 1.91),))
+    z = np.zeros((len(shares), len(setting.unknowns)))
+    z[:, 0] = setting.unknowns[0].at_share(shares)
+    shown = forward.shown(z, "hertz-point")
+    clr = forward.states(z, ["clr"])["clr"][:, 0]
+    x = np.linspace(0.0, 100.0, len(shares))
+    hertz = np.exp(shown.crf[:, 0] + std * rng.standard_normal(len(shares)))
+    damping = np.exp(shown.damping[:, 0] + 0.05 * rng.standard_normal(len(shares)))
+    heard = [
+        recording(time, crf, std * crf, damping_ratio=zeta, damping_std=0.05 * zeta)
+        for time, crf, zeta in zip(x, hertz, damping, strict=True)
+    ]
+    return heard, clr
+
+
+# The filter ----------------------------------------------------------------------------------------------------------
+
+
+def straight_table(share, places=2):
+    """Contacts whose channels are straight lines over the range: one of them here, twice."""
+    knots = np.linspace(0.0, 1.0, KNOTS)
+    lines = {"crf": 8.0 + 0.4 * knots, "damping": -4.0 - 0.1 * knots, "crfa": 1.0 + 2.0 * knots}
+    count = 2
+    return Table(
+        {key: np.tile(line, (count, places, 1)) for key, line in lines.items()},
+        {"crf": np.full((count, places), 0.01), "damping": np.full((count, places), 0.02),
+         "crfa": np.full((count, places), EMULATED_HEIGHT_STD)},
+        np.tile([-0.3, 0.3], (count, 1)),
+        np.full(count, share),
+        Extra(*(np.full(count, value) for value in (SIZE, RESTLESS, SCATTER))),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, emulator, moving):
+    """Ten logarithms' joint density, their covariance by the integrated Wiener process's own formula."""
+    rng = np.random.default_rng(3)
+    observations = [
+        replace(recording(time, 2980.0 * (1.0 + 0.01 * rng.standard_normal()), 15.0, crfa=2.9, crfa_std=0.2),
+                load_n=load)
+        for time in TIMES for load in (400.0, 700.0)
+    ]  # fmt: skip
+    series = series_of(observations)
+    forward = Forward(setting, emulator, series.places)
+    course = Course(forward, series, "hertz-point", "sq_m")
+    walked = course._walk(straight_table(0.4), moving=moving)
+    sounds = series.sounds
+    slope = np.array([{"crf": 0.4, "crfa": 2.0}[sound.channel] for sound in sounds])
+    begin = np.array([{"crf": 8.0, "crfa": 1.0}[sound.channel] for sound in sounds]) + 0.4 * slope
+    lever = np.array([(-0.3, 0.3)[sound.place] if sound.channel == "crf" else 0.0 for sound in sounds])
+    time = np.array([sound.at for sound in sounds])
+    early, late = np.minimum.outer(time, time), np.maximum.outer(time, time)
+    wandered = RESTLESS**2 * (early**2 * late / 2.0 - early**3 / 6.0)
+    covariance = np.outer(slope, slope) * moving * (DRIFT_STD**2 * np.outer(time, time) + wandered)
+    covariance += SIZE**2 * np.outer(lever, lever)
+    for row, one in enumerate(sounds):
+        weight, emulated = WEIGHTS[one.channel], {"crf": 0.01, "crfa": EMULATED_HEIGHT_STD}[one.channel]
+        for column, other in enumerate(sounds):
+            if one.channel == other.channel == "crfa":
+                covariance[row, column] += GAIN_STD**2
+            if (one.channel, one.place) == (other.channel, other.place):
+                covariance[row, column] += (weight * SIZE) ** 2 + emulated**2
+        covariance[row, row] += one.heard.std**2 + (weight * SCATTER) ** 2
+    values = np.array([sound.heard.value for sound in sounds])
+    assert walked.log == pytest.approx(multivariate_normal(begin, covariance).logpdf(values), abs=1e-6)
+
+
+def test_tables_are_straight_between_knots_and_level_beyond():
+    table = np.tile(np.linspace(0.0, 1.0, KNOTS) ** 2, (3, 1))
+    value, slope = between_knots(table, np.array([0.5, -0.2, 1.3]))
+    assert value == pytest.approx([0.25, 0.0, 1.0])
+    assert slope[0] == pytest.approx(1.0, abs=0.07)
+    assert list(slope[1:]) == [0.0, 0.0]
+
+
+def test_a_share_of_a_range_goes_both_ways(setting):
+    for unknown in setting.unknowns:
+        if unknown.key != "grid_error":
+            assert unknown.share(unknown.at_share(np.array([0.2, 0.5, 0.8]))) == pytest.approx([0.2, 0.5, 0.8])
+
+
+# Forecasts -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_roughening_contact_is_foretold(setting, emulator):
+    """Sq goes along its range at a steady rate; the load share reaches one half after the last recording."""
+    shares = np.linspace(0.3, 1.0, 61)
+    heard, clr = heard_along(setting, emulator, shares)
+    there, limit = int(np.argmax(clr >= 0.5)), 0.5
+    seen = there - 12
+    found = forecast_observations(setting, emulator, heard[: seen + 1 : 2], limit=("clr", limit), x_name="hours")
+    crossing = np.interp(limit, clr[there - 1 : there + 1], [heard[there - 1].x, heard[there].x])
+    crossing -= heard[: seen + 1 : 2][-1].x
+    assert found.told
+    assert found.alarm
+    assert found.rising
+    assert found.time.low < crossing < found.time.high
+    assert found.time.high < 8.0 * found.time.low
+    assert found.clr.low < clr[seen] < found.clr.high
+    assert "rises above 50.0 %" in found.sentence()
+    json.dumps(found.scalars(), allow_nan=False)
+
+
+def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):
+    heard, _ = heard_along(setting, emulator, np.full(20, 0.55), seed=5)
+    found = forecast_observations(setting, emulator, heard, limit=read_limit("sq=3 um", setting))
+    assert (found.told, found.alarm) == (False, False)
+    assert found.sentence().startswith("No change of the contact is told over 20 visits")
+    assert found.drifting == "sq_m"
+    json.dumps(found.scalars(), allow_nan=False)
+
+
+def test_many_visits_are_taken_together_and_none_is_lost():
+    series = series_of([recording(float(number), 3000.0 + number) for number in range(200)])
+    assert len(series.x) == MOST
+    assert series.span == pytest.approx(199.0, abs=3.0)
+    assert np.exp([sound.heard.value for sound in series.sounds]) == pytest.approx(
+        3000.0 + np.array(series.x), abs=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda setting: read_limit("crf=3000 Hz", setting), "--forecast takes a limit such as clr=0.5, of clr, sq or"),
+        (lambda setting: read_limit("clr=half", setting), "--forecast clr takes a share of the load"),
+        (lambda setting: read_limit("sq=2 N", setting), "--forecast sq must be"),
+        (lambda _: series_of([recording(float("nan"))]), "has no place in time; give a column x"),
+        (lambda _: series_of([recording(1.0)] * 9), "4 recordings at different times or more, got 1"),
+        (lambda setting: forecast_observations(setting, None, [], limit=("clr", 1.5)), "must lie between 0 and 1"),
+        (lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-6), drifting="oil_alpha_1_pa"),
+         "a limit must be of clr or oil_alpha_1_pa"),
+    ],
+)  # fmt: skip
+def test_a_forecast_of_nothing_is_refused(setting, call, said):
+    with pytest.raises(BadInput, match=said):
+        call(setting)
+
+
+# Design --------------------------------------------------------------------------------------------------------------
+
+
+def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(setting, emulator):
+    """At the bound that is stated, asked of the formula itself and of other contacts."""
+    rng = np.random.default_rng(11)
+    conditions = setting.case.conditions
+    forward = Forward(setting, emulator, (Point(conditions.load, conditions.entrainment_speed),))
+    found = design_contact(forward, rng.standard_normal((600, forward.dims)), clr=0.3)
+    ways = {lever.key: lever for lever in found.levers}
+    assert list(ways) == ["sq_m", "oil_viscosity_pa_s", "load_n", "entrainment_speed_m_s"]
+    assert ways["sq_m"].way == "at most"
+    z = rng.standard_normal((4000, forward.dims))
+    sq = setting.unknowns[0]
+    for bound, expected in ((ways["sq_m"].bound, 0.95), (None, found.now)):
+        if bound is not None:
+            z[:, 0] = sq.at_share(
+                np.interp(bound, sq.value(sq.at_share(np.linspace(0, 1, 400))), np.linspace(0, 1, 400))
+            )
+        x = emulator.features(forward.shares(z)[:, 0])
+        clr = formula(x[:, len(setting.contact) + 1], sq.value(z[:, 0]))["clr"]
+        assert np.mean(clr < 0.3) == pytest.approx(expected, abs=0.02)
+        z = rng.standard_normal((4000, forward.dims))
+    chances = ways["entrainment_speed_m_s"].chances
+    assert np.all(np.diff(chances) > -1e-9)
+    assert np.all(np.diff(ways["load_n"].chances) < 0.0)
+    assert "composite roughness: at most" in found.sentence()
+    json.dumps(found.scalars(), allow_nan=False)
+    with pytest.raises(BadInput, match="--design must be a load share"):
+        design_contact(forward, z, clr=1.2)
