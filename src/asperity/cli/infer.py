@@ -85,8 +85,9 @@ def infer(
                 workers=count,
             )
     emulated = _emulated(setting, emulator, count, quiet=quiet)
-    found = inference.infer_heard(setting, emulated, heard, sampler=cast("Sampler", sampler), seed=seed)
     ahead = None if limit is None else inference.forecast_heard(setting, emulated, heard, limit, seed=seed)
+    now = inference.latest(heard) if ahead is not None and ahead.told else heard
+    found = inference.infer_heard(setting, emulated, now, sampler=cast("Sampler", sampler), seed=seed)
     kept = None if design is None else inference.design_contact(found.forward, found.draws.z, clr=design)
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)

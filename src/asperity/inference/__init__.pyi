@@ -22,6 +22,7 @@ from .infer import forecast_heard as forecast_heard
 from .infer import infer_contact as infer_contact
 from .infer import infer_heard as infer_heard
 from .infer import infer_observations as infer_observations
+from .infer import latest as latest
 from .infer import with_observation as with_observation
 from .inference import CRUCIAL as CRUCIAL
 from .inference import Inference as Inference

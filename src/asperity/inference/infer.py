@@ -84,9 +84,16 @@ def infer_heard(
 
 
 def forecast_heard(setting: Setting, emulator: Emulator, heard: Listened, limit: Limit, *, seed: int = 0) -> Forecast:
-    """`forecast_observations` of what `listen` heard; where the case has a [wear], by its drift."""
+    """`forecast_observations` of what `listen` heard."""
     x_name = heard.track.x_name if heard.track is not None else ""
     return forecast_observations(setting, emulator, heard.observations, limit=limit, seed=seed, x_name=x_name)
+
+
+def latest(heard: Listened) -> Listened:
+    """The last recording at each operating point alone: what there is of a contact that has changed."""
+    last = {one.place: one for one in sorted(heard.observations, key=lambda one: one.x)}
+    note = "The contact changes over the series: the numbers are of the last recording at each operating point."
+    return replace(heard, observations=tuple(last.values()), notes=(*heard.notes, note))
 
 
 def infer_observations(

@@ -10,6 +10,7 @@ from asperity.arrays import Field
 from asperity.inference.forward import LAWS, Forward
 from asperity.inference.likelihood import OF_DAMPING
 from asperity.inference.observations import Point
+from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import Draws
 from asperity.inference.priors import Unknown
 from asperity.inference.settings import LOAD, SPEED, Setting
@@ -19,6 +20,7 @@ CONTACTS = 400  # possible ones that a point is to tell apart
 HEARD = 4  # times each of them is heard
 USUAL_STD = 2e-3  # relative, of a frequency to be heard
 USUAL_DAMPING_STD = 0.05
+SILENT = 0.01  # CLR below which asperities alone make no line that anybody hears
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ def expected_information(
     """What one more recording at each candidate is expected to tell of all unknowns together, in bits.
 
     By nested Monte Carlo: the mean of ln p(heard | contact) - ln p(heard) over possible contacts and what they would
-    show, with errors of measurement, emulator and law.
+    show, with errors of measurement, emulator and law; times the probability that there is a line to be heard.
     """
     rng = np.random.default_rng([seed, 6])
     rows = rng.choice(len(draws.z), min(CONTACTS, len(draws.z)), replace=False)
@@ -63,10 +65,14 @@ def expected_information(
     points = tuple(Point(load, speed, temperature) for load, speed in candidates)
     there = replace(forward, points=points)
     crf, crf_std, damping, damping_std = (np.empty((len(rows), len(points))) for _ in range(4))
+    heard = np.ones(crf.shape, dtype=bool)
     for number, law in enumerate(LAWS):
         of_law = draws.law[rows] == number
         if of_law.any():
-            shown = there.shown(draws.z[rows[of_law]], law, heights=False)
+            emulated = there.emulated(draws.z[rows[of_law]], there.outputs(law, heights=False))
+            shown = there.shown_by(draws.z[rows[of_law]], law, emulated, heights=False)
+            if CLR in emulated:
+                heard[of_law] = OUTPUTS[CLR].back(emulated[CLR][0]) > SILENT
             crf[of_law], crf_std[of_law] = shown.crf, shown.crf_std
             damping[of_law], damping_std[of_law] = shown.damping, shown.damping_std
     size = draws.size[rows][:, None]
@@ -76,7 +82,11 @@ def expected_information(
         _information([(mean[:, number], spread[:, number]) for mean, spread in channels], rng)
         for number in range(len(points))
     ]
-    return [NextPoint(load, speed, gain) for (load, speed), gain in zip(candidates, gains, strict=True)]
+    shares = heard.mean(axis=0)
+    return [
+        NextPoint(load, speed, float(share * gain))
+        for (load, speed), gain, share in zip(candidates, gains, shares, strict=True)
+    ]
 
 
 def _information(channels: list[tuple[Field, Field]], rng: np.random.Generator) -> float:
