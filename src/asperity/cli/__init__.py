@@ -1,8 +1,8 @@
 """The command line: parses, calls, prints. No physics. One module a group of commands.
 
 The first line of the output is the verdict; `--json` prints one object and nothing else; progress goes to stderr.
-Exit codes: 0 done, 2 bad input or usage, 1 anything else; of `track` and `watch` 3 an alarm, 4 they
-cannot tell, 5 sensor or machine off.
+Exit codes: 0 done, 2 bad input or usage, 1 anything else; of `track` and `watch` 3 an alarm (of
+`infer --forecast`, too), 4 they cannot tell, 5 sensor or machine off.
 """
 
 from asperity.cli import (  # each adds its commands

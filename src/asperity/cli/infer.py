@@ -60,15 +60,15 @@ def infer(
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
-    if case_file is None or not (paths or design is not None):
-        lacks = "the contact; give --case CASE.toml" if case_file is None else "recordings; name files, or their folder"
-        raise BadInput(f"asperity infer needs {lacks}")
+    if case_file is None:
+        raise BadInput("asperity infer needs the contact; give --case CASE.toml")
+    if not paths and (design is None or forecast is not None):
+        raise BadInput("asperity infer needs recordings; name files, or their folder")
     require_choice("--sampler", sampler, inference.SAMPLERS)
     setting = inference.setting_of(chosen_case(case_file, overrides))
     limit = None if forecast is None else inference.read_limit(forecast, setting)
     require_output(page, ".html", option="--report")
-    count = workers or processes.cores()
-    heard = inference.Listened()
+    count, heard = workers or processes.cores(), inference.Listened()
     if paths:
         with progress("recordings", "reading recordings ...", quiet=quiet):
             heard = inference.listen(
@@ -92,8 +92,6 @@ def infer(
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)
     _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
-    if ahead is not None and ahead.alarm:
-        raise typer.Exit(EXIT_CODES["alarm"])
 
 
 def _show(
@@ -105,7 +103,7 @@ def _show(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """The verdict, first that of what was asked, and the tables; or all as JSON."""
+    """The verdict, first that of what was asked, and the tables; or all as JSON. An alarm decides the exit code."""
     asked = [one.sentence() for one in (ahead, kept) if one is not None]
     told = {
         "forecast": None if ahead is None else ahead.scalars(),
@@ -114,6 +112,8 @@ def _show(
     }
     blocks = (_told(found), _points(found), _models(found), _notes(found), written("report", page))
     show([*asked, found.verdict()], lambda: found.scalars() | told, *blocks, as_json=as_json, quiet=quiet)
+    if ahead is not None and ahead.alarm:
+        raise typer.Exit(EXIT_CODES["alarm"])
 
 
 def _emulated(setting: "Setting", folder: Path | None, workers: int, *, quiet: bool) -> "Emulator":

@@ -41,3 +41,5 @@ from .process import Process as Process
 from .sampling import Pool as Pool
 from .settings import Setting as Setting
 from .settings import setting_of as setting_of
+from .visits import Series as Series
+from .visits import Sound as Sound
