@@ -52,7 +52,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
     ("motion_table",),
     ("robustness",),
     ("vibration",),
-    ("inference", "forecast", "next_points"),
+    ("inference", "forecast", "next_points", "rings"),
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
 WHOLE = ("certified", "first_call", "stress", "surfaces", "rollers")  # short enough as they are, whatever is asked

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import binom
@@ -31,6 +31,7 @@ from asperity.inference import (
     infer_observations,
     setting_of,
 )
+from asperity.inference.emulator import sobol_shares
 from asperity.inference.inference import STAGES, stages
 from asperity.inference.listening import band_of
 from asperity.inference.outputs import OUTPUTS
@@ -48,36 +49,63 @@ PLACES = tuple((load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8
 ONE = PLACES[2]  # the operating point of those inferred from one: 500 N, 0.8 m/s
 TESTS = 2  # recordings at each operating point
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
+NONE = 1e-9  # variance on an output's scale
 LEAST_SHARE = 0.01  # CLR below which there is no line to be found
 INSIDE, FINER = "as the emulator has it", "on twice the cells"
 OUTSIDE = ("exponent 1/5", "5 % stiffer at 900 N")  # truths that neither law has
 LEFT_S = 60.0  # of the time given, for what is written at the end
 
 
+class Scatter(NamedTuple):
+    """Variance of one surface about its point's mean, on an output's scale: by the mean, and by where in the ranges."""
+
+    mean: Field
+    level: Field
+    powers: Field  # of its logarithm over shares of the ranges, from their middle
+    factor: float
+
+    def __call__(self, mean: Field, shares: Field) -> Field:
+        """At means, and shares (n, d) of the ranges."""
+        return np.asarray(np.interp(mean, self.mean, self.level) * self.factor * np.exp((shares - 0.5) @ self.powers))
+
+    @classmethod
+    def of(cls, mean: Field, variance: Field, shares: Field) -> "Scatter":
+        """By tenths of the mean; the rest of its logarithm a line over each of the ranges."""
+        tenths = np.array_split(np.argsort(mean), 10)
+        middle, level = (np.array([values[part].mean() for part in tenths]) for values in (mean, variance))
+        level = level + NONE
+        touching = variance > NONE  # where no surface touches, none scatters
+        rest = (variance / np.interp(mean, middle, level))[touching]
+        slopes = np.column_stack([np.ones(len(rest)), shares[touching] - 0.5])
+        powers = np.linalg.lstsq(slopes, np.log(rest), rcond=None)[0][1:]
+        return cls(middle, level, powers, float(np.mean(rest) / np.mean(np.exp(slopes[:, 1:] @ powers))))
+
+
 @dataclass(frozen=True)
 class OfFewSurfaces(Emulator):
     """An emulator that is asked for means over few surfaces: what these scatter by is part of its deviation."""
 
-    scatter: Mapping[str, tuple[Field, Field]] = field(default_factory=dict)
+    scatter: Mapping[str, Scatter] = field(default_factory=dict)
 
     def __call__(self, shares: Field, wanted: Sequence[str]) -> dict[str, tuple[Field, Field]]:
         """Mean and standard deviation, that of as many surfaces as a truth has included."""
         return {
-            key: (mean, np.sqrt(std**2 + np.interp(mean, *self.scatter[key]) / SURFACES))
+            key: (mean, np.sqrt(std**2 + self.scatter[key](mean, shares) / SURFACES))
             for key, (mean, std) in super().__call__(shares, wanted).items()
         }
 
     @classmethod
-    def of(cls, emulator: Emulator) -> "OfFewSurfaces":
-        """From the surfaces of the emulator's own points: variance of one about its point's mean, by tenths."""
+    def of(cls, emulator: Emulator, setting: Setting) -> "OfFewSurfaces":
+        """From the surfaces of the emulator's own points."""
         table = load_study(emulator.folder).table
         groups = table[table["status"] == "done"].groupby("point")[list(OUTPUTS)]
+        means, variances = groups.mean(), groups.var()
+        shares = sobol_shares(setting)[means.index]
         scatter = {}
         for key, output in OUTPUTS.items():
-            mean, variance = groups.mean()[key].to_numpy(), groups.var()[key].to_numpy()
-            scaled, spread = output.forward(mean), variance * output.slope(mean) ** 2
-            tenths = np.array_split(np.argsort(scaled), 10)
-            scatter[key] = tuple(np.array([values[part].mean() for part in tenths]) for values in (scaled, spread))
+            mean = means[key].to_numpy()
+            variance = variances[key].to_numpy() * output.slope(mean) ** 2
+            scatter[key] = Scatter.of(output.forward(mean), variance, shares)
         return cls(**vars(emulator), scatter=scatter)
 
 
@@ -106,7 +134,7 @@ def judge_all(machines: int, finer: int, kept: Path, *, end: float = float("inf"
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
-    whole = OfFewSurfaces.of(emulator)
+    whole = OfFewSurfaces.of(emulator, setting)
     on_its_grid = replace(whole, grid={})  # truths on its own grid: what a finer one changes is no part of them
     rows = Rows(kept / "rows.csv")
     for number in range(machines):

@@ -12,6 +12,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from asperity.case import load_case
 from asperity.coupling import dry_full_load, excitation, oscillator
 from asperity.errors import BadInput
+from asperity.grid import Grid
 from asperity.inference import (
     Forward,
     Heard,
@@ -22,14 +23,16 @@ from asperity.inference import (
     infer_contact,
     infer_observations,
     setting_of,
+    with_measured,
     with_observation,
 )
 from asperity.inference.estimates import bits, estimate
-from asperity.inference.likelihood import _gaussian
+from asperity.inference.likelihood import COMMON, _gaussian
 from asperity.inference.next_point import _information
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.process import Process, fit_process
 from asperity.inference.sampling import Pool, importance, nested
+from asperity.surface import MeasuredSurface
 from support.emulated import CASE, formula_emulator, formula_setting
 
 SIX = [(load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5)]
@@ -124,7 +127,8 @@ def test_the_likelihood_is_the_multivariate_normal():
     here = [0, 2, 3]
     for row in range(3):
         covariance = np.outer(common[row, here], common[row, here])
-        covariance += np.diag([said[i].std ** 2 + std[row, i] ** 2 + 0.3**2 for i in here])
+        covariance += COMMON * np.outer(std[row, here], std[row, here])
+        covariance += np.diag([said[i].std ** 2 + (1.0 - COMMON) * std[row, i] ** 2 + 0.3**2 for i in here])
         expected = multivariate_normal(shown[row, here], covariance).logpdf([said[i].value for i in here])
         assert _gaussian(said, shown, std, 0.3, common)[row] == pytest.approx(expected, abs=1e-9)
 
@@ -361,3 +365,22 @@ def test_the_height_of_one_line_says_nothing_of_the_contact(setting, emulator):
     loud = [replace(plain, crfa=height, crfa_std=0.03 * height) for height in (1e-6, 1e6)]
     quiet, noisy = (infer_observations(setting, emulator, [one]).posterior()["sq_m"] for one in loud)
     assert [quiet.low, quiet.median, quiet.high] == pytest.approx([noisy.low, noisy.median, noisy.high], rel=0.2)
+
+
+def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
+    """Its Sq, with what places and instruments differ by; recordings are then told from a narrower prior."""
+    rng = np.random.default_rng(6)
+    grid = Grid((64, 64), (-1e-3, -1e-3), (1e-3, 1e-3), (False, False))
+    measured = MeasuredSurface(0.7e-6 * rng.standard_normal((64, 64)), grid, "ring.csv", "text")
+    known, said = with_measured(setting, measured)
+    z = np.array([-1.0, 0.0, 1.0])
+    assert 1e6 * known.contact[0].value(z) == pytest.approx([0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006)
+    assert known.ranges == setting.ranges  # the emulator's own
+    assert said.startswith("Sq is taken as ring.csv shows it, 0.7")
+    told = infer_observations(known, emulator, of_one.observations).posterior()["clr"]
+    alone = of_one.posterior()["clr"]
+    assert told.high - told.low < 0.8 * (alone.high - alone.low)
+    with pytest.raises(BadInput, match=r"widen infer\.sq"):
+        with_measured(setting, replace(measured, heights=10.0 * measured.heights))
+    with pytest.raises(BadInput, match="the case knows its Sq"):
+        with_measured(replace(setting, contact=setting.contact[1:]), measured)

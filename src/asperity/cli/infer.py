@@ -1,11 +1,13 @@
 """`asperity infer`: what recordings say of a contact, and what to run next."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from asperity import inference, processes, report
+from asperity import surface as surfaces
 from asperity.cli import options
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Overrides, Page, Quiet, chosen_case, require_output
@@ -32,6 +34,7 @@ def infer(
         typer.Option("--case", metavar="CASE.toml", help="The contact; its [infer] says what is not known."),
     ] = None,
     overrides: Overrides = None,
+    surface: options.SurfaceFile = None,
     table_file: Annotated[
         Path | None,
         typer.Option("--table", metavar="CSV", help="Columns file, load_n, entrainment_m_s, temperature_degc."),
@@ -65,7 +68,7 @@ def infer(
     if not paths and (design is None or forecast is not None):
         raise BadInput("asperity infer needs recordings; name files, or their folder")
     require_choice("--sampler", sampler, inference.SAMPLERS)
-    setting = inference.setting_of(chosen_case(case_file, overrides))
+    setting, known = _setting(case_file, overrides, surface)
     limit = None if forecast is None else inference.read_limit(forecast, setting)
     require_output(page, ".html", option="--report")
     count, heard = workers or processes.cores(), inference.Listened()
@@ -87,11 +90,21 @@ def infer(
     emulated = _emulated(setting, emulator, count, quiet=quiet)
     ahead = None if limit is None else inference.forecast_heard(setting, emulated, heard, limit, seed=seed)
     now = inference.latest(heard) if ahead is not None and ahead.told else heard
+    now = replace(now, notes=(*now.notes, *known))
     found = inference.infer_heard(setting, emulated, now, sampler=cast("Sampler", sampler), seed=seed)
     kept = None if design is None else inference.design_contact(found.forward, found.draws.z, clr=design)
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)
     _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
+
+
+def _setting(path: Path, overrides: list[str] | None, surface: Path | None) -> tuple["Setting", tuple[str, ...]]:
+    """What is to be inferred, Sq as a surface was measured where one is given, and a note of that."""
+    setting = inference.setting_of(chosen_case(path, overrides))
+    if surface is None:
+        return setting, ()
+    setting, said = inference.with_measured(setting, surfaces.read_surface(surface))
+    return setting, (said,)
 
 
 def _show(

@@ -29,6 +29,7 @@ from .inference import Inference as Inference
 from .inference import PointEstimates as PointEstimates
 from .listening import Listened as Listened
 from .listening import listen as listen
+from .measured import with_measured as with_measured
 from .next_point import NextPoint as NextPoint
 from .observations import Heard as Heard
 from .observations import Observation as Observation

@@ -142,7 +142,7 @@ class Table(NamedTuple):
         along = along_range(contacts, column, unknown.at_share(np.linspace(0.0, 1.0, KNOTS)))
         shown = forward.shown(along, course.law, deviations=False)
         tables = {key: _by_knots(getattr(shown, key)) for key in CHANNELS}
-        heights = np.full(here.crf.shape, EMULATED_HEIGHT_STD)
+        heights = np.where(np.isnan(here.crfa_std), 0.0, np.hypot(here.crfa_std, EMULATED_HEIGHT_STD))
         return cls(
             tables,
             {"crf": here.crf_std, "damping": here.damping_std, "crfa": heights},

@@ -203,7 +203,7 @@ def build_emulator(
     AsperityError
         if too many of its contacts fail.
     """
-    sobol = _sobol(setting)
+    sobol = sobol_shares(setting)
     plan = plan_points(
         setting.case,
         [overrides_at(setting.case, setting.ranges, shares) for shares in sobol],
@@ -284,7 +284,8 @@ def _processes(means: "_Means", x: Field, fitted: Path, identity: str) -> tuple[
     return processes, quality
 
 
-def _sobol(setting: Setting) -> Field:
+def sobol_shares(setting: Setting) -> Field:
+    """Shares of the ranges of all points of a setting's emulator, (points, ranges)."""
     from scipy.stats import qmc
 
     count = len(setting.ranges)

@@ -32,7 +32,7 @@ LEAST_DAMPING = 1e-4
 class Shown(NamedTuple):
     """What a law says that recordings show: arrays of (unknowns, operating points); logarithms, and their deviations.
 
-    `lever` is by how much ln CRF moves with the law's exponent of the load.
+    That of CRFA is the emulator's of CAR. `lever` is by how much ln CRF moves with the law's exponent of the load.
     """
 
     crf: Field
@@ -40,6 +40,7 @@ class Shown(NamedTuple):
     damping: Field
     damping_std: Field
     crfa: Field
+    crfa_std: Field
     lever: Field
 
 
@@ -155,10 +156,10 @@ class Forward:
             total = np.maximum(rest + scale.back(own), LEAST_DAMPING)
             damping, damping_std = np.log(total), own_std / scale.slope(scale.back(own)) / total
         crf = 0.5 * (stiffness - np.log(mass)) - math.log(2.0 * math.pi)
-        crfa = np.full(crf.shape, np.nan)
+        crfa, crfa_std = np.full(crf.shape, np.nan), np.full(crf.shape, np.nan)
         if heights and self._noisy:
-            crfa = self._height(z, crf, damping, np.maximum(OUTPUTS[CAR].back(emulated[CAR][0]), LEAST_SHARE))
-        return Shown(crf, 0.5 * stiffness_std, damping, damping_std, crfa, lever)
+            crfa, crfa_std = self._height(z, crf, damping, emulated[CAR])
+        return Shown(crf, 0.5 * stiffness_std, damping, damping_std, crfa, crfa_std, lever)
 
     def _sphere(self, emulated: tuple[Field, Field], loads: Field) -> tuple[Field, Field, Field]:
         """Logarithm of the sphere's stiffness under CLR F, its deviation, and ln(CLR F)."""
@@ -170,8 +171,11 @@ class Forward:
         lever = np.log(borne * loads)
         return math.log(one_newton) + lever / 3.0, std / OUTPUTS[CLR].slope(share) / borne / 3.0, lever
 
-    def _height(self, z: Field, crf: Field, damping: Field, car: Field) -> Field:
-        """Logarithm of CRFA but for a gain: Sq^2 fc^p f^(4 - 2n) / 4 ζ^2, over noise behind a low pass of order n."""
+    def _height(self, z: Field, crf: Field, damping: Field, emulated: tuple[Field, Field]) -> tuple[Field, Field]:
+        """Logarithm of CRFA but for a gain, and its deviation by CAR's.
+
+        Sq^2 fc^p f^(4 - 2n) / 4 ζ^2, over noise behind a low pass of order n.
+        """
         model = self.setting.case.vibration
         assert model is not None
         law = model.excitation
@@ -182,8 +186,10 @@ class Forward:
         sq = self.unknown(z, "sq_m", math.nan)[:, None]
         if "sq_m" not in self._place:
             sq = np.ones((len(z), 1))
+        car = np.maximum(OUTPUTS[CAR].back(emulated[0]), LEAST_SHARE)
         cutoff = exponent * np.log(car / law.car_reference)
-        return np.asarray(2.0 * np.log(sq) + power * cutoff + (4 - 2 * order) * crf - 2.0 * damping - math.log(4.0))
+        height = 2.0 * np.log(sq) + power * cutoff + (4 - 2 * order) * crf - 2.0 * damping - math.log(4.0)
+        return np.asarray(height), power * exponent * emulated[1] / (OUTPUTS[CAR].slope(car) * car)
 
 
 def _operating_value(setting: Setting, point: Point, key: str) -> float:

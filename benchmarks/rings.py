@@ -1,0 +1,63 @@
+"""The paper's twelve rings: what Sq of a profilometer says of their load share, and what its two printed CRF add.
+
+`python -m benchmarks.rings` runs this part alone; the emulator is that of `benchmarks.inference`.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.case import load_case
+from asperity.inference import Observation, Unknown, build_emulator, infer_observations, setting_of
+from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
+from asperity.quantities import quantity
+from benchmarks.inference import CASE, KEPT
+
+CRF_STD_HZ = 15.0  # the width that the paper's figure gives a point
+LOAD_N, SPEED_M_S = 500.0, 1.91
+
+
+def main() -> None:
+    """Print the table."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps the emulator")
+    print("\n".join(lines(fast=True, kept=arguments.parse_args().kept)))
+
+
+def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - short as it is
+    """What `python -m benchmarks rings` prints."""
+    setting = setting_of(load_case(CASE))
+    emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
+    clr, kg = quantity("clr"), quantity("mass_kg")
+    yield "## The paper's rings at 500 N: what Sq says of CLR, and what a printed CRF adds"
+    yield "| Sq [um] | CLR by Sq alone, 90 % | printed CRF [Hz] | CLR, 90 % | bits | effective mass, 90 % | law own |"
+    yield "|---|---|---|---|---|---|---|"
+    for number, (sq, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
+        known = Unknown("sq_m", setting.contact[0].range, sq, std)
+        ring = replace(setting, contact=(known, *setting.contact[1:]))
+        printed = {0: CRF_ENDS_HZ[0], len(SAMPLES_SQ_UM) - 1: CRF_ENDS_HZ[1]}.get(number)
+        heard = [] if printed is None else [
+            Observation(load_n=LOAD_N, entrainment_m_s=SPEED_M_S, crf_hz=printed, crf_std_hz=CRF_STD_HZ)
+        ]  # fmt: skip
+        found = infer_observations(ring, emulator, heard)
+        before = _interval(found.values(found.prior)["clr"])
+        cells = [f"{sq:.2f} ± {std:.2f}", clr.interval(*before), "", "", "", "", ""]
+        if printed is not None:
+            told, mass = found.posterior()["clr"], found.posterior()["mass_kg"]
+            cells[2:] = [f"{printed:.0f}", clr.interval(told.low, told.high), f"{told.information_bits:.1f}",
+                         kg.interval(mass.low, mass.high), f"{found.law_probability('own'):.2f}"]  # fmt: skip
+        yield f"| {' | '.join(cells)} |"
+    yield "Ten of the twelve CRF are drawn and not printed; of those rings Sq alone says something."
+
+
+def _interval(values: Field) -> tuple[float, float]:
+    low, high = np.quantile(values, (0.05, 0.95))
+    return float(low), float(high)
+
+
+if __name__ == "__main__":
+    main()
