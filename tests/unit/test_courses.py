@@ -8,7 +8,15 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from asperity.errors import BadInput
-from asperity.inference import Forward, Observation, Point, design_contact, forecast_observations, read_limit
+from asperity.inference import (
+    Forward,
+    Observation,
+    Point,
+    design_contact,
+    forecast_observations,
+    read_limit,
+    wear_drift,
+)
 from asperity.inference.course import DRIFT_STD, KNOTS, WEIGHTS, Course, Extra, Table, between_knots
 from asperity.inference.likelihood import EMULATED_HEIGHT_STD, GAIN_STD
 from asperity.inference.visits import MOST, series_of
@@ -145,6 +153,29 @@ def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):
     assert found.sentence().startswith("No change of the contact is told over 20 visits")
     assert found.drifting == "sq_m"
     json.dumps(found.scalars(), allow_nan=False)
+
+
+def test_a_wear_history_is_the_first_drift(setting, emulator):
+    """Sq that grows from 0.5 to 1 um in 200 h: a fourth of a range of 0.25 to 4 um, an eighth of it in 100 h."""
+
+    class Worn:
+        hours = 200.0
+
+        @staticmethod
+        def at(hours):
+            return {"sq_m": 0.5e-6 * 2.0 ** (hours / 200.0)}
+
+    assert wear_drift(setting, Worn(), 100.0) == pytest.approx((0.125, 0.125))
+    assert wear_drift(setting, Worn(), 400.0) == pytest.approx((0.5, 0.5))
+    heard, _ = heard_along(setting, emulator, np.full(6, 0.5), std=0.3)  # which tells next to nothing
+    ends = []
+    for drift in ((0.6, 0.05), (-0.6, 0.05)):
+        found = forecast_observations(setting, emulator, heard, drift=drift, laws=("hertz-point",))
+        ends.append(found.bands["ends"][:, -1])
+    assert np.all(ends[0] > ends[1] + 0.03)
+    assert ends[0][1] > ends[1][1] + 0.2
+    with pytest.raises(BadInput, match="which cannot drift"):
+        wear_drift(replace(setting, contact=()), Worn(), 1.0)
 
 
 def test_many_visits_are_taken_together_and_none_is_lost():

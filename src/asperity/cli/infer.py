@@ -46,6 +46,9 @@ def infer(
     forecast: Annotated[
         str | None, typer.Option(metavar="LIMIT", help="When clr=0.5, or sq='2 um', is crossed; of a series.")
     ] = None,
+    worn: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of asperity wear: its drift of Sq is what is expected.")
+    ] = None,
     design: Annotated[
         float | None, typer.Option(metavar="CLR", help="What keeps the load share below it, such as 0.3; alone, too.")
     ] = None,
@@ -65,6 +68,8 @@ def infer(
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
     if case_file is None:
         raise BadInput("asperity infer needs the contact; give --case CASE.toml")
+    if worn is not None and forecast is None:
+        raise BadInput("--worn says how Sq is expected to drift; give --forecast, too")
     if not paths and (design is None or forecast is not None):
         raise BadInput("asperity infer needs recordings; name files, or their folder")
     require_choice("--sampler", sampler, inference.SAMPLERS)
@@ -75,20 +80,11 @@ def infer(
     if paths:
         with progress("recordings", "reading recordings ...", quiet=quiet):
             heard = inference.listen(
-                paths,
-                setting,
-                table=table_file,
-                band_hz=band,
-                rate_hz=rate,
-                unit=unit,
-                channel=channel,
-                scale=scale,
-                shaft_hz=shaft or None,
-                method=cast("SeriesMethod | None", method),
-                workers=count,
-            )
+                paths, setting, table=table_file, band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale,
+                shaft_hz=shaft or None, method=cast("SeriesMethod | None", method), workers=count,
+            )  # fmt: skip
     emulated = _emulated(setting, emulator, count, quiet=quiet)
-    ahead = None if limit is None else inference.forecast_heard(setting, emulated, heard, limit, seed=seed)
+    ahead = None if limit is None else inference.forecast_heard(setting, emulated, heard, limit, worn=worn, seed=seed)
     now = inference.latest(heard) if ahead is not None and ahead.told else heard
     now = replace(now, notes=(*now.notes, *known))
     found = inference.infer_heard(setting, emulated, now, sampler=cast("Sampler", sampler), seed=seed)

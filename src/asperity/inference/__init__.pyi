@@ -23,6 +23,7 @@ from .infer import infer_contact as infer_contact
 from .infer import infer_heard as infer_heard
 from .infer import infer_observations as infer_observations
 from .infer import latest as latest
+from .infer import wear_drift as wear_drift
 from .infer import with_observation as with_observation
 from .inference import CRUCIAL as CRUCIAL
 from .inference import Inference as Inference

@@ -5,6 +5,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
 
+from asperity.ageing import WearHistory, load_wear
 from asperity.case import Case
 from asperity.errors import BadInput, require_choice
 from asperity.inference.emulator import Emulator, build_emulator
@@ -23,10 +24,12 @@ from asperity.inference.posterior import (
     sample_models,
     with_point,
 )
+from asperity.inference.priors import share_of
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting, setting_of
 from asperity.study import StudyProgress
 
+LEAST_DRIFT_STD = 0.02  # of a first drift that a wear model foretells, in shares of the range over the series
 SAMPLERS: tuple[Sampler, ...] = ("importance", "nested")
 
 
@@ -83,10 +86,47 @@ def infer_heard(
     )
 
 
-def forecast_heard(setting: Setting, emulator: Emulator, heard: Listened, limit: Limit, *, seed: int = 0) -> Forecast:
-    """`forecast_observations` of what `listen` heard."""
+def forecast_heard(
+    setting: Setting,
+    emulator: Emulator,
+    heard: Listened,
+    limit: Limit,
+    *,
+    worn: str | Path | WearHistory | None = None,
+    seed: int = 0,
+) -> Forecast:
+    """`forecast_observations` of what `listen` heard; `worn` is a history of `asperity wear`, whose drift is expected.
+
+    Its hours are those of x, from the first recording on.
+    """
     x_name = heard.track.x_name if heard.track is not None else ""
-    return forecast_observations(setting, emulator, heard.observations, limit=limit, seed=seed, x_name=x_name)
+    times = [one.x for one in heard.observations]
+    drift = None
+    if worn is not None and times:
+        history = worn if isinstance(worn, WearHistory) else load_wear(worn)
+        drift = wear_drift(setting, history, max(times) - min(times))
+    return forecast_observations(
+        setting, emulator, heard.observations, limit=limit, drift=drift, seed=seed, x_name=x_name
+    )
+
+
+def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[float, float]:
+    """First drift of Sq, in shares of its range over so many hours, as a wear history has it; and its deviation.
+
+    Wear coefficients are known to a factor of two: the deviation is the drift itself.
+
+    Raises
+    ------
+    BadInput
+        where the case knows its Sq.
+    """
+    unknown = next((one for one in setting.contact if one.key == "sq_m"), None)
+    if unknown is None:
+        raise BadInput("the case knows its Sq, which cannot drift; leave --worn out")
+    end = min(hours, history.hours)
+    first, last = (float(share_of(unknown.range, unknown.from_si(history.at(time)["sq_m"]))) for time in (0.0, end))
+    mean = (last - first) * hours / end
+    return mean, max(abs(mean), LEAST_DRIFT_STD)
 
 
 def latest(heard: Listened) -> Listened:
