@@ -14,7 +14,7 @@ import numpy as np
 from asperity.ehl import ContactModel, Options, contact_state, solve_contact
 from benchmarks.robustness import OIL, contacts, prepared
 
-MODELS: tuple[ContactModel, ...] = ("mixed", "unified")
+MODELS: tuple[ContactModel, ...] = ("mixed",)
 COARSE, FINE = (128, 256), 512
 SHOWN = 1e-3  # difference from which on an interval is compared with it: below, the solver's tolerance is what differs
 

@@ -27,7 +27,7 @@ MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
 ONWARDS, BACK = 2.5, 1.5  # of the difference to the coarser grid: how far a rough contact's figures may yet go
 AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
 UNRESOLVED = 2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
-BY_TWO_ORDERS = 0.8  # share of all this where both orders of the wedge are known, and tell more
+BY_TWO_ORDERS = 0.85  # share of all this where both orders of the wedge are known, and tell more
 KEPT_ON, KEPT_BACK, KEPT_UNRESOLVED = 2.0, 0.5, 1.0  # the same of the load share, where three grids are known too
 OF_ENDS = 3.0  # of the same, of what is read off a roller's ends: their error falls with the cell, not its square
 NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
@@ -222,7 +222,7 @@ def grid_error(
     cells (`benchmarks.intervals`). A roller's edge pressure and end film get 3 d, and up to ten times that where d
     does not shrink as grids get finer. d is no less than a quarter of the difference between the grids before, lest
     two grids agree by chance, and no less than what the second-order wedge did to the first order's figures on the
-    finest grid; where that is known, 0.8 of all this will do. The load share, where three grids
+    finest grid; where that is known, 0.85 of all this will do. The load share, where three grids
     are known too, gets 2 d the way that it went, 0.5 d the other and one of the squared cell. Source: P. J. Roache,
     J. Fluids Eng. 116 (1994) 405.
     """
