@@ -125,8 +125,8 @@ class Quantity:
     def number_in(self, values: Mapping[str, Any]) -> str:
         """Its number in a row, a run's or a table's: "61.3 (44 to 78)", or "61.3 ± 2.4".
 
-        One that has a whole interval, known or not, bears no deviation: that would be a part of the doubt alone. A share
-        or film whose deviation reaches beyond what it can be has the interval that is left: "0.2 (0.0 to 7.1)".
+        One that has a whole interval, known or not, bears no deviation: that would be a part of the doubt alone. A
+        share or film whose deviation reaches beyond what it can be has the interval that is left: "0.2 (0.0 to 7.1)".
         """
         value, (low, high) = values.get(self.key), (values.get(end) for end in self.ends)
         if self.ends[0] not in values:

@@ -93,7 +93,7 @@ def test_a_film_far_from_its_fits_is_told_with_the_reason():
 
 
 def test_asperities_that_bear_nothing_at_a_small_film_ratio_are_told():
-    """At Sq 2.5 um the paper's film ratio is 0.25, and asperities carry nine tenths: the note is for when they do not."""
+    """The paper's contact at Sq 2.5 um has a film ratio of 0.25, and asperities bear nine tenths: no note."""
     solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
     assert not any("film ratio" in note for note in solution_notes(solved))
     untouched = replace(solved, in_contact=np.zeros_like(solved.in_contact))

@@ -63,17 +63,19 @@ def test_a_stored_number_is_shown_in_its_display_unit():
     assert quantity("clr").text(0.8404, 0.024) == "84.0 ± 2.4 %"
     assert quantity("h_min_m").text_in({"h_min_m": 1.5e-7, "h_min_error_m": None}) == "0.150 µm"
 
+    assert quantity("p_max_pa").number(2e9) == "2.000"
+    assert quantity("converged").text(False) == "NO"
+    assert quantity("crf_hz").text(None) == NO_VALUE
+    assert quantity("iterations").text(31) == "31"
+
 
 def test_no_deviation_leads_beyond_what_a_share_or_film_can_be():
     assert quantity("car").text_in({"car": 0.002, "car_error": 0.069}) == "0.2 (0.0 to 7.1) %"
     assert quantity("car").text_in({"car": 0.97, "car_error": 0.05}) == "97.0 (92.0 to 100.0) %"
     assert quantity("car").text_in({"car": 0.2, "car_error": 0.069}) == "20.0 ± 6.9 %"
-    assert quantity("h_central_m").text_in({"h_central_m": 1e-8, "h_central_error_m": 4e-8}) == "0.010 (0.000 to 0.050) µm"
+    film = quantity("h_central_m").text_in({"h_central_m": 1e-8, "h_central_error_m": 4e-8})
+    assert film == "0.010 (0.000 to 0.050) µm"
     assert quantity("crfa").number(1.0, 2.0) == "1.0 ± 2.0"  # what only scatters, and is no share
-    assert quantity("p_max_pa").number(2e9) == "2.000"
-    assert quantity("converged").text(False) == "NO"
-    assert quantity("crf_hz").text(None) == NO_VALUE
-    assert quantity("iterations").text(31) == "31"
 
 
 def test_a_presets_resonance_is_the_plain_one_by_another_name():
