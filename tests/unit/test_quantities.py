@@ -62,7 +62,6 @@ def test_a_value_ends_where_its_deviation_does(value, deviation, form, text):
 def test_a_stored_number_is_shown_in_its_display_unit():
     assert quantity("clr").text(0.8404, 0.024) == "84.0 ± 2.4 %"
     assert quantity("h_min_m").text_in({"h_min_m": 1.5e-7, "h_min_error_m": None}) == "0.150 µm"
-
     assert quantity("p_max_pa").number(2e9) == "2.000"
     assert quantity("converged").text(False) == "NO"
     assert quantity("crf_hz").text(None) == NO_VALUE
