@@ -1,7 +1,8 @@
 """Every snippet of every page is run, or says above itself why it is not: `<!-- not run: reason -->`.
 
 The snippets of a page are run in their order, in one folder that holds the examples, in this process; what Python
-defines stays for the page's next block of Python. README's are run in test_readme, which holds what they print.
+defines stays for the page's next block of Python. README's are run in test_readme, which holds what they print. A block of `text` behind commands is what they print: each
+of its lines, where "..." stands for anything.
 """
 
 import re
@@ -44,16 +45,25 @@ def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys):
         if block.language == "python":
             exec(compile(block.text, f"{page.path.name}:{block.line.number}", "exec"), kept)
             continue
-        refused = next((after.text for after in page.blocks if after.line.number > block.line.number), "")
-        for line in block.text.replace("\\\n", " ").splitlines():
-            run(line.removeprefix("$ "), refused if refused.startswith("error: ") else None, capsys)
+        after = next((one for one in page.blocks if one.line.number > block.line.number), None)
+        shown = after.text if after is not None and after.language in ("", "text") else ""
+        refused = shown if shown.startswith("error: ") else None
+        lines = block.text.replace("\\\n", " ").splitlines()
+        said = "\n".join(run(line.removeprefix("$ "), refused, capsys) for line in lines)
+        assert refused is not None or unsaid(shown, said) == []
 
 
-def run(line: str, refusal: str | None, capsys) -> None:
-    """Run a command, which does what it is for, or is refused as the block behind it shows."""
+def unsaid(shown: str, said: str) -> list[str]:
+    """The lines that a page shows and nothing printed."""
+    patterns = {line: ".*".join(map(re.escape, line.split("..."))) for line in shown.splitlines()}
+    return [line for line, pattern in patterns.items() if not re.search(f"^{pattern}$", said, re.MULTILINE)]
+
+
+def run(line: str, refusal: str | None, capsys) -> str:
+    """What a command prints that does what it is for, or is refused as the block behind it shows."""
     words = shlex.split(line, comments=True)
     if not words:
-        return
+        return ""
     assert words[0] == "asperity", f"{line}: mark what is no command of ours as not run"
     with pytest.raises(SystemExit) as end:
         main(words[1:])
@@ -62,6 +72,7 @@ def run(line: str, refusal: str | None, capsys) -> None:
         assert said.err.strip() == refusal.strip()
     else:
         assert (end.value.code or 0) in FINE, f"{line}: {said.err}"
+    return said.out
 
 
 def test_a_reason_stands_above_a_snippet_and_nowhere_else():
@@ -77,6 +88,13 @@ def test_a_snippet_that_fails_is_seen(tmp_path, monkeypatch, capsys):
         run("asperity solve no-such-case.toml", None, capsys)
     with pytest.raises(AssertionError, match="mark what is no command"):
         run("make test", None, capsys)
+
+
+def test_a_line_that_nothing_printed_is_seen():
+    said = "Full film: 0 %.\nReport: mine.html\n"
+    assert unsaid("Full film: ...\nReport: mine.html", said) == []
+    assert unsaid("Full ...\nMixed ...", said) == ["Mixed ..."]
+    assert unsaid("film: 0 %.", said) == ["film: 0 %."]
 
 
 def test_readme_is_run_by_its_own_tests_or_says_why_not():
