@@ -285,6 +285,25 @@ def test_a_solver_that_lies_is_seen():
     assert all(row.error > 0.05 for row in run_benchmark(Lying(), cells=(64,)).rows)
 
 
+@pytest.mark.parametrize(("lasting", "least", "solves"), [((0.5, 0.25, 0.75), 0.25, 4), ((1.5,), 1.5, 2)])
+def test_seconds_are_the_least_of_three_and_count_no_first_solve(monkeypatch, lasting, least, solves):
+    case = CASES["dry-ball-1"]
+    clock = iter([time for seconds in lasting for time in (10.0, 10.0 + seconds)])
+    monkeypatch.setattr("asperity.benchmark.run.load_benchmark", lambda _: (case,))
+    monkeypatch.setattr("asperity.benchmark.run.time.process_time", lambda: next(clock))
+    calls = []
+
+    class Counted:
+        name, kinds = "counted", (case.kind,)
+
+        def solve(self, given, cells):  # noqa: ARG002
+            calls.append(cells)
+            return {entry.quantity: entry.value for entry in case.certified}
+
+    assert {row.seconds for row in run_benchmark(Counted(), cells=(64,)).rows} == {least}
+    assert len(calls) == solves
+
+
 def test_the_command_runs_a_folder_of_cases(tmp_path, monkeypatch, capsys):
     from asperity.cli import main
 
