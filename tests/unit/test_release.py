@@ -68,7 +68,8 @@ def test_one_paper_and_one_licence():
     assert stated("codemeta.json")["license"].endswith(f"/{PROJECT['license']}")
 
 
-def test_the_recipe_needs_what_the_project_needs():
+def test_recipe_and_metadata_need_what_the_project_needs():
+    assert stated("codemeta.json")["softwareRequirements"] == PROJECT["dependencies"]
     wanted = {CONDA.get(name, name).lower(): bound for name, bound in map(split, PROJECT["dependencies"])}
     wanted["python"] = PROJECT["requires-python"]
     assert dict(map(split, stated("recipe/recipe.yaml")["requirements"]["run"])) == wanted
