@@ -166,11 +166,11 @@ def _fit(candidate: _Candidate, places: Places, scatters: Field) -> Fitted:
     own = np.tile(places.variance + scatters[:, None] ** 2, (len(MEMORIES), 1))  # (scatters, places)
     memory = np.repeat(MEMORIES, scatters.size)
     precision = _precision(own, memory)
-    linear, squares, determinant = _least_squares(precision, products)
+    linear, squares, determinant = _least_squares(precision, products, columns.shape[-1])
     for _ in range(ROUNDS if np.any(places.x_std > 0.0) else 0):
         steepness = linear @ np.swapaxes(slopes, 1, 2)
         precision = _precision(own + (steepness * places.x_std) ** 2, memory)
-        linear, squares, determinant = _least_squares(precision, products)
+        linear, squares, determinant = _least_squares(precision, products, columns.shape[-1])
     likelihood = np.log(np.repeat(ALIKE, scatters.size)) - 0.5 * (squares + precision.log_determinant)
     linear[..., 0] += middle
     return Fitted(np.max(likelihood, axis=1), likelihood - 0.5 * determinant, linear)
@@ -209,19 +209,20 @@ def _products(columns: Field, y: Field) -> Field:
     """Of each column with each and with y, at a place and across to the one before; (bends, 2 places, pairs)."""
     whole = np.concatenate([columns, np.broadcast_to(y[:, None], (*columns.shape[:2], 1))], axis=-1)
     behind = _before(np.swapaxes(whole, 1, 2)).swapaxes(1, 2)
-    here, across = whole[..., None] * whole[:, :, None], whole[..., None] * behind[:, :, None]
-    products = np.concatenate([here, across + np.swapaxes(across, -1, -2)], axis=1)
-    return products.reshape(*products.shape[:2], -1)
+    one, other = np.triu_indices(whole.shape[-1])
+    across = whole[..., one] * behind[..., other] + whole[..., other] * behind[..., one]
+    return np.concatenate([whole[..., one] * whole[..., other], across], axis=1)
 
 
-def _least_squares(precision: _Precision, products: Field) -> tuple[Field, Field, Field]:
-    """What fits best (bends, scatters, linear), the squares it leaves, and ln of the determinant of its information."""
+def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[Field, Field, Field]:
+    """What `size` columns fit best (bends, scatters, linear), the squares left, ln det of their information."""
     found = np.concatenate([precision.own, precision.next], axis=-1) @ products
-    size = round(np.sqrt(products.shape[-1]))
-    found = found.reshape(*found.shape[:2], size, size)
-    right = found[..., :-1, -1]
-    linear, determinant = _solved(found[..., :-1, :-1], right)
-    return linear, found[..., -1, -1] - np.sum(linear * right, axis=-1), determinant
+    one, other = np.triu_indices(size + 1)
+    whole = np.empty((*found.shape[:2], size + 1, size + 1))
+    whole[..., one, other] = whole[..., other, one] = found
+    right = whole[..., :-1, -1]
+    linear, determinant = _solved(whole[..., :-1, :-1], right)
+    return linear, whole[..., -1, -1] - np.sum(linear * right, axis=-1), determinant
 
 
 def _solved(information: Field, right: Field) -> tuple[Field, Field]:
