@@ -18,7 +18,7 @@ from asperity.inference import (
     wear_drift,
 )
 from asperity.inference.course import DRIFT_STD, KNOTS, WEIGHTS, Course, Extra, Table, between_knots
-from asperity.inference.likelihood import EMULATED_HEIGHT_STD, GAIN_STD
+from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD
 from asperity.inference.visits import MOST, series_of
 from support.emulated import formula, formula_emulator, formula_setting
 
@@ -97,7 +97,7 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
     early, late = np.minimum.outer(time, time), np.maximum.outer(time, time)
     wandered = RESTLESS**2 * (early**2 * late / 2.0 - early**3 / 6.0)
     covariance = np.outer(slope, slope) * moving * (DRIFT_STD**2 * np.outer(time, time) + wandered)
-    covariance += SIZE**2 * np.outer(lever, lever)
+    covariance += EXPONENT_STD**2 * np.outer(lever, lever)
     for row, one in enumerate(sounds):
         weight, emulated = WEIGHTS[one.channel], {"crf": 0.01, "crfa": EMULATED_HEIGHT_STD}[one.channel]
         for column, other in enumerate(sounds):

@@ -257,7 +257,7 @@ def test_a_wrong_law_widens_the_intervals_and_is_said(setting, emulator, of_six)
     assert found.models[0].log_evidence > found.models[1].log_evidence + 10.0  # with the error against exact
     assert found.posterior()["clr"].information_bits < of_six.posterior()["clr"].information_bits - 0.5
     ratio = [one.high / one.low for one in (found.posterior()["sq_m"], of_six.posterior()["sq_m"])]
-    assert ratio[0] > 1.2 * ratio[1]
+    assert ratio[0] > 1.1 * ratio[1]  # both allow for an exponent that is off
 
 
 def test_nothing_heard_cannot_be_told(setting, emulator):

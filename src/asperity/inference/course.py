@@ -14,7 +14,7 @@ from scipy.special import ndtr
 from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.inference.forward import Forward, Law
-from asperity.inference.likelihood import EMULATED_HEIGHT_STD, GAIN_STD, OF_DAMPING, OF_HEIGHT, SIZES
+from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, OF_DAMPING, OF_HEIGHT, SIZES
 from asperity.inference.outputs import CLR
 from asperity.inference.visits import CHANNELS, Series, Sound
 
@@ -194,7 +194,7 @@ class _State:
         mean = np.zeros((count, FIRST + len(CHANNELS) * places))
         mean[:, SHARE], mean[:, SPEED] = table.share, drift[0]
         variance = np.zeros_like(mean)
-        variance[:, SPEED], variance[:, LEVER], variance[:, GAIN] = drift[1] ** 2, table.extra.size**2, GAIN_STD**2
+        variance[:, SPEED], variance[:, LEVER], variance[:, GAIN] = drift[1] ** 2, EXPONENT_STD**2, GAIN_STD**2
         for number, channel in enumerate(CHANNELS):
             own = slice(FIRST + number * places, FIRST + (number + 1) * places)
             error = (WEIGHTS[channel] * table.extra.size[:, None]) ** 2

@@ -1,9 +1,9 @@
 """How probable what was heard is, by a law, with or without a term for what the law itself gets wrong.
 
 Without the term, a frequency is off by its measurement and the emulator, whose error all operating points of a contact
-have in common in part. With it, each operating point has an error of the law, and the law's exponent of the load one
-for all; how large they are is not known, and three sizes are as probable. CRFA has a gain that nobody knows, for all
-recordings in common.
+have in common in part. With it, each operating point has an error of the law; how large it is is not known, and three
+sizes are as probable. The law's exponent of the load is off too, by the same at all points. CRFA has a gain that nobody
+knows, for all recordings in common.
 """
 
 from collections.abc import Sequence
@@ -16,6 +16,7 @@ from asperity.inference.observations import Heard, Point
 
 SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
 OF_DAMPING, OF_HEIGHT = 5.0, 10.0  # the same error in ln ζ and ln CRFA
+EXPONENT_STD = 0.03  # of the power of the load that CRF goes with: as far as 1/5 is from 1/6
 COMMON = 0.25  # share of the emulator's variance that all operating points of a contact have in common
 GAIN_STD = 30.0  # of ln CRFA: an accelerometer and what excites it are free, and the height of one point says nothing
 EMULATED_HEIGHT_STD = 0.05  # of ln CRFA beyond what CAR's deviation makes: its process's own shape
@@ -35,7 +36,8 @@ def log_at_sizes(shown: Shown, points: Sequence[Point]) -> Field:
 
 
 def _at_size(shown: Shown, points: Sequence[Point], size: float) -> Field:
-    lever = size * (shown.lever - shown.lever.mean(axis=1, keepdims=True))
+    off = EXPONENT_STD if size > 0.0 else 0.0
+    lever = off * (shown.lever - shown.lever.mean(axis=1, keepdims=True))
     total = _gaussian([point.crf for point in points], shown.crf, shown.crf_std, size, lever)
     none = np.zeros_like(lever)
     total = total + _gaussian(
