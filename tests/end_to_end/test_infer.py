@@ -120,6 +120,7 @@ def test_refusals_are_one_sentence(asp):
     for arguments, said in (
         (("a.wav",), "give --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
+        (("a.wav", "--case", "infer.toml", "--worn", "d"), "give --forecast, too"),
         (("a.wav", "--case", "infer.toml", "--forecast", "crf=3 kHz"), "--forecast takes a limit such as clr=0.5"),
         (("empty", "--case", "infer.toml"), "holds no recordings"),
         (("a.wav", "--case", "infer.toml", "--table", "kilo.csv"), "has a column load_kn; take load_n"),
