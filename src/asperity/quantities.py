@@ -131,15 +131,19 @@ class Quantity:
         value, (low, high) = values.get(self.key), (values.get(end) for end in self.ends)
         if self.ends[0] not in values:
             deviation = values.get(self.deviation)
-            most = 1.0 if (self.unit, self.display) == ("1", "%") else math.inf
-            if self.group in BOUNDED and value is not None and deviation and math.isfinite(value + deviation):
-                low, high = max(0.0, value - deviation), min(most, value + deviation)
-                if (low, high) != (value - deviation, value + deviation):
-                    return f"{self.number(value)} ({self._span(low, high)})"
-            return self.number(value, deviation)
+            left = self.left(value, deviation)
+            return self.number(value, deviation) if left is None else f"{self.number(value)} ({self._span(*left)})"
         if value is None or low is None or high is None:
             return self.number(value)
         return f"{self.number(value)} ({self._span(low, high)})"
+
+    def left(self, value: float | None, deviation: float | None) -> tuple[float, float] | None:
+        """The interval that is left of a share or film whose deviation reaches beyond what it can be; else None."""
+        if self.group not in BOUNDED or value is None or not deviation or not math.isfinite(value + deviation):
+            return None
+        most = 1.0 if (self.unit, self.display) == ("1", "%") else math.inf
+        low, high = max(0.0, value - deviation), min(most, value + deviation)
+        return None if (low, high) == (value - deviation, value + deviation) else (low, high)
 
     def text_in(self, values: Mapping[str, Any]) -> str:
         """The same with its unit: "61.3 (44 to 78) %"."""

@@ -95,6 +95,8 @@ def test_a_grid_that_cannot_tell_says_so_in_the_tiles(answer):
     assert {tile.key: tile.doubt for tile in replace(answer, determined=False).tiles}["clr"] == NOT_DETERMINED
     unknown = replace(answer, row={**answer.row, "clr_low": None})
     assert {tile.key: tile.doubt for tile in unknown.tiles}["clr"] == NOT_DETERMINED
+    wide = replace(answer, row={**answer.row, "car": 0.002, "car_error": 0.069})
+    assert {tile.key: tile.doubt for tile in wide.tiles}["car"] == "0.0 to 7.1 %"  # and nothing below
     silent = replace(answer, row={**answer.row, "crf_hz": None})
     assert {tile.key: (tile.value, tile.doubt) for tile in silent.tiles}["crf_hz"] == ("–", "")
 

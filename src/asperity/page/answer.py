@@ -127,6 +127,9 @@ class Answer(Picture):
             deviation = self.row.get(entry.deviation)
             if deviation is None:
                 return NOT_DETERMINED
+            left = entry.left(value, deviation)
+            if left is not None:
+                return entry.interval(*left)
             _, _, spread = entry.number(value, deviation).partition(" ± ")
             return f"± {spread.rstrip(')')} {entry.display}".rstrip() if spread else ""
         return "" if entry.key in BY_FORMULA else NOT_DETERMINED
