@@ -18,6 +18,7 @@ from asperity.inference import (
     wear_drift,
 )
 from asperity.inference.course import DRIFT_STD, KNOTS, WEIGHTS, Course, Extra, Table, between_knots
+from asperity.inference.forecast import Limit
 from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD
 from asperity.inference.visits import MOST, series_of
 from support.emulated import formula, formula_emulator, formula_setting
@@ -144,6 +145,12 @@ def test_a_roughening_contact_is_foretold(setting, emulator):
     assert found.clr.low < clr[seen] < found.clr.high
     assert "rises above 50.0 %" in found.sentence()
     json.dumps(found.scalars(), allow_nan=False)
+    falling = replace(found, rising=False, already=0.0, within=0.9)  # from above, where it still is
+    assert falling.alarm
+    fallen = replace(falling, already=1.0, within=0.0)  # run in
+    assert not fallen.alarm
+    assert fallen.sentence() == "CLR is below 50.0 % (probability 1.00)."
+    assert replace(fallen, limit=Limit("oil_viscosity_pa_s", 0.02)).alarm  # of oil less is worse
 
 
 def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):

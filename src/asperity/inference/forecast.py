@@ -26,6 +26,7 @@ ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are
 HORIZON, STEPS = 2.0, 80  # how far, over the span of the series; in so many steps
 ODDS = 100.0  # of a change over none, from which on it is told: chance gets there once in a hundred series, at most
 ENDS = (0.05, 0.5, 0.95)
+WORSE_ABOVE = (CLR, "sq_m")  # what may fall as far as it likes: running in is no alarm
 
 
 class Limit(NamedTuple):
@@ -87,8 +88,15 @@ class Forecast:
 
     @property
     def alarm(self) -> bool:
-        """Whether it changes, and is past the limit or more likely than not to cross it within the horizon."""
-        return self.told and self.already + self.within >= 0.5
+        """Whether it changes, and is past the limit or more likely than not to cross it within the horizon.
+
+        Load share and Sq are past a limit above it: one that falls is an alarm as long as it has not fallen below.
+        """
+        if not self.told:
+            return False
+        if self.limit.key in WORSE_ABOVE and not self.rising:
+            return self.already < 0.5
+        return self.already + self.within >= 0.5
 
     def sentence(self) -> str:
         """In words."""
@@ -101,7 +109,8 @@ class Forecast:
             )
         way = "rises above" if self.rising else "falls below"
         if self.already >= 0.5:
-            return f"{entry.short} is past {entry.text(self.limit.value)} (probability {self.already:.2f})."
+            side = "above" if self.rising else "below"
+            return f"{entry.short} is {side} {entry.text(self.limit.value)} (probability {self.already:.2f})."
         unit = f" in {self.x_name}" if self.x_name else ""
         said = (
             f"{entry.short} {way} {entry.text(self.limit.value)} within {self.horizon:.3g} after the last recording"
