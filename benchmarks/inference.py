@@ -16,7 +16,7 @@ from time import perf_counter, process_time
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import binom
+from scipy.stats import binomtest
 from threadpoolctl import threadpool_limits
 
 from asperity.arrays import Field
@@ -389,10 +389,10 @@ def median(rows: Sequence[Mapping[str, str]], high: str, low: str, how: np.ufunc
 
 
 def share(inside: Sequence[bool]) -> str:
-    """A share with its 90 % interval, were it the true one."""
+    """A share with its 90 % interval (Clopper and Pearson's)."""
     found = float(np.mean(inside))
-    low, high = binom.interval(0.9, len(inside), found)
-    return f"{100 * found:.0f} % ({100 * low / len(inside):.0f} to {100 * high / len(inside):.0f})"
+    exact = binomtest(int(np.sum(inside)), len(inside)).proportion_ci(0.9)
+    return f"{100 * found:.0f} % ({100 * exact.low:.0f} to {100 * exact.high:.0f})"
 
 
 if __name__ == "__main__":

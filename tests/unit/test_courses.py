@@ -10,9 +10,11 @@ from scipy.stats import multivariate_normal
 from asperity.errors import BadInput
 from asperity.inference import (
     Forward,
+    Listened,
     Observation,
     Point,
     design_contact,
+    forecast_heard,
     forecast_observations,
     read_limit,
     wear_drift,
@@ -39,6 +41,9 @@ def emulator(setting):
 
 def recording(x, crf=3000.0, std=6.0, **more):
     return Observation(load_n=500.0, entrainment_m_s=1.91, crf_hz=crf, crf_std_hz=std, x=x, **more)
+
+
+HEARD = Listened(observations=(recording(1.0),))
 
 
 def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
@@ -162,16 +167,19 @@ def test_a_contact_that_stays_as_it_is_is_not_said_to_change(setting, emulator):
     json.dumps(found.scalars(), allow_nan=False)
 
 
+class Worn:
+    """Sq that grows from 0.5 to 1 um in 200 h."""
+
+    def __init__(self, hours=200.0):
+        self.hours = hours
+
+    @staticmethod
+    def at(hours):
+        return {"sq_m": 0.5e-6 * 2.0 ** (hours / 200.0)}
+
+
 def test_a_wear_history_is_the_first_drift(setting, emulator):
-    """Sq that grows from 0.5 to 1 um in 200 h: a fourth of a range of 0.25 to 4 um, an eighth of it in 100 h."""
-
-    class Worn:
-        hours = 200.0
-
-        @staticmethod
-        def at(hours):
-            return {"sq_m": 0.5e-6 * 2.0 ** (hours / 200.0)}
-
+    """A fourth of a range of 0.25 to 4 um, an eighth of it in 100 h."""
     assert wear_drift(setting, Worn(), 100.0) == pytest.approx((0.125, 0.125))
     assert wear_drift(setting, Worn(), 400.0) == pytest.approx((0.5, 0.5))
     heard, _ = heard_along(setting, emulator, np.full(6, 0.5), std=0.3)  # which tells next to nothing
@@ -183,6 +191,8 @@ def test_a_wear_history_is_the_first_drift(setting, emulator):
     assert ends[0][1] > ends[1][1] + 0.2
     with pytest.raises(BadInput, match="which cannot drift"):
         wear_drift(replace(setting, contact=()), Worn(), 1.0)
+    with pytest.raises(BadInput, match="has no hours"):
+        wear_drift(setting, Worn(0.0), 1.0)
 
 
 def test_many_visits_are_taken_together_and_none_is_lost():
@@ -201,10 +211,17 @@ def test_many_visits_are_taken_together_and_none_is_lost():
         (lambda setting: read_limit("clr=half", setting), "--forecast clr takes a share of the load"),
         (lambda setting: read_limit("sq=2 N", setting), "--forecast sq must be"),
         (lambda _: series_of([recording(float("nan"))]), "has no place in time; give a column x"),
+        (lambda _: series_of([recording(float("inf"))]), "has no place in time"),
         (lambda _: series_of([recording(1.0)] * 9), "4 recordings at different times or more, got 1"),
         (lambda setting: forecast_observations(setting, None, [], limit=("clr", 1.5)), "must lie between 0 and 1"),
         (lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-6), drifting="oil_alpha_1_pa"),
          "a limit must be of clr or oil_alpha_1_pa"),
+        (lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-5)),
+         "a limit of Sq must lie within what .infer. allows, 0.25 µm to 4 µm, got 10 µm"),
+        (lambda setting: forecast_heard(setting, None, HEARD, read_limit("hardness=2 GPa", setting), worn="worn"),
+         "--worn says how Sq drifts, and the limit is of hardness_pa"),
+        (lambda setting: forecast_heard(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),
+         "4 recordings at different times or more, got 1"),
     ],
 )  # fmt: skip
 def test_a_forecast_of_nothing_is_refused(setting, call, said):

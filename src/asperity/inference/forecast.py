@@ -16,13 +16,15 @@ from asperity.inference.emulator import Emulator
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law
 from asperity.inference.observations import Observation
 from asperity.inference.outputs import CLR, OUTPUTS
-from asperity.inference.posterior import joined, taken
-from asperity.inference.sampling import FEWEST, Pool, Sampled, importance
+from asperity.inference.posterior import RULED_OUT, joined, taken
+from asperity.inference.priors import si
+from asperity.inference.sampling import Pool, Sampled, importance
 from asperity.inference.settings import Setting
 from asperity.inference.visits import Series, series_of
 from asperity.quantities import quantity
 
 ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
+FEWEST, ROUGH = 20.0, 60.0  # draws that any model is worth, at least; fewer than the second are told
 HORIZON, STEPS = 2.0, 80  # how far, over the span of the series; in so many steps
 ODDS = 100.0  # of a change over none, from which on it is told: chance gets there once in a hundred series, at most
 ENDS = (0.05, 0.5, 0.95)
@@ -64,6 +66,7 @@ class Forecast:
     horizon : how far ahead was looked
     clr, value : load share and what drifts, at the last visit
     bands : ends and median of the limit's quantity at each visit and ahead, by x
+    effective : how many independent courses it rests on
     x_name : what x is
     """
 
@@ -78,6 +81,7 @@ class Forecast:
     horizon: float
     clr: Interval
     value: Interval
+    effective: float
     bands: Mapping[str, Field] = field(repr=False)
     x_name: str = ""
 
@@ -118,7 +122,9 @@ class Forecast:
         )
         if self.within < 0.05:
             return said + "."
-        return said + f", if so after {self.time.low:.3g} to {self.time.high:.3g} (90 %; {self.time.median:.3g})."
+        said += f", if so after {self.time.low:.3g} to {self.time.high:.3g} (90 %; {self.time.median:.3g})"
+        rough = f"; roughly, as it rests on {self.effective:.0f} courses" if self.effective < ROUGH else ""
+        return f"{said}{rough}."
 
     def scalars(self) -> dict[str, Any]:
         """As JSON has it; times in the series' own unit, after its last recording."""
@@ -131,6 +137,7 @@ class Forecast:
             "already": self.already,
             "within": self.within,
             "horizon": self.horizon,
+            "effective": self.effective,
             "time": {key: None if np.isnan(end) else end for key, end in self.time._asdict().items()},
             "clr": self.clr._asdict(),
             "value": self.value._asdict(),
@@ -194,7 +201,7 @@ def forecast_observations(
     Raises
     ------
     BadInput
-        for a limit that is neither, recordings without x, or fewer than four visits.
+        for a limit that is neither or out of its range, recordings without x, or fewer than four visits.
     AsperityError
         where no course was found.
     """
@@ -204,6 +211,7 @@ def forecast_observations(
         raise BadInput(f"a limit must be of {CLR} or {drifting}, which changes, got {limit.key!r}")
     if limit.key == CLR and not 0.0 < limit.value < 1.0:
         raise BadInput(f"a limit of CLR must lie between 0 and 1, got {limit.value:g}")
+    _require_within(setting, limit)
     series = series_of(observations)
     forward = Forward(setting, emulator, series.places)
     models, best = [], -np.inf
@@ -214,11 +222,27 @@ def forecast_observations(
             sampled = importance(pool, _target(moving=moving), enough=ENOUGH, best=best)
             best = max(best, sampled.log_evidence)
             models.append(_Model(course, moving, sampled))
-    if max(model.sampled.effective for model in models) < FEWEST:
-        raise AsperityError(
-            "no course of the contact was found that these recordings fit; state wider priors in [infer]"
-        )
+    for model in models:
+        if model.sampled.effective < FEWEST and model.sampled.log_evidence > best - RULED_OUT:
+            raise AsperityError(
+                f"too few courses of the contact were found that fit these recordings: they are worth "
+                f"{model.sampled.effective:.0f}, and {FEWEST:.0f} are needed; leave recordings out, or --forecast"
+            )
     return replace(_forecast(models, limit, seed), x_name=x_name)
+
+
+def _require_within(setting: Setting, limit: Limit) -> None:
+    """BadInput for a limit that what drifts cannot reach within the range that the emulator knows."""
+    unknown = next((one for one in setting.contact if one.key == limit.key), None)
+    if unknown is None:
+        return
+    low, high = (si(end, unknown.range.unit) for end in (unknown.range.low, unknown.range.high))
+    if not low < limit.value < high:
+        entry = quantity(limit.key)
+        raise BadInput(
+            f"a limit of {entry.short} must lie within what [infer] allows, {entry.text(low)} to {entry.text(high)}, "
+            f"got {entry.text(limit.value)}"
+        )
 
 
 def _target(*, moving: bool) -> Callable[[Any], Field]:
@@ -256,6 +280,7 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
         horizon=HORIZON * series.span,
         clr=Interval.of(clr),
         value=Interval.of(value),
+        effective=float(1.0 / np.sum((np.exp(logs - logsumexp(logs))) ** 2 / [m.sampled.effective for m in models])),
         bands={"x": np.concatenate([series.x, x_ahead]), "ends": np.quantile(whole, ENDS, axis=0)},
     )
 

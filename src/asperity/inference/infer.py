@@ -15,6 +15,7 @@ from asperity.inference.inference import Inference
 from asperity.inference.listening import Listened, listen
 from asperity.inference.next_point import candidate_points, expected_information
 from asperity.inference.observations import Observation, Point, points_of
+from asperity.inference.outputs import CLR
 from asperity.inference.posterior import (
     Draws,
     Sampler,
@@ -27,6 +28,7 @@ from asperity.inference.posterior import (
 from asperity.inference.priors import share_of
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting, setting_of
+from asperity.inference.visits import series_of
 from asperity.study import StudyProgress
 
 LEAST_DRIFT_STD = 0.02  # of a first drift that a wear model foretells, in shares of the range over the series
@@ -103,6 +105,9 @@ def forecast_heard(
     times = [one.x for one in heard.observations]
     drift = None
     if worn is not None and times:
+        if limit.key not in (CLR, "sq_m"):
+            raise BadInput(f"--worn says how Sq drifts, and the limit is of {limit.key}; leave --worn out")
+        series_of(heard.observations)  # refuses what is no series
         history = worn if isinstance(worn, WearHistory) else load_wear(worn)
         drift = wear_drift(setting, history, max(times) - min(times))
     return forecast_observations(
@@ -124,6 +129,8 @@ def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[fl
     if unknown is None:
         raise BadInput("the case knows its Sq, which cannot drift; leave --worn out")
     end = min(hours, history.hours)
+    if end <= 0.0:
+        raise BadInput("the wear history has no hours, and says nothing of a drift; leave --worn out")
     first, last = (float(share_of(unknown.range, unknown.from_si(history.at(time)["sq_m"]))) for time in (0.0, end))
     mean = (last - first) * hours / end
     return mean, max(abs(mean), LEAST_DRIFT_STD)

@@ -60,7 +60,7 @@ def series_of(observations: Sequence[Observation]) -> Series:
         where one has no x, or there are fewer than four visits.
     """
     for one in observations:
-        if math.isnan(one.x):
+        if not math.isfinite(one.x):
             raise BadInput(f"{one.name or 'a recording'} has no place in time; give a column x (hours) in --table")
     times = sorted({one.x for one in observations})
     if len(times) < FEWEST:
