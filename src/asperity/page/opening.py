@@ -14,7 +14,7 @@ from asperity.page.work import open_run
 from asperity.paper import papers_case
 from asperity.study import load_study
 
-FIRST = {"grid.cells": [192, 128]}  # of the paper's contact, which is there where nothing is named; 128 cannot tell its CLR
+FIRST = {"grid.cells": [192, 128]}  # of the paper's contact, where nothing is named; 128 x 128 cannot tell its CLR
 
 
 @dataclass(frozen=True, kw_only=True)
