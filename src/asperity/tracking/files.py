@@ -18,7 +18,7 @@ _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log",
                   ".crdownload", ".partial", ".download", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
 ABSOLUTE_ZERO = -273.15  # degC
 _CONDITION_WORDS = {  # in headings of what recordings were made at
-    "load_n": {"load", "force", "last", "kraft"},
+    "load_n": {"load", "force", "kraft"},
     "speed_hz": {"speed", "rpm", "drehzahl"},
     "entrainment_m_s": {"speed", "entrainment"},
     "temperature_degc": {"temperature", "temp", "temperatur", "degc"},
