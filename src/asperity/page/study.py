@@ -110,6 +110,7 @@ class StudyView:
             return
         number = int(row)
         self._mark(old=True)
+        self.way.text = ""  # leads to the point before
         self.chosen.text = sentences([f"Solving {self._words(number)} ..."], "soft")
         self._queue.ask((solve_row, (self._folder, swept.numbers[number])), lambda result: self._solved(result, number))
 
