@@ -99,9 +99,9 @@ def _amplitudes(*, fast: bool) -> Iterator[str]:
     yield "|---|" + "---|" * (len(grids) + 4)
     for wavelength, printed in VENNER.items():
         found = [waves(wavelength, cells).central for cells in grids]
-        limit = found[-1] + (found[-1] - found[-2]) / 3.0 if len(found) > 1 else float("nan")
-        off = 100.0 * ((limit if len(found) > 1 else found[-1]) / printed - 1.0)
-        row = " | ".join(f"{value:.4f}" for value in (*found, limit))
+        limit = found[-1] + (found[-1] - found[-2]) / 3.0 if len(found) > 1 else None  # one grid has none
+        off = 100.0 * ((found[-1] if limit is None else limit) / printed - 1.0)
+        row = " | ".join("not determined" if value is None else f"{value:.4f}" for value in (*found, limit))
         yield f"| {wavelength:g} | {row} | {printed:.3f} | {off:+.1f} % | {master_curve(wavelength):.3f} |"
 
 
