@@ -145,11 +145,19 @@ def _conclude(run: Unfinished, *, alone: bool) -> None:
 
 
 def _said(part: str, *, whole: bool, seconds: float) -> Iterator[str]:
-    """A part's lines; one that asks for its `seconds` does what it has time for, and goes on the next time."""
+    """A part's lines, and whether that is all of it, unless it says how large its sample is.
+
+    One that asks for its `seconds` does what it has time for, and goes on the next time.
+    """
     told = importlib.import_module(f"benchmarks.{part}").lines
     asks = {"seconds": seconds} if "seconds" in inspect.signature(told).parameters else {}
+    counted = part in WHOLE
     with nullcontext() if part in ON_ALL else threadpool_limits(1):
-        yield from told(fast=not whole and part not in WHOLE, **asks)
+        for line in told(fast=not whole and part not in WHOLE, **asks):
+            counted = counted or kept.SAMPLE.match(line) is not None
+            yield line
+    if not counted:
+        yield kept.IN_FULL if whole else kept.IN_SHORT
 
 
 def _run(part: str, *, whole: bool, seconds: float) -> tuple[str, str]:

@@ -182,6 +182,7 @@ def tables(kept: Path) -> Iterator[str]:
     """Shares of intervals that hold and of alarms, as Markdown."""
     rows = list(csv.DictReader((kept / "courses.csv").open()))
     yield "## The time to CLR 50 %: intervals of 90 % over simulated wear histories"
+    yield f"Sample: {len(rows)} series."
     yield "| course | series | held | upper end over lower (median) | CLR at the last recording held | change told |"
     yield "|---|---|---|---|---|---|"
     wearing = [row for row in rows if row["kind"] == "wearing"]

@@ -140,6 +140,7 @@ def run(
         counts, silent = accounted(folder, stores[1])
         first, second = (latest(store) for store in stores)
         differ = sorted(file for file in first.keys() | second.keys() if first.get(file) != second.get(file))
+        yield f"Sample: {minutes:.0f} minutes."
         yield "| a folder as loggers leave it | |"
         yield "|---|---|"
         yield f"| minutes, arrivals, kills | {(monotonic() - began) / 60.0:.1f}, {number}, {kills} |"

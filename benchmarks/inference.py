@@ -370,6 +370,7 @@ def tables(kept: Path) -> Iterator[str]:
         odds = f"{np.median(np.log(1.0 / exact - 1.0)):.1f}"
         yield f"| {' | '.join((law, points, *clr, *sq, *bits, error, odds))} |"
     machines = {row["machine"] for row in every}
+    yield f"Sample: {len(machines)} machines."
     silent = {row["machine"] for row in every if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"}
     yield (
         f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of {len(silent)} too few "

@@ -1,7 +1,7 @@
 """What benchmarks said, kept as csv that `docs/benchmarks.md` includes, and what became of each number since.
 
 A part's tables go to docs/benchmarks/PART.csv, PART-2.csv ... as they stand, its headings and sentences to
-PART-said.csv, where a table is named by its file.
+PART-said.csv, where a table is named by its file. What a larger sample gave stays: a smaller one is compared with it.
 """
 
 import csv
@@ -12,6 +12,8 @@ from pathlib import Path
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER, PAGE = DOCS / "benchmarks", DOCS / "benchmarks.md"
 CHANGED = 0.1  # relative, from which a number is told: less is a shared machine's mood
+IN_FULL, IN_SHORT = "Measured in full.", "Measured in short; `--whole` takes all of it."
+SAMPLE = re.compile(r"Sample: (\d+) ")  # what a part says that goes on as long as it has time
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 Table = list[list[str]]
@@ -41,10 +43,16 @@ def cells(line: str) -> list[str]:
 
 
 def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
-    """Write a part's csv in place of the last ones; what changed against these, a line each."""
+    """Write a part's csv in place of those of no larger a sample; what changed against these, a line each."""
     said, tables = taken_apart(lines)
     before = {path.name: read(path) for path in _files(part, folder)}
     now = {_name(part, number): table for number, table in enumerate(tables, 1)}
+    have, had = sample(said), sample([text for row in before.get(f"{part}-said.csv", []) for text in row])
+    if have < had:
+        return [
+            f"{part}: stays as it was; {_in_words(have)} is compared with {_in_words(had)}",
+            *(line for name in now if name in before for line in changes(name, before[name], now[name])),
+        ]
     now[f"{part}-said.csv"] = [["said"], *([text] for text in said)]
     folder.mkdir(parents=True, exist_ok=True)
     for name in before.keys() - now.keys():
@@ -53,6 +61,17 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
         with (folder / name).open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(table)
     return [line for name in now for line in changes(name, before.get(name), now[name])]
+
+
+def sample(said: Iterable[str]) -> float:
+    """How much a part took into account, by its own words; 0 where it took little or does not say."""
+    sizes = [float("inf") if text == IN_FULL else float(found[1]) if (found := SAMPLE.match(text)) else 0.0
+             for text in said]  # fmt: skip
+    return max(sizes, default=0.0)
+
+
+def _in_words(size: float) -> str:
+    return "all of it" if size == float("inf") else f"a sample of {size:.0f}" if size else "a short run"
 
 
 def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:

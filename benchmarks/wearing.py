@@ -80,6 +80,7 @@ class Shelf:
         self.end = time.perf_counter() + ENOUGH * seconds
         self.folder = KEPT / stamp()
         self.left: list[str] = []
+        self.made = 0
 
     def worn(self, plan: Plan) -> tuple[WearHistory, float] | None:
         """A history and the processor time that it took in all; None where time runs out on the way."""
@@ -104,6 +105,7 @@ class Shelf:
         """Those of them that are there, or that time allows."""
         for plan in plans:
             if (made := self.worn(plan)) is not None:
+                self.made += 1
                 yield plan, *made
 
 
@@ -427,5 +429,6 @@ def lines(*, fast: bool, seconds: float) -> Iterator[str]:  # noqa: ARG001
         yield from part(shelf)
     yield from intervals()
     yield from kills()
+    yield f"Sample: {shelf.made} histories."
     if shelf.left:
         yield f"\nNot at their end for want of time; the same command goes on with them: {', '.join(shelf.left)}.\n"

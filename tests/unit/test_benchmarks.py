@@ -2,6 +2,7 @@
 
 import importlib
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from benchmarks import __main__ as bench_main
@@ -65,6 +66,28 @@ def test_what_moved_by_more_than_a_tenth_is_told(tmp_path, old, new, told):
     assert kept.keep("cost", text.replace(old, new).splitlines(), tmp_path) == told
 
 
+@pytest.mark.parametrize(
+    ("had", "have", "replaced"),
+    [
+        ("Sample: 52 machines.", "Sample: 6 machines.", False),
+        ("Sample: 52 machines.", "Sample: 53 machines.", True),
+        (kept.IN_FULL, kept.IN_SHORT, False),
+        (kept.IN_SHORT, kept.IN_FULL, True),
+        (kept.IN_SHORT, kept.IN_SHORT, True),
+        (kept.IN_FULL, kept.IN_FULL, True),
+        ("", kept.IN_SHORT, True),
+    ],
+)
+def test_a_smaller_sample_is_compared_and_replaces_nothing(tmp_path, had, have, replaced):
+    kept.keep("cost", [*LINES, "", "| a |", "|---|", "| 1 |", had], tmp_path)
+    files = {path.name: path.read_text("utf-8") for path in tmp_path.iterdir()}
+    told = kept.keep("cost", [*"\n".join(LINES).replace("0.50", "0.60").splitlines(), have], tmp_path)
+    assert "cost.csv: 256, time [s]: 0.50 is now 0.60" in told
+    assert replaced == ({path.name: path.read_text("utf-8") for path in tmp_path.iterdir()} != files)
+    assert (tmp_path / "cost-2.csv").exists() != replaced
+    assert told[0].startswith("cost: stays as it was; ") != replaced
+
+
 def test_the_page_of_the_docs_includes_the_files_as_they_are():
     assert kept.PAGE.read_text("utf-8") == kept.page(parts=(*PARTS, TIMES))
 
@@ -82,6 +105,20 @@ def test_a_run_that_was_cut_off_goes_on_after_the_parts_that_ended(tmp_path):
     assert Unfinished.of(["one", "two", "three"], afresh=False, **(where | {"whole": True})).done == {}
     again.forget()
     assert Unfinished.of(["one", "two", "three"], afresh=False, **where).done == {}
+
+
+@pytest.mark.parametrize(
+    ("said", "whole", "last"),
+    [
+        (["| 1 |"], True, kept.IN_FULL),
+        (["| 1 |"], False, kept.IN_SHORT),
+        (["Sample: 7 rings.", "| 1 |"], False, "| 1 |"),
+    ],
+)
+def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch, said, whole, last):
+    monkeypatch.setattr(importlib, "import_module", lambda _: SimpleNamespace(lines=lambda **_: iter(said)))
+    assert list(bench_main._said("intervals", whole=whole, seconds=1.0))[-1] == last
+    assert kept.sample(bench_main._said("certified", whole=whole, seconds=1.0)) == (7.0 if len(said) > 1 else 0.0)
 
 
 def test_every_part_is_one_that_can_be_run():
