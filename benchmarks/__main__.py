@@ -47,6 +47,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
     ("damping", "damping_stages"),
     ("intervals",),
     ("indicators",),
+    ("sensors",),
     ("alarms",),
     ("hostile",),
     ("motion_table",),

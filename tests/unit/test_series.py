@@ -6,9 +6,9 @@ import pytest
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear import learn_series, series_resonances
+from asperity.wear.expected import Blocks, Parameters, costs_at, point_at
 from asperity.wear.resonance import line_shape
-from asperity.wear.separation import Blocks, Parameters, _costs, _point
-from asperity.wear.series import _Line, _objection
+from asperity.wear.series import JudgedLine, objection_to
 from asperity.wear.transfer import through
 
 BAND = (1800.0, 4000.0)
@@ -95,22 +95,22 @@ def test_the_score_is_the_slope_of_the_cost():
     passed = through(1900.0, 4100.0)
     passed = passed._replace(coefficients=rng.normal(0.0, 0.3, passed.coefficients.size))
     at = Parameters(own, rng.normal(0.0, 0.5, 50), passed)
-    point, d = _point(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
+    point, d = point_at(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
         shift = np.zeros_like(own)
         shift[row, column] = d
-        up, down = (np.sum(_costs(blocks, at._replace(own=own + side * shift))) for side in (1.0, -1.0))
+        up, down = (np.sum(costs_at(blocks, at._replace(own=own + side * shift))) for side in (1.0, -1.0))
         slope = (up - down) / (2 * d)
         assert point.own_score[row, column] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
     shift = np.zeros(50)
     shift[20] = d
-    up, down = (np.sum(_costs(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0))
+    up, down = (np.sum(costs_at(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0))
     assert point.base_score[20] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
     for number in (0, 7, 30):
         shift = np.zeros(passed.coefficients.size)
         shift[number] = d
         ends = [passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)]
-        up, down = (np.sum(_costs(blocks, at._replace(transfer=end))) for end in ends)
+        up, down = (np.sum(costs_at(blocks, at._replace(transfer=end))) for end in ends)
         assert point.passed_score[number] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
 
 
@@ -217,6 +217,6 @@ def test_of_a_long_series_some_settle_what_all_share():
     ],
 )
 def test_every_line_that_is_not_the_contacts_is_refused_with_its_reason(changes, words):
-    line = _Line(f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0)
-    said = _objection(line._replace(**changes), BAND)
+    line = JudgedLine(f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0)
+    said = objection_to(line._replace(**changes), BAND)
     assert said is None if words is None else words in said

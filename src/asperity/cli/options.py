@@ -84,7 +84,9 @@ Unit = Annotated[
     str | None, typer.Option(help="Unit of the values, such as g or, of heights, um, for files that do not state it.")
 ]
 LateralUnit = Annotated[str | None, typer.Option(help="Unit of x and y, for a file that names none.")]
-Channel = Annotated[str | None, typer.Option(help="Name or number of the channel, where files have several.")]
+Channel = Annotated[
+    str | None, typer.Option(help="Name or number of the channel, where files have several; a,b: two sensors.")
+]
 Scale = Annotated[
     float | None, typer.Option(help="What a stored 1 stands for, in the unit: g at full scale of a wav, g per volt.")
 ]

@@ -13,9 +13,10 @@ FOLDER_WIDE = "recordings"
 OPERATING = ("load_n", "entrainment_m_s", "temperature_degc", "speed_hz")  # what a recording was made at
 RATES = ("faults_hz", "faults_per_turn")
 SUCH = {"faults_hz": 87.3, "faults_per_turn": 3.58}
-OF_THE_MACHINE = ("machine_class", *RATES, "bands_hz", "tacho", "pulses_per_turn", "condition_channels")
+OF_THE_MACHINE = ("sensor", "machine_class", *RATES, "bands_hz", "tacho", "pulses_per_turn", "condition_channels")
 KEYS = ("rate_hz", "unit", "channel", "scale", "started", *OF_THE_MACHINE, *OPERATING)
 SUFFIXES = (".toml", ".json")
+NAMES = ("channel", "tacho", "sensor")  # which may be numbers
 MACHINE_CLASSES = ("large-rigid", "large-flexible", "medium-rigid", "medium-flexible")  # of ISO 20816-3
 
 
@@ -78,14 +79,14 @@ def _checked(path: Path) -> dict[str, Any]:
             raise BadInput(f"{path.name}: pulses_per_turn must be a positive number, got {value!r}")
         if key == "machine_class" and value not in MACHINE_CLASSES:
             raise BadInput(f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got {value!r}")
-        if key in ("unit", "channel", "tacho") and not isinstance(value, str) and not (key != "unit" and number):
+        if key in ("unit", *NAMES) and not isinstance(value, str) and not (key != "unit" and number):
             raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
     if "started" in stated:
         started = parse_time(stated["started"])
         if started is None:
             raise BadInput(f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00")
         stated["started"] = started
-    for key in ("channel", "tacho"):
+    for key in NAMES:
         if key in stated:
             stated[key] = str(stated[key])
     return stated

@@ -12,6 +12,7 @@ from .files import Place as Place
 from .files import Table as Table
 from .files import read_table as read_table
 from .files import recordings_in as recordings_in
+from .model import OnSensor as OnSensor
 from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording
 from .operating import ZERO_CELSIUS as ZERO_CELSIUS

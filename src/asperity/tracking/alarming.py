@@ -16,6 +16,7 @@ from asperity.errors import BadInput
 from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
 from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, PULSES, Follows, Response, conditions_of
+from asperity.tracking.reading import Reading
 from asperity.wear import Alarm, Condition, Said, Sight, Stages, StageSource, Watched, knee_weight, sequential_alarm
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
@@ -145,31 +146,46 @@ def _of_the_contact(tracked: Sequence[TrackedRecording], source: StageSource, re
 
 
 def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Watched]:
-    """Level and kurtosis of every recording of a running machine in the unit that most have."""
-    units = Counter(one.reading.unit for one in tracked if one.reading.quality is not None)
+    """Level and kurtosis of every recording of a running machine, on each sensor."""
+    sensors = dict.fromkeys(name for one in tracked for name in one.readings)
+    several = len(sensors) > 1
+    return [
+        level
+        for sensor in sensors
+        for level in _levels_on(
+            sensor if several else "", [one.readings.get(sensor) for one in tracked], tracked, response
+        )
+    ]
+
+
+def _levels_on(
+    sensor: str, readings: Sequence[Reading | None], tracked: Sequence[TrackedRecording], response: Response
+) -> list[Watched]:
+    """What one sensor heard, in the unit that most of its recordings have; None where it has none."""
+    units = Counter(one.unit for one in readings if one is not None and one.quality is not None)
     if not units:
         return []
     (usual, _), *_ = units.most_common(1)
 
-    def logarithms(value: Callable[[TrackedRecording], float]) -> Field:
-        values = np.full(len(tracked), np.nan)
-        for number, one in enumerate(tracked):
-            quality = one.reading.quality
-            if quality is not None and not quality.dead and one.reading.unit == usual and value(one) > 0.0:
+    def logarithms(value: Callable[[Reading], float]) -> Field:
+        values = np.full(len(readings), np.nan)
+        for number, one in enumerate(readings):
+            quality = None if one is None else one.quality
+            if one is not None and quality is not None and not quality.dead and one.unit == usual and value(one) > 0.0:
                 values[number] = np.log(value(one))
         return values
 
-    def quality_of(name: str) -> Callable[[TrackedRecording], float]:
-        return lambda one: float(getattr(one.reading.quality, name))
+    def quality_of(name: str) -> Callable[[Reading], float]:
+        return lambda one: float(getattr(one.quality, name))
 
-    def named(several: str, words: str) -> dict[str, Callable[[TrackedRecording], float]]:
-        names = dict.fromkeys(name for one in tracked for name in getattr(one.reading, several))
+    def named(several: str, words: str) -> dict[str, Callable[[Reading], float]]:
+        names = dict.fromkeys(name for one in readings if one is not None for name in getattr(one, several))
         return {f"{words} {name}": _getter(several, name) for name in names}
 
     heard = {
         "the level (rms)": quality_of("rms"),
         KURTOSIS: quality_of("kurtosis"),
-        "velocity (rms)": lambda one: one.reading.velocity,
+        "velocity (rms)": lambda one: one.velocity,
     }
     lines, deep = named("lines", "the line at"), named("depths", "the envelope at")
     heard |= named("bands", "the level") | lines
@@ -177,13 +193,14 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
     every = {words: logarithms(value) for words, value in (heard | deep).items()}
     return [
         Watched(
-            name=words,
+            name=f"{words} on {sensor}" if sensor else words,
             values=values,
             least=LEVEL_LEAST,
             contact=False,
             in_words=_times,
             loud=words not in deep and words != KURTOSIS,
             jumps=words in deep,
+            sensor=sensor,
             conditions=of_pulses if words in deep or words in lines or words == KURTOSIS else met,
         )
         for words, values in every.items()
@@ -191,8 +208,8 @@ def _levels(tracked: Sequence[TrackedRecording], response: Response) -> list[Wat
     ]
 
 
-def _getter(several: str, name: str) -> Callable[[TrackedRecording], float]:
-    return lambda one: getattr(one.reading, several).get(name, np.nan)
+def _getter(several: str, name: str) -> Callable[[Reading], float]:
+    return lambda one: getattr(one, several).get(name, np.nan)
 
 
 def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> Alarm:
@@ -221,8 +238,8 @@ def _sights(tracked: Sequence[TrackedRecording], contact: Sequence[Watched]) -> 
     seen = np.any([np.zeros(len(tracked), dtype=bool), *(np.isfinite(one.values) for one in contact)], axis=0)
     sights = []
     for number, recording in enumerate(tracked):
-        name, quality, reason = Path(recording.file).name, recording.reading.quality, recording.resonance.reason
-        if quality is not None and quality.dead:
+        name, reason = Path(recording.file).name, recording.resonance.reason
+        if recording.dead:
             sights.append(Sight("blind", f"{name}: {recording.reading.reason}"))
         elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
             sights.append(Sight())

@@ -9,6 +9,7 @@ from asperity.case import Case, MachineCase
 from asperity.errors import BadInput
 from asperity.recording import OpenRecording, Quality, check_recording, open_channels
 from asperity.tracking.files import recordings_in
+from asperity.tracking.reading import channels_in
 from asperity.tracking.target import Target, search_target
 
 
@@ -88,7 +89,8 @@ def check_recordings(
     ----------
     files : recordings, or folders of them; what cannot be read is in `refused`
     case, band_hz : as for `search_target`
-    rate_hz, unit, channel, scale : as for `read_recording`; without `channel` every channel is checked
+    rate_hz, unit, channel, scale : as for `read_recording`, several channels with commas between them; without
+        `channel` every one is checked
 
     Raises
     ------
@@ -101,9 +103,10 @@ def check_recordings(
     refused: list[tuple[Path, str]] = []
     for path in [*(recordings_in(there) if there else []), *absent]:
         try:
-            for opened in open_channels(path, rate_hz=rate_hz, unit=unit, channel=channel, scale=scale):
-                quality = check_recording(opened, width_hz=target.width_hz, band_hz=target.band_hz)
-                checked.append(CheckedRecording(opened, quality))
+            for name in channels_in(channel):
+                for opened in open_channels(path, rate_hz=rate_hz, unit=unit, channel=name, scale=scale):
+                    quality = check_recording(opened, width_hz=target.width_hz, band_hz=target.band_hz)
+                    checked.append(CheckedRecording(opened, quality))
         except BadInput as error:
             refused.append((path, str(error)))
     return RecordingChecks(checked=tuple(checked), refused=tuple(refused), target=target)

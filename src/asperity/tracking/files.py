@@ -17,6 +17,7 @@ _NO_RECORDINGS = {".html", ".htm", ".nc", ".png", ".pdf", ".svg", ".md", ".log",
                   ".docx", ".xlsx", ".part", ".filepart",
                   ".crdownload", ".partial", ".download", ".tmp", ".tdms_index", ".gz", ".7z", ".rar"}  # fmt: skip
 ABSOLUTE_ZERO = -273.15  # degC
+SENSOR = "sensor"  # heading of the column that says which of several sensors a recording is of
 _CONDITION_WORDS = {  # in headings of what recordings were made at
     "load_n": {"load", "force", "kraft"},
     "speed_hz": {"speed", "rpm", "drehzahl"},
@@ -28,7 +29,7 @@ _ABOUT = {"readme", "liesmich", "license", "licence", "changelog"}  # names of f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where a recording stands in the series, as a table says it; None for what it does not say."""
+    """Where a recording stands in the series, and whose it is, as a table says it; None for what it does not say."""
 
     x: float
     x_std: float | None = None
@@ -36,6 +37,7 @@ class Place:
     speed_hz: float | None = None
     entrainment_m_s: float | None = None
     temperature_degc: float | None = None
+    sensor: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +161,7 @@ def may_be_recording(path: Path) -> bool:
 
 
 def read_table(path: str | Path) -> Table:
-    """Read a table (csv) of file, x and its deviation, and what recordings were made at.
+    """Read a table (csv) of file, x and its deviation, what recordings were made at, and by which sensor.
 
     The latter are load_n, speed_hz (of the shaft), entrainment_m_s, temperature_degc (of the oil). The column of x is
     the first that is none of these; its heading names it, such as sq_um. A column of that heading with _std behind is
@@ -183,9 +185,9 @@ def read_table(path: str | Path) -> Table:
     reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
     columns = [(name or "").strip() for name in reader.fieldnames or []]
     reader.fieldnames = columns
-    others = [name for name in columns if name not in ("file", *OPERATING) and not name.endswith("_std")]
+    others = [name for name in columns if name not in ("file", SENSOR, *OPERATING) and not name.endswith("_std")]
     _require_units(path, others)
-    if "file" not in columns or not (others or set(columns) & set(OPERATING)):
+    if "file" not in columns or not (others or set(columns) & {SENSOR, *OPERATING}):
         raise UnreadableFile(
             f"{path} needs a column file and one of x, such as sq_um; got {', '.join(columns) or 'none'}"
         )
@@ -209,7 +211,7 @@ def read_table(path: str | Path) -> Table:
         key = Path(name.replace("\\", "/")).as_posix()
         if key in places:
             raise BadInput(f"{path}, line {number}: {name} has a row already; leave one of the two out")
-        places[key] = Place(x=x, x_std=x_std, **said)
+        places[key] = Place(x=x, x_std=x_std, sensor=(row.get(SENSOR) or "").strip() or None, **said)
     return Table(name=path.name, x_name=x_name, places=places)
 
 

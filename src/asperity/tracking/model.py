@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -21,7 +21,7 @@ from asperity.tracking.operating import Operating
 from asperity.tracking.reading import Reading
 from asperity.tracking.silence import SILENCE
 from asperity.tracking.target import Target
-from asperity.wear import IN_WORDS, Alarm, AlarmState, CleanSpectrum, Resonance, Stages, StageSource
+from asperity.wear import DISAGREE, IN_WORDS, Alarm, AlarmState, CleanSpectrum, Resonance, Stages, StageSource
 
 if TYPE_CHECKING:
     import pandas
@@ -35,14 +35,41 @@ ENDINGS = (".csv", ".parquet", ".nc")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OnSensor:
+    """What one of several sensors says of a recording: `alone` by itself, None where it has no usable spectrum.
+
+    `hears` says whether it hears the line that is the contact's.
+    """
+
+    reading: Reading
+    alone: Resonance | None
+    hears: bool
+
+    def row(self) -> dict[str, Any]:
+        """Its part of the recording's line."""
+        quality, alone = self.reading.quality, self.alone
+        return {
+            "file": self.reading.file,
+            "hears": self.hears,
+            "crf_hz": None if alone is None else finite_or_none(alone.crf_hz),
+            "crf_std_hz": None if alone is None else finite_or_none(alone.crf_std_hz),
+            "crfa": None if alone is None else finite_or_none(alone.crfa),
+            "rms": None if quality is None else finite_or_none(quality.rms),
+            "kurtosis": None if quality is None else finite_or_none(quality.kurtosis),
+            "reason": self.reading.reason or ("" if alone is None else alone.reason),
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrackedRecording:
-    """One recording of a series.
+    """One recording of a series; of several sensors what they heard at one time.
 
     `resonance` is not found, with its reason, for a recording that could not be used. `clr` and its 90 % interval are
     the contact model's reading of the CRF, nan without one. `damping_reason` says why the width of its line is no
     damping ratio that can be followed; empty where it is one. `crf_reference_hz` and `damping_reference` are CRF and
     damping ratio as they would be at the load, speed and temperature of the first recordings. `label` is the stage's
-    name; `state` the alarm's after it.
+    name; `state` the alarm's after it. Of several sensors `on_sensors` has what each says, by name, and `reading` and
+    `file` are those of the first whose spectrum counts.
     """
 
     file: str
@@ -60,6 +87,18 @@ class TrackedRecording:
     severe_probability: float = np.nan
     label: str = "none"
     state: AlarmState = "none"
+    on_sensors: Mapping[str, OnSensor] = field(default_factory=dict)
+
+    @property
+    def readings(self) -> dict[str, Reading]:
+        """What was read of it, by sensor."""
+        return {name: one.reading for name, one in self.on_sensors.items()} or {self.reading.sensor: self.reading}
+
+    @property
+    def dead(self) -> bool:
+        """Whether no sensor hears anything."""
+        qualities = [one.quality for one in self.readings.values() if one.quality is not None]
+        return bool(qualities) and all(one.dead for one in qualities)
 
     @property
     def damping(self) -> tuple[float, float]:
@@ -71,21 +110,30 @@ class TrackedRecording:
     @property
     def zone(self) -> str | None:
         """Its zone of ISO 20816-3, A to D; None without a machine class, an acceleration, or a long enough record."""
-        if "machine_class" not in self.reading.facts or not np.isfinite(self.reading.velocity):
+        reading = self._gravest
+        if "machine_class" not in reading.facts or not np.isfinite(reading.velocity):
             return None
-        return severity_zone(self.reading.velocity, self.reading.facts["machine_class"][0])
+        return severity_zone(reading.velocity, reading.facts["machine_class"][0])
+
+    @property
+    def _gravest(self) -> Reading:
+        """What the sensor of the greatest velocity heard."""
+        known = [one for one in self.readings.values() if np.isfinite(one.velocity)]
+        return max(known, key=lambda one: one.velocity, default=self.reading)
 
     def severity(self) -> str:
         """Its velocity and zone in words, or why they are not determined."""
-        velocity, zone = self.reading.velocity, self.zone
+        reading, zone = self._gravest, self.zone
+        velocity = reading.velocity
         if not np.isfinite(velocity):
             return (
                 "velocity not determined: it takes an acceleration of known unit, at 2.5 kHz or more for 3.2 s or more"
             )
-        said = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz"
+        on = f" on {reading.sensor}" if self.on_sensors else ""
+        said = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz{on}"
         if zone is None:
             return f"{said}; zone of ISO 20816-3 not determined: no machine_class is stated beside the recording"
-        return f"{said}: zone {zone} of ISO 20816-3 ({self.reading.facts['machine_class'][0]}), {ZONES[zone]}"
+        return f"{said}: zone {zone} of ISO 20816-3 ({reading.facts['machine_class'][0]}), {ZONES[zone]}"
 
     def row(self) -> dict[str, Any]:
         """Its line of the table, by the names of `asperity track --json`; None where there is nothing."""
@@ -126,6 +174,7 @@ class TrackedRecording:
             "crf_reference_hz": finite_or_none(self.crf_reference_hz),
             **asdict(self.operating),
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
+            "sensors": {name: one.row() for name, one in self.on_sensors.items()},
         }
 
 
@@ -155,6 +204,19 @@ class Track:
         """In how many recordings a contact resonance was found."""
         return sum(recording.resonance.found for recording in self.recordings)
 
+    def of_sensor(self, name: str) -> "Track":
+        """The recordings that one of several sensors has, with the judgement of all."""
+        there = [number for number, one in enumerate(self.recordings) if name in one.on_sensors]
+        recordings = [
+            replace(one, file=reading.file, reading=reading)
+            for one in (self.recordings[number] for number in there)
+            for reading in [one.on_sensors[name].reading]
+        ]
+        states = tuple(self.alarm.states[number] for number in there)
+        since = self.alarm.since
+        since = None if since is None else min(sum(number < since for number in there), len(there) - 1)
+        return replace(self, recordings=tuple(recordings), alarm=replace(self.alarm, states=states, since=since))
+
     def silent(self, reason: str) -> "Track":
         """The same where no recording comes any more, for a `reason`: blind, unless an alarm stands."""
         noted = replace(self, notes=(*self.notes, f"{reason[:1].upper()}{reason[1:]}."))
@@ -174,6 +236,7 @@ class Track:
         seen = self._without_resonance(several)
         if self.stages is not None:
             seen = f"{self.stages.verdict.rstrip('.')}; contact resonance found in {self.resonance_count} of {several}."
+        seen = " ".join(filter(None, [seen, heard_in_words(self.recordings)]))
         alarm = self.alarm
         if alarm.explained:
             seen = f"{seen} {alarm.explained[0].upper()}{alarm.explained[1:]}."
@@ -320,12 +383,41 @@ class Track:
         return path
 
 
+def heard_in_words(recordings: Sequence[TrackedRecording]) -> str:
+    """On which of several sensors the line was heard, where they disagree, and who is silent; empty of one sensor."""
+    names = list(dict.fromkeys(name for one in recordings for name in one.on_sensors))
+    if not names:
+        return ""
+    heard = Counter(
+        " and ".join(name for name in names if name in one.on_sensors and one.on_sensors[name].hears)
+        for one in recordings
+        if one.resonance.found
+    )
+    said = [f"on {who} in {count}" for who, count in heard.most_common()]
+    sentence = f"The line was heard {', '.join(said)}." if said else "No line was heard as one by two sensors."
+    apart = sum(one.resonance.reason.startswith(DISAGREE) for one in recordings)
+    if apart:
+        sentence += f" The sensors disagree in {apart}: that is no single claim."
+    for name in names:
+        silent = [
+            one.on_sensors[name].reading.reason
+            for one in recordings
+            if name in one.on_sensors
+            and not one.on_sensors[name].reading.usable
+            and any(other.reading.usable for other in one.on_sensors.values())
+        ]
+        if silent:
+            there = sum(name in one.on_sensors for one in recordings)
+            sentence += f" Sensor {name} is of no use in {len(silent)} of {there}: {silent[-1]}."
+    return sentence
+
+
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     """A recording's line with a column for each fault's depth, each line and each band."""
-    rest = {name: value for name, value in row.items() if name not in NAMED}
-    return rest | {
-        f"{kind}_{name}": value for several, kind in NAMED.items() for name, value in row.get(several, {}).items()
-    }
+    rest = {name: value for name, value in row.items() if name not in (*NAMED, "sensors")}
+    heard = {f"{key}_{name}": value for name, said in row.get("sensors", {}).items() for key, value in said.items()}
+    kinds = {f"{kind}_{name}": value for several, kind in NAMED.items() for name, value in row.get(several, {}).items()}
+    return rest | kinds | heard
 
 
 def _in_json(stages: Stages) -> dict[str, Any]:

@@ -129,25 +129,49 @@ def keep_track(
     Parameters
     ----------
     options : by which the recordings were read
-    machine, point, sensor, acknowledge : as `watch_folder` takes them
+    machine, point, sensor, acknowledge : as `watch_folder` takes them; of several sensors each is kept by its own name,
+        with the judgement of all
 
     Raises
     ------
     BadInput
         for a sensor whose recordings were read otherwise before.
     """
+    names = list(dict.fromkeys(name for one in track.recordings for name in one.on_sensors))
+    if names and sensor is not None:
+        raise BadInput(f"these recordings are of the sensors {', '.join(names)}, got sensor {sensor}; leave it out")
+    if not names:
+        spot = (machine, point, sensor or options.channel)
+        return _kept(track, store, settings_of(track.target, options), spot, acknowledge)
+    kept = [
+        _kept(track.of_sensor(name), store, settings_of(track.target, options), (machine, point, name), acknowledge)
+        for name in names
+    ]
+    alarmed = next((one.alarm for one in kept if one.alarm.state == "alarm"), None)
+    if alarmed is None or track.alarm.state == "alarm":
+        return track
+    return replace(track, alarm=replace(track.alarm, state="alarm", since=0, reason=alarmed.reason))
+
+
+def _kept(
+    track: Track,
+    store: str | Path,
+    settings: dict[str, Any],
+    names: tuple[str | None, str | None, str | None],
+    acknowledge: str | None,
+) -> Track:
+    """A sensor's track appended to a store; the track with the alarm that stands there."""
     whole = tuple(
         replace(one, file=str(path), reading=replace(one.reading, file=str(path)))
         for one in track.recordings
         for path in [Path(one.file).resolve()]
     )
     track = replace(track, recordings=whole)
-    place = spot_of(Path(whole[0].file).parent, machine, point, sensor or options.channel)
+    folder = Path(whole[0].file).parent
     with closing(Store(store)) as opened:
-        settings = settings_of(track.target, options)
-        if machine is None or point is None:
-            settings[FOLDER] = str(Path(whole[0].file).parent)
-        entered = opened.sensor(place, settings)
+        if names[0] is None or names[1] is None:
+            settings[FOLDER] = str(folder)
+        entered = opened.sensor(spot_of(folder, *names), settings)
         keys = {}
         for recording in track.recordings:
             key = keys[recording.file] = version_of(Path(recording.file))

@@ -21,7 +21,7 @@ from asperity.errors import BadInput, UnreadableFile
 from asperity.kept import sealed, unsealed
 from asperity.processes import leave_interrupts_to_the_parent
 from asperity.rating import velocity_rms
-from asperity.recording import Gauge, Quality, ReadOptions, open_recording
+from asperity.recording import Gauge, OpenRecording, Quality, ReadOptions, open_recording
 from asperity.signals import Spectrum, averaged_spectrum
 from asperity.tracking.beside import bands, beside, heard_at, lines, rates, steady
 from asperity.tracking.files import Place
@@ -39,13 +39,15 @@ WORTH_A_POOL = 32 << 20  # bytes in all; starting processes takes a second
 class Reading:
     """What reading one file gave. Without a `spectrum`, `reason` says why; `quality` may still be known.
 
-    `bands` are rms in bands, and `lines` at the rates of faults and meshes, each with two harmonics.
+    `sensor` says which of several heard it, where a table or sidecar does. `bands` are rms in bands, and `lines` at the
+    rates of faults and meshes, each with two harmonics.
     `rate_doubt` is the relative standard deviation of the rate. `facts` are texts by name, each with its source;
     `started` is in ISO form or empty. `depths` are how deep the envelope is modulated at the rates of faults, where a
     sidecar states those; `velocity` is rms, 10 to 1000 Hz [m/s], nan of what is no acceleration or too short to tell.
     """
 
     file: str
+    sensor: str = ""
     spectrum: Spectrum | None = None
     quality: Quality | None = None
     rate_hz: float = np.nan
@@ -75,6 +77,31 @@ class Reading:
         return datetime.fromisoformat(self.started) if self.started else None
 
 
+def channels_in(channel: str | None) -> list[str | None]:
+    """The channels that are asked for; one whose name has a comma in it goes by its number."""
+    names = [] if channel is None else [name.strip() for name in channel.split(",") if name.strip()]
+    if len(set(names)) < len(names):
+        raise BadInput(f"channel {channel} names one twice; name each once")
+    return [*names] or [None]
+
+
+def one_channel(channel: str | None) -> str | None:
+    """The channel that is asked for, where it can be only one.
+
+    Raises
+    ------
+    BadInput
+        for several.
+    """
+    (name, *others) = channels_in(channel)
+    if others:
+        raise BadInput(
+            f"one watch follows one channel, got {channel}; start a watch for each, with the same store, and asperity "
+            "track takes them together"
+        )
+    return name
+
+
 def read_spectrum(
     path: Path, options: ReadOptions, target: Target, spacing_hz: float, place: Place | None = None
 ) -> Reading:
@@ -82,7 +109,7 @@ def read_spectrum(
     try:
         opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
-        return Reading(file=str(path), reason=str(refusal))
+        return Reading(file=str(path), sensor=(place.sensor if place else None) or "", reason=str(refusal))
     known = Reading(
         file=str(path),
         rate_hz=opened.rate_hz,
@@ -90,6 +117,7 @@ def read_spectrum(
         unit=opened.unit,
         facts={name: (_text(fact.value), fact.source) for name, fact in opened.facts.items()},
         started=opened.started.isoformat() if opened.started else "",
+        sensor=_sensor(opened, place),
     )
     told = beside(opened, place)
     rates_hz = rates(opened, told, target)
@@ -128,6 +156,13 @@ def read_spectrum(
         reason="; ".join(quality.faults) or failed,
         **heard,
     )
+
+
+def _sensor(opened: OpenRecording, place: Place | None) -> str:
+    """Who heard a recording, as the table says it or else what stands beside it."""
+    if place is not None and place.sensor is not None:
+        return place.sensor
+    return str(opened.facts["sensor"].value) if "sensor" in opened.facts else ""
 
 
 def _text(value: object) -> str:

@@ -3,10 +3,8 @@
 Reading is left to `reading`, the methods to `asperity.wear`; what is decided here is how they are put together.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import get_args
 
@@ -16,13 +14,14 @@ from asperity.arrays import Field
 from asperity.case import Case, MachineCase
 from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
-from asperity.signals import Spectrum
 from asperity.tracking.alarming import at_reference, raise_alarm, weighed
+from asperity.tracking.alike import copies, on_one_grid, spectrum_of, without_silence
 from asperity.tracking.files import Place, Table, in_their_places, read_table, recordings_in
+from asperity.tracking.heard import heard_together, recording_of
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track, TrackedRecording
-from asperity.tracking.operating import operating_of, response_of, unstated
-from asperity.tracking.reading import WINDOW, Reading, common_spacing, read_spectra
+from asperity.tracking.operating import response_of, unstated
+from asperity.tracking.reading import WINDOW, Reading, channels_in, common_spacing, read_spectra
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
     FALSE_ALARMS,
@@ -36,16 +35,12 @@ from asperity.wear import (
     StageSource,
     asperity_load_share,
     comparability,
-    damping_objection,
     no_resonance,
     series_resonances,
     split_stages,
 )
 
-QUIET_SHARE = 0.05  # rms over the usual one, below which the machine was off
-USUAL = 8  # recordings, the first, whose median rms is the usual one: later ones may be louder by wear
 MOST_TOGETHER = 400  # recordings separated at once: memory grows with their square, time with their cube
-SAME_LINES = 0.25  # of a line, by which the highest lines of two spectra may differ and still be laid on one another
 ALONE: SeriesMethod = "modes"  # where there are too few recordings for the joint separation
 X_UNITS = ("um", "mm", "nm", "m", "h", "s", "min", "d", "km", "cycles")
 
@@ -78,7 +73,9 @@ def track_recordings(
     case : its contact model says where the resonance may lie, and what load share a CRF stands for; a machine's also
         how often what passes or meshes
     band_hz : where to look instead; without either, the paper's contact stands in, and `notes` say so
-    rate_hz, unit, channel, scale : as `read_recording` takes them, for all recordings alike
+    rate_hz, unit, channel, scale : as `read_recording` takes them, for all recordings alike; several channels, with
+        commas between them, are sensors of one machine, as are recordings of which a table or sidecar says different
+        sensors
     x : place of each recording in the series, shape (recordings,); or `table`, a csv as `read_table` takes it
         or what that read; otherwise the hours since the first, where all say when they began, or their number
     shaft_hz : speeds of shafts whose harmonics are removed; None finds them
@@ -102,9 +99,7 @@ def track_recordings(
     stated = table if isinstance(table, Table) or table is None else read_table(table)
     x_name, places = _stated_places(files, x, stated)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
-    spacing = common_spacing(files, options, target)
-    numbered = dict(read_spectra(files, options, target, spacing, places=places, workers=workers, progress=progress))
-    readings = [numbered[number] for number in range(len(files))]
+    readings = _read(files, options, target, places, workers, progress)
     if all(reading.spectrum is None and reading.quality is None for reading in readings):
         others = f" (and so on for {len(readings) - 1} more files)" if len(readings) > 1 else ""
         raise BadInput(f"{readings[0].reason}{others}")
@@ -120,6 +115,30 @@ def track_recordings(
         false_alarm_rate=false_alarm_rate,
         acknowledge=acknowledge,
     )
+
+
+def _read(
+    files: Sequence[Path],
+    options: ReadOptions,
+    target: Target,
+    places: Mapping[str, Place] | None,
+    workers: int,
+    progress: Callable[[Reading], None] | None,
+) -> list[Reading]:
+    """What every channel that is asked for gave, file by file."""
+    channels = channels_in(options.channel)
+    spacing = common_spacing(files, replace(options, channel=channels[0]), target)
+    readings: list[Reading] = []
+    for channel in channels:
+        of_one = replace(options, channel=channel)
+        numbered = dict(read_spectra(files, of_one, target, spacing, places=places, workers=workers, progress=progress))
+        of_files = [numbered[number] for number in range(len(files))]
+        if len(channels) > 1:
+            if all(reading.refused for reading in of_files):
+                raise BadInput(f"channel {channel} cannot be read of any recording: {of_files[0].reason}")
+            of_files = [replace(one, sensor=f"{one.sensor} {channel}".strip()) for one in of_files]
+        readings += of_files
+    return readings
 
 
 def judge(
@@ -143,12 +162,19 @@ def judge(
     """
     require_choice("source of stages", stages_from, get_args(StageSource))
     notes = [f"The band is {target.source}."] if target.assumed else []
+    alarming = (false_alarm_rate, acknowledge, before)
+    sensors = list(dict.fromkeys(one.sensor for one in readings if one.sensor or not one.refused))
+    if len(sensors) > 1:
+        _require_together(sensors, method, watched=learned is not None)
+        readings = [one if one.sensor in sensors else replace(one, sensor=sensors[0]) for one in readings]
+        several, x_name, told = heard_together(readings, target, places, x_name, shaft_hz)
+        return _staged(several, x_name, target, "joint", (detector, stages_from), alarming, [*notes, *told])
     names, times = [reading.file for reading in readings], [reading.time for reading in readings]
     places, x_name = in_their_places(names, times, [not reading.refused for reading in readings], places, x_name)
     order = np.argsort(np.array([places[reading.file].x for reading in readings]), kind="stable")
-    series, left_out = _on_one_grid(_without_silence([readings[number] for number in order]))
+    series, left_out = on_one_grid(without_silence([readings[number] for number in order]))
     notes += left_out
-    spectra = {number: _spectrum(reading) for number, reading in enumerate(series) if reading.usable}
+    spectra = {number: spectrum_of(reading) for number, reading in enumerate(series) if reading.usable}
     files = [series[number].file for number in spectra]
     memory = Learned() if learned is None else learned
     cleaned = [memory.clean(file, one, shaft_hz) for file, one in zip(files, spectra.values(), strict=True)]
@@ -170,24 +196,9 @@ def judge(
     used = dict(zip(spectra, zip(cleaned, resonances, strict=True), strict=True))
     tracked = []
     for number, reading in enumerate(series):
-        place = places[reading.file]
         clean, found = used.get(number, (None, None))
         resonance = found or no_resonance(reading.reason, target.band_hz, chosen)
-        clocked = float(np.hypot(resonance.crf_std, reading.rate_doubt * resonance.crf_hz))  # a rate off is a CRF off
-        resonance = replace(resonance, crf_std=clocked)
-        tracked.append(
-            TrackedRecording(
-                file=reading.file,
-                x=place.x,
-                x_std=place.x_std or 0.0,
-                reading=reading,
-                clean=clean,
-                resonance=resonance,
-                damping_reason=resonance.reason if clean is None else _damping_reason(resonance, clean),
-                operating=operating_of(reading, place),
-            )
-        )
-    alarming = (false_alarm_rate, acknowledge, before)
+        tracked.append(recording_of(reading, places[reading.file], clean, resonance))
     return _staged(tracked, x_name, target, chosen, (detector, stages_from), alarming, notes)
 
 
@@ -203,9 +214,6 @@ def _staged(
     used = [recording for recording in tracked if recording.clean is not None]
     comparable = bool(used) and all(recording.reading.unit == ACCELERATION for recording in used)
     x = np.array([recording.x for recording in tracked])
-    crf = np.array([recording.resonance.crf_hz for recording in tracked])
-    crf_std = np.array([recording.resonance.crf_std for recording in tracked])
-    crf_std = np.where(np.isfinite(crf_std), crf_std, 0.0)
     met = [recording.operating for recording in tracked]
     response = response_of(target.case, met)
     tracked = at_reference(tracked, response)
@@ -233,7 +241,8 @@ def _staged(
         response=response,
     )
     if target.full_load_crf_hz is not None:
-        share = asperity_load_share(crf, crf_std, target.full_load_crf_hz)
+        crf, crf_std = np.array([(one.resonance.crf_hz, one.resonance.crf_std) for one in tracked]).T
+        share = asperity_load_share(crf, np.where(np.isfinite(crf_std), crf_std, 0.0), target.full_load_crf_hz)
         tracked = [
             replace(recording, clr=float(clr), clr_interval=(float(low), float(high)))
             for recording, clr, low, high in zip(tracked, share.clr, *share.interval, strict=True)
@@ -241,6 +250,7 @@ def _staged(
     if not comparable and used:
         units = ", ".join(sorted({recording.reading.unit for recording in used}))
         notes.append(f"CRFA is not comparable with other series: its unit is {units}, not m/s^2. CRF is.")
+    copied = copies([one.reading for one in tracked])
     return Track(
         recordings=tuple(
             replace(recording, severe_probability=float(probability), label=label, state=state)
@@ -254,13 +264,29 @@ def _staged(
         alarm=alarm,
         comparable=comparable,
         problems=comparability([_facts_of(recording) for recording in used]),
-        notes=(*notes, *filter(None, [response.said]), *unstated(met), *_without_damping(tracked), *_copies(tracked)),
+        notes=(*notes, *filter(None, [response.said]), *unstated(met), *_without_damping(tracked), *copied),
     )
+
+
+def _require_together(sensors: Sequence[str], method: SeriesMethod | None, *, watched: bool) -> None:
+    """BadInput for several sensors where one is due."""
+    if watched:
+        raise BadInput(
+            f"one watch follows one sensor, and these recordings are of {len(sensors)} ({', '.join(sensors)}); give "
+            "each sensor a folder of its own and the same store, and asperity track takes them together"
+        )
+    if "" in sensors:
+        raise BadInput(
+            f"some recordings say of which sensor they are ({', '.join(filter(None, sensors))}) and others do not; say "
+            "it of all"
+        )
+    if method not in (None, "joint"):
+        raise BadInput(f"several sensors are judged together by method joint, got {method}; leave it out")
 
 
 def _facts_of(recording: TrackedRecording) -> RecordingFacts:
     """What makes a recording comparable with others."""
-    spectrum = _spectrum(recording.reading)
+    spectrum = spectrum_of(recording.reading)
     return RecordingFacts(
         name=Path(recording.file).name,
         rate_hz=recording.reading.rate_hz,
@@ -310,14 +336,6 @@ class _Ways(Mapping[StageSource, Stages]):
         return self.known[source]
 
 
-def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
-    """Why its damping is not determined, or nothing. The joint separation knows which lines are missing."""
-    spectrum, half = clean.spectrum, resonance.damping_ratio * resonance.crf_hz
-    within = np.abs(spectrum.frequency_hz - resonance.crf_hz) <= half
-    missing = float(np.mean(~clean.kept[within])) if within.any() and resonance.method != "joint" else 0.0
-    return damping_objection(resonance, spectrum.resolution_hz, taken_out=missing) or ""
-
-
 def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
     """A sentence on resonances whose damping is not determined."""
     reasons = [one.damping_reason for one in tracked if one.resonance.found and one.damping_reason]
@@ -326,21 +344,6 @@ def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
         return []
     many = f"{len(reasons)} of {found} resonances" if found > 1 else "the resonance"
     return [f"Damping is not determined of {many}: {reasons[0]}{', and so on' if len(reasons) > 1 else ''}."]
-
-
-def _copies(tracked: Sequence[TrackedRecording]) -> list[str]:
-    """A sentence for each recording whose spectrum is another's: one of them is a copy."""
-    sampled = []
-    for recording in tracked:
-        if recording.reading.spectrum is not None:
-            density = recording.reading.spectrum.density
-            sampled.append((density[:: max(1, density.size // 16)][1:], Path(recording.file).name))
-    sampled.sort(key=lambda pair: float(pair[0].sum()))
-    return [
-        f"{name} and {other} hold the same samples; leave one of them out."
-        for (first, name), (second, other) in pairwise(sampled)
-        if first.shape == second.shape and bool(np.all(np.abs(first - second) <= 1e-4 * second))
-    ]
 
 
 def _stated_places(
@@ -356,57 +359,6 @@ def _stated_places(
     if table is not None:
         return table.x_name, table.placed(files)
     return "", None
-
-
-def _without_silence(series: list[Reading]) -> list[Reading]:
-    """Recordings far quieter than the first ones are off: of a machine at rest an accelerometer still hears the hall.
-
-    Counted from the first, so that a machine which grows loud does not make its own past look silent.
-    """
-    by_unit: dict[str, list[float]] = {}
-    for reading in series:
-        if reading.quality is not None and not reading.quality.off:
-            by_unit.setdefault(reading.unit, []).append(reading.quality.rms)
-    usual = {unit: float(np.median(levels[:USUAL])) for unit, levels in by_unit.items()}
-    judged = []
-    for reading in series:
-        quality = reading.quality
-        if quality is not None and not quality.off and quality.rms < QUIET_SHARE * usual[reading.unit]:
-            share = 100.0 * quality.rms / usual[reading.unit]
-            reason = f"the machine was off, or the sensor disconnected: rms is {share:.1g} % of what it was at first"
-            reading = replace(reading, reason=reason, quality=replace(quality, off=True))
-        judged.append(reading)
-    return judged
-
-
-def _on_one_grid(series: list[Reading]) -> tuple[list[Reading], list[str]]:
-    """All usable spectra on the frequencies that most of them have; the others are left out, with the reason."""
-    spectra = {number: _spectrum(reading) for number, reading in enumerate(series) if reading.usable}
-    if not spectra:
-        return series, []
-    grids = [(spectrum.segment, round(series[number].rate_hz)) for number, spectrum in spectra.items()]
-    (common, _), *_ = Counter(grids).most_common(1)
-    first = [*spectra.values()][grids.index(common)]
-    aligned = list(series)
-    left_out = 0
-    for number, spectrum in spectra.items():
-        same = spectrum.frequency_hz.shape == first.frequency_hz.shape
-        apart = abs(spectrum.frequency_hz[-1] - first.frequency_hz[-1]) if same else np.inf
-        if apart <= SAME_LINES * first.spacing_hz:
-            on_it = replace(spectrum, frequency_hz=first.frequency_hz)
-            aligned[number] = replace(aligned[number], spectrum=on_it)
-        else:
-            rate = aligned[number].rate_hz
-            reason = f"sampled at {rate:g} Hz where the series has {common[1]:g} Hz; track it apart"
-            aligned[number] = replace(aligned[number], reason=reason)
-            left_out += 1
-    notes = [f"{left_out} of {len(series)} recordings have another sampling rate and were left out."]
-    return aligned, notes if left_out else []
-
-
-def _spectrum(reading: Reading) -> Spectrum:
-    assert reading.spectrum is not None  # of a usable recording
-    return reading.spectrum
 
 
 def _resonances(cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod, groups: int) -> list[Resonance]:

@@ -24,7 +24,7 @@ from asperity.tracking.calls import Caller, deliver
 from asperity.tracking.files import Place, Table, in_their_places, may_be_recording, natural, read_table, utf8
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
-from asperity.tracking.reading import Reading, common_spacing, read_spectra
+from asperity.tracking.reading import Reading, common_spacing, one_channel, read_spectra
 from asperity.tracking.silence import silence
 from asperity.tracking.store import FOLDER, STORE, Sensor, Store, Version
 from asperity.tracking.store import Place as Spot
@@ -113,7 +113,7 @@ def watch_folder(
         require_positive("the time without a recording (--expect)", expect_s, "s")
     folder, out = _folders(folder, out, tell)
     target = search_target(case, band_hz)
-    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
+    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=one_channel(channel), scale=scale)
     opened = _opened(store or out / STORE, folder, (machine, point, sensor or channel), settings_of(target, options))
     memory = _Memory(opened, target, options, call)
     memory.sensor.tells = tell

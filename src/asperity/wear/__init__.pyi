@@ -28,6 +28,9 @@ from .resonance import SeenLine as SeenLine
 from .resonance import damping_objection as damping_objection
 from .resonance import line_shape as line_shape
 from .resonance import no_resonance as no_resonance
+from .sensors import DISAGREE as DISAGREE
+from .sensors import SensorLines as SensorLines
+from .sensors import resonances_of_sensors as resonances_of_sensors
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
 from .series import SeriesMethod as SeriesMethod
 from .series import Shared as Shared

@@ -39,9 +39,11 @@ class Watched:
     contact : whether it is the contact's, whose severe stage is a rise that flattens; otherwise a level, which grows
     in_words : a change of it, in words
     loud : whether gain changes it
-    jumps : whether a jump upwards alarms, unless all that is loud moves with it: then the sensor may have been moved
+    jumps : whether a jump upwards alarms, unless all that is loud on its sensor moves with it: then that may have been
+        moved
     conditions : what it may follow without any wear; of the same recordings
     relative : whether `values` are ratios, of which conditions change the logarithm
+    sensor : which of several heard it
     """
 
     name: str
@@ -51,6 +53,7 @@ class Watched:
     in_words: Callable[[float], str]
     loud: bool = False
     jumps: bool = False
+    sensor: str = ""
     conditions: tuple[Condition, ...] = ()
     relative: bool = False
 
@@ -294,7 +297,7 @@ def _decided(
         leaning = (course, one.name)
     for one, looked, share in zip(watched, found, shares, strict=True):
         upwards = one.jumps and looked.step.change > 0.0 and looked.step.log_ratio >= threshold(share)
-        loud = [other for other, heard in beside if heard.loud] if upwards else []
+        loud = [other for other, heard in beside if heard.loud and heard.sensor == one.sensor] if upwards else []
         if upwards and not (loud and all(_moves_at(other, looked.step.at) for other in loud)):
             return "alarm", _jumped(one, looked, unit), one.name
     if sight.state == "blind":

@@ -4,46 +4,38 @@ P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) (f/f_i)^t is fitted to all spectra at on
 docs/theory/indicators.md has the equations.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from asperity.arrays import Field, Mask
-from asperity.wear.resonance import line_and_slopes, line_shape
+from asperity.wear.expected import (
+    DAMPING_SPREAD,
+    USUAL_DAMPING,
+    Blocks,
+    Parameters,
+    Point,
+    bounds_of,
+    costs_at,
+    lines_and_slopes,
+    point_at,
+)
+from asperity.wear.resonance import line_shape
 from asperity.wear.scoring import damped_scoring
 from asperity.wear.transfer import Transfer, rises, through
 
 MOST_TOGETHER = 100  # recordings of a longer series that settle what all of them share
 COARSE_BLOCKS = 160
 DAMPINGS = np.geomspace(0.006, 0.08, 6)  # of the search
-USUAL_DAMPING, DAMPING_SPREAD = 0.02, 1.0  # prior of ln ζ: centre, and a factor e either way as standard deviation
 LEVELS = np.geomspace(0.03, 3e3, 21)  # of the search: a line's height over the base below it
 STARTS = (0.1, 0.3, 0.5)  # quantiles over the recordings, as first guesses of what is common to them
-LEAST_DAMPING, MOST_DAMPING = 1e-3, 0.3
 LONGEST_STEP = np.array([1.0, 0.03, 0.5, 1.0])  # of ln A, ln f, ln ζ, ln g
 MOST_STEPS = 60
 SETTLED = 1e-3  # ln likelihood that the next step promises
-LOOSE = 1e-4  # information of everything before the data, so that a line of no height has a defined place
 PACES = (0.3, 1e-4)  # of the transfer from spline to spline: the first guess, and the least
 SAME_PACE, MOST_PACES = 0.1, 8  # change of its logarithm that no longer counts
-
-
-class Blocks(NamedTuple):
-    """Spectra averaged over blocks of lines: density and independent ordinates (recordings, blocks)."""
-
-    centre: Field  # (blocks,)
-    density: Field
-    weight: Field
-
-
-class Parameters(NamedTuple):
-    """A_i, f_i, ζ_i, g_i as logarithms (recordings, 4), ln B (blocks,), and what the lines come through."""
-
-    own: Field
-    base: Field
-    transfer: Transfer = Transfer()
 
 
 class Joint(NamedTuple):
@@ -112,7 +104,7 @@ def _nearest(centre: Field, templates: Templates) -> npt.NDArray[np.intp]:
     return np.searchsorted(centre, templates.f0).clip(0, centre.size - 1)
 
 
-def _search(
+def search(
     blocks: Blocks, base: Field, templates: Templates, prepared: Iterable[Model] | None = None
 ) -> tuple[Field, Field]:
     """-ln likelihood of each recording for a line at each template, gain and height at their best, and ln of those.
@@ -140,10 +132,11 @@ def _search(
 
 def _tracks(blocks: Blocks, base: Field, templates: Templates) -> Field:
     """The best line in each recording, given the base: ln A, ln f, ln ζ, ln g, shape (recordings, 4)."""
-    return _best(*_search(blocks, base, templates), templates)
+    return best_of(*search(blocks, base, templates), templates)
 
 
-def _best(cost: Field, values: Field, templates: Templates) -> Field:
+def best_of(cost: Field, values: Field, templates: Templates) -> Field:
+    """The likeliest template of each recording: ln A, ln f, ln ζ, ln g."""
     best = np.argmin(cost, axis=1)
     rows = np.arange(best.size)
     level, gain = values[rows, best].T
@@ -160,23 +153,8 @@ def beside(
 ) -> tuple[Joint, Field]:
     """Lines of recordings beside what others have settled: ln B (blocks,) and transfer; the fit, and `elsewhere`."""
     coarse = coarser(blocks)
-    cost, values = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, base)), templates, prepared)
-    return _each(blocks, Parameters(_best(cost, values, templates), base, transfer), doubt), cost
-
-
-def lines_and_slopes(centre: Field, at: Parameters) -> tuple[Field, Field, Field]:
-    """A L T(f)/T(f_i), and its derivatives by ln f_i and ln ζ_i, (recordings, blocks)."""
-    level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
-    line, by_f0, by_damping = line_and_slopes(centre[None, :], f0, damping)
-    passed = level * np.exp(_away(centre, at) @ at.transfer.coefficients)
-    steep = at.transfer.steepness(f0[:, 0])[:, None]
-    return passed * line, passed * (by_f0 - steep * line), passed * by_damping
-
-
-def _away(centre: Field, at: Parameters) -> Field:
-    """What the transfer's coefficients stand at, less that at each line's place; (recordings, blocks, coefficients)."""
-    here = at.transfer.columns(np.exp(at.own[:, 1]))
-    return np.asarray(at.transfer.columns(centre)[None] - here[:, None])
+    cost, values = search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, base)), templates, prepared)
+    return alone_beside(blocks, Parameters(best_of(cost, values, templates), base, transfer), doubt), cost
 
 
 def _settled_base(blocks: Blocks, own: Field, base: Field) -> Field:
@@ -215,8 +193,8 @@ def separate(blocks: Blocks) -> Separation:
         shared = joint.parameters
         own = _tracks(coarse, np.exp(np.interp(coarse.centre, blocks.centre, shared.base)), templates)
         own[chosen] = shared.own
-        joint = _each(blocks, shared._replace(own=own), joint.doubt)
-    elsewhere, _ = _search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base)), templates)
+        joint = alone_beside(blocks, shared._replace(own=own), joint.doubt)
+    elsewhere, _ = search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base)), templates)
     return Separation(joint, templates, elsewhere, chosen)
 
 
@@ -245,76 +223,12 @@ def _together(blocks: Blocks, coarse: Blocks, templates: Templates) -> Joint:
         best = joint
     base = np.exp(np.interp(blocks.centre, coarse.centre, best.parameters.base))
     base = _settled_base(blocks, best.parameters.own, base)
-    low, high = _bounds(blocks)
+    low, high = bounds_of(blocks)
     passed = through(float(np.exp(low[1])), float(np.exp(high[1])))
     return _passed_on(blocks, Parameters(best.parameters.own, np.log(base), passed))
 
 
-class _Point(NamedTuple):
-    """Where a scoring step stands: cost, score and information; the base's part and the transfer's apart."""
-
-    cost: float
-    own_score: Field  # (recordings, 4)
-    own_information: Field  # (recordings, 4, 4)
-    base_score: Field  # (blocks,)
-    base_information: Field  # (blocks,)
-    coupling: Field  # (recordings, 4, blocks)
-    passed_score: Field  # (coefficients,)
-    passed_information: Field  # (coefficients, coefficients)
-    passed_own: Field  # (recordings, 4, coefficients)
-    passed_coupling: Field  # (coefficients, blocks)
-
-
-def expected_density(blocks: Blocks, at: Parameters) -> Field:
-    """What the parameters say of each block, (recordings, blocks)."""
-    return np.asarray(lines_and_slopes(blocks.centre, at)[0] + np.exp(at.own[:, 3, None] + at.base))
-
-
-def whittle_costs(blocks: Blocks, expected: Field) -> Field:
-    """-ln likelihood of each recording."""
-    return np.asarray(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1))
-
-
-def _costs(blocks: Blocks, at: Parameters) -> Field:
-    """-ln likelihood of each recording, its prior included."""
-    return np.asarray(whittle_costs(blocks, expected_density(blocks, at)) + _prior(at.own))
-
-
-def _prior(own: Field) -> Field:
-    return np.asarray(0.5 * ((own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD) ** 2)
-
-
-def _point(blocks: Blocks, at: Parameters, stiff: Field) -> _Point:
-    line, by_f0, by_damping = lines_and_slopes(blocks.centre, at)
-    common = np.exp(at.own[:, 3, None] + at.base)
-    expected = line + common
-    relative = np.stack([line, by_f0, by_damping, common], axis=1) / expected[:, None]
-    off = blocks.weight * (blocks.density / expected - 1.0)
-    weighted = relative * blocks.weight[:, None]
-    own_score = np.einsum("npb,nb->np", relative, off)
-    own_score[:, 2] -= (at.own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD**2
-    own_information = np.einsum("npb,nqb->npq", weighted, relative, optimize=True)
-    own_information[:, 2, 2] += DAMPING_SPREAD**-2
-    base_part = relative[:, 3]
-    passed = relative[:, 0, :, None] * _away(blocks.centre, at)
-    coefficients = at.transfer.coefficients
-    flat, weights = passed.reshape(blocks.weight.size, coefficients.size), blocks.weight.reshape(-1, 1)
-    fit = float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own)))
-    return _Point(
-        cost=fit + 0.5 * float(coefficients @ stiff @ coefficients),
-        own_score=own_score,
-        own_information=own_information + LOOSE * np.eye(4),
-        base_score=np.sum(base_part * off, axis=0),
-        base_information=np.sum(blocks.weight * base_part**2, axis=0) + LOOSE,
-        coupling=weighted * base_part[:, None],
-        passed_score=off.ravel() @ flat - stiff @ coefficients,
-        passed_information=flat.T @ (weights * flat) + stiff,
-        passed_own=np.matmul(weighted, passed),
-        passed_coupling=np.einsum("nb,nbc->cb", blocks.weight * base_part, passed, optimize=True),
-    )
-
-
-def _reduced(point: _Point, damping: Field | float) -> tuple[Field, Field, Field]:
+def _reduced(point: Point, damping: Field | float) -> tuple[Field, Field, Field]:
     """Information of the recordings' own parameters and the transfer once the base is eliminated; that of the base.
 
     Both damped; and their coupling. Levels of g and B are fixed against one another by Σ ln g = 0.
@@ -337,23 +251,17 @@ def _reduced(point: _Point, damping: Field | float) -> tuple[Field, Field, Field
     return reduced, base_information, flat
 
 
-def _bounds(blocks: Blocks) -> tuple[Field, Field]:
-    """Least and greatest ln A, ln f, ln ζ, ln g."""
-    low, high = np.log(0.97 * blocks.centre[0]), np.log(1.03 * blocks.centre[-1])
-    return np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0]), np.array([60.0, high, np.log(MOST_DAMPING), 60.0])
-
-
 def _scored(blocks: Blocks, start: Parameters, pace: float = PACES[0]) -> Joint:
     """Damped Fisher scoring of everything at once; the base, whose blocks do not couple, is eliminated first."""
-    lower, upper = _bounds(blocks)
+    lower, upper = bounds_of(blocks)
     stiff = start.transfer.stiffness(pace)
 
-    def placed(at: Parameters) -> tuple[Parameters, _Point]:
-        return at, _point(blocks, at, stiff)
+    def placed(at: Parameters) -> tuple[Parameters, Point]:
+        return at, point_at(blocks, at, stiff)
 
     def propose(
-        state: tuple[Parameters, _Point], damping: Field
-    ) -> tuple[Mask, Callable[[Mask], tuple[Parameters, _Point]]] | None:
+        state: tuple[Parameters, Point], damping: Field
+    ) -> tuple[Mask, Callable[[Mask], tuple[Parameters, Point]]] | None:
         at, point = state
         reduced, base_information, flat = _reduced(point, damping)
         score = np.concatenate([point.own_score.ravel(), point.passed_score])
@@ -369,7 +277,7 @@ def _scored(blocks: Blocks, start: Parameters, pace: float = PACES[0]) -> Joint:
             at.transfer._replace(coefficients=at.transfer.coefficients + np.clip(passed, -1.0, 1.0)),
         )
         stretch = 0.5 * float(trial.transfer.coefficients @ stiff @ trial.transfer.coefficients)
-        return np.array([np.sum(_costs(blocks, trial)) + stretch < point.cost]), lambda _: placed(trial)
+        return np.array([np.sum(costs_at(blocks, trial)) + stretch < point.cost]), lambda _: placed(trial)
 
     start = start._replace(own=np.clip(start.own, lower, upper))
     (at, point), _ = damped_scoring(placed(start), propose, steps=MOST_STEPS, least=1e-7, most=1e6)
@@ -379,36 +287,92 @@ def _scored(blocks: Blocks, start: Parameters, pace: float = PACES[0]) -> Joint:
     return Joint(at, point.cost, std, covariance[own:, own:])
 
 
-def _each(blocks: Blocks, start: Parameters, doubt: Field) -> Joint:
-    """Damped Fisher scoring of every recording's own parameters beside a base and a transfer that are known."""
-    lower, upper = _bounds(blocks)
-    stiff = np.zeros_like(doubt)
+class Heard(NamedTuple):
+    """What one sensor hears: its blocks, where its lines are thought to be, and the doubt about its transfer."""
 
-    def placed(own: Field, costs: Field) -> tuple[Field, Field, _Point]:
-        return own, costs, _point(blocks, start._replace(own=own), stiff)
+    blocks: Blocks
+    at: Parameters
+    doubt: Field
+
+
+class Lines(NamedTuple):
+    """Lines of recordings, each of one place and damping on all sensors.
+
+    `own` (sensors, recordings, 4) are as in `Parameters`; `inverse` (recordings, n, n) is of the information in all
+    that is one's own, of which each sensor's are at `places`; `cost` (recordings,); `points` are by sensor.
+    """
+
+    own: Field
+    cost: Field
+    inverse: Field
+    points: list[Point]
+
+    @property
+    def dragged(self) -> list[Field]:
+        """What each coefficient of a sensor's transfer does to all that is one's own; (recordings, n, coefficients)."""
+        return [
+            np.matmul(self.inverse[:, :, places(sensor)], point.passed_own) for sensor, point in enumerate(self.points)
+        ]
+
+
+def places(sensor: int) -> list[int]:
+    """Where ln A, ln f, ln ζ, ln g of a sensor stand among what is a recording's own; f and ζ are all sensors'."""
+    return [0, 1, 2, 3] if sensor == 0 else [2 + 2 * sensor, 1, 2, 3 + 2 * sensor]
+
+
+def each(sensors: Sequence[Heard]) -> Lines:
+    """Damped Fisher scoring of every recording's own parameters beside bases and transfers that are known."""
+    lower, upper = bounds_of(sensors[0].blocks)
+    count, size = len(sensors), 2 + 2 * len(sensors)
+    again = (count - 1.0) * DAMPING_SPREAD**-2  # the prior of a damping counts once
+
+    def cost_of(own: Field) -> Field:
+        every = [costs_at(one.blocks, one.at._replace(own=mine)) for one, mine in zip(sensors, own, strict=True)]
+        return np.asarray(np.sum(every, axis=0) - 0.5 * again * (own[0, :, 2] - np.log(USUAL_DAMPING)) ** 2)
+
+    def placed(own: Field, cost: Field) -> tuple[Field, Field, list[Point], Field, Field]:
+        points = [
+            point_at(one.blocks, one.at._replace(own=mine), np.zeros_like(one.doubt))
+            for one, mine in zip(sensors, own, strict=True)
+        ]
+        score, information = np.zeros((own.shape[1], size)), np.zeros((own.shape[1], size, size))
+        for sensor, point in enumerate(points):
+            at = np.array(places(sensor))
+            score[:, at] += point.own_score
+            information[:, at[:, None], at] += point.own_information
+        score[:, 2] += again * (own[0, :, 2] - np.log(USUAL_DAMPING))
+        information[:, 2, 2] -= again
+        return own, cost, points, score, information
 
     def propose(
-        state: tuple[Field, Field, _Point], damping: Field
-    ) -> tuple[Mask, Callable[[Mask], tuple[Field, Field, _Point]]] | None:
-        own, costs, point = state
-        diagonal = np.einsum("npp->np", point.own_information)
-        damped = point.own_information + (damping[:, None] * diagonal)[:, :, None] * np.eye(4)
-        step = np.linalg.solve(damped, point.own_score[..., None])[..., 0]
-        if np.max(np.sum(step * point.own_score, axis=1)) < 2.0 * SETTLED:
+        state: tuple[Field, Field, list[Point], Field, Field], damping: Field
+    ) -> tuple[Mask, Callable[[Mask], tuple[Field, Field, list[Point], Field, Field]]] | None:
+        own, cost, _, score, information = state
+        diagonal = np.einsum("npp->np", information)
+        damped = information + (damping[:, None] * diagonal)[:, :, None] * np.eye(size)
+        step = np.linalg.solve(damped, score[..., None])[..., 0]
+        if np.max(np.sum(step * score, axis=1)) < 2.0 * SETTLED:
             return None
-        trial = np.clip(own + np.clip(step, -LONGEST_STEP, LONGEST_STEP), lower, upper)
-        trial_costs = _costs(blocks, start._replace(own=trial))
-        return trial_costs < costs, lambda better: placed(
-            np.where(better[:, None], trial, own), np.where(better, trial_costs, costs)
+        by_sensor = np.stack([step[:, places(sensor)] for sensor in range(count)])
+        trial = np.clip(own + np.clip(by_sensor, -LONGEST_STEP, LONGEST_STEP), lower, upper)
+        trial_cost = cost_of(trial)
+        return trial_cost < cost, lambda better: placed(
+            np.where(better[:, None], trial, own), np.where(better, trial_cost, cost)
         )
 
-    own = np.clip(start.own, lower, upper)
-    state = placed(own, _costs(blocks, start._replace(own=own)))
-    (own, costs, point), _ = damped_scoring(state, propose, steps=MOST_STEPS, least=1e-7, most=1e6, fits=own.shape[0])
-    inverse = np.linalg.inv(point.own_information)
-    dragged = np.matmul(inverse, point.passed_own)  # by each coefficient of the transfer
-    variance = np.einsum("npp->np", inverse) + np.einsum("npc,cd,npd->np", dragged, doubt, dragged, optimize=True)
-    return Joint(start._replace(own=own), float(np.sum(costs)), np.sqrt(variance), doubt)
+    own = np.stack([np.clip(one.at.own, lower, upper) for one in sensors])
+    state = placed(own, cost_of(own))
+    state, _ = damped_scoring(state, propose, steps=MOST_STEPS, least=1e-7, most=1e6, fits=own.shape[1])
+    own, cost, points, _, information = state
+    return Lines(own, cost, np.linalg.inv(information), points)
+
+
+def alone_beside(blocks: Blocks, start: Parameters, doubt: Field) -> Joint:
+    """Lines of one sensor beside a base and a transfer that are known."""
+    lines = each([Heard(blocks, start, doubt)])
+    (dragged,) = lines.dragged
+    variance = np.einsum("npp->np", lines.inverse) + np.einsum("npc,cd,npd->np", dragged, doubt, dragged, optimize=True)
+    return Joint(start._replace(own=lines.own[0]), float(np.sum(lines.cost)), np.sqrt(variance), doubt)
 
 
 def _passed_on(blocks: Blocks, start: Parameters) -> Joint:

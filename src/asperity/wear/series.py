@@ -15,23 +15,10 @@ import numpy.typing as npt
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
+from asperity.wear.expected import LOOSE, Blocks, expected_density, lines_and_slopes, whittle_costs
 from asperity.wear.indicators import STRONG_EVIDENCE, IndicatorMethod, contact_resonance, require_band
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
-from asperity.wear.separation import (
-    LOOSE,
-    Blocks,
-    Joint,
-    Model,
-    Templates,
-    beside,
-    coarser,
-    expected_density,
-    lines_and_slopes,
-    models,
-    separate,
-    templates_on,
-    whittle_costs,
-)
+from asperity.wear.separation import Joint, Model, Templates, beside, coarser, models, separate, templates_on
 from asperity.wear.transfer import Transfer
 
 SeriesMethod = Literal["joint", IndicatorMethod]
@@ -106,8 +93,8 @@ class Shared:
         blocks = _blocked(spectra, lines, self.size, kept)
         templates, ready = self._search
         joint, elsewhere = beside(blocks, self.base, Transfer(*self.reach, self.transfer), self.doubt, templates, ready)
-        witnesses = _Witnesses(self.counts, self.change, self.by_chance)
-        found = _Found(joint, templates, elsewhere, witnesses, self.stands)
+        witnesses = Witnesses(self.counts, self.change, self.by_chance)
+        found = Found(joint, templates, elsewhere, witnesses, self.stands)
         return _judged(blocks, found, self.band_hz)
 
 
@@ -140,10 +127,27 @@ def series_resonances(
     return learn_series(spectra, band_hz=band_hz, kept=kept)[0]
 
 
+class Separated(NamedTuple):
+    """A series separated: its spectra in blocks, the fit, the resonances in it, and what it learned."""
+
+    blocks: Blocks
+    found: "Found"
+    resonances: tuple[Resonance, ...]
+    shared: Shared
+
+
 def learn_series(
     spectra: Sequence[Spectrum], *, band_hz: tuple[float, float], kept: Sequence[Mask] | None = None
 ) -> tuple[tuple[Resonance, ...], Shared]:
     """The joint separation of `series_resonances`, and what it learned, by which further spectra can be judged."""
+    separation = separated(spectra, band_hz=band_hz, kept=kept)
+    return separation.resonances, separation.shared
+
+
+def separated(
+    spectra: Sequence[Spectrum], *, band_hz: tuple[float, float], kept: Sequence[Mask] | None = None
+) -> Separated:
+    """The joint separation of `series_resonances`, with all that it rests on."""
     if len(spectra) < FEWEST_RECORDINGS:
         raise BadInput(
             f"the joint separation needs at least {FEWEST_RECORDINGS} recordings to tell what stays from what moves, "
@@ -177,9 +181,9 @@ def learn_series(
         joint = separation.joint
         witnesses = _witnesses(blocks, joint, separation.witnesses)
         stands = _stands(joint, _evidence(blocks, joint)[0] > STRONG_EVIDENCE)
-        found = _Found(joint, separation.templates, separation.elsewhere, witnesses, stands)
+        found = Found(joint, separation.templates, separation.elsewhere, witnesses, stands)
         resonances = _judged(blocks, found, band_hz)
-    return resonances, Shared(
+    shared = Shared(
         band_hz=band_hz,
         first=int(lines[0]),
         size=size,
@@ -194,6 +198,7 @@ def learn_series(
         change=witnesses.change,
         by_chance=witnesses.by_chance,
     )
+    return Separated(blocks, found, resonances, shared)
 
 
 def _blocked(
@@ -210,7 +215,7 @@ def _blocked(
     return Blocks(centre, mean, averages * share)
 
 
-class _Witnesses(NamedTuple):
+class Witnesses(NamedTuple):
     """How far recordings are from what was fitted to them, relative to what all share; (recordings, blocks) each."""
 
     counts: Mask  # where what all share is most of what is there
@@ -218,41 +223,41 @@ class _Witnesses(NamedTuple):
     by_chance: Field  # variance that chance brings
 
 
-class _Found(NamedTuple):
+class Found(NamedTuple):
     """A fit to be judged: lines and what they stand beside; -ln likelihood of a line at each template."""
 
     joint: Joint
     templates: Templates
     elsewhere: Field
-    witnesses: _Witnesses
+    witnesses: Witnesses
     stands: bool
 
 
-def _shares(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
+def shares_of(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
     """What line, place, damping and machine each have in what is expected (recordings, 4, blocks), and that."""
     line, by_f0, by_damping = lines_and_slopes(blocks.centre, joint.parameters)
     expected = expected_density(blocks, joint.parameters)
     return np.stack([line, by_f0, by_damping, expected - line], axis=1) / expected[:, None], expected
 
 
-def _witnesses(blocks: Blocks, joint: Joint, rows: list[int]) -> _Witnesses:
-    relative, expected = _shares(blocks, joint)
+def _witnesses(blocks: Blocks, joint: Joint, rows: list[int]) -> Witnesses:
+    relative, expected = shares_of(blocks, joint)
     common = relative[rows, 3]
     counts = (common > COMMON_FROM) & (blocks.weight[rows] > 0.0)
     share = np.where(counts, common, 1.0)
     change = np.where(counts, (blocks.density / expected - 1.0)[rows] / share, 0.0)
     by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[rows], 1.0) * share**2), 0.0)
-    return _Witnesses(counts, change, by_chance)
+    return Witnesses(counts, change, by_chance)
 
 
-def _misfit(blocks: Blocks, joint: Joint, witnesses: _Witnesses) -> Field:
+def misfit_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
     """Standard deviations (recordings, 4) that a machine brings which does not quite repeat itself, beside chance.
 
     What the fit of one recording would make of the residuals that the others have where its line lies: its influence
     a_b on each parameter, applied to r_jb of those recordings j whose own line is far; squared, averaged over them,
     less what chance explains.
     """
-    relative, _ = _shares(blocks, joint)
+    relative, _ = shares_of(blocks, joint)
     information = np.einsum("npb,nqb,nb->npq", relative, relative, blocks.weight, optimize=True) + LOOSE * np.eye(4)
     influence = np.linalg.solve(information, relative * blocks.weight[:, None])
     felt = influence * relative[:, None, 3]  # what a relative change of the machine in block b does to each parameter
@@ -266,13 +271,27 @@ def _misfit(blocks: Blocks, joint: Joint, witnesses: _Witnesses) -> Field:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def _evidence(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
-    """By how much (BIC) a line beside what all share explains each recording better; what all share alone."""
+def gain_of(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
+    """Twice by how much a line beside what all share makes each recording likelier (ln); what all share alone."""
     bare = np.exp(joint.parameters.base)
     relative = np.sum(blocks.weight * blocks.density / bare, axis=1) / blocks.weight.sum(axis=1)
     alone = relative[:, None] * bare
     with_line = whittle_costs(blocks, expected_density(blocks, joint.parameters))
-    return 2.0 * (whittle_costs(blocks, alone) - with_line) - 3.0 * np.log(blocks.weight.sum(axis=1)), alone
+    return 2.0 * (whittle_costs(blocks, alone) - with_line), alone
+
+
+def _evidence(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
+    """By how much (BIC) a line beside what all share explains each recording better; what all share alone."""
+    gain, alone = gain_of(blocks, joint)
+    return gain - 3.0 * np.log(blocks.weight.sum(axis=1)), alone
+
+
+def left_over(blocks: Blocks, expected: Field) -> Field:
+    """Rms of what a fit leaves of each recording's spectrum, relative, beyond chance."""
+    counted = blocks.weight > 0.0
+    off = blocks.density / expected - 1.0
+    excess = np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / np.sum(counted, axis=1)
+    return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
 
 
 def _stands(joint: Joint, significant: Mask) -> bool:
@@ -282,28 +301,24 @@ def _stands(joint: Joint, significant: Mask) -> bool:
     return places.size > 0 and float(np.std(places)) < STANDING * float(np.median(widths))
 
 
-def _judged(blocks: Blocks, found: _Found, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
+def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
     """Which of the lines are there, each with its reason."""
     joint = found.joint
     own, base, _ = joint.parameters
     evidence, alone = _evidence(blocks, joint)
     bare, expected = np.exp(base), expected_density(blocks, joint.parameters)
 
-    std = np.hypot(joint.std, _misfit(blocks, joint, found.witnesses))
-    off = blocks.density / expected - 1.0
-    counted = blocks.weight > 0.0
-    excess = np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / np.sum(counted, axis=1)
-    misfit = np.sqrt(np.maximum(excess, 0.0))
-
+    std = np.hypot(joint.std, misfit_std(blocks, joint, found.witnesses))
+    misfit = left_over(blocks, expected)
     way = STANDS if found.stands else MOVES
     resonances = []
     for i in range(own.shape[0]):
         fitted = np.exp(own[i])
         deviations = std[i, :3] * fitted[:3]
         _, f0, zeta, gain = (float(value) for value in fitted)
-        rival = _rival(f0, zeta, found.elsewhere[i], found.templates)
-        line = _Line(f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival)
-        objection = _objection(line, band_hz)
+        rival = rival_of(f0, zeta, found.elsewhere[i], found.templates)
+        line = JudgedLine(f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival)
+        objection = objection_to(line, band_hz)
         if objection is not None:
             background = (blocks.centre, alone[i])
             resonances.append(no_resonance(objection, band_hz, "joint", evidence=line.evidence, background=background))
@@ -322,7 +337,7 @@ def _judged(blocks: Blocks, found: _Found, band_hz: tuple[float, float]) -> tupl
     return tuple(resonances)
 
 
-class _Line(NamedTuple):
+class JudgedLine(NamedTuple):
     """A recording's line as it is judged; `lead` in ln likelihood over a line at `rival`, the best place elsewhere."""
 
     f0: float
@@ -335,10 +350,11 @@ class _Line(NamedTuple):
 
     @property
     def width(self) -> float:
+        """Half-power width [Hz]."""
         return 2.0 * self.damping * self.f0
 
 
-def _rival(f0: float, damping: float, cost: Field, templates: Templates) -> tuple[float, float]:
+def rival_of(f0: float, damping: float, cost: Field, templates: Templates) -> tuple[float, float]:
     """The best place more than three widths away, and by how much the line's own is better."""
     away = np.abs(templates.f0 - f0) > 6.0 * damping * f0
     if np.all(away) or not np.any(away):
@@ -346,7 +362,7 @@ def _rival(f0: float, damping: float, cost: Field, templates: Templates) -> tupl
     return float(templates.f0[away][np.argmin(cost[away])]), float(np.min(cost[away]) - np.min(cost[~away]))
 
 
-def _objection(line: _Line, band_hz: tuple[float, float]) -> str | None:
+def objection_to(line: JudgedLine, band_hz: tuple[float, float]) -> str | None:
     """Why a line is not the contact's, or cannot be told to be."""
     low, high = band_hz
     if line.evidence < STRONG_EVIDENCE:

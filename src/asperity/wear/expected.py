@@ -1,0 +1,119 @@
+"""What parameters say of a series' spectra: a base that all share, and a line beside it in each.
+
+P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) T(f)/T(f_i), its -ln likelihood, score and information. How it is fitted is left
+to `separation`; docs/theory/indicators.md has the equations.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.arrays import Field
+from asperity.wear.resonance import line_and_slopes
+from asperity.wear.transfer import Transfer
+
+USUAL_DAMPING, DAMPING_SPREAD = 0.02, 1.0  # prior of ln ζ: centre, and a factor e either way as standard deviation
+LEAST_DAMPING, MOST_DAMPING = 1e-3, 0.3
+LOOSE = 1e-4  # information of everything before the data, so that a line of no height has a defined place
+
+
+class Blocks(NamedTuple):
+    """Spectra averaged over blocks of lines: density and independent ordinates (recordings, blocks)."""
+
+    centre: Field  # (blocks,)
+    density: Field
+    weight: Field
+
+
+class Parameters(NamedTuple):
+    """A_i, f_i, ζ_i, g_i as logarithms (recordings, 4), ln B (blocks,), and what the lines come through."""
+
+    own: Field
+    base: Field
+    transfer: Transfer = Transfer()
+
+
+def lines_and_slopes(centre: Field, at: Parameters) -> tuple[Field, Field, Field]:
+    """A L T(f)/T(f_i), and its derivatives by ln f_i and ln ζ_i, (recordings, blocks)."""
+    level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
+    line, by_f0, by_damping = line_and_slopes(centre[None, :], f0, damping)
+    passed = level * np.exp(_away(centre, at) @ at.transfer.coefficients)
+    steep = at.transfer.steepness(f0[:, 0])[:, None]
+    return passed * line, passed * (by_f0 - steep * line), passed * by_damping
+
+
+def _away(centre: Field, at: Parameters) -> Field:
+    """What the transfer's coefficients stand at, less that at each line's place; (recordings, blocks, coefficients)."""
+    here = at.transfer.columns(np.exp(at.own[:, 1]))
+    return np.asarray(at.transfer.columns(centre)[None] - here[:, None])
+
+
+class Point(NamedTuple):
+    """Where a scoring step stands: cost, score and information; the base's part and the transfer's apart."""
+
+    cost: float
+    own_score: Field  # (recordings, 4)
+    own_information: Field  # (recordings, 4, 4)
+    base_score: Field  # (blocks,)
+    base_information: Field  # (blocks,)
+    coupling: Field  # (recordings, 4, blocks)
+    passed_score: Field  # (coefficients,)
+    passed_information: Field  # (coefficients, coefficients)
+    passed_own: Field  # (recordings, 4, coefficients)
+    passed_coupling: Field  # (coefficients, blocks)
+
+
+def expected_density(blocks: Blocks, at: Parameters) -> Field:
+    """What the parameters say of each block, (recordings, blocks)."""
+    return np.asarray(lines_and_slopes(blocks.centre, at)[0] + np.exp(at.own[:, 3, None] + at.base))
+
+
+def whittle_costs(blocks: Blocks, expected: Field) -> Field:
+    """-ln likelihood of each recording."""
+    return np.asarray(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected), axis=1))
+
+
+def costs_at(blocks: Blocks, at: Parameters) -> Field:
+    """-ln likelihood of each recording, its prior included."""
+    return np.asarray(whittle_costs(blocks, expected_density(blocks, at)) + _prior(at.own))
+
+
+def _prior(own: Field) -> Field:
+    return np.asarray(0.5 * ((own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD) ** 2)
+
+
+def point_at(blocks: Blocks, at: Parameters, stiff: Field) -> Point:
+    """Cost, score and information at some parameters; `stiff` is the transfer's information before the data."""
+    line, by_f0, by_damping = lines_and_slopes(blocks.centre, at)
+    common = np.exp(at.own[:, 3, None] + at.base)
+    expected = line + common
+    relative = np.stack([line, by_f0, by_damping, common], axis=1) / expected[:, None]
+    off = blocks.weight * (blocks.density / expected - 1.0)
+    weighted = relative * blocks.weight[:, None]
+    own_score = np.einsum("npb,nb->np", relative, off)
+    own_score[:, 2] -= (at.own[:, 2] - np.log(USUAL_DAMPING)) / DAMPING_SPREAD**2
+    own_information = np.einsum("npb,nqb->npq", weighted, relative, optimize=True)
+    own_information[:, 2, 2] += DAMPING_SPREAD**-2
+    base_part = relative[:, 3]
+    passed = relative[:, 0, :, None] * _away(blocks.centre, at)
+    coefficients = at.transfer.coefficients
+    flat, weights = passed.reshape(blocks.weight.size, coefficients.size), blocks.weight.reshape(-1, 1)
+    fit = float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own)))
+    return Point(
+        cost=fit + 0.5 * float(coefficients @ stiff @ coefficients),
+        own_score=own_score,
+        own_information=own_information + LOOSE * np.eye(4),
+        base_score=np.sum(base_part * off, axis=0),
+        base_information=np.sum(blocks.weight * base_part**2, axis=0) + LOOSE,
+        coupling=weighted * base_part[:, None],
+        passed_score=off.ravel() @ flat - stiff @ coefficients,
+        passed_information=flat.T @ (weights * flat) + stiff,
+        passed_own=np.matmul(weighted, passed),
+        passed_coupling=np.einsum("nb,nbc->cb", blocks.weight * base_part, passed, optimize=True),
+    )
+
+
+def bounds_of(blocks: Blocks) -> tuple[Field, Field]:
+    """Least and greatest ln A, ln f, ln ζ, ln g."""
+    low, high = np.log(0.97 * blocks.centre[0]), np.log(1.03 * blocks.centre[-1])
+    return np.array([-60.0, low, np.log(LEAST_DAMPING), -60.0]), np.array([60.0, high, np.log(MOST_DAMPING), 60.0])

@@ -1,0 +1,78 @@
+"""One machine on two sensors: a line is the contact's where both hear it at one place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.sensors import BAND, NINETY, TRUTH, two_sensors
+
+from asperity.errors import BadInput
+from asperity.wear import DISAGREE, resonances_of_sensors
+
+
+def pulls(told):
+    return [(one.crf_hz - true) / one.crf_std for one, true in zip(told.resonances, TRUTH, strict=True) if one.found]
+
+
+def test_a_line_on_both_is_found_and_held_as_often_as_the_interval_says():
+    """Through structures that differ; benchmarks/sensors.py has the same at 40 series a row."""
+    off = []
+    for seed in range(6):
+        told = resonances_of_sensors(two_sensors(100 + seed, size=0.3), band_hz=BAND)
+        assert all(one.found for one in told.resonances)
+        assert set(told.heard_on) == {("a", "b")}
+        off += pulls(told)
+    assert np.mean(np.abs(off) < NINETY) == pytest.approx(0.9, abs=0.08)
+
+
+def test_an_interval_narrows_by_what_is_independent_and_not_by_a_copy():
+    sensors = two_sensors(3, heights=(0.1, 0.1))
+    told = resonances_of_sensors(sensors, band_hz=BAND)
+    alone = resonances_of_sensors({"a": sensors["a"]}, band_hz=BAND)
+    copied = resonances_of_sensors({"a": sensors["a"], "b": sensors["a"]}, band_hz=BAND)
+    narrower = [one.crf_std / other.crf_std for one, other in zip(told.resonances, alone.resonances, strict=True)]
+    as_wide = [one.crf_std / other.crf_std for one, other in zip(copied.resonances, alone.resonances, strict=True)]
+    assert np.median(narrower) < 0.9
+    assert np.median(as_wide) == pytest.approx(1.0, abs=0.02)
+    assert told.common < 0.5 < 0.95 < copied.common
+
+
+def test_a_line_too_weak_for_either_sensor_is_found_by_both():
+    told = resonances_of_sensors(two_sensors(0, heights=(0.012, 0.012)), band_hz=BAND)
+    best = max(sum(one.found for one in every) for every in told.alone.values())
+    assert sum(one.found for one in told.resonances) > best
+    assert np.max(np.abs(pulls(told))) < 4.0
+
+
+def test_a_mode_that_moves_on_one_sensor_is_never_the_contacts():
+    for seed in range(3):
+        told = resonances_of_sensors(two_sensors(seed, heights=(0.0, 0.0), moving=True), band_hz=BAND)
+        assert all(one.found for one in told.alone["a"])
+        assert not any(one.found for one in told.resonances)
+        assert "heard on a only, not on b" in told.resonances[0].reason
+
+
+def test_sensors_that_disagree_make_no_single_claim():
+    told = resonances_of_sensors(two_sensors(1, heights=(0.0, 0.7), moving=True), band_hz=BAND)
+    assert all(one.reason.startswith(DISAGREE) for one in told.resonances)
+    assert set(told.heard_on) == {()}
+
+
+def test_a_sensor_without_spectra_leaves_the_others_word():
+    sensors = two_sensors(2)
+    alone = resonances_of_sensors({"a": sensors["a"]}, band_hz=BAND)
+    told = resonances_of_sensors({"a": sensors["a"], "b": [None] * TRUTH.size}, band_hz=BAND)
+    assert [one.crf_hz for one in told.resonances] == [one.crf_hz for one in alone.resonances]
+    assert set(told.heard_on) == {("a",)}
+    with pytest.raises(BadInput, match="no sensor has 6 recordings"):
+        resonances_of_sensors({"a": sensors["a"][:3], "b": sensors["b"][:3]}, band_hz=BAND)
+
+
+def test_where_sensors_have_agreed_one_of_them_is_enough_for_a_recording():
+    sensors = two_sensors(4)
+    told = resonances_of_sensors({"a": sensors["a"], "b": [*sensors["b"][:9], None, None, None]}, band_hz=BAND)
+    assert told.heard_on == (("a", "b"),) * 9 + (("a",),) * 3
+    assert told.resonances[10].reason.endswith("here on a only")
+    deaf = [replace(one, density=np.ones_like(one.density)) for one in sensors["b"]]
+    silent = resonances_of_sensors({"a": sensors["a"], "b": deaf}, band_hz=BAND)
+    assert not any(one.found for one in silent.resonances)

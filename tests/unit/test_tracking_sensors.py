@@ -1,0 +1,124 @@
+"""Recordings of several sensors, laid beside one another and judged as one machine."""
+
+import json
+
+import numpy as np
+import pytest
+
+from asperity.errors import BadInput
+from asperity.recording import ReadOptions
+from asperity.tracking import keep_track, store_overview, track_recordings
+from asperity.wear import line_shape
+
+RATE, SECONDS, BAND = 10_000.0, 4.0, (1800.0, 4000.0)
+TRUTH = np.linspace(2900.0, 3750.0, 8)
+
+
+def hears(rng, f0, heights):
+    """What sensors hear [m/s^2]: the contact's line, one wave for all, and noise of their own."""
+    samples = round(RATE * SECONDS)
+    frequency = np.fft.rfftfreq(samples, 1.0 / RATE)
+
+    def waves():
+        return (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)) / np.sqrt(2.0)
+
+    line = np.sqrt(line_shape(frequency, f0, 0.02)) * waves()
+    return [
+        np.fft.irfft((np.sqrt(height) * line + 0.3 * waves()) * np.sqrt(RATE * samples / 2.0), samples)
+        for height in heights
+    ]
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """A folder of files with the channels a and b, of which b is dead in the folder `dead`."""
+    folder = tmp_path_factory.mktemp("both")
+    rng = np.random.default_rng(8)
+    for name in ("whole", "dead", "apart"):
+        (folder / name).mkdir()
+    for number, f0 in enumerate(TRUTH):
+        a, b = hears(rng, f0, (1.0, 0.6))
+        facts = {"fs": RATE, "unit": "m/s^2"}
+        np.savez(folder / "whole" / f"{number}.npz", a=a, b=b, **facts)
+        np.savez(folder / "dead" / f"{number}.npz", a=a, b=1e-9 * np.ones_like(b), **facts)
+        for name, values in (("a", a), ("b", b)):
+            np.savez(folder / "apart" / f"{name}{number}.npz", acc=values, **facts)
+    return folder
+
+
+def test_channels_of_one_file_are_sensors_of_one_machine(both, tmp_path):
+    track = track_recordings([both / "whole"], channel="a, b", band_hz=BAND)
+    assert len(track.recordings) == TRUTH.size
+    assert "The line was heard on a and b in 8." in track.verdict()
+    crf = [one.resonance.crf_hz for one in track.recordings]
+    assert crf == pytest.approx(TRUTH, abs=12.0)
+    row = json.loads(json.dumps(track.scalars()))["recordings"][0]
+    assert [*row["sensors"]] == ["a", "b"]
+    assert row["sensors"]["b"]["hears"] is True
+    assert row["sensors"]["b"]["rms"] != row["sensors"]["a"]["rms"]
+    assert {"rms_a", "rms_b", "hears_b"} <= set(track.table.columns)
+    kept = keep_track(track, tmp_path / "asperity.db", ReadOptions(channel="a,b"), machine="rig", point="ring")
+    assert kept.alarm == track.alarm
+    assert [one["sensor"] for one in store_overview(tmp_path / "asperity.db").rows] == ["a", "b"]
+
+
+def test_files_of_sensors_are_laid_beside_one_another_by_a_table(both, tmp_path):
+    rows = [f"{name}{number}.npz,{number + 0.5},{name}" for name in "ab" for number in range(TRUTH.size)]
+    (tmp_path / "table.csv").write_text("\n".join(["file,x,sensor", *rows]))
+    by_table = track_recordings([both / "apart"], table=tmp_path / "table.csv", band_hz=BAND)
+    by_channel = track_recordings([both / "whole"], channel="a,b", band_hz=BAND)
+    assert [one.x for one in by_table.recordings] == [number + 0.5 for number in range(TRUTH.size)]
+    assert [one.resonance.crf_hz for one in by_table.recordings] == pytest.approx(
+        [one.resonance.crf_hz for one in by_channel.recordings], rel=1e-9
+    )
+    (tmp_path / "table.csv").write_text("\n".join(["file,x,sensor", *rows[:-8], *(row[:-1] for row in rows[-8:])]))
+    with pytest.raises(BadInput, match="others do not"):
+        track_recordings([both / "apart"], table=tmp_path / "table.csv", band_hz=BAND)
+
+
+def test_a_sidecar_says_of_which_sensor_a_recording_is_and_when_it_began(both, tmp_path):
+    for name in "ab":
+        for number in range(TRUTH.size):
+            to = tmp_path / f"{name}{number}.npz"
+            to.write_bytes((both / "apart" / to.name).read_bytes())
+            late = 1 if name == "b" else 0
+            said = f'sensor = "{name}"\nstarted = "2025-03-0{number + 1} 12:00:0{late}"\n'
+            to.with_suffix(".npz.toml").write_text(said)
+    track = track_recordings([tmp_path], band_hz=BAND)
+    assert track.x_name == "time_h"
+    assert [one.x for one in track.recordings] == pytest.approx([24.0 * number for number in range(TRUTH.size)])
+    assert "on a and b in 8" in track.verdict()
+
+
+def test_a_dead_sensor_is_told_and_the_other_goes_on(both):
+    track = track_recordings([both / "dead"], channel="a,b", band_hz=BAND)
+    alone = track_recordings([both / "dead"], channel="a", band_hz=BAND)
+    assert "The line was heard on a in 8. Sensor b is of no use in 8 of 8:" in track.verdict()
+    assert [one.resonance.crf_hz for one in track.recordings] == [one.resonance.crf_hz for one in alone.recordings]
+    assert track.alarm.state == alone.alarm.state != "blind"
+
+
+def test_a_level_that_grows_on_the_other_sensor_is_heard(tmp_path):
+    rng = np.random.default_rng(4)
+    for number in range(24):
+        a, b = hears(rng, 3000.0, (0.0, 0.0))
+        louder = np.exp(0.3 * max(number - 12, 0))
+        np.savez(tmp_path / f"{number:02d}.npz", a=a, b=louder * b, fs=RATE, unit="m/s^2")
+    track = track_recordings([tmp_path], channel="a,b", band_hz=BAND)
+    assert track.alarm.state == "alarm"
+    assert track.alarm.raised_by.endswith("on b")
+
+
+@pytest.mark.parametrize(("channel", "named"), [("a,c", "channel c cannot be read"), ("a,a", "names one twice")])
+def test_channels_that_are_none_are_refused(both, channel, named):
+    with pytest.raises(BadInput, match=named):
+        track_recordings([both / "whole"], channel=channel, band_hz=BAND)
+
+
+def test_a_copy_is_no_second_sensor(tmp_path):
+    rng = np.random.default_rng(1)
+    for number, f0 in enumerate(TRUTH[:6]):
+        (a,) = hears(rng, f0, (1.0,))
+        np.savez(tmp_path / f"{number}.npz", a=a, b=a, fs=RATE, unit="m/s^2")
+    with pytest.raises(BadInput, match="sensors a and b hold the same samples in 0"):
+        track_recordings([tmp_path], channel="a,b", band_hz=BAND)
