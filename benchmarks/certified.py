@@ -1,13 +1,10 @@
-"""Solvers held against the benchmark's certified values: error and time by family of cases, and the figure of both."""
+"""Solvers held against the benchmark's certified values: error and time by family of cases."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from statistics import median
 
-from asperity import report
 from asperity.benchmark import BenchmarkResult, run_benchmark, solver_named
 
-FIGURE = Path(__file__).parents[1] / "docs" / "images" / "benchmark-error.png"
 SOLVERS = ("asperity", "tamaas", "contactmechanics")
 CELLS = (64, 128, 256)
 
@@ -24,7 +21,6 @@ def lines(*, fast: bool) -> Iterator[str]:
         yield from _rows(result)
     for case, reason in results[0].left_out:
         yield f"{case}: {reason}"
-    report.write_figure(report.benchmark_figure(*results), FIGURE)
 
 
 def _rows(result: BenchmarkResult) -> Iterator[str]:

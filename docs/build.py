@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import draw_benchmark
 import make_quantities
 import make_reference
 from sphinx.cmd.build import main as sphinx
@@ -25,6 +26,7 @@ BESIDE = {
     "SECURITY.md": "security.md",
 }
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
+ERRORS = STAGE / "images" / "benchmark-error.png"  # drawn from the csv that the last `make bench` wrote
 REST = "<!-- the rest -->"  # where pages go that no other list of pages names
 
 
@@ -75,12 +77,13 @@ def stage() -> None:
     wanted |= {staged(path): path.read_bytes() for path in sources() if path.suffix != ".md"}
     made = [STAGE / name for name in ("gallery", "reference/names")]
     for path in STAGE.rglob("*"):
-        if path.is_file() and path not in wanted and not any(path.is_relative_to(folder) for folder in made):
+        if path.is_file() and path not in (*wanted, ERRORS) and not any(path.is_relative_to(folder) for folder in made):
             path.unlink()
     for path, content in wanted.items():
         if not path.exists() or path.read_bytes() != content:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
+    draw_benchmark.write(ERRORS)
 
 
 def main() -> int:

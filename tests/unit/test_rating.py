@@ -1,4 +1,4 @@
-"""Ratings: the standards' printed constants and values, published lives, closed forms, continuity and limits."""
+"""Ratings: constants as public readings of the standards have them, published lives, closed forms, continuity, limits."""
 
 import math
 from dataclasses import fields
