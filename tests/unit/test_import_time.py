@@ -94,6 +94,19 @@ def test_a_command_loads_only_what_it_needs(tmp_path, arguments):
     assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
+COMPILES = {"numba.np.linalg", "numba.np.npyimpl", "numba.typed.typeddict"}
+
+
+def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
+    probe = (
+        f"import sys\nfrom asperity.cli import main\ntry: main(['solve', {str(PAPER)!r}, *{VIBRATED!r}])\n"
+        f"except SystemExit: print('loaded', *[m for m in {sorted(COMPILES)!r} if m in sys.modules])"
+    )
+    for _ in range(2):  # the first one may have to compile
+        done = subprocess.run([sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
+
+
 def test_numba_waits_for_a_solve():
     assert "numba" not in loaded_after("import asperity; asperity.read_surface; asperity.power_spectrum")
 

@@ -4,8 +4,9 @@ A law can be chosen by its name, with its parameters beside it as the case file 
 are not in use is kept, so that another law can be tried.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields
+from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_origin, get_type_hints
 
 from asperity.coupling.excitations import (
@@ -181,18 +182,27 @@ def vibration_choices() -> Mapping[str, Choice]:
     for name, choice in _choices(VibrationModel):
         choices[name] = choice._replace(kind=str, default=choice.default.name) if name in LAWS else choice
         for law in LAWS.get(name, {}).values():
-            for parameter, own in _choices(law):
+            for parameter, own in _choices(law):  # type: ignore[arg-type]  # classes are hashable
                 choices.pop(parameter, None)  # one that two laws share stands behind the latter
                 choices[parameter] = own._replace(default=None) if own.default is MISSING else own
     return choices
 
 
-def _choices(law: type) -> Iterator[tuple[str, Choice]]:
+@cache
+def _choices(law: type) -> tuple[tuple[str, Choice], ...]:
     kinds, marks = get_type_hints(law), parameters(law)
-    for entry in fields(law):
-        if entry.init:
-            kind = str if get_origin(kinds[entry.name]) is Literal else kinds[entry.name]
-            yield entry.name, Choice(kind, entry.default, marks[entry.name].unit)
+    return tuple(
+        (
+            entry.name,
+            Choice(
+                str if get_origin(kinds[entry.name]) is Literal else kinds[entry.name],
+                entry.default,
+                marks[entry.name].unit,
+            ),
+        )
+        for entry in fields(law)
+        if entry.init
+    )
 
 
 def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:

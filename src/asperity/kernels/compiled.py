@@ -13,6 +13,7 @@ from typing import Any
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.runtime.nrt import rtsys
 
 _DIGEST = 32  # bytes behind what is kept; pickle passes over them
 
@@ -56,6 +57,12 @@ class _Cache(FunctionCache):
         super().__init__(function)
         kept = self._cache_file
         self._cache_file = _CheckedFile(kept._cache_path, self._impl.filename_base, kept._source_stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was compiled before; numba loads all that compiling needs first, which takes longer than a solve."""
+        rtsys.initialize(target_context)  # kept machine code calls it
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled, if the disk lets us."""

@@ -89,7 +89,10 @@ def add_mobility_slopes(
     real = out.centre.dtype.type
     dx, dy = spacing
     over_dx2, over_dy2, own = real(1.0 / (dx * dx)), real(1.0 / (dy * dy)), real(compliance)
-    slope = film.log_mobility_by_pressure + own * film.log_mobility_by_gap
+    slope = np.empty_like(film.log_mobility_by_gap)
+    for i in range(nx):  # in loops, as what numba needs for sums of whole arrays takes long to load
+        for j in range(ny):
+            slope[i, j] = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
     for i in range(nx):
         for j in range(ny):
             here, scale = rows.state[i, j] == LUBRICATED, rows.fluid_scale[i, j]

@@ -368,9 +368,12 @@ def _starts(frequency: Field, density: Field) -> list[Field]:
 
 def _leakage(spectrum: Spectrum) -> Field:
     """What the window spreads over the lines around one; sums to 1. Exact for a spectrum smooth between lines."""
-    power = np.abs(np.fft.fft(taper(spectrum.window, spectrum.segment))) ** 2
+    if spectrum.window == "boxcar":
+        return np.ones(1)
+    weights = taper(spectrum.window, spectrum.segment)
     half = min(8, (spectrum.segment - 1) // 2)
-    near = np.concatenate([power[-half:], power[: half + 1]]) / power.sum()
+    power = np.abs(scipy.fft.rfft(weights)[: half + 1]) ** 2
+    near = np.concatenate([power[:0:-1], power]) / (weights.size * float(weights @ weights))  # Parseval
     reach = int(np.flatnonzero(near[half:] > 1e-4)[-1])
     near = near[half - reach : half + reach + 1]
     return np.asarray(near / near.sum())
