@@ -15,7 +15,7 @@ from typing import Any, get_type_hints
 from asperity.errors import require_positive
 
 NO_VALUE = "–"
-BOUNDED = ("load", "film")  # groups of what is never negative: shares, at most 1, and films
+BOUNDED = ("load", "film")  # groups of what is never negative: shares, mostly at most 1, and films
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units over their SI unit; any other display unit is the SI unit itself
 _FACTORS = {"%": 1e2, "nm": 1e9, "µm": 1e6, "mm": 1e3, "µs": 1e6, "ms": 1e3, "kHz": 1e-3, "MPa": 1e-6, "GPa": 1e-9}
@@ -141,7 +141,7 @@ class Quantity:
         """The interval that is left of a share or film whose deviation reaches beyond what it can be; else None."""
         if self.group not in BOUNDED or value is None or not deviation or not math.isfinite(value + deviation):
             return None
-        most = 1.0 if (self.unit, self.display) == ("1", "%") else math.inf
+        most = 1.0 if (self.unit, self.display) == ("1", "%") and value <= 1.0 else math.inf
         low, high = max(0.0, value - deviation), min(most, value + deviation)
         return None if (low, high) == (value - deviation, value + deviation) else (low, high)
 

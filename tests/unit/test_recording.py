@@ -73,6 +73,8 @@ def test_what_no_one_states_is_asked_for(folder, tmp_path):
     with pytest.raises(BadInput, match=r"holds 2 channels \(two\[1\], two\[2\]\); give channel"):
         read_recording(tmp_path / "two.npy", rate_hz=1.0)
     assert read_recording(tmp_path / "two.npy", rate_hz=1.0, channel="2").facts["channel"].value == "two[2]"
+    with pytest.raises(BadInput, match="has no channel '²'; it has two"):  # a digit, and no number
+        read_recording(tmp_path / "two.npy", rate_hz=1.0, channel="²")
 
 
 def test_contradictions_are_refused(folder):

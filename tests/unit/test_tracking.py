@@ -44,6 +44,8 @@ def test_a_folder_is_its_recordings_in_the_order_of_their_numbers(tmp_path):
         "r10.wav",
         "r9.wav",
         "r2.csv",
+        "²r.csv",
+        "²3.csv",
         "2003.10.22.12.06.24",
         ".hidden.wav",
         "r2.csv.toml",
@@ -54,7 +56,7 @@ def test_a_folder_is_its_recordings_in_the_order_of_their_numbers(tmp_path):
     (tmp_path / "table.csv").write_text("file,sq_um\nr2.csv,1\n")
     (tmp_path / "results").mkdir()
     names = [path.name for path in recordings_in([tmp_path, tmp_path / "r9.wav"])]
-    assert names == ["2003.10.22.12.06.24", "r2.csv", "r9.wav", "r10.wav"]
+    assert names == ["2003.10.22.12.06.24", "r2.csv", "r9.wav", "r10.wav", "²3.csv", "²r.csv"]
 
 
 def test_a_table_places_recordings(tmp_path):

@@ -248,7 +248,7 @@ def _channel(path: Path, contents: Contents, requested: str | None) -> Channel:
             f"{path.name} has {len(matching)} channels {requested!r}; "
             f"give {_listed([channel.name for channel in matching])}"
         )
-    if requested.strip().isdigit() and 0 < int(requested) <= len(channels):
+    if requested.strip().isdecimal() and 0 < int(requested) <= len(channels):
         return channels[int(requested) - 1]
     raise BadInput(f"{path.name} has no channel {requested!r}; it has {_listed(names)}")
 

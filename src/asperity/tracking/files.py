@@ -260,9 +260,9 @@ def _heading(path: Path) -> list[str]:
 
 
 @lru_cache(maxsize=1 << 16)
-def natural(name: str) -> list[tuple[int, int | str]]:
+def natural(name: str) -> tuple[tuple[int, int | str], ...]:
     """By what names are sorted so that their numbers stand in order."""
-    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", name) if part]
+    return tuple((0, int(part)) if part.isdecimal() else (1, part) for part in re.split(r"(\d+)", name) if part)
 
 
 def utf8(name: str) -> bool:

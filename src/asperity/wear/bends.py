@@ -190,9 +190,9 @@ class _Precision(NamedTuple):
 def _precision(variance: Field, memory: Field) -> _Precision:
     """Of scatter of a variance (..., scatters, places), each with a memory (scatters,)."""
     fresh = 1.0 - memory[:, None] ** 2
-    inner = np.ones(variance.shape[-1])
-    inner[1:-1] = 0.0
-    own = (1.0 + memory[:, None] ** 2 * (1.0 - inner)) / fresh / variance
+    inside = np.ones(variance.shape[-1])
+    inside[[0, -1]] = 0.0
+    own = (1.0 + memory[:, None] ** 2 * inside) / fresh / variance
     following = -memory[:, None] / fresh / np.sqrt(variance * _before(variance, first=np.inf))
     of_memory = (variance.shape[-1] - 1) * np.log(fresh[:, 0])
     return _Precision(own, following, np.sum(np.log(2.0 * np.pi * variance), axis=-1) + of_memory)
@@ -255,7 +255,7 @@ def after_break(x: Field, x_std: Field, breaks: Field, density: Field) -> Field:
 
 
 def log_sum(marginal: Field) -> Field:
-    """Over the scatters, which are evenly spaced in their logarithm."""
+    """Over the scatters, all but the least of them evenly spaced in their logarithm, and their memories."""
     top = np.max(marginal, axis=1, keepdims=True)
     return np.asarray(np.log(np.sum(np.exp(marginal - top), axis=1)) + top[:, 0])
 

@@ -1,6 +1,6 @@
 """The joint separation: what all spectra of a series share, and one line beside it in each.
 
-P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) (f/f_i)^t is fitted to all spectra at once, B free in every block of lines.
+P_i(f) = g_i B(f) + A_i L(f; f_i, ζ_i) T(f)/T(f_i) is fitted to all spectra at once, B free in every block of lines.
 docs/theory/indicators.md has the equations.
 """
 
