@@ -1,19 +1,21 @@
 """Contact spectroscopy on simulated machines: do intervals hold the truth, at one operating point and at six.
 
-Truths are contacts solved anew (never the emulator's), means over several surfaces, with unknowns drawn from the case's
+Truths are contacts solved anew (never the emulator's), means over many surfaces, with unknowns drawn from the case's
 priors; their recordings are the rig's, with structural modes, noise and tones, and go through the joint separation.
-Emulator, contacts and rows are kept in build/inference and gone on from. `python -m benchmarks.inference` runs this
-part alone, `--machines 60` with fewer of them, `--finer 10` with as many whose truth is solved on twice the cells.
+The emulator is the product's; only where a truth is solved on the emulator's own grid is what a finer one changes no
+part of it. Emulator and contacts are kept in build/inference and gone on from, rows in
+docs/benchmarks/inference-machines.csv, of which the tables are made. `python -m benchmarks.inference` runs this part
+alone, `--machines 60` with fewer of them, `--finer 10` with as many whose truth is solved on twice the cells.
 """
 
 import argparse
-import csv
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest
@@ -31,82 +33,29 @@ from asperity.inference import (
     infer_observations,
     setting_of,
 )
-from asperity.inference.emulator import sobol_shares
 from asperity.inference.inference import STAGES, stages
 from asperity.inference.listening import band_of
-from asperity.inference.outputs import OUTPUTS
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
 from asperity.study import load_study, overrides_at, plan_points, run_study
 from asperity.wear import remove_lines, series_resonances
+from benchmarks.rows import FOLDER, Rows
 
 CASE = Path(__file__).parents[1] / "examples" / "infer.toml"
 KEPT = Path(__file__).parents[1] / "build" / "inference"
-MACHINES, FEW, BATCH, SURFACES, SEED = 200, 6, 5, 6, 20
+ROWS = FOLDER / "inference-machines.csv"
+MACHINES, FEW, BATCH, SEED = 200, 6, 1, 21
+SURFACES = 12  # of a truth: their mean scatters by 2 points of CLR, and the emulator is off by 5
 ALSO_OUTSIDE = 100  # of the first so many machines every second is heard by a law that is neither of both, too
 KEYS = ("clr", "car", "h_mean_m")
 PLACES = tuple((load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5))
 ONE = PLACES[2]  # the operating point of those inferred from one: 500 N, 0.8 m/s
 TESTS = 2  # recordings at each operating point
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
-NONE = 1e-9  # variance on an output's scale
 LEAST_SHARE = 0.01  # CLR below which there is no line to be found
 INSIDE, FINER = "as the emulator has it", "on twice the cells"
 OUTSIDE = ("exponent 1/5", "5 % stiffer at 900 N")  # truths that neither law has
 LEFT_S = 60.0  # of the time given, for what is written at the end
-
-
-class Scatter(NamedTuple):
-    """Variance of one surface about its point's mean, on an output's scale: by the mean, and by where in the ranges."""
-
-    mean: Field
-    level: Field
-    powers: Field  # of its logarithm over shares of the ranges, from their middle
-    factor: float
-
-    def __call__(self, mean: Field, shares: Field) -> Field:
-        """At means, and shares (n, d) of the ranges."""
-        return np.asarray(np.interp(mean, self.mean, self.level) * self.factor * np.exp((shares - 0.5) @ self.powers))
-
-    @classmethod
-    def of(cls, mean: Field, variance: Field, shares: Field) -> "Scatter":
-        """By tenths of the mean; the rest of its logarithm a line over each of the ranges."""
-        tenths = np.array_split(np.argsort(mean), 10)
-        middle, level = (np.array([values[part].mean() for part in tenths]) for values in (mean, variance))
-        level = level + NONE
-        touching = variance > NONE  # where no surface touches, none scatters
-        rest = (variance / np.interp(mean, middle, level))[touching]
-        slopes = np.column_stack([np.ones(len(rest)), shares[touching] - 0.5])
-        powers = np.linalg.lstsq(slopes, np.log(rest), rcond=None)[0][1:]
-        return cls(middle, level, powers, float(np.mean(rest) / np.mean(np.exp(slopes[:, 1:] @ powers))))
-
-
-@dataclass(frozen=True)
-class OfFewSurfaces(Emulator):
-    """An emulator that is asked for means over few surfaces: what these scatter by is part of its deviation."""
-
-    scatter: Mapping[str, Scatter] = field(default_factory=dict)
-
-    def __call__(self, shares: Field, wanted: Sequence[str]) -> dict[str, tuple[Field, Field]]:
-        """Mean and standard deviation, that of as many surfaces as a truth has included."""
-        return {
-            key: (mean, np.sqrt(std**2 + self.scatter[key](mean, shares) / SURFACES))
-            for key, (mean, std) in super().__call__(shares, wanted).items()
-        }
-
-    @classmethod
-    def of(cls, emulator: Emulator, setting: Setting) -> "OfFewSurfaces":
-        """From the surfaces of the emulator's own points."""
-        table = load_study(emulator.folder).table
-        groups = table[table["status"] == "done"].groupby("point")[list(OUTPUTS)]
-        means, variances = groups.mean(), groups.var()
-        shares = sobol_shares(setting)[means.index]
-        scatter = {}
-        for key, output in OUTPUTS.items():
-            mean = means[key].to_numpy()
-            variance = variances[key].to_numpy() * output.slope(mean) ** 2
-            scatter[key] = Scatter.of(output.forward(mean), variance, shares)
-        return cls(**vars(emulator), scatter=scatter)
 
 
 def main() -> None:
@@ -119,14 +68,14 @@ def main() -> None:
     wanted = arguments.parse_args()
     with threadpool_limits(1):
         judge_all(FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept)
-    print("\n".join(tables(wanted.kept)))
+    print("\n".join(tables()))
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
     """What `python -m benchmarks inference` prints: all machines judged so far, as many more as there is time for."""
     end = perf_counter() + seconds - LEFT_S
     judge_all(FEW if fast else MACHINES, 0, KEPT, end=end)
-    yield from tables(KEPT)
+    yield from tables()
 
 
 def judge_all(machines: int, finer: int, kept: Path, *, end: float = float("inf")) -> None:
@@ -134,36 +83,19 @@ def judge_all(machines: int, finer: int, kept: Path, *, end: float = float("inf"
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
-    whole = OfFewSurfaces.of(emulator, setting)
-    on_its_grid = replace(whole, grid={})  # truths on its own grid: what a finer one changes is no part of them
-    rows = Rows(kept / "rows.csv")
+    on_its_grid = replace(emulator, grid={})
+    rows = Rows(ROWS, ("machine", "law"))
     for number in range(machines):
         outside = [OUTSIDE[number // 2 % len(OUTSIDE)]] if number % 2 == 0 and number < ALSO_OUTSIDE else []
         for law in (INSIDE, *([FINER] if number < finer else []), *outside):
             if perf_counter() > end:
                 return
-            if (str(number), law) not in rows.done:
-                truth = _truth(setting, number, kept, finer=law == FINER)
+            if (number, law) not in rows:
                 began = process_time()
-                found = list(judged(setting, whole if law == FINER else on_its_grid, Machine(number, law, *truth)))
-                rows.write([row | {"seconds": f"{process_time() - began:.1f}"} for row in found])
-
-
-class Rows:
-    """The csv that keeps what was found of each machine."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        read = list(csv.DictReader(path.open())) if path.exists() else []
-        self.done = {(row["machine"], row["law"]) for row in read}
-
-    def write(self, rows: list[dict[str, Any]]) -> None:
-        """Put rows behind those that are there."""
-        with self.path.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            if file.tell() == 0:
-                writer.writeheader()
-            writer.writerows(rows)
+                truth = _truth(setting, number, kept, finer=law == FINER)
+                solved_s, began = process_time() - began, process_time()
+                found = list(judged(setting, emulator if law == FINER else on_its_grid, Machine(number, law, *truth)))
+                rows.write([row | {"truth_s": solved_s, "seconds": process_time() - began} for row in found])
 
 
 # Truths --------------------------------------------------------------------------------------------------------------
@@ -209,7 +141,8 @@ def solved(setting: Setting, batch: int, folder: Path) -> list[tuple[Field, dict
     there = folder / f"{batch:03d}"
     finished = load_study(there) if (there / "table.parquet").exists() else None
     if finished is None or finished.missing:
-        finished = run_study(plan, out=there, workers=1)
+        with ThreadPoolExecutor(1) as executor:  # a process for each machine would take as long to start
+            finished = run_study(plan, out=there, executor=executor)
     done = finished.table[finished.table["status"] == "done"]
     means = done.groupby("point")[list(KEYS)].agg(["mean", "count"])
     found = []
@@ -334,9 +267,10 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
 # Told ----------------------------------------------------------------------------------------------------------------
 
 
-def tables(kept: Path) -> Iterator[str]:
-    """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown."""
-    every = list(csv.DictReader((kept / "rows.csv").open()))
+def tables() -> Iterator[str]:
+    """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown: of all rows that are kept."""
+    rows = Rows(ROWS, ("machine", "law"))
+    every = list(rows)
     yield "## Intervals of 90 % that hold the truth, of simulated machines"
     yield (
         "| truth | points | machines | CLR held | CLR held, laws exact | Sq held | Sq held, laws exact | stage held "
@@ -374,7 +308,7 @@ def tables(kept: Path) -> Iterator[str]:
     silent = {row["machine"] for row in every if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"}
     yield (
         f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of {len(silent)} too few "
-        "recordings show a line, and nothing is said."
+        f"recordings show a line, and nothing is said. Rows by the code that found them: {rows.codes()}."
     )
 
 

@@ -23,28 +23,11 @@ from asperity.inference import (
 )
 from asperity.report import write_inference_report
 from asperity.tracking import read_table
-from support.emulated import formula_emulator, formula_setting
+from support.emulated import SMALL, formula_emulator, formula_setting
 from support.recordings import SHARED
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "infer.toml"
-SMALL = {
-    "surface.correlation_length": "40 um",
-    "infer": {
-        "points": 16, "surfaces": 2, "cells": [32, 24], "sq": {"from": "0.5 um", "to": "2 um"},
-        "correlation_length": "known", "hardness": "known", "eta0": "known", "alpha": "known",
-        "load": {"from": "400 N", "to": "600 N"}, "entrainment_speed": {"from": "1 m/s", "to": "3 m/s"},
-    },
-}  # fmt: skip
 REAL = ("mfpt", "ims", "mfpt-formats", "endaq", "uff")
-
-
-@pytest.fixture(scope="module")
-def small(tmp_path_factory):
-    """A setting, its emulator, and the folder that holds it."""
-    folder = tmp_path_factory.mktemp("infer") / "emulator"
-    setting = setting_of(load_case(EXAMPLE).with_overrides(SMALL))
-    with ThreadPoolExecutor(1) as executor:
-        return setting, build_emulator(setting, folder=folder, executor=executor), folder
 
 
 def test_an_emulator_foretells_contacts_and_says_how_well(small):

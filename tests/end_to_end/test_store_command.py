@@ -123,7 +123,7 @@ def _count(store):
 
 def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeypatch):
     """An alarm long before the latest recordings is not passed over, and stands."""
-    monkeypatch.setattr("asperity.tracking.watch.LATEST", 16)
+    monkeypatch.setattr("asperity.tracking.order.LATEST", 16)
     monkeypatch.setattr("asperity.tracking.watch.STRIDE", 8)
     snapshots(tmp_path / "in", [*failing(), *np.ones(30)])
     (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)

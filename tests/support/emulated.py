@@ -13,6 +13,14 @@ from asperity.inference.process import Process
 
 CASE = Path(__file__).parents[2] / "examples" / "infer.toml"
 POINTS = 64  # a power of two
+SMALL = {  # a few small contacts
+    "surface.correlation_length": "40 um",
+    "infer": {
+        "points": 16, "surfaces": 2, "cells": [32, 24], "sq": {"from": "0.5 um", "to": "2 um"},
+        "correlation_length": "known", "hardness": "known", "eta0": "known", "alpha": "known",
+        "load": {"from": "400 N", "to": "600 N"}, "entrainment_speed": {"from": "1 m/s", "to": "3 m/s"},
+    },
+}  # fmt: skip
 
 
 def formula_setting(**overrides: object) -> Setting:

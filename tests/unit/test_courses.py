@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from asperity.errors import BadInput
 from asperity.inference import (
@@ -16,17 +17,20 @@ from asperity.inference import (
     design_contact,
     forecast_heard,
     forecast_observations,
+    latest,
     read_limit,
     wear_drift,
 )
 from asperity.inference.course import DRIFT_STD, KNOTS, WEIGHTS, Course, Extra, Table, between_knots
 from asperity.inference.forecast import Limit
 from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD
-from asperity.inference.visits import MOST, series_of
+from asperity.inference.process import Process
+from asperity.inference.visits import MOST, MOST_PLACES, series_of
 from support.emulated import formula, formula_emulator, formula_setting
 
 TIMES = np.array([0.0, 0.15, 0.4, 0.75, 1.0])
 SIZE, RESTLESS, SCATTER = 0.02, 0.2, 0.003
+EMULATED, ALIKE = {"crf": 0.01, "damping": 0.02, "crfa": EMULATED_HEIGHT_STD}, 0.6  # deviations, and their correlation
 
 
 @pytest.fixture(scope="module")
@@ -67,24 +71,23 @@ def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
 # The filter ----------------------------------------------------------------------------------------------------------
 
 
-def straight_table(share, places=2):
+def straight_table(share, memory, places=2):
     """Contacts whose channels are straight lines over the range: one of them here, twice."""
     knots = np.linspace(0.0, 1.0, KNOTS)
     lines = {"crf": 8.0 + 0.4 * knots, "damping": -4.0 - 0.1 * knots, "crfa": 1.0 + 2.0 * knots}
     count = 2
     return Table(
         {key: np.tile(line, (count, places, 1)) for key, line in lines.items()},
-        {"crf": np.full((count, places), 0.01), "damping": np.full((count, places), 0.02),
-         "crfa": np.full((count, places), EMULATED_HEIGHT_STD)},
+        {key: np.tile(std**2 * np.array([[1.0, ALIKE], [ALIKE, 1.0]]), (count, 1, 1)) for key, std in EMULATED.items()},
         np.tile([-0.3, 0.3], (count, 1)),
         np.full(count, share),
-        Extra(*(np.full(count, value) for value in (SIZE, RESTLESS, SCATTER))),
-    )  # fmt: skip
+        Extra(*(np.full(count, value) for value in (SIZE, RESTLESS, SCATTER, memory))),
+    )
 
 
-@pytest.mark.parametrize("moving", [False, True])
-def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, emulator, moving):
-    """Ten logarithms' joint density, their covariance by the integrated Wiener process's own formula."""
+@pytest.mark.parametrize(("moving", "memory"), [(False, 0.0), (True, 0.0), (True, 0.65)])
+def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, emulator, moving, memory):
+    """Twenty logarithms' joint density, their covariance by the integrated Wiener process's own formula."""
     rng = np.random.default_rng(3)
     observations = [
         replace(recording(time, 2980.0 * (1.0 + 0.01 * rng.standard_normal()), 15.0, crfa=2.9, crfa_std=0.2),
@@ -94,7 +97,7 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
     series = series_of(observations)
     forward = Forward(setting, emulator, series.places)
     course = Course(forward, series, "hertz-point", "sq_m")
-    walked = course._walk(straight_table(0.4), moving=moving)
+    walked = course._walk(straight_table(0.4, memory), moving=moving)
     sounds = series.sounds
     slope = np.array([{"crf": 0.4, "crfa": 2.0}[sound.channel] for sound in sounds])
     begin = np.array([{"crf": 8.0, "crfa": 1.0}[sound.channel] for sound in sounds]) + 0.4 * slope
@@ -105,15 +108,36 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
     covariance = np.outer(slope, slope) * moving * (DRIFT_STD**2 * np.outer(time, time) + wandered)
     covariance += EXPONENT_STD**2 * np.outer(lever, lever)
     for row, one in enumerate(sounds):
-        weight, emulated = WEIGHTS[one.channel], {"crf": 0.01, "crfa": EMULATED_HEIGHT_STD}[one.channel]
+        weight, emulated = WEIGHTS[one.channel], EMULATED[one.channel]
         for column, other in enumerate(sounds):
             if one.channel == other.channel == "crfa":
                 covariance[row, column] += GAIN_STD**2
+            if one.channel == other.channel:
+                covariance[row, column] += emulated**2 * (1.0 if one.place == other.place else ALIKE)
             if (one.channel, one.place) == (other.channel, other.place):
-                covariance[row, column] += (weight * SIZE) ** 2 + emulated**2
-        covariance[row, row] += one.heard.std**2 + (weight * SCATTER) ** 2
+                covariance[row, column] += (weight * SIZE) ** 2
+            if memory and one.channel == other.channel == "crf":
+                covariance[row, column] += SCATTER**2 * memory ** (abs(one.at - other.at) * (len(TIMES) - 1))
+        white = one.channel != "crf" or not memory
+        covariance[row, row] += one.heard.std**2 + white * (weight * SCATTER) ** 2
     values = np.array([sound.heard.value for sound in sounds])
     assert walked.log == pytest.approx(multivariate_normal(begin, covariance).logpdf(values), abs=1e-6)
+
+
+def test_errors_of_near_operating_points_are_nearly_the_same():
+    """The process's own posterior covariance, written out."""
+    rng = np.random.default_rng(2)
+    x, at = rng.random((20, 2)), rng.random((4, 3, 2))
+    at[:, 1] = at[:, 0] + 1e-3
+    process = Process(x, np.sin(4.0 * x[:, 0]), np.full(20, 0.01), np.array([0.5, 2.0]), 1.3, 1e-3)
+    kernel = ConstantKernel(1.3) * Matern([0.5, 2.0], nu=2.5)
+    known = kernel(x) + np.diag(process.noise / process._scale**2 + process.rough)
+    for group, found in zip(at, process.correlations(at), strict=True):
+        across = kernel(group, x)
+        covariance = kernel(group) * (1.0 + 1e-3 / 1.3) - across @ np.linalg.solve(known, across.T)
+        deviation = np.sqrt(np.diag(covariance))
+        assert found == pytest.approx(covariance / np.outer(deviation, deviation), abs=2e-3)
+        assert found[0, 1] > 0.99
 
 
 def test_tables_are_straight_between_knots_and_level_beyond():
@@ -146,7 +170,9 @@ def test_a_roughening_contact_is_foretold(setting, emulator):
     assert found.alarm
     assert found.rising
     assert found.time.low < crossing < found.time.high
-    assert found.time.high < 8.0 * found.time.low
+    assert found.time.high < 10.0 * found.time.low
+    assert found.by.median <= found.time.median * (1.0 + 1e-9) or found.within < 1.0
+    assert (found.by.high == np.inf) == (found.within < 0.95 * (1.0 - found.already))
     assert found.clr.low < clr[seen] < found.clr.high
     assert "rises above 50.0 %" in found.sentence()
     json.dumps(found.scalars(), allow_nan=False)
@@ -204,9 +230,40 @@ def test_many_visits_are_taken_together_and_none_is_lost():
     )
 
 
+def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_for(setting, emulator):
+    """A load that differs at every visit: one table, and CRF moved to it to within what contacts differ by."""
+    rng = np.random.default_rng(8)
+    loads = 500.0 * np.exp(0.012 * rng.standard_normal(12))
+    heard = [replace(recording(float(number)), load_n=load) for number, load in enumerate([500.0, *loads, 800.0])]
+    series = series_of(heard)
+    assert [place.load_n for place in series.places] == [500.0, 800.0]
+    assert series.usual == 0
+    forward = Forward(setting, emulator, series.places)
+    course = Course(forward, series, "hertz-point", "sq_m")
+    z = rng.standard_normal((400, forward.dims))
+    there = Forward(setting, emulator, tuple(Point(load, 1.91) for load in loads)).shown(z, "hertz-point").crf
+    here = forward.shown(z, "hertz-point").crf[:, 0]
+    for load, moved, raw, sound in zip(loads, there.T, series.sounds[1:], course.sounds[1:], strict=False):
+        change = moved - here
+        assert raw.heard.value - sound.heard.value == pytest.approx(change.mean(), abs=2e-4)
+        assert sound.heard.std**2 - raw.heard.std**2 == pytest.approx(change.var(), rel=0.5, abs=1e-8)
+        assert np.sign(change.mean()) == np.sign(load - 500.0)
+    many = [replace(recording(float(number)), load_n=250.0 + 45.0 * number) for number in range(15)]
+    assert len(series_of(many).places) <= MOST_PLACES
+
+
+def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
+    heard = [replace(recording(x), load_n=load) for x, load in ((0.0, 300.0), (80.0, 700.0), (91.0, 500.0))]
+    now = latest(Listened(observations=(*heard, recording(100.0))))
+    assert [one.x for one in now.observations] == [100.0]  # 500 N; 700 N was last heard too long ago
+    assert now.notes[-1].endswith("Operating points that were last recorded before: 2.")
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
+        (lambda _: series_of([replace(recording(float(x)), temperature_k=(None, 340.0)[x % 2]) for x in range(6)]),
+         "some recordings have a temperature and some have none"),
         (lambda setting: read_limit("crf=3000 Hz", setting), "--forecast takes a limit such as clr=0.5, of clr, sq or"),
         (lambda setting: read_limit("clr=half", setting), "--forecast clr takes a share of the load"),
         (lambda setting: read_limit("sq=2 N", setting), "--forecast sq must be"),

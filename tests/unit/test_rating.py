@@ -1,4 +1,4 @@
-"""Ratings: constants as public readings of the standards have them, published lives, closed forms, continuity, limits."""
+"""Ratings: constants as public readings of the standards have them, published lives, closed forms, limits."""
 
 import math
 from dataclasses import fields

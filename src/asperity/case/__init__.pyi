@@ -7,6 +7,7 @@ from .beginnings import KINDS as KINDS
 from .beginnings import beginning as beginning
 from .case import Case as Case
 from .case import load_case as load_case
+from .infer import MOST_POINTS as MOST_POINTS
 from .infer import InferSection as InferSection
 from .infer import PriorSection as PriorSection
 from .laws import LubricantSection as LubricantSection

@@ -9,6 +9,7 @@ import typer
 from asperity import inference, processes, report
 from asperity import surface as surfaces
 from asperity.cli import options
+from asperity.cli.ahead import contacts_solved, emulated, require_forecast
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Overrides, Page, Quiet, chosen_case, require_output
 from asperity.cli.recordings import EXIT_CODES
@@ -17,11 +18,8 @@ from asperity.errors import BadInput, require_choice
 from asperity.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.inference import Design, Emulator, Forecast, Inference, Sampler, Setting
-    from asperity.study import StudyProgress
+    from asperity.inference import Design, Forecast, Inference, Sampler, Setting
     from asperity.wear import SeriesMethod
-
-EMULATING = "the emulator's contacts; once for a case, and kept ..."
 
 
 @app.command()
@@ -39,16 +37,13 @@ def infer(
         Path | None,
         typer.Option("--table", metavar="CSV", help="Columns file, load_n, entrainment_m_s, temperature_degc."),
     ] = None,
-    emulator: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the emulator; else one in the user's cache.")
-    ] = None,
+    emulator: options.EmulatorFolder = None,
+    extend: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Solve up to N further points where the posterior is; kept.")
+    ] = 0,
     sampler: Annotated[str, typer.Option(help="importance, or nested (dynesty), which takes minutes.")] = "importance",
-    forecast: Annotated[
-        str | None, typer.Option(metavar="LIMIT", help="When clr=0.5, or sq='2 um', is crossed; of a series.")
-    ] = None,
-    worn: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of asperity wear: its drift of Sq is what is expected.")
-    ] = None,
+    forecast: options.ForecastLimit = None,
+    worn: options.Worn = None,
     design: Annotated[
         float | None, typer.Option(metavar="CLR", help="What keeps the load share below it, such as 0.3; alone, too.")
     ] = None,
@@ -68,8 +63,7 @@ def infer(
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
     if case_file is None:
         raise BadInput("asperity infer needs the contact; give --case CASE.toml")
-    if worn is not None and forecast is None:
-        raise BadInput("--worn says how Sq is expected to drift; give --forecast, too")
+    require_forecast(forecast, worn=worn)
     if not paths and (design is None or forecast is not None):
         raise BadInput("asperity infer needs recordings; name files, or their folder")
     require_choice("--sampler", sampler, inference.SAMPLERS)
@@ -83,11 +77,14 @@ def infer(
                 paths, setting, table=table_file, band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale,
                 shaft_hz=shaft or None, method=cast("SeriesMethod | None", method), workers=count,
             )  # fmt: skip
-    emulated = _emulated(setting, emulator, count, quiet=quiet)
-    ahead = None if limit is None else inference.forecast_heard(setting, emulated, heard, limit, worn=worn, seed=seed)
+    answering = emulated(setting, emulator, count, quiet=quiet)
+    ahead = None if limit is None else inference.forecast_heard(setting, answering, heard, limit, worn=worn, seed=seed)
     now = inference.latest(heard) if ahead is not None and ahead.told else heard
     now = replace(now, notes=(*now.notes, *known))
-    found = inference.infer_heard(setting, emulated, now, sampler=cast("Sampler", sampler), seed=seed)
+    by = cast("Sampler", sampler)
+    found = inference.infer_heard(setting, answering, now, sampler=by, seed=seed)
+    with contacts_solved(quiet=quiet) as step:
+        found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
     kept = None if design is None else inference.design_contact(found.forward, found.draws.z, clr=design)
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)
@@ -123,18 +120,6 @@ def _show(
     show([*asked, found.verdict()], lambda: found.scalars() | told, *blocks, as_json=as_json, quiet=quiet)
     if ahead is not None and ahead.alarm:
         raise typer.Exit(EXIT_CODES["alarm"])
-
-
-def _emulated(setting: "Setting", folder: Path | None, workers: int, *, quiet: bool) -> "Emulator":
-    """The emulator, and on a terminal how far it is."""
-    with progress("emulator", EMULATING, quiet=quiet) as display:
-
-        def step(state: "StudyProgress") -> None:
-            left = state.seconds_left
-            rest = "" if left is None else f", {left:.0f} s left"
-            display(f"{state.kept + state.done} of {state.total} contacts{rest}", state.kept + state.done, state.total)
-
-        return inference.build_emulator(setting, folder=folder, workers=workers, progress=step)
 
 
 def _told(found: "Inference") -> Block:

@@ -160,6 +160,17 @@ Tell = Annotated[
         metavar="STATES", help="Of which changes: such as alarm,blind, and their end; all of them, unless given."
     ),
 ]
+ForecastLimit = Annotated[
+    str | None,
+    typer.Option("--forecast", metavar="LIMIT", help="When clr=0.5, or sq='2 um', is crossed; of a series."),
+]
+Worn = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder of asperity wear: its drift of Sq is what is expected.")
+]
+EmulatorFolder = Annotated[
+    Path | None,
+    typer.Option("--emulator", metavar="DIR", help="Folder of the emulator; else one in the user's cache."),
+]
 Method = Annotated[str | None, typer.Option(help="joint, modes, likelihood or peak (the paper's).")]
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

@@ -10,6 +10,7 @@ import typer
 
 from asperity import files, processes, recording, report, tracking, wear
 from asperity.cli import options
+from asperity.cli.ahead import follower
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, contact_at, require_output
 from asperity.cli.show import Block, Row, columns, progress, show, span, table, text, written
@@ -133,6 +134,9 @@ def track(
     stages_from: options.StagesFrom = "crf",
     false_alarms: options.FalseAlarms = 1e-3,
     acknowledge: options.Acknowledge = None,
+    forecast: options.ForecastLimit = None,
+    worn: options.Worn = None,
+    emulator: options.EmulatorFolder = None,
     store: options.StoreFile = None,
     machine: options.Machine = None,
     point: options.Point = None,
@@ -146,34 +150,32 @@ def track(
     quiet: Quiet = False,
 ) -> None:
     """Follow the contact resonance through a series of recordings: normal wear, severe wear, or no way to tell."""
-    if page is not None:
-        files.require_writable(page)
+    for path in (page, store):
+        if path is not None:
+            files.require_writable(path)
     for path in out or ():
         require_output(path, ".csv", ".parquet", ".nc")
-    if store is not None:
-        files.require_writable(store)
+    count, stated = workers or processes.cores(), _as_read(rate, unit, channel, scale)
+    ahead = follower(forecast, case_file, worn, emulator, workers=count, quiet=quiet)
     with _files_read("reading recordings ...", quiet=quiet) as step:
         tracked = tracking.track_recordings(
             paths,
             case=contact_at(case_file),
             band_hz=band,
-            rate_hz=rate,
-            unit=unit,
-            channel=channel,
-            scale=scale,
+            **stated,
             table=table_file,
             shaft_hz=shaft or None,
             method=cast("SeriesMethod | None", method),
             stages_from=cast("StageSource", stages_from),
             false_alarm_rate=false_alarms,
             acknowledge=acknowledge,
-            workers=workers or processes.cores(),
+            foreteller=ahead,
+            workers=count,
             progress=step,
         )
     if store is not None:
-        stated = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
-        names = {"machine": machine, "point": point, "sensor": sensor}
-        tracked = tracking.keep_track(tracked, store, stated, acknowledge=acknowledge, **names)
+        read, names = recording.ReadOptions(**stated), {"machine": machine, "point": point, "sensor": sensor}
+        tracked = tracking.keep_track(tracked, store, read, acknowledge=acknowledge, **names)
     kept = [*_write(tracked, out or (), page), *([] if store is None else [store])]
     hint = ["  Add --report track.html for the page, --out track.csv for the table."]
     show(
@@ -216,6 +218,9 @@ def watch(
     stages_from: options.StagesFrom = "crf",
     false_alarms: options.FalseAlarms = 1e-3,
     acknowledge: options.Acknowledge = None,
+    forecast: options.ForecastLimit = None,
+    worn: options.Worn = None,
+    emulator: options.EmulatorFolder = None,
     store: options.StoreFile = None,
     machine: options.Machine = None,
     point: options.Point = None,
@@ -228,10 +233,11 @@ def watch(
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, each read once; goes on where it was stopped. Ctrl-C ends it."""
-    kept, state = out if out is not None else folder / "asperity-watch", "cannot-tell"
-    stated: dict[str, Any] = {"rate_hz": rate, "unit": unit, "channel": channel, "scale": scale}
+    kept = out if out is not None else folder / "asperity-watch"
+    count, stated = workers or processes.cores(), _as_read(rate, unit, channel, scale)
     names: dict[str, Any] = {"store": store, "machine": machine, "point": point, "sensor": sensor}
     pace: dict[str, Any] = {"once": once, "every_s": every, "settle_s": settle, "expect_s": expect}
+    ahead = follower(forecast, case_file, worn, emulator, workers=count, quiet=quiet)
     with _files_read("watching ...", quiet=quiet) as step:
         updates = tracking.watch_folder(
             folder,
@@ -245,22 +251,40 @@ def watch(
             stages_from=cast("StageSource", stages_from),
             false_alarm_rate=false_alarms,
             acknowledge=acknowledge,
+            foreteller=ahead,
             **names,
-            tell=wear.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(",")),
+            tell=_states(tell),
             call=tracking.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
             recall=(kept / PAGE).is_file(),
             **pace,
-            workers=workers or processes.cores(),
+            workers=count,
             progress=step,
         )
-        try:
-            for update in updates:
-                state = _written_and_shown(update, kept, as_json=as_json, quiet=quiet) or state
-        except KeyboardInterrupt:
-            if once:
-                raise
-            print(f"stopped; what was heard is in {kept}, and the next watch goes on from there", file=sys.stderr)
+        state = _followed(updates, kept, once=once, as_json=as_json, quiet=quiet)
     _end(state)
+
+
+def _followed(updates: "Iterator[Update]", kept: Path, *, once: bool, as_json: bool, quiet: bool) -> str:
+    """Write and show every update until Ctrl-C; the state of the last."""
+    state = "cannot-tell"
+    try:
+        for update in updates:
+            state = _written_and_shown(update, kept, as_json=as_json, quiet=quiet) or state
+    except KeyboardInterrupt:
+        if once:
+            raise
+        print(f"stopped; what was heard is in {kept}, and the next watch goes on from there", file=sys.stderr)
+    return state
+
+
+def _as_read(rate: float | None, unit: str | None, channel: str | None, scale: float | None) -> dict[str, Any]:
+    """How recordings are read, by the names of the library."""
+    return {"rate_hz": rate, "unit": unit, "channel": channel, "scale": scale}
+
+
+def _states(tell: str | None) -> "Sequence[AlarmState]":
+    """States of which somebody is told."""
+    return wear.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(","))
 
 
 def _end(state: str) -> None:

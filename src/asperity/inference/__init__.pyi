@@ -7,12 +7,16 @@ from .emulator import GridError as GridError
 from .emulator import Quality as Quality
 from .emulator import build_emulator as build_emulator
 from .emulator import emulators_folder as emulators_folder
+from .emulator import extend_emulator as extend_emulator
 from .estimates import Estimate as Estimate
+from .following import Follower as Follower
+from .following import Foreseen as Foreseen
 from .forecast import Forecast as Forecast
 from .forecast import Interval as Interval
 from .forecast import Limit as Limit
 from .forecast import forecast_observations as forecast_observations
 from .forecast import read_limit as read_limit
+from .forecast import require_limit as require_limit
 from .forward import LAWS as LAWS
 from .forward import Forward as Forward
 from .forward import Law as Law
@@ -24,6 +28,7 @@ from .infer import infer_heard as infer_heard
 from .infer import infer_observations as infer_observations
 from .infer import latest as latest
 from .infer import wear_drift as wear_drift
+from .infer import with_further as with_further
 from .infer import with_observation as with_observation
 from .inference import CRUCIAL as CRUCIAL
 from .inference import Inference as Inference

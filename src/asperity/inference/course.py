@@ -4,8 +4,10 @@ A particle is a contact that does not change but for the one unknown; along its 
 table of the emulator. So all that a course can do is integrated, and particles are drawn from the unknowns alone.
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,17 +17,23 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.inference.forward import Forward, Law
 from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, OF_DAMPING, OF_HEIGHT, SIZES
+from asperity.inference.observations import Heard
 from asperity.inference.outputs import CLR
+from asperity.inference.priors import si
+from asperity.inference.settings import OPERATING, TEMPERATURE
 from asperity.inference.visits import CHANNELS, Series, Sound
 
 KNOTS = 17  # of the table along the range of what drifts
 DRIFT_STD = 0.3  # of the first drift, in shares of the range over the series
 RESTLESS, RESTLESS_SPREAD = 0.1, 1.0  # how much a drift changes over the series; median, deviation of its logarithm
 SCATTER, SCATTER_SPREAD = 1e-3, 1.0  # of CRF from visit to visit beyond its own deviation, relative
-EXTRA = 3  # unknowns of a course: the law's error, restlessness, scatter
+MEMORIES = (0.0, 0.4, 0.65, 0.85)  # correlation of the scatter of CRF from one visit to the next, evenly spaced ones
+ALIKE = (0.7, 0.1, 0.1, 0.1)  # how probable each is: as where stages are read off a series
+EXTRA = 4  # unknowns of a course: the law's error, restlessness, scatter and its memory
 PASSES = 2  # of an update: the table is no straight line
 WEIGHTS = {"crf": 1.0, "damping": OF_DAMPING, "crfa": OF_HEIGHT}  # of the law's error and of scatter
-SHARE, SPEED, LEVER, GAIN, FIRST = 0, 1, 2, 3, 4  # places in the state: the rest are errors of channels at places
+SHARE, SPEED, LEVER, GAIN, SLOW, FIRST = range(6)  # places in the state: the rest are errors of channels at places
+PROBES, STEPS = 256, (0.02, 0.02, 2.0)  # contacts, and steps (load, speed, K), by which sounds are moved
 
 
 class Followed(NamedTuple):
@@ -53,15 +61,17 @@ class Extra(NamedTuple):
     size: Field
     restless: Field
     scatter: Field
+    memory: Field
 
     @classmethod
     def of(cls, z: Field) -> "Extra":
-        """From standard normal numbers (n, 3)."""
+        """From standard normal numbers (n, EXTRA)."""
         place = np.minimum((len(SIZES) * ndtr(z[:, 0])).astype(int), len(SIZES) - 1)
         return cls(
             np.array(SIZES)[place],
             RESTLESS * np.exp(RESTLESS_SPREAD * z[:, 1]),
             SCATTER * np.exp(SCATTER_SPREAD * z[:, 2]),
+            np.array(MEMORIES)[np.searchsorted(np.cumsum(ALIKE)[:-1], ndtr(z[:, 3]))],
         )
 
 
@@ -99,6 +109,27 @@ class Course:
         """Unknowns of a contact and of its course."""
         return self.forward.dims + EXTRA
 
+    @cached_property
+    def sounds(self) -> tuple[Sound, ...]:
+        """All that was heard as it would have been at its place: moved there as contacts of the prior move in the mean.
+
+        By how much these differ is in its deviation.
+        """
+        asides = np.array([sound.aside for sound in self.series.sounds])
+        z = np.random.default_rng(0).standard_normal((PROBES, self.forward.dims))
+        here, moved = self.forward.shown(z, self.law, deviations=False), {}
+        for axis in np.flatnonzero(np.any(asides != 0.0, axis=0)):
+            forward, steps = _aside(self.forward, int(axis))
+            there = forward.shown(z, self.law, deviations=False)
+            moved[int(axis)] = {key: (getattr(there, key) - getattr(here, key)) / steps for key in CHANNELS}
+        return tuple(self._at_its_place(sound, moved) for sound in self.series.sounds)
+
+    def _at_its_place(self, sound: Sound, moved: Mapping[int, Mapping[str, Field]]) -> Sound:
+        slopes = {axis: slope[sound.channel][:, sound.place] for axis, slope in moved.items()}
+        by = sum((sound.aside[axis] * slope for axis, slope in slopes.items()), np.zeros(PROBES))
+        value, std = sound.heard.value - float(np.mean(by)), math.hypot(sound.heard.std, float(np.std(by)))
+        return sound._replace(heard=Heard(value, std))
+
     def __call__(self, z: Field) -> Followed:
         """How probable what was heard makes contacts, shape (n, dims), without a course and with any."""
         table = Table.of(self, z)
@@ -114,9 +145,9 @@ class Course:
         restless = table.extra.restless if moving else np.zeros(len(table.share))
         path = np.empty((len(table.share), len(self.series.x)))
         before = 0.0
-        for sound in self.series.sounds:
+        for sound in self.sounds:
             if sound.at > before:
-                state.wait(sound.at - before, restless)
+                state.wait(sound.at - before, restless, table.extra, len(self.series.x) - 1)
                 before = sound.at
             state.hear(sound, table, places)
             path[:, sound.visit] = state.mean[:, SHARE]
@@ -128,7 +159,7 @@ class Table(NamedTuple):
     """What contacts would show along the range of what drifts: each channel (n, places, knots)."""
 
     channels: Mapping[str, Field]
-    deviations: Mapping[str, Field]  # of the emulator, (n, places)
+    errors: Mapping[str, Field]  # covariance of the emulator's, (n, places, places)
     lever: Field  # of the law's exponent, (n, places), 0 in the mean
     share: Field  # where each begins, (n,)
     extra: Extra
@@ -142,10 +173,17 @@ class Table(NamedTuple):
         along = along_range(contacts, column, unknown.at_share(np.linspace(0.0, 1.0, KNOTS)))
         shown = forward.shown(along, course.law, deviations=False)
         tables = {key: _by_knots(getattr(shown, key)) for key in CHANNELS}
-        heights = np.where(np.isnan(here.crfa_std), 0.0, np.hypot(here.crfa_std, EMULATED_HEIGHT_STD))
+        alike = forward.correlations(contacts, course.law)
+        heights = np.nan_to_num(here.crfa_std)
+        errors = {
+            key: std[:, :, None] * std[:, None, :] * alike[key]
+            for key, std in (("crf", here.crf_std), ("damping", here.damping_std), ("crfa", heights))
+        }
+        own = np.arange(heights.shape[1])
+        errors["crfa"][:, own, own] += np.where(np.isnan(here.crfa_std), 0.0, EMULATED_HEIGHT_STD**2)
         return cls(
             tables,
-            {"crf": here.crf_std, "damping": here.damping_std, "crfa": heights},
+            errors,
             here.lever - here.lever.mean(axis=1, keepdims=True),
             unknown.share(contacts[:, column]),
             Extra.of(z[:, forward.dims :]),
@@ -154,6 +192,20 @@ class Table(NamedTuple):
     def at(self, channel: str, place: int, share: Field) -> tuple[Field, Field]:
         """Value and slope at shares of the range; level beyond its ends."""
         return between_knots(self.channels[channel][:, place], share)
+
+
+def _aside(forward: Forward, axis: int) -> tuple[Forward, Field]:
+    """The same a step aside in load (0), speed (1) or temperature (2), towards the middle of its range; the steps."""
+    entry = next(one for one in forward.setting.operating if one.key == (*OPERATING, TEMPERATURE)[axis])
+    low, high = (si(end, entry.unit) for end in (entry.low, entry.high))
+    name = ("load_n", "entrainment_m_s", "temperature_k")[axis]
+    steps, points = np.empty(len(forward.points)), []
+    for place, point in enumerate(forward.points):
+        value = getattr(point, name)
+        steps[place] = STEPS[axis] if value < 0.5 * (low + high) else -STEPS[axis]
+        moved = value + steps[place] if axis == 2 else value * math.exp(steps[place])
+        points.append(replace(point, **{name: moved}))
+    return replace(forward, points=tuple(points)), steps
 
 
 def along_range(z: Field, column: int, knots: Field) -> Field:
@@ -195,17 +247,25 @@ class _State:
         mean[:, SHARE], mean[:, SPEED] = table.share, drift[0]
         variance = np.zeros_like(mean)
         variance[:, SPEED], variance[:, LEVER], variance[:, GAIN] = drift[1] ** 2, EXPONENT_STD**2, GAIN_STD**2
+        variance[:, SLOW] = table.extra.scatter**2 * (table.extra.memory > 0.0)
         for number, channel in enumerate(CHANNELS):
             own = slice(FIRST + number * places, FIRST + (number + 1) * places)
-            error = (WEIGHTS[channel] * table.extra.size[:, None]) ** 2
-            variance[:, own] = error + table.deviations[channel] ** 2
+            variance[:, own] = (WEIGHTS[channel] * table.extra.size[:, None]) ** 2
         covariance = np.zeros((*mean.shape, mean.shape[1]))
         diagonal = np.arange(mean.shape[1])
         covariance[:, diagonal, diagonal] = variance
+        for number, channel in enumerate(CHANNELS):
+            own = slice(FIRST + number * places, FIRST + (number + 1) * places)
+            covariance[:, own, own] += table.errors[channel]
         return cls(mean, covariance, np.zeros(count))
 
-    def wait(self, time: float, restless: Field) -> None:
-        """Let the share drift on, and its drift wander (an integrated Wiener process)."""
+    def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:
+        """Let the share drift on, its drift wander (an integrated Wiener process), and slow scatter be forgotten."""
+        left = extra.memory ** (time * visits)
+        self.mean[:, SLOW] *= left
+        self.covariance[:, SLOW] *= left[:, None]
+        self.covariance[:, :, SLOW] *= left[:, None]
+        self.covariance[:, SLOW, SLOW] += extra.scatter**2 * (extra.memory > 0.0) * (1.0 - left**2)
         self.mean[:, SHARE] += time * self.mean[:, SPEED]
         self.covariance[:, SHARE] += time * self.covariance[:, SPEED]
         self.covariance[:, :, SHARE] += time * self.covariance[:, :, SPEED]
@@ -219,21 +279,23 @@ class _State:
         channel, place = sound.channel, sound.place
         error = FIRST + CHANNELS.index(channel) * places + place
         noise = sound.heard.std**2 + (WEIGHTS[channel] * table.extra.scatter) ** 2
+        if channel == "crf":
+            noise = np.where(table.extra.memory > 0.0, sound.heard.std**2, noise)  # its scatter is in the state
         share = self.mean[:, SHARE]
         for turn in range(PASSES):
             value, slope = table.at(channel, place, share)
             said = value + slope * (self.mean[:, SHARE] - share) + self.mean[:, error]
             with_share, spread = slope[:, None] * self.covariance[:, SHARE], self.covariance[:, error].copy()
             if channel == "crf":
-                spread += table.lever[:, place, None] * self.covariance[:, LEVER]
-                said = said + table.lever[:, place] * self.mean[:, LEVER]
+                spread += table.lever[:, place, None] * self.covariance[:, LEVER] + self.covariance[:, SLOW]
+                said = said + table.lever[:, place] * self.mean[:, LEVER] + self.mean[:, SLOW]
             elif channel == "crfa":
                 spread += self.covariance[:, GAIN]
                 said = said + self.mean[:, GAIN]
             across = with_share + spread
             total = slope * across[:, SHARE] + across[:, error] + noise
             if channel == "crf":
-                total += table.lever[:, place] * across[:, LEVER]
+                total += table.lever[:, place] * across[:, LEVER] + across[:, SLOW]
             elif channel == "crfa":
                 total += across[:, GAIN]
             rest = sound.heard.value - said

@@ -17,18 +17,20 @@ import numpy as np
 import pandas
 
 from asperity.arrays import Field
+from asperity.case import MOST_POINTS
 from asperity.errors import AsperityError, BadInput, UnreadableFile
 from asperity.files import make_folder, user_cache
 from asperity.inference.outputs import CLR, OUTPUTS, Output
 from asperity.inference.process import Process, fit_process, require_learning
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
 from asperity.kept import read_json, write_json
-from asperity.study import ParameterRange, StudyProgress, overrides_at, plan_points, run_study
+from asperity.study import ParameterRange, StudyPlan, StudyProgress, StudyResult, overrides_at, plan_points, run_study
 
 FOLDS = 5  # of the points: each is held out of the processes that foretell it
 LAYOUT = 1  # counts up when what an emulator keeps or means changes
 MOST_MISSING = 0.2  # share of the points whose contacts failed
 FITTED = "emulator.json"
+FURTHER, SHARES = "further", "shares.json"
 FINER, FINER_POINTS = "finer", 24  # points solved on twice the cells too
 NORMAL_90 = 1.6448536269514722
 FILM_EXPONENTS = {"viscosity": 0.7, "alpha": 0.54, "load": -0.13, "sq": -1.0}  # ln Λ: Dowson and Higginson's film
@@ -79,6 +81,7 @@ class Emulator:
     seconds: float  # spent on its contacts
     cells: tuple[int, int] = (0, 0)
     grid: Mapping[str, GridError] = field(default_factory=dict)
+    further: int = 0  # of the points, those where posteriors were
 
     def __call__(self, shares: Field, wanted: Iterable[str]) -> dict[str, tuple[Field, Field]]:
         """Mean and standard deviation of the wanted outputs, on their scales, at shares (n, d) of the ranges."""
@@ -99,6 +102,7 @@ class Emulator:
         return {
             "folder": str(self.folder),
             "points": self.points,
+            "further": self.further,
             "surfaces": self.surfaces,
             "failed": self.failed,
             "ranges": [str(entry) for entry in self.ranges],
@@ -112,10 +116,11 @@ class Emulator:
         clr, grid = self.quality[CLR], self.grid.get(CLR, GridError())
         moved = OUTPUTS[CLR].back(np.array([0.0, grid.shift]))
         finer = f" On twice the cells CLR 50 % is {100 * moved[1]:.0f} %, which is corrected for." if self.grid else ""
+        where = f" ({self.further} of them where posteriors were)" if self.further else ""
         return (
-            f"Emulator of {self.points} contacts, {self.surfaces} surfaces each: CLR of points held out is off by "
-            f"{100 * clr.error:.1f} points (rms; one surface scatters by {100 * clr.scatter:.1f}), and the stated 90 % "
-            f"hold {100 * clr.coverage:.0f} %. Its grid has {self.cells[0]} x {self.cells[1]} cells.{finer}"
+            f"Emulator of {self.points} contacts{where}, {self.surfaces} surfaces each: CLR of points held out is off "
+            f"by {100 * clr.error:.1f} points (rms; one surface scatters by {100 * clr.scatter:.1f}), and the stated "
+            f"90 % hold {100 * clr.coverage:.0f} %. Its grid has {self.cells[0]} x {self.cells[1]} cells.{finer}"
         )
 
 
@@ -204,12 +209,7 @@ def build_emulator(
         if too many of its contacts fail.
     """
     sobol = sobol_shares(setting)
-    plan = plan_points(
-        setting.case,
-        [overrides_at(setting.case, setting.ranges, shares) for shares in sobol],
-        seeds=setting.surfaces,
-        kind="still",
-    )
+    plan = _plan(setting, sobol)
     identity = hashlib.sha256(
         json.dumps([plan.design, [case.id for case in plan.cases], version("asperity"), LAYOUT]).encode()
     ).hexdigest()
@@ -220,24 +220,71 @@ def build_emulator(
     elif read_json(fitted, "delete it, and it is fitted again").get("identity") != identity:
         raise BadInput(f"{home} holds the emulator of another case, range or version; choose another folder")
     make_folder(home)
-    result = run_study(plan, out=home, executor=executor, workers=workers, progress=progress)
-    means = _Means.of(result.table, setting.surfaces)
-    if len(means.points) < (1.0 - MOST_MISSING) * len(sobol):
-        reasons = result.failures["reason"]
+    how: dict[str, Any] = {"executor": executor, "workers": workers, "progress": progress}
+    result = run_study(plan, out=home, **how)
+    shares, table, failed = _with_further(setting, sobol, result, home, **how)
+    means = _Means.of(table, setting.surfaces)
+    if len(means.points) < (1.0 - MOST_MISSING) * len(shares):
+        reasons = table["reason"][table["status"] == "failed"]
         first = reasons.iloc[0] if len(reasons) else "they are missing"
         raise AsperityError(
-            f"{len(sobol) - len(means.points)} of {len(sobol)} points of the emulator failed ({first}); narrow the "
+            f"{len(shares) - len(means.points)} of {len(shares)} points of the emulator failed ({first}); narrow the "
             "ranges in [infer]"
         )
     features = features_of(setting)
-    x = features(sobol[means.points])
-    finer = _finer(setting, sobol, executor=executor, workers=workers, progress=progress, home=home)
-    processes, quality = _processes(means, x, fitted, identity)
-    seconds = float(result.table["seconds"].sum())
+    finer = _finer(setting, sobol, home=home, **how)
+    processes, quality = _processes(means, features(shares[means.points]), fitted, identity)
     return Emulator(
-        setting.ranges, features, processes, quality, len(means.points), setting.surfaces, result.failed, home, seconds,
-        setting.case.grid.cells, _grid_errors(result.table, finer),
+        setting.ranges, features, processes, quality, len(means.points), setting.surfaces, failed, home,
+        float(table["seconds"].sum()), setting.case.grid.cells, _grid_errors(result.table, finer),
+        int(np.sum(means.points >= len(sobol))),
     )  # fmt: skip
+
+
+def extend_emulator(setting: Setting, emulator: Emulator, shares: Field, **how: Any) -> Emulator:
+    """The emulator with further points, at shares (n, ranges); kept beside the others, so that it stays extended.
+
+    Stopped, the next call that builds it goes on. `how` is as `build_emulator` takes it.
+
+    Raises
+    ------
+    BadInput
+        for more points than an emulator may have, or one that is not on disk.
+    """
+    if not (emulator.folder / FITTED).exists():
+        raise BadInput(f"{emulator.folder} holds no emulator; only one that is kept can be extended")
+    if emulator.points + len(shares) > MOST_POINTS:
+        raise BadInput(
+            f"an emulator has {MOST_POINTS} points at most, got {emulator.points} and {len(shares)}; extend it by less"
+        )
+    place = emulator.folder / FURTHER / f"{len(_further(emulator.folder)):03d}"
+    make_folder(place)
+    write_json(place / SHARES, {"shares": np.asarray(shares, dtype=float).tolist()})
+    return build_emulator(setting, folder=emulator.folder, **how)
+
+
+def _plan(setting: Setting, shares: Field) -> StudyPlan:
+    points = [overrides_at(setting.case, setting.ranges, one) for one in shares]
+    return plan_points(setting.case, points, seeds=setting.surfaces, kind="still")
+
+
+def _further(home: Path) -> list[Path]:
+    """Folders of the points that it was extended by, in order."""
+    return sorted(path.parent for path in (home / FURTHER).glob(f"*/{SHARES}"))
+
+
+def _with_further(
+    setting: Setting, sobol: Field, result: StudyResult, home: Path, **how: Any
+) -> tuple[Field, pandas.DataFrame, int]:
+    """Shares and rows of all points, the further ones behind the first, and how many contacts failed."""
+    shares, tables, failed = [sobol], [result.table], result.failed
+    for folder in _further(home):
+        own = np.array(read_json(folder / SHARES, f"delete {folder}")["shares"], dtype=float)
+        more = run_study(_plan(setting, own), out=folder / "study", **how)
+        tables.append(more.table.assign(point=more.table["point"] + sum(map(len, shares))))
+        shares.append(own)
+        failed += more.failed
+    return np.concatenate(shares), pandas.concat(tables, ignore_index=True), failed
 
 
 def _finer(setting: Setting, sobol: Field, *, home: Path, **how: Any) -> pandas.DataFrame:
@@ -271,6 +318,8 @@ def _processes(means: "_Means", x: Field, fitted: Path, identity: str) -> tuple[
     """A process for each output and how good it is: as they were kept, or fitted now, and kept."""
     processes, quality = {}, {}
     known = read_json(fitted, "delete it, and it is fitted again") if fitted.exists() else None
+    if known is not None and known.get("points", len(x)) != len(x):
+        known = None  # extended since
     for output in OUTPUTS.values():
         y, noise = means.scaled(output)
         if known is None:
@@ -280,7 +329,7 @@ def _processes(means: "_Means", x: Field, fitted: Path, identity: str) -> tuple[
             processes[output.key], quality[output.key] = _as_kept(known, output.key, x, y, noise)
     if known is None:
         kept = {key: {**processes[key].settings(), "quality": vars(quality[key])} for key in OUTPUTS}
-        write_json(fitted, {"identity": identity, "layout": LAYOUT, "outputs": kept})
+        write_json(fitted, {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": kept})
     return processes, quality
 
 

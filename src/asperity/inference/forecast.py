@@ -48,7 +48,8 @@ class Interval(NamedTuple):
     @classmethod
     def of(cls, values: Field) -> "Interval":
         """Of equally probable values; nan where there are none."""
-        return cls(*(float(end) for end in np.quantile(values, ENDS))) if len(values) else cls(*[float("nan")] * 3)
+        ends = np.quantile(values, ENDS, method="higher") if len(values) else [math.nan] * 3
+        return cls(*(float(end) for end in ends))
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,10 @@ class Forecast:
     rising : whether the limit is reached from below
     log_odds : ln evidence of a change over none
     already, within : probability that the limit is crossed by the last visit, and that it will be within `horizon`
-    time : after the last visit, in the series' unit, of those courses that cross it within the horizon
+    time : after the last visit, in the series' unit, of those courses that cross it within the horizon: where it is
+        crossed at all
+    by : time by which the limit is crossed with a probability of 5, 50 and 95 %, of all courses that had not crossed it
+        by the last visit; infinite where they do not so within the horizon
     horizon : how far ahead was looked
     clr, value : load share and what drifts, at the last visit
     bands : ends and median of the limit's quantity at each visit and ahead, by x
@@ -78,6 +82,7 @@ class Forecast:
     already: float
     within: float
     time: Interval
+    by: Interval
     horizon: float
     clr: Interval
     value: Interval
@@ -138,12 +143,17 @@ class Forecast:
             "within": self.within,
             "horizon": self.horizon,
             "effective": self.effective,
-            "time": {key: None if np.isnan(end) else end for key, end in self.time._asdict().items()},
+            "time": _finite(self.time),
+            "by": _finite(self.by),
             "clr": self.clr._asdict(),
             "value": self.value._asdict(),
             "x": list(self.series.x),
             "sentence": self.sentence(),
         }
+
+
+def _finite(interval: Interval) -> dict[str, float | None]:
+    return {key: end if math.isfinite(end) else None for key, end in interval._asdict().items()}
 
 
 def read_limit(text: str, setting: Setting) -> Limit:
@@ -207,11 +217,7 @@ def forecast_observations(
     """
     limit = Limit(*limit)
     drifting = drifting or ("sq_m" if limit.key == CLR else limit.key)
-    if limit.key not in (CLR, drifting):
-        raise BadInput(f"a limit must be of {CLR} or {drifting}, which changes, got {limit.key!r}")
-    if limit.key == CLR and not 0.0 < limit.value < 1.0:
-        raise BadInput(f"a limit of CLR must lie between 0 and 1, got {limit.value:g}")
-    _require_within(setting, limit)
+    require_limit(setting, limit, drifting)
     series = series_of(observations)
     forward = Forward(setting, emulator, series.places)
     models, best = [], -np.inf
@@ -231,8 +237,14 @@ def forecast_observations(
     return replace(_forecast(models, limit, seed), x_name=x_name)
 
 
-def _require_within(setting: Setting, limit: Limit) -> None:
-    """BadInput for a limit that what drifts cannot reach within the range that the emulator knows."""
+def require_limit(setting: Setting, limit: Limit, drifting: str | None = None, *, worn: bool = False) -> None:
+    """BadInput for a limit of something else than what drifts, or that it cannot reach within the emulator's range."""
+    if limit.key not in (CLR, drifting or limit.key):
+        raise BadInput(f"a limit must be of {CLR} or {drifting}, which changes, got {limit.key!r}")
+    if worn and limit.key not in (CLR, "sq_m"):
+        raise BadInput(f"--worn says how Sq drifts, and the limit is of {limit.key}; leave --worn out")
+    if limit.key == CLR and not 0.0 < limit.value < 1.0:
+        raise BadInput(f"a limit of CLR must lie between 0 and 1, got {limit.value:g}")
     unknown = next((one for one in setting.contact if one.key == limit.key), None)
     if unknown is None:
         return
@@ -277,6 +289,7 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
         already=float(np.mean(already)),
         within=float(np.mean(will)),
         time=Interval.of(times),
+        by=Interval.of(np.concatenate([times, np.full(int(np.sum(~already & ~will)), np.inf)])),
         horizon=HORIZON * series.span,
         clr=Interval.of(clr),
         value=Interval.of(value),

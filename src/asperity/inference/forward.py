@@ -113,6 +113,17 @@ class Forward:
             found[key] = mean.reshape(rows, places) + error.at(z_grid), std.reshape(rows, places)
         return found
 
+    def correlations(self, z: Field, law: Law) -> dict[str, Field]:
+        """Of the emulator's errors at the operating points, (n, points, points), in CRF, damping and CRFA."""
+        count, places = len(z), len(self.points)
+        stiff, damped = (CLR, CLR) if law == "hertz-point" else (STIFFNESS, DAMPING)
+        keys = {"crf": stiff, "damping": damped, "crfa": CAR}
+        if places == 1:
+            return dict.fromkeys(keys, np.ones((count, 1, 1)))
+        x = self.emulator.features(self.shares(z).reshape(count * places, -1)).reshape(count, places, -1)
+        found = {key: self.emulator.processes[key].correlations(x) for key in dict.fromkeys(keys.values())}
+        return {channel: found[key] for channel, key in keys.items()}
+
     def states(self, z: Field, keys: Sequence[str]) -> dict[str, Field]:
         """Outputs in their own units, shape (n, points)."""
         return {key: OUTPUTS[key].back(mean) for key, (mean, _) in self.emulated(z, keys).items()}

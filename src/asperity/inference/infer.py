@@ -4,23 +4,25 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from asperity.ageing import WearHistory, load_wear
 from asperity.case import Case
 from asperity.errors import BadInput, require_choice
-from asperity.inference.emulator import Emulator, build_emulator
-from asperity.inference.forecast import Forecast, Limit, forecast_observations
+from asperity.inference.emulator import Emulator, build_emulator, extend_emulator
+from asperity.inference.forecast import Forecast, Limit, forecast_observations, require_limit
 from asperity.inference.forward import Forward, Law
 from asperity.inference.inference import Inference
 from asperity.inference.listening import Listened, listen
 from asperity.inference.next_point import candidate_points, expected_information
 from asperity.inference.observations import Observation, Point, points_of
-from asperity.inference.outputs import CLR
 from asperity.inference.posterior import (
     Draws,
     Sampler,
+    emulated_share,
     new_pools,
     posterior_draws,
+    posterior_shares,
     prior_draws,
     sample_models,
     with_point,
@@ -31,6 +33,9 @@ from asperity.inference.settings import Setting, setting_of
 from asperity.inference.visits import series_of
 from asperity.study import StudyProgress
 
+MATERIAL = 0.1  # share of CLR's variance over the posterior, from which on the emulator's own is worth reducing
+LATELY = 0.1  # of a series: recordings of one state of a contact that changes
+ROUND = 16  # points by which an emulator is extended before the next posterior
 LEAST_DRIFT_STD = 0.02  # of a first drift that a wear model foretells, in shares of the range over the series
 SAMPLERS: tuple[Sampler, ...] = ("importance", "nested")
 
@@ -42,6 +47,7 @@ def infer_contact(
     table: str | Path | None = None,
     emulator: Emulator | str | Path | None = None,
     sampler: Sampler = "importance",
+    extend: int = 0,
     seed: int = 0,
     workers: int | None = None,
     executor: Executor | None = None,
@@ -57,6 +63,7 @@ def infer_contact(
     emulator : one that is there, or the folder to keep it in; None: one in the user's cache. Building it solves
         hundreds of contacts, once
     sampler : "importance", seconds; "nested", minutes, by dynesty, to check the other
+    extend : by how many points the emulator may be extended where the posterior is, see `with_further`
     seed : of all that is drawn; the same seed gives the same numbers
     workers, executor, progress : see `asperity.study.run_study`, of the emulator's contacts
 
@@ -76,7 +83,42 @@ def infer_contact(
     heard = listen(files, setting, table=table) if files else Listened(observations=tuple(given))
     if not isinstance(emulator, Emulator):
         emulator = build_emulator(setting, folder=emulator, executor=executor, workers=workers, progress=progress)
-    return infer_heard(setting, emulator, heard, sampler=sampler, seed=seed)
+    found = infer_heard(setting, emulator, heard, sampler=sampler, seed=seed)
+    return with_further(found, extend, sampler=sampler, executor=executor, workers=workers, progress=progress)
+
+
+def with_further(found: Inference, most: int, *, sampler: Sampler = "importance", **how: Any) -> Inference:
+    """The same with an emulator that is extended where the posterior is, by up to `most` points; and a note of it.
+
+    In rounds, each a posterior, as long as the emulator's own variance is more than a tenth of CLR's over the
+    posterior, on its scale, at the case's own operating point or any that was heard. Points are contacts drawn from
+    the posterior, at these operating points in turn; they are kept with the emulator. `how` is as `build_emulator`
+    takes it.
+
+    Raises
+    ------
+    BadInput
+        for an emulator that is not kept on disk, or one that would have too many points.
+    """
+    added, first = 0, found
+    before = share = emulated_share(first.forward, first.draws)
+    while most > added and share > MATERIAL and found.observations:
+        count = min(most - added, ROUND)
+        shares = posterior_shares(found.forward, found.draws, count, found.seed + added)
+        emulator = extend_emulator(found.setting, found.emulator, shares, **how)
+        found, added = infer_observations(
+            found.setting, emulator, found.observations, sampler=sampler, seed=found.seed, silent=found.silent,
+            notes=first.notes,
+        ), added + count  # fmt: skip
+        share = emulated_share(found.forward, found.draws)
+    if most == 0 or not found.observations:
+        return found
+    said = f"The emulator's own error makes {100 * share:.0f} % of the variance of CLR that is left"
+    if added:
+        said += f", {100 * before:.0f} % before it was extended by {added} points where the posterior is"
+    else:
+        said += f", and it was not extended: it is from {100 * MATERIAL:.0f} % on"
+    return replace(found, notes=(*found.notes, f"{said}."))
 
 
 def infer_heard(
@@ -96,17 +138,17 @@ def forecast_heard(
     *,
     worn: str | Path | WearHistory | None = None,
     seed: int = 0,
+    x_name: str = "",
 ) -> Forecast:
     """`forecast_observations` of what `listen` heard; `worn` is a history of `asperity wear`, whose drift is expected.
 
-    Its hours are those of x, from the first recording on.
+    Its hours are those of x, from the first recording on. `x_name` is what x is, that of the track where it has one.
     """
-    x_name = heard.track.x_name if heard.track is not None else ""
+    x_name = heard.track.x_name if heard.track is not None else x_name
     times = [one.x for one in heard.observations]
     drift = None
     if worn is not None and times:
-        if limit.key not in (CLR, "sq_m"):
-            raise BadInput(f"--worn says how Sq drifts, and the limit is of {limit.key}; leave --worn out")
+        require_limit(setting, limit, worn=True)
         series_of(heard.observations)  # refuses what is no series
         history = worn if isinstance(worn, WearHistory) else load_wear(worn)
         drift = wear_drift(setting, history, max(times) - min(times))
@@ -137,10 +179,18 @@ def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[fl
 
 
 def latest(heard: Listened) -> Listened:
-    """The last recording at each operating point alone: what there is of a contact that has changed."""
+    """The last recording at each operating point alone, of the last tenth of the series: the contact has changed."""
+    times = [one.x for one in heard.observations]
+    begin = max(times) - LATELY * (max(times) - min(times))
     last = {one.place: one for one in sorted(heard.observations, key=lambda one: one.x)}
-    note = "The contact changes over the series: the numbers are of the last recording at each operating point."
-    return replace(heard, observations=tuple(last.values()), notes=(*heard.notes, note))
+    of_now = [one for one in last.values() if one.x >= begin]
+    note = (
+        "The contact changes over the series: the numbers are of the last recording at each operating point, in the "
+        "last tenth of it."
+    )
+    if len(of_now) < len(last):
+        note += f" Operating points that were last recorded before: {len(last) - len(of_now)}."
+    return replace(heard, observations=tuple(of_now), notes=(*heard.notes, note))
 
 
 def infer_observations(

@@ -1,9 +1,10 @@
 """Recordings to observations: tracked as a series, each with the load, speed and temperature that it was made at."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import isnan
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -96,33 +97,38 @@ def band_of(setting: Setting) -> tuple[float, float]:
 
 def observed(tracked: Track, case: Case) -> Listened:
     """The resonances of a track with their operating points, and what was taken for granted."""
+    heard = observed_rows([one.row() for one in tracked.recordings], case, comparable=tracked.comparable)
+    return replace(heard, track=tracked, notes=(*tracked.notes, *heard.notes))
+
+
+def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: bool) -> Listened:
+    """The same of lines as `asperity track --json` and a store have them; CRFA counts where it is `comparable`."""
     observations, silent, assumed = [], [], set()
-    for recording in tracked.recordings:
-        name, resonance = Path(recording.file).name, recording.resonance
-        if not resonance.found:
-            silent.append((name, resonance.reason))
+    for row in rows:
+        name, std = Path(row["file"]).name, row["crf_std_hz"]
+        if not row["found"]:
+            silent.append((name, row["reason"]))
             continue
-        if isnan(resonance.crf_std) or resonance.crf_std <= 0.0:
-            silent.append((name, f"the method {resonance.method} states no deviation of CRF"))
+        if not std:
+            silent.append((name, "its method states no deviation of CRF"))
             continue
-        met = recording.operating
-        load, speed, celsius = met.load_n, met.entrainment_m_s, met.temperature_degc
-        assumed |= {key for key in ("load_n", "entrainment_m_s") if getattr(met, key) is None}
-        damping, damping_std = recording.damping
-        high = tracked.comparable and resonance.crfa_std > 0.0
+        assumed |= {key for key in ("load_n", "entrainment_m_s") if row[key] is None}
+        speed, celsius = row["entrainment_m_s"], row["temperature_degc"]
+        crfa, crfa_std = _with_deviation(row, "crfa", "crfa_std") if comparable else (nan, nan)
+        damping, damping_std = _with_deviation(row, "damping_ratio", "damping_std")
         observations.append(
             Observation(
-                load_n=case.conditions.load if load is None else load,
+                load_n=case.conditions.load if row["load_n"] is None else row["load_n"],
                 entrainment_m_s=case.conditions.entrainment_speed if speed is None else speed,
                 temperature_k=None if celsius is None else celsius + ZERO_CELSIUS,
-                crf_hz=resonance.crf_hz,
-                crf_std_hz=resonance.crf_std,
-                crfa=resonance.crfa if high else np.nan,
-                crfa_std=resonance.crfa_std if high else np.nan,
-                damping_ratio=damping if damping_std > 0.0 else np.nan,
-                damping_std=damping_std if damping_std > 0.0 else np.nan,
+                crf_hz=row["crf_hz"],
+                crf_std_hz=std,
+                crfa=crfa,
+                crfa_std=crfa_std,
+                damping_ratio=damping,
+                damping_std=damping_std,
                 name=name,
-                x=recording.x,
+                x=nan if row["x"] is None else row["x"],
             )
         )
     words = {"load_n": "load", "entrainment_m_s": "entrainment speed"}
@@ -130,4 +136,9 @@ def observed(tracked: Track, case: Case) -> Listened:
         f"No table or sidecar says the {words[key]} of every recording; that of {case.source} was taken."
         for key in sorted(assumed)
     ]
-    return Listened(tracked, tuple(observations), tuple(silent), (*tracked.notes, *notes))
+    return Listened(None, tuple(observations), tuple(silent), tuple(notes))
+
+
+def _with_deviation(row: Mapping[str, Any], key: str, std: str) -> tuple[float, float]:
+    """A number of a line and its deviation; nan where there is none."""
+    return (row[key], row[std]) if row[key] is not None and row[std] else (nan, nan)

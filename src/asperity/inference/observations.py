@@ -87,8 +87,7 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
     BadInput
         where only some of them say how warm the oil was.
     """
-    if len({one.temperature_k is None for one in observations}) > 1:
-        raise BadInput("some recordings have a temperature and some have none; give it of all, or of none")
+    require_temperatures(observations)
     groups: dict[tuple[float, float, float | None], list[Observation]] = {}
     for one in observations:
         groups.setdefault(one.place, []).append(one)
@@ -102,6 +101,12 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
         )
         for place, group in groups.items()
     )
+
+
+def require_temperatures(observations: Sequence[Observation]) -> None:
+    """BadInput where only some of them say how warm the oil was."""
+    if len({one.temperature_k is None for one in observations}) > 1:
+        raise BadInput("some recordings have a temperature and some have none; give it of all, or of none")
 
 
 def _together(pairs: Sequence[tuple[float, float]], least: float = 0.0) -> Heard:

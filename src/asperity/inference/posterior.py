@@ -164,6 +164,20 @@ def posterior_draws(
     return replace(whole, effective=effective)
 
 
+def emulated_share(forward: Forward, draws: Draws) -> float:
+    """Share of CLR's variance over the posterior that is the emulator's own, on its scale: the largest of all."""
+    _, std = forward.emulated(draws.z, [CLR])[CLR]
+    whole = np.var(OUTPUTS[CLR].forward(draws.states[CLR]), axis=0)
+    return float(np.max(np.minimum(np.mean(std**2, axis=0) / whole, 1.0)))
+
+
+def posterior_shares(forward: Forward, draws: Draws, count: int, seed: int) -> Field:
+    """Shares of the emulator's ranges of contacts drawn from the posterior, (count, ranges): at each point in turn."""
+    rng = np.random.default_rng([seed, 6])
+    chosen = forward.shares(draws.z[rng.permutation(len(draws.z))[:count]])
+    return np.asarray(chosen[np.arange(len(chosen)), np.arange(len(chosen)) % len(forward.points)])
+
+
 def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draws:
     """Equally probable contacts before any recording; those `known` with more operating points behind theirs."""
     there = 0 if known is None else known.states[CLR].shape[1]

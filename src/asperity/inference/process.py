@@ -98,6 +98,22 @@ class Process:
         parts = np.array_split(x, max(1, -(-len(x) // AT_ONCE)))
         return np.concatenate([_basis(p) @ self._trend + self._scale * (self._kernel(p) @ weights) for p in parts])
 
+    def correlations(self, x: Field) -> Field:
+        """Of its errors at points that belong together, (n, m, d): (n, m, m)."""
+        count, together, _ = x.shape
+        whitener = self._single[0]
+        found = np.empty((count, together, together))
+        for rows in np.array_split(np.arange(count), max(1, -(-count * together // AT_ONCE))):
+            part = x[rows]
+            white = (self._kernel(part.reshape(-1, part.shape[2])) @ whitener).reshape(len(rows), together, -1)
+            square = np.sum(((part[:, :, None] - part[:, None]) / self.lengths) ** 2, axis=-1)
+            distance = np.sqrt(5.0 * square)
+            alike = (1.0 + distance + distance**2 / 3.0) * np.exp(-distance)
+            left = self.level * alike - white @ white.transpose(0, 2, 1)
+            found[rows] = left + self.rough * alike
+        deviations = np.sqrt(np.maximum(np.einsum("nii->ni", found), 1e-12))
+        return np.asarray(np.clip(found / deviations[:, :, None] / deviations[:, None], -1.0, 1.0))
+
     def settings(self) -> dict[str, Any]:
         """What `fit_process` found, in numbers."""
         return {"lengths": [float(length) for length in self.lengths], "level": self.level, "rough": self.rough}

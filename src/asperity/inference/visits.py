@@ -7,21 +7,29 @@ from typing import NamedTuple
 
 import numpy as np
 
+from asperity.arrays import Field
 from asperity.errors import BadInput
-from asperity.inference.observations import Heard, Observation, Point, points_of
+from asperity.inference.observations import Heard, Observation, Point, points_of, require_temperatures
 
 FEWEST, MOST = 4, 60  # visits; neighbours of more are taken together
 CHANNELS = ("crf", "damping", "crfa")
+ALIKE = np.array([0.03, 0.03, 1.5])  # load and speed, relative, and temperature [K], that are taken for one place
+MOST_PLACES = 8  # more, and those further apart are taken for one
+WIDER = 1.5
 
 
 class Sound(NamedTuple):
-    """A logarithm heard: when (0 the first visit, 1 the last), in which channel, at which place, how surely."""
+    """A logarithm heard: when (0 the first visit, 1 the last), in which channel, at which place, how surely.
+
+    `aside` is where it was heard less the place: logarithms of load and speed, and temperature [K].
+    """
 
     at: float
     visit: int
     channel: str
     place: int
     heard: Heard
+    aside: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ def series_of(observations: Sequence[Observation]) -> Series:
     Raises
     ------
     BadInput
-        where one has no x, or there are fewer than four visits.
+        where one has no x, only some say how warm the oil was, or there are fewer than four visits.
     """
     for one in observations:
         if not math.isfinite(one.x):
@@ -68,18 +76,45 @@ def series_of(observations: Sequence[Observation]) -> Series:
             f"a forecast takes resonances of {FEWEST} recordings at different times or more, got {len(times)}; leave "
             "--forecast out, or record again"
         )
+    require_temperatures(observations)
     groups = np.array_split(np.array(times), min(MOST, len(times)))
     x = tuple(float(group.mean()) for group in groups)
-    places: dict[tuple[float, float, float | None], int] = {}
+    places = _places(points_of(observations))
     sounds = []
     for visit, group in enumerate(groups):
         own = [one for one in observations if group[0] <= one.x <= group[-1]]
         for point in points_of(own):
-            place = places.setdefault((point.load_n, point.entrainment_m_s, point.temperature_k), len(places))
+            place, aside = _nearest(point, places)
             at = (x[visit] - x[0]) / (x[-1] - x[0])
             sounds += [
-                Sound(at, visit, channel, place, heard)
+                Sound(at, visit, channel, place, heard, aside)
                 for channel in CHANNELS
                 if not math.isnan((heard := getattr(point, channel)).value)
             ]
-    return Series(x, tuple(Point(*place) for place in places), tuple(sounds))
+    return Series(x, places, tuple(sounds))
+
+
+def _conditions(point: Point) -> Field:
+    """Logarithms of load and speed, and temperature; those that differ by 1 are as far apart as `ALIKE`."""
+    return np.array([math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0])
+
+
+def _places(points: Sequence[Point]) -> tuple[Point, ...]:
+    """Operating points, in order, those left out that lie near one that is there: each is emulated by itself."""
+    near = ALIKE
+    while True:
+        places: list[Point] = []
+        for point in points:
+            if all(np.any(np.abs(_conditions(point) - _conditions(one)) > near) for one in places):
+                places.append(point)
+        if len(places) <= MOST_PLACES:
+            return tuple(Point(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places)
+        near = WIDER * near
+
+
+def _nearest(point: Point, places: Sequence[Point]) -> tuple[int, tuple[float, float, float]]:
+    """Which place an operating point is taken for, and by how much it is another."""
+    asides = [_conditions(point) - _conditions(one) for one in places]
+    place = int(np.argmin([np.sum((aside / ALIKE) ** 2) for aside in asides]))
+    load, speed, temperature = (float(value) for value in asides[place])
+    return place, (load, speed, temperature)

@@ -1,3 +1,6 @@
+from .ahead import FORECAST as FORECAST
+from .ahead import Foreteller as Foreteller
+from .ahead import Foretold as Foretold
 from .alarming import BASELINE as BASELINE
 from .alarming import LEVEL_LEAST as LEVEL_LEAST
 from .calls import Caller as Caller
@@ -17,6 +20,7 @@ from .model import Track as Track
 from .model import TrackedRecording as TrackedRecording
 from .operating import ZERO_CELSIUS as ZERO_CELSIUS
 from .operating import Operating as Operating
+from .order import unacknowledged as unacknowledged
 from .overview import StoreOverview as StoreOverview
 from .overview import acknowledge_in as acknowledge_in
 from .overview import keep_track as keep_track

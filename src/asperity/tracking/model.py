@@ -17,6 +17,7 @@ from asperity.files import whole_file, write_csv
 from asperity.kept import netcdf_bytes
 from asperity.quantities import quantity
 from asperity.rating import ZONES, severity_zone
+from asperity.tracking.ahead import FORECAST, Foretold
 from asperity.tracking.operating import Operating
 from asperity.tracking.reading import Reading
 from asperity.tracking.silence import SILENCE
@@ -185,7 +186,7 @@ class Track:
     `recordings` in the order of `x`; `x_name` says what that is. `stages` is read from CRF, damping or both, as asked
     for, and decides labels, probabilities and alarm; `stages_by` has all three. None and none where no resonance was
     found at all. `problems` are sentences for which recordings should not be compared; `notes` say what was chosen for
-    the user.
+    the user. `forecast` is what is foretold of it, None where nothing was asked.
     """
 
     recordings: tuple[TrackedRecording, ...]
@@ -198,6 +199,7 @@ class Track:
     comparable: bool
     problems: tuple[str, ...]
     notes: tuple[str, ...]
+    forecast: Foretold | None = None
 
     @property
     def resonance_count(self) -> int:
@@ -229,8 +231,20 @@ class Track:
         )
         return replace(noted, alarm=blind)
 
+    def foretold(self, forecast: Foretold) -> "Track":
+        """The same with a forecast, which raises the alarm with the last recording where it is one."""
+        track = replace(self, forecast=forecast)
+        if not forecast.alarm or self.alarm.state == "alarm":
+            return track
+        reason = forecast.sentence().rstrip(".")
+        return replace(track, alarm=self.alarm.raised_from(len(self.alarm.states) - 1, reason, FORECAST))
+
     def verdict(self) -> str:
-        """One sentence: the stage with its confidence, or that these recordings cannot tell, and why."""
+        """The stage with its confidence, or that these recordings cannot tell, and why; and what is foretold."""
+        ahead = "" if self.forecast is None or self.forecast.alarm else f" {self.forecast.sentence()}"
+        return f"{self._verdict()}{ahead}"
+
+    def _verdict(self) -> str:
         total = len(self.recordings)
         several = f"{total} recordings" if total != 1 else "1 recording"
         seen = self._without_resonance(several)
@@ -283,6 +297,7 @@ class Track:
             },
             "stages_by": {source: _in_json(told) for source, told in ways.items()},
             "alarm": self._alarm(),
+            "forecast": None if self.forecast is None else self.forecast.scalars(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),
             "band_source": self.target.source,

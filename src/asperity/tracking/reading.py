@@ -263,3 +263,11 @@ def reading_from(packed: bytes, name: str) -> Reading:
         return Reading(spectrum=spectrum, quality=quality, **content)
     except Exception as error:
         raise UnreadableFile(f"{name} is no reading of a recording; {remedy}") from error
+
+
+def any_of(readings: list[Reading]) -> list[Reading]:
+    """The same; BadInput where nothing could be read of any."""
+    if all(reading.spectrum is None and reading.quality is None for reading in readings):
+        others = f" (and so on for {len(readings) - 1} more files)" if len(readings) > 1 else ""
+        raise BadInput(f"{readings[0].reason}{others}")
+    return readings

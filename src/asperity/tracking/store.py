@@ -262,6 +262,13 @@ class Sensor:
             (number,) = found.fetchone()
         self.recordings[key] = Kept(number, reading.time, None, reading.refused)
 
+    def rows(self, keys: Sequence[Version]) -> list[dict[str, Any]]:
+        """Lines of the recordings that were judged, as `asperity track --json` has them, in the order of the keys."""
+        found = self.store.read("SELECT id, row FROM recording WHERE sensor = ? AND row IS NOT NULL", self.number)
+        rows = dict(found)
+        numbers = [self.recordings[key].number for key in keys]
+        return [json.loads(rows[number]) for number in numbers if number in rows]
+
     def reading(self, key: Version) -> Reading | None:
         """What was kept; None, and forgotten, where it is damaged."""
         ((body,),) = self.store.read("SELECT reading FROM recording WHERE id = ?", self.recordings[key].number)

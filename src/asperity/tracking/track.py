@@ -14,6 +14,7 @@ from asperity.arrays import Field
 from asperity.case import Case, MachineCase
 from asperity.errors import BadInput, require_choice
 from asperity.recording import ACCELERATION, ReadOptions
+from asperity.tracking.ahead import Foreteller
 from asperity.tracking.alarming import at_reference, raise_alarm, weighed
 from asperity.tracking.alike import copies, on_one_grid, spectrum_of, without_silence
 from asperity.tracking.files import Place, Table, in_their_places, read_table, recordings_in
@@ -21,7 +22,8 @@ from asperity.tracking.heard import heard_together, recording_of
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track, TrackedRecording
 from asperity.tracking.operating import response_of, unstated
-from asperity.tracking.reading import WINDOW, Reading, channels_in, common_spacing, read_spectra
+from asperity.tracking.order import unacknowledged
+from asperity.tracking.reading import WINDOW, Reading, any_of, channels_in, common_spacing, read_spectra
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
     FALSE_ALARMS,
@@ -62,6 +64,7 @@ def track_recordings(
     stages_from: StageSource = "crf",
     false_alarm_rate: float = FALSE_ALARMS,
     acknowledge: str | None = None,
+    foreteller: Foreteller | None = None,
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Track:
@@ -77,15 +80,16 @@ def track_recordings(
         commas between them, are sensors of one machine, as are recordings of which a table or sidecar says different
         sensors
     x : place of each recording in the series, shape (recordings,); or `table`, a csv as `read_table` takes it
-        or what that read; otherwise the hours since the first, where all say when they began, or their number
+        or what that read; else hours since the first, where all say when they began, or their number
     shaft_hz : speeds of shafts whose harmonics are removed; None finds them
     method : of `series_resonances`; None takes "joint" from 6 recordings on, and of fewer says that one spectrum
         cannot tell whose resonance it shows
     detector : of `split_stages`
     stages_from : what decides stage and alarm: "crf", "damping" or "both". The other two are told all the same
     false_alarm_rate : alarms a recording where nothing wears; 0.001 is one in 1000 recordings
-    acknowledge : name of the recording up to which somebody has looked at the machine, or "last": what came before
-        raises no alarm, and the baseline is learned anew behind it
+    acknowledge : name of the recording up to which somebody has looked, or "last": what came before raises no alarm,
+        and the baseline is learned anew behind it
+    foreteller : who foretells the series behind it, and may raise the alarm
     workers : processes that read at the same time
     progress : called with each file that was read
 
@@ -99,11 +103,8 @@ def track_recordings(
     stated = table if isinstance(table, Table) or table is None else read_table(table)
     x_name, places = _stated_places(files, x, stated)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
-    readings = _read(files, options, target, places, workers, progress)
-    if all(reading.spectrum is None and reading.quality is None for reading in readings):
-        others = f" (and so on for {len(readings) - 1} more files)" if len(readings) > 1 else ""
-        raise BadInput(f"{readings[0].reason}{others}")
-    return judge(
+    readings = any_of(_read(files, options, target, places, workers, progress))
+    track = judge(
         readings,
         target,
         places,
@@ -115,6 +116,12 @@ def track_recordings(
         false_alarm_rate=false_alarm_rate,
         acknowledge=acknowledge,
     )
+    return track if foreteller is None else _foretold(track, foreteller, acknowledge)
+
+
+def _foretold(track: Track, foreteller: Foreteller, acknowledge: str | None) -> Track:
+    rows = unacknowledged([one.row() for one in track.recordings], acknowledge)
+    return track.foretold(foreteller(rows, track.x_name, comparable=track.comparable))
 
 
 def _read(

@@ -19,11 +19,13 @@ from asperity.case import Case, MachineCase
 from asperity.errors import BadInput, require_choice, require_positive
 from asperity.files import make_folder
 from asperity.recording import ReadOptions, names_beside
-from asperity.tracking.alarming import BASELINE, LAST
+from asperity.tracking.ahead import Ahead, Foreteller
+from asperity.tracking.alarming import LAST
 from asperity.tracking.calls import Caller, deliver
-from asperity.tracking.files import Place, Table, in_their_places, may_be_recording, natural, read_table, utf8
+from asperity.tracking.files import Table, may_be_recording, natural, read_table, utf8
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
+from asperity.tracking.order import Order, file_name, longest, ordered, unacknowledged, window
 from asperity.tracking.reading import Reading, common_spacing, one_channel, read_spectra
 from asperity.tracking.silence import silence
 from asperity.tracking.store import FOLDER, STORE, Sensor, Store, Version
@@ -34,7 +36,6 @@ from asperity.wear import ALARM_STATES, FALSE_ALARMS, AlarmState, Detector, Seri
 
 SUFFIXES = (".toml", ".json")  # of sidecars
 STRIDE = 80  # recordings that are judged together where many arrive at once
-LATEST = 112  # recordings of a long series that are judged with the first BASELINE: as many as the alarm looks back
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +75,7 @@ def watch_folder(
     machine: str | None = None,
     point: str | None = None,
     sensor: str | None = None,
+    foreteller: Foreteller | None = None,
     call: Sequence[Caller] = (),
     tell: Sequence[AlarmState] = ALARM_STATES,
     recall: bool = False,
@@ -98,10 +100,11 @@ def watch_folder(
     store : SQLite file for what was read and said, asperity.db in `out` by default; several watches may share one
     machine, point, sensor : whose recordings these are, in the store; by default the folder above, the folder, the
         channel
-    call : who is told when the state is another than they were told last, as `callers` makes them; a call that fails
-        is kept in the store and made again
+    foreteller : who foretells the series behind the last acknowledged recording; asked when a judgement has been kept
+        and told, as often as takes no more than a tenth of the time. Its alarm is kept and told as any other
+    call : who is told, as `callers` makes them, when the state is another than last; a call that fails is made again
     tell : states of which they are told, and of their end
-    recall : at the start give the last judgement, where neither recordings nor what is asked has changed since
+    recall : at the start give the last judgement, where neither recordings nor question have changed since
     others : as `track_recordings`; a recording that is not in `table` yet waits until it is
 
     Raises
@@ -115,8 +118,8 @@ def watch_folder(
     target = search_target(case, band_hz)
     options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=one_channel(channel), scale=scale)
     opened = _opened(store or out / STORE, folder, (machine, point, sensor or channel), settings_of(target, options))
-    memory = _Memory(opened, target, options, call)
-    memory.sensor.tells = tell
+    opened.tells = tell
+    memory = _Memory(opened, target, options, call, Ahead(foreteller))
     asked: dict[str, Any] = {"shaft_hz": shaft_hz, "method": method, "detector": detector}
     asked |= {"stages_from": stages_from, "false_alarm_rate": false_alarm_rate}
     pace = _Pace(recall, once, every_s, settle_s, expect_s)
@@ -171,17 +174,17 @@ def _looks(
             arrived = memory.settled(unread, pace)
             named = None if table is None or not (arrived or memory.sensor.recordings) else read_table(table)
             new = read(arrived, named)
-            known = sorted(memory.sensor.series(), key=lambda key: natural(_name(key)))
+            known = sorted(memory.sensor.series(), key=lambda key: natural(file_name(key)))
             waiting = len(unread) - len(arrived)
             reason = "" if new or (acknowledge and first) else silence(memory.sensor.arrivals(), pace.expect_s)
             said = memory.sensor.fell_silent(reason, memory.who) if reason else None
             if said is not None:
                 failed = deliver(memory.sensor, memory.call, now=first)
                 if not told:
-                    track = memory.silent(partial(judge, **asked), _ordered(known, named, memory.sensor), reason)
+                    track = memory.silent(partial(judge, **asked), ordered(known, named, memory.sensor), reason)
                     yield Update(new=(), track=track, waiting=waiting, said=said, failed=failed)
             elif new or first:
-                question = _digest(asked, named, known, memory.target)
+                question = _digest({**asked, **memory.ahead.asked}, named, known, memory.target)
                 recalled = first and pace.recall and not new and acknowledge is None
                 said = memory.said(question) if recalled else None
                 if said is not None:
@@ -189,11 +192,16 @@ def _looks(
                     failed = deliver(memory.sensor, memory.call, now=True)
                     yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
                 else:
-                    order = _ordered(known, named, memory.sensor)
+                    order = ordered(known, named, memory.sensor)
                     judging = partial(judge, **asked)
                     track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
-                    failed = deliver(memory.sensor, memory.call, now=first)
-                    yield Update(new=new, track=track, waiting=waiting, failed=(*memory.left_out(), *failed))
+                    failed = (*memory.left_out(), *deliver(memory.sensor, memory.call, now=first))
+                    ahead = memory.foretold()
+                    failed += deliver(memory.sensor, memory.call) if ahead is not None else ()
+                    yield Update(new=new, track=ahead or track, waiting=waiting, failed=failed)
+            elif (ahead := memory.foretold()) is not None:
+                failed = deliver(memory.sensor, memory.call)
+                yield Update(new=(), track=ahead, waiting=waiting, failed=failed)
             else:
                 deliver(memory.sensor, memory.call)
             if pace.once:
@@ -224,49 +232,6 @@ def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
     return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options) | machine
 
 
-class _Order(NamedTuple):
-    """Recordings in the order in which they are judged, what x is, and where each stands, by its file."""
-
-    keys: list[Version]
-    x_name: str
-    places: Mapping[str, Place]
-
-    def place(self, number: int) -> Place:
-        """Where a recording stands."""
-        return self.places[self.keys[number].file]
-
-
-def _ordered(known: Sequence[Version], table: Table | None, sensor: Sensor) -> _Order:
-    """The recordings that the table knows by now, or all, by x."""
-    places = None
-    if table is not None:
-        places = table.placed([Path(key.file) for key in known if table.row(Path(key.file)) is not None])
-        known = [key for key in known if key.file in places]
-    kept = [sensor.recordings[key] for key in known]
-    files, heard = [key.file for key in known], [not one.refused for one in kept]
-    x_name = "" if table is None else table.x_name
-    stand, x_name = in_their_places(files, [one.time for one in kept], heard, places, x_name)
-    return _Order(sorted(known, key=lambda key: stand[key.file].x), x_name, stand)
-
-
-def _window(order: _Order, end: int, sensor: Sensor) -> list[int]:
-    """What is judged of a long series: the first ones nobody has acknowledged, the latest, and who raised the alarm."""
-    keys = order.keys[:end]
-    if end <= BASELINE + LATEST:
-        return list(range(end))
-    behind = 0
-    if sensor.acknowledged is not None:
-        behind = next((number for number, key in enumerate(keys, 1) if _name(key) == sensor.acknowledged), 0)
-    chosen = {*range(behind, min(behind + BASELINE, end)), *range(end - LATEST, end)}
-    if sensor.standing is not None:
-        chosen |= {number for number, key in enumerate(keys) if key.file == sensor.standing.file}
-    return sorted(chosen)
-
-
-def _name(key: Version) -> str:
-    return key.file.rpartition(os.sep)[2]
-
-
 def _digest(asked: Mapping[str, Any], table: Table | None, known: Sequence[Version], target: Target) -> str:
     """What a judgement depends on, besides what the store holds."""
     told = json.dumps([asked, repr(table), target.full_load_crf_hz], default=str)
@@ -276,8 +241,11 @@ def _digest(asked: Mapping[str, Any], table: Table | None, known: Sequence[Versi
 class _Memory:
     """What a watch knows of its sensor: the store, and what of it this run has needed, at hand."""
 
-    def __init__(self, sensor: Sensor, target: Target, options: ReadOptions, call: Sequence[Caller]) -> None:
-        self.sensor, self.target, self.options, self.call = sensor, target, options, call
+    def __init__(
+        self, sensor: Sensor, target: Target, options: ReadOptions, call: Sequence[Caller], ahead: Ahead
+    ) -> None:
+        self.sensor, self.target, self.options, self.call, self.ahead = sensor, target, options, call, ahead
+        self._unforetold: tuple[Track, Order, str] | None = None  # the last judgement, while its forecast is due
         self._readings: dict[Version, Reading] = {}
         self._learned: Learned | None = None
         self.unnamed: set[str] = set()
@@ -359,7 +327,7 @@ class _Memory:
         return self.sensor.said() if self.sensor.asked == question else None
 
     def judged(
-        self, judging: Callable[..., Track], order: _Order, new: int, question: str, acknowledge: str | None
+        self, judging: Callable[..., Track], order: Order, new: int, question: str, acknowledge: str | None
     ) -> Track | None:
         """A judgement as the store leaves it, an acknowledgement taken first; of many new ones, one after another.
 
@@ -372,15 +340,31 @@ class _Memory:
         if acknowledge is not None:
             self.sensor.acknowledge(_named(acknowledge, keys))
         unjudged = (number for number, key in enumerate(keys) if self.sensor.recordings[key].state is None)
-        first = max(next(unjudged, len(keys)) + STRIDE, BASELINE + LATEST)
+        first = max(next(unjudged, len(keys)) + STRIDE, longest())
         for end in range(first, len(keys), STRIDE):
             self._judged(judging, order, end, 0, "", again=again, who=())
-        return self._judged(judging, order, len(keys), new, question, again=again, who=self.who)
+        answers = question if self.ahead.foreteller is None else ""  # not answered before its forecast is made
+        track = self._judged(judging, order, len(keys), new, answers, again=again, who=self.who)
+        self._unforetold = (track, order, question)
+        return track
+
+    def foretold(self) -> Track | None:
+        """The last judgement with its forecast, kept; None where there is none to make, or none yet."""
+        if self._unforetold is None or not self.ahead.due:
+            return None
+        (track, order, question), self._unforetold = self._unforetold, None
+        acknowledged = self.sensor.acknowledged
+        every = [row | {"x": order.places[row["file"]].x} for row in self.sensor.rows(order.keys)]
+        rows = unacknowledged(every, acknowledged)
+        made = self.ahead.make(rows, order.x_name, comparable=track.comparable, acknowledged=acknowledged)
+        return self.sensor.judged(
+            track.foretold(made), {key.file: key for key in order.keys}, 0, question, self._learned, self.who
+        )
 
     def _judged(
         self,
         judging: Callable[..., Track],
-        order: _Order,
+        order: Order,
         end: int,
         new: int,
         question: str,
@@ -392,21 +376,21 @@ class _Memory:
         track, keys = self._looked_at(judging, order, end, again=again)
         return self.sensor.judged(track, {key.file: key for key in keys}, new, question, self._learned, who)
 
-    def silent(self, judging: Callable[..., Track], order: _Order, reason: str) -> Track | None:
+    def silent(self, judging: Callable[..., Track], order: Order, reason: str) -> Track | None:
         """The series as it is when no recording comes any more; nothing of it is kept. None where none is known."""
         if not order.keys:
             return None
         return self._looked_at(judging, order, len(order.keys), again=False)[0].silent(reason)
 
     def _looked_at(
-        self, judging: Callable[..., Track], order: _Order, end: int, *, again: bool
+        self, judging: Callable[..., Track], order: Order, end: int, *, again: bool
     ) -> tuple[Track, list[Version]]:
         """The series up to an end as it is judged beside what was said, and what of it was looked at."""
-        window = {order.keys[number]: order.place(number) for number in _window(order, end, self.sensor)}
-        held = {key: self._readings.get(key) or self.sensor.reading(key) for key in window}
+        chosen = {order.keys[number]: order.place(number) for number in window(order, end, self.sensor)}
+        held = {key: self._readings.get(key) or self.sensor.reading(key) for key in chosen}
         self._readings = {key: reading for key, reading in held.items() if reading is not None}
         states: dict[str, AlarmState] = {}
-        for key in window:
+        for key in chosen:
             state = self.sensor.recordings[key].state if key in self.sensor.recordings else None
             if state is not None and not again:
                 states[key.file] = state
@@ -414,26 +398,27 @@ class _Memory:
         before = Before(states) if standing is None else Before(states, standing.reason, standing.raised_by)
         if self._learned is None:
             self._learned = self.sensor.learned()
-        names = {_name(key) for key in self._readings}
-        track = judging(
+        names = {file_name(key) for key in self._readings}
+        track: Track = judging(
             [*self._readings.values()],
             self.target,
-            {key.file: window[key] for key in self._readings},
+            {key.file: chosen[key] for key in self._readings},
             order.x_name,
             acknowledge=self.sensor.acknowledged if self.sensor.acknowledged in names else None,
             learned=self._learned,
             before=before,
         )
-        return track, [*window]
+        last = self.ahead.standing(self.sensor.acknowledged)
+        return track if last is None else track.foretold(last), [*chosen]
 
 
 def _named(acknowledge: str, keys: Sequence[Version]) -> str:
     """The name of the recording up to which somebody has looked."""
     if acknowledge == LAST:
-        return _name(keys[-1])
+        return file_name(keys[-1])
     for key in keys:
-        if acknowledge in (key.file, _name(key)):
-            return _name(key)
+        if acknowledge in (key.file, file_name(key)):
+            return file_name(key)
     raise BadInput(f"{acknowledge} is not among the {len(keys)} recordings; acknowledge one of them, or {LAST}")
 
 

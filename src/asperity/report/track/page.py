@@ -9,7 +9,7 @@ import numpy as np
 from asperity.quantities import NO_VALUE, in_print, quantity
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
 from asperity.report.track import exhibits
-from asperity.tracking import Track, TrackedRecording
+from asperity.tracking import FORECAST, Track, TrackedRecording
 from asperity.wear import ALERTS, IN_WORDS
 
 METHODS = {
@@ -35,7 +35,7 @@ NEXT = {  # what to do, by the alarm's state; of an alarm by who raised it, its 
     "blind": "Check that the machine runs, then sensor, cable and supply. Until then nobody hears the machine.",
     "none": "Nothing; record on as planned.",
 }
-NEXT |= {"damping": NEXT["CRF"], "kurtosis": NEXT["the"], "velocity": NEXT["the"]}
+NEXT |= {FORECAST: NEXT["CRF"], "damping": NEXT["CRF"], "kurtosis": NEXT["the"], "velocity": NEXT["the"]}
 SUREST = 0.99  # beyond which a probability says more of the model than of the machine
 NO_BREAK = ("saturating exponential", "saturating hyperbola", "straight line", "smooth curves", "no change")
 MOST_LINES = 20  # of those taken out, listed by name
@@ -119,6 +119,8 @@ def _how_sure(track: Track) -> str:
     alarm, last = track.alarm, track.recordings[-1]
     if alarm.raised_by == "zone":
         return "The standard's limits for machines of this class, not what this machine is used to."
+    if alarm.raised_by == FORECAST:
+        return "The probability is that of the model's courses; a change is told where it is a hundred to one."
     if alarm.state not in ("alarm", "alert"):
         return "No statement: see what is missing." if alarm.state != "none" else "Small changes would not be seen yet."
     said = f"Set to be said without wear once in {1.0 / alarm.false_alarm_rate:.0f} recordings"
