@@ -32,6 +32,7 @@ ALONE = (  # whose times are their result: nothing runs beside them; those first
     "conserving",
     "motion",
     "films",
+    "chosen_films",
     "friction",
     "stress",
     "surfaces",
@@ -43,20 +44,22 @@ ALONE = (  # whose times are their result: nothing runs beside them; those first
     "monitor",
 )
 ABREAST = (  # what is counted, on each processor one of these, each one part or some that need what another keeps
+    ("inference", "forecast", "next_points", "rings"),  # the longest first
     ("wearing",),
+    ("indicators",),
+    ("no_speed", "chosen_grids"),
     ("damping", "damping_stages"),
     ("intervals",),
-    ("indicators",),
     ("sensors",),
     ("alarms",),
     ("hostile",),
     ("motion_table",),
     ("robustness",),
     ("vibration",),
-    ("inference", "forecast", "next_points", "rings"),
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
-WHOLE = ("certified", "first_call", "stress", "surfaces", "rollers")  # short enough as they are, whatever is asked
+# short enough as they are, whatever is asked
+WHOLE = ("certified", "chosen_films", "first_call", "stress", "surfaces", "rollers")
 ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors
 TIMES = "times"  # the part that says how long the others took
 

@@ -2,18 +2,16 @@
 
 Fifty random ones: cap 5 to 8 GPa, Hertz's pressure 1 to 2.5 GPa, film ratio 0.1 to 2; lines, balls and ellipses. Asks
 how many are solved, how long that takes, and whether CLR is within its error bar of the finer grid's.
-
-    python -m benchmarks.chosen_grids [--count 50] [--model mixed] [--most 150]
 """
 
-import argparse
+import json
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import scipy
-from threadpoolctl import threadpool_limits
 
 from asperity.conditions import ContactConditions, ElasticPair
 from asperity.ehl import (
@@ -29,7 +27,13 @@ from asperity.ehl import (
 from asperity.grid import Grid
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import gaussian_surface
+from benchmarks.unfinished import stamp
 
+COUNT, FEW = 50, range(3, 9)  # those take seconds, the third minutes on the finer grid
+MOST = 150  # Newton steps on a grid
+LEFT_S = 30.0  # of a part's time, for what is under way when it ends
+KEPT = Path("build/chosen_grids")
+ROOMS = ("ehl", "kernels", "lubricant", "surface")  # whose code decides
 FINER = 1.5
 FEWEST_CELLS = 8
 PAIR = ElasticPair((206e9, 206e9), (0.3, 0.3))
@@ -47,7 +51,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solve went: cells, whether it converged, seconds, CLR, its interval, and whether the grid can tell it."""
+    """How a solve went: whether it converged, processor time [s], CLR, its interval, whether the grid can tell it."""
 
     cells: tuple[int, int]
     converged: bool
@@ -60,7 +64,8 @@ class Outcome:
     def told(self) -> str:
         """CLR and its interval in words."""
         ends = "no interval" if self.interval is None else f"{self.interval[0]:.3f} to {self.interval[1]:.3f}"
-        return f"{self.clr:.3f} ({ends}{'' if self.determined else ', not determined'})"
+        doubts = ("" if self.determined else ", not determined") + ("" if self.converged else ", not converged")
+        return f"{self.clr:.3f} ({ends}{doubts})"
 
 
 def samples(count: int, seed: int = 14) -> Iterator[Sample]:
@@ -111,7 +116,7 @@ def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -
         correlation_length=sample.texture.lengths,
         rng=np.random.default_rng(sample.seed),
     )
-    began = time.perf_counter()
+    began = time.process_time()
     solution = solve_contact(
         sample.conditions,
         sample.oil,
@@ -119,7 +124,7 @@ def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -
         options=Options(model=model, max_iterations=most),
         strict=False,
     )
-    seconds = time.perf_counter() - began
+    seconds = time.process_time() - began
     state = contact_state(solution)
     interval = None if state.error is None else state.error.clr.interval
     determined = state.error is not None and undetermined(solution, state.error.clr) is None
@@ -141,29 +146,36 @@ def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     )
 
 
-def main() -> None:
-    """Solve them and print a table."""
-    arguments = argparse.ArgumentParser(prog="python -m benchmarks.chosen_grids", description=__doc__)
-    arguments.add_argument("--count", type=int, default=50)
-    arguments.add_argument("--model", default="mixed")
-    arguments.add_argument("--most", type=int, default=150, help="Newton steps on a grid")
-    wanted = arguments.parse_args()
-    print("| contact | lambda | p_h [GPa] | cells | converged | s | CLR | finer: converged | s | CLR |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    pairs = []
-    with threadpool_limits(1):
-        for number, sample in enumerate(samples(wanted.count)):
-            one, two = (solved(sample, wanted.model, wanted.most, finer) for finer in (1.0, FINER))
-            pairs.append((one, two))
-            ratio = least_film(sample.conditions, sample.oil) / sample.texture.sq
-            print(
-                f"| {number} {sample.conditions.geometry} | {ratio:.2f} | {sample.conditions.hertz.p_max / 1e9:.2f} | "
-                f"{one.cells[0]} x {one.cells[1]} | {one.converged} | {one.seconds:.1f} | {one.told} | "
-                f"{two.converged} | {two.seconds:.1f} | {two.told} |",
-                flush=True,
-            )
-    print(f"\n{summary(pairs)}")
+def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
+    """The table as Markdown: all contacts solved so far by this code, as many more as there is time for."""
+    end = time.perf_counter() + seconds - LEFT_S
+    every = dict(enumerate(samples(COUNT)))
+    pairs = kept_pairs({number: every[number] for number in (FEW if fast else every)}, end)
+    yield "## Hard steel on the grid that is chosen for it, and on one finer by 1.5 in both directions\n"
+    yield f"Sample: {len(pairs)} contacts.\n"
+    yield "| contact | film ratio | p_h [GPa] | cells | time [s] | CLR | finer: time [s] | CLR |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for number, (one, two) in pairs.items():
+        conditions, oil, sq = every[number].conditions, every[number].oil, every[number].texture.sq
+        cells = " | ".join(f"{solve.seconds:.1f} | {solve.told}" for solve in (one, two))
+        yield (
+            f"| {number} {conditions.geometry} | {least_film(conditions, oil) / sq:.2f} | "
+            f"{conditions.hertz.p_max / 1e9:.2f} | {one.cells[0]} x {one.cells[1]} | {cells} |"
+        )
+    yield f"\n{summary(list(pairs.values()))}"
 
 
-if __name__ == "__main__":
-    main()
+def kept_pairs(wanted: dict[int, Sample], end: float) -> dict[int, tuple[Outcome, Outcome]]:
+    """Each contact on both grids, as they are kept, and those that time allows."""
+    path = KEPT / f"{stamp(*ROOMS)}.json"
+    kept = json.loads(path.read_text("utf-8")) if path.is_file() else {}
+    for number, sample in wanted.items():
+        if str(number) not in kept and time.perf_counter() < end:
+            kept[str(number)] = [asdict(solved(sample, "mixed", MOST, finer)) for finer in (1.0, FINER)]
+            KEPT.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(kept), "utf-8")
+    return {int(number): (Outcome(**one), Outcome(**two)) for number, (one, two) in sorted(kept.items(), key=_number)}
+
+
+def _number(entry: tuple[str, object]) -> int:
+    return int(entry[0])

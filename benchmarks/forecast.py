@@ -180,9 +180,12 @@ def _heard(sounds: dict[str, Field], rng: np.random.Generator) -> list[Observati
 
 def tables(kept: Path) -> Iterator[str]:
     """Shares of intervals that hold and of alarms, as Markdown."""
-    rows = list(csv.DictReader((kept / "courses.csv").open()))
+    path = kept / "courses.csv"
+    rows = list(csv.DictReader(path.open())) if path.exists() else []
     yield "## The time to CLR 50 %: intervals of 90 % over simulated wear histories"
     yield f"Sample: {len(rows)} series."
+    if not rows:
+        return
     yield "| course | series | held | upper end over lower (median) | CLR at the last recording held | change told |"
     yield "|---|---|---|---|---|---|"
     wearing = [row for row in rows if row["kind"] == "wearing"]

@@ -1,6 +1,6 @@
 """Indicators measured on the simulated rig: failures and errors over SNR, intervals, stages of wear.
 
-`python -m benchmarks.indicators` runs this part alone; `--fast` a tenth of it.
+`python -m benchmarks.indicators` runs this part alone; `--fast` a twentieth of it.
 """
 
 import argparse
@@ -39,8 +39,8 @@ class Heard(NamedTuple):
 
 
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a tenth of the series and trials."""
-    share = 10 if fast else 1
+    """Markdown, a line at a time; `fast` takes a twentieth of the series and trials."""
+    share = 20 if fast else 1
     yield f"## Indicators: 12 samples x 5 repeats of {DURATION:g} s at 20 kHz, {SERIES // share} series a row\n"
     yield from table_lines(SERIES // share)
     few, fewer = max(FEW // share, 1), max(FEWER // share, 1)
@@ -273,6 +273,6 @@ def stage_row(truth: Callable[[np.ndarray], np.ndarray], errors: float, tests: i
 
 if __name__ == "__main__":
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.indicators", description=__doc__)
-    arguments.add_argument("--fast", action="store_true", help="a tenth of the series and trials")
+    arguments.add_argument("--fast", action="store_true", help="a twentieth of the series and trials")
     for line in lines(fast=arguments.parse_args().fast):
         print(line, flush=True)

@@ -134,9 +134,13 @@ def taught(found: Inference, there: Forward, heard: tuple[Field, Field]) -> Fiel
 
 def tables(kept: Path) -> Iterator[str]:
     """How often the advice is the better, as Markdown."""
-    rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader((kept / "next.csv").open())]
+    path = kept / "next.csv"
+    read = list(csv.DictReader(path.open())) if path.exists() else []
+    rows = [{key: float(value) for key, value in row.items()} for row in read]
     yield f"## The advised next point against {RANDOM} drawn at random, machines heard at one"
     yield f"Sample: {len(rows)} machines."
+    if not rows:
+        return
     yield "| heard there | machines | advised teaches more than their mean | bits, advised | bits, mean of the random |"
     yield "|---|---|---|---|---|"
     for key, name in (("once", "once"), ("mean", f"mean of {TIMES} times")):

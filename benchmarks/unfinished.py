@@ -1,5 +1,6 @@
 """A run of the benchmarks that may be cut off: which parts have ended, kept beside what it builds."""
 
+import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 FILE = Path("build/benchmarks.json")
+PACKAGE = Path(__file__).parents[1] / "src" / "asperity"
 
 Ended = tuple[float, str, list[str]]  # seconds, what kept the part from its end, what changed against the last
 
@@ -50,3 +52,12 @@ class Unfinished:
         """What has come to its end is no more gone on with."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)
+
+
+def stamp(*names: str) -> str:
+    """The code of rooms and modules of the package as a digest: what other code has done is not gone on with."""
+    digest = hashlib.sha256()
+    for name in names:
+        for path in sorted((PACKAGE / name).rglob("*.py")) or [PACKAGE / f"{name}.py"]:
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]

@@ -121,6 +121,23 @@ def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch,
     assert kept.sample(bench_main._said("certified", whole=whole, seconds=1.0)) == (7.0 if len(said) > 1 else 0.0)
 
 
+@pytest.mark.parametrize("part", ["inference", "forecast", "next_points"])
+def test_a_part_that_had_no_time_says_so(tmp_path, part):
+    said = [*importlib.import_module(f"benchmarks.{part}").tables(tmp_path)]
+    assert any(line.startswith("Sample: 0 ") for line in said)
+
+
+def test_what_other_code_has_done_is_not_gone_on_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(unfinished, "PACKAGE", tmp_path)
+    (tmp_path / "room").mkdir()
+    for path in ("room/first.py", "room/second.py", "alone.py"):
+        (tmp_path / path).write_text(path)
+    before = {names: unfinished.stamp(*names) for names in (("room", "alone"), ("room",), ("room/second",), ("alone",))}
+    (tmp_path / "room" / "second.py").write_text("another")
+    changed = {names: unfinished.stamp(*names) != stamp for names, stamp in before.items()}
+    assert changed == {("room", "alone"): True, ("room",): True, ("room/second",): True, ("alone",): False}
+
+
 def test_every_part_is_one_that_can_be_run():
     assert len(set(PARTS)) == len(PARTS)
     assert set(WHOLE) < set(PARTS)
