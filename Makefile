@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check bench docs installed attacks clean
+.PHONY: demo test check bench docs installed release attacks clean
 .DEFAULT_GOAL := demo
 
 demo: $(READY)
@@ -24,6 +24,11 @@ bench: $(READY)
 
 # a wheel in environments that are not ours: base, with extras, lowest and newest dependencies, a folder nobody can write
 installed: $(READY)
+	PYTHON="$(PYTHON)" ./.ci/installed
+
+# refused while metadata name no author and no address; then the wheel and the sdist, installed and tried
+release: $(READY)
+	ASPERITY_RELEASE=1 $(BIN)/python -m pytest -q tests/unit/test_release.py
 	PYTHON="$(PYTHON)" ./.ci/installed
 
 attacks: $(READY)

@@ -5,7 +5,7 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from docstrings import described, plain
+from docstrings import described, plain, signed
 
 project = "asperity"
 author = "The asperity developers"
@@ -25,6 +25,8 @@ extensions = [
 templates_path = ["_templates"]
 exclude_patterns = ["scripts"]  # the gallery is made of them
 default_role = "literal"
+smartquotes_action = "q"  # two hyphens are an option's, not a dash
+maximum_signature_line_length = 88
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 6
@@ -85,3 +87,4 @@ def setup(app):
     """Docstrings speak Markdown in places, and what reStructuredText would read into them is put right here."""
     app.connect("autodoc-process-docstring", described, priority=100)  # before napoleon reads them
     app.connect("autodoc-process-docstring", plain)
+    app.connect("autodoc-process-signature", signed)

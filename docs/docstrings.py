@@ -8,18 +8,38 @@ import re
 from typing import Any
 
 CODE = re.compile(r"(``?[^`]+``?)")
+INNER = r"\[(?:[^\[\]]|\[(?:[^\[\]]|\[[^\[\]]*\])*\])*\]"  # brackets, three deep
+ARRAY = re.compile(rf"(~?numpy\.ndarray){INNER}")
 
 
 def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: list[str]) -> None:
-    """Escape bars, stars and trailing underscores outside code, in place; add what a class says behind its fields."""
+    """Escape bars, stars and trailing underscores outside code, in place; add what a class says behind its fields.
+
+    Words before a colon in a property's first line are no type: they come back to where they stood.
+    """
     if what == "class":
         lines += _fields(thing)
+    taken = [line for line in lines if line.startswith(":type: ")] if what == "property" else []
+    for line in taken:
+        lines.remove(line)
+        lines[0] = f"{line.removeprefix(':type: ')}: {lines[0]}"
     lines[:] = ["".join(_escaped(part) for part in CODE.split(line)) for line in lines]
 
 
 def described(_app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
     """Put what a parameter is on a line of its own: behind the colon numpy's form has types, and ours has words."""
     lines[:] = [part for line in lines for part in _entry(line)]
+
+
+def signed(
+    _app: Any, _what: str, _name: str, _thing: Any, _options: Any, signature: str | None, returns: str | None
+) -> tuple[str | None, str | None]:
+    """Arrays without what they are made of, and defaults that a factory makes as dots, so that the rest is parsed."""
+    return _short(signature), _short(returns)
+
+
+def _short(text: str | None) -> str | None:
+    return text and ARRAY.sub(r"\1", text).replace("<factory>", "...")
 
 
 def _entry(line: str) -> list[str]:

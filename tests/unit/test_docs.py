@@ -216,6 +216,13 @@ def test_tests_stand_in_the_files_that_are_named_beside_them(page):
         assert not files or named <= there, place(page, line)
 
 
+def test_every_validation_is_told_of():
+    text = "".join(page.text for page in pages() if page.path.parent.name in ("docs", "theory"))
+    tests = sorted(path.name for path in (ROOT / "tests" / "validation").glob("test_*.py"))
+    assert len(tests) > 20
+    assert [name for name in tests if f"{name}`" not in text] == []
+
+
 def test_docstrings_name_what_exists():
     """In the package, where names of the same function's own are right, too."""
     wrong = []

@@ -1,6 +1,8 @@
 """What a release states of itself: one version everywhere, metadata by their schemas, needs as pyproject has them."""
 
+import copy
 import json
+import os
 import re
 import subprocess
 import sys
@@ -99,6 +101,65 @@ def test_the_recipe_is_one_to_conda_forges_builder(right, wrong):
         return
     with pytest.raises(builder.RecipeParseError):
         rendered()
+
+
+NOBODY = "The asperity developers"  # whose names a release states
+FILLED = ("pyproject.toml", "CITATION.cff", "codemeta.json", ".zenodo.json", "recipe/recipe.yaml")
+
+
+def metadata() -> dict[str, dict]:
+    return {"pyproject.toml": {"project": PROJECT}, **{name: stated(name) for name in FILLED[1:]}}
+
+
+def unfilled(given: dict[str, dict]) -> list[str]:
+    """What a release has to state and these files leave open, as file and key."""
+    project, citation, codemeta, zenodo, recipe = (given[name] for name in FILLED)
+    named = {
+        "pyproject.toml authors": [one["name"] for one in project["project"]["authors"]],
+        "CITATION.cff authors": [one.get("name") for one in citation["authors"]],
+        "codemeta.json author": [one["name"] for one in codemeta["author"]],
+        ".zenodo.json creators": [one["name"] for one in zenodo["creators"]],
+    }
+    addresses = {
+        "pyproject.toml urls": project["project"].get("urls", {}).get("Repository"),
+        "CITATION.cff repository-code": citation.get("repository-code"),
+        "codemeta.json codeRepository": codemeta.get("codeRepository"),
+        "recipe/recipe.yaml source.url": recipe["source"].get("url"),
+        "recipe/recipe.yaml source.sha256": recipe["source"].get("sha256"),
+        "recipe/recipe.yaml about.repository": recipe["about"].get("repository"),
+    }
+    return [key for key, names in named.items() if NOBODY in names] + [
+        key for key, said in addresses.items() if not said
+    ]
+
+
+def test_a_release_states_who_and_where():
+    """Asked by `make release` alone: nothing is published yet, so there is no address to state."""
+    if not os.environ.get("ASPERITY_RELEASE"):
+        pytest.skip("no release is built: make release asks")
+    assert unfilled(metadata()) == []
+
+
+def test_what_a_release_leaves_open_is_seen_and_listed():
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| \[([\w./-]+)\]\(.+?\) \| (.+) \|$", text.partition("## A release")[2], re.M))
+    assert set(rows) == set(FILLED)
+    whole = copy.deepcopy(metadata())
+    person, place = {"name": "Somebody"}, "https://example.org/asperity"
+    whole["pyproject.toml"]["project"] |= {"authors": [person], "urls": {"Repository": place}}
+    whole["CITATION.cff"] |= {"authors": [{"family-names": "Somebody"}], "repository-code": place}
+    whole["codemeta.json"] |= {"author": [person], "codeRepository": place}
+    whole[".zenodo.json"]["creators"] = [person]
+    whole["recipe/recipe.yaml"]["source"] = {"url": place, "sha256": "0" * 64}
+    whole["recipe/recipe.yaml"]["about"]["repository"] = place
+    assert unfilled(whole) == []
+    for file in FILLED:
+        open_ones = unfilled(whole | {file: metadata()[file]})
+        assert all(one.startswith(f"{file} ") for one in open_ones)
+        assert all(one.rpartition(" ")[2].rpartition(".")[2] in rows[file] for one in open_ones)
+    assert (
+        "ASPERITY_RELEASE=1" in (ROOT / "Makefile").read_text("utf-8").partition("\nrelease:")[2].partition("\n\n")[0]
+    )
 
 
 def split(requirement: str) -> tuple[str, str]:
