@@ -15,7 +15,7 @@ import yaml
 from support.source import PACKAGE, ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-CONDA = {"matplotlib": "matplotlib-base"}  # what conda-forge calls it
+CONDA = {"matplotlib": "matplotlib-base", "soundfile": "pysoundfile"}  # what conda-forge calls them
 LARGEST = 3_000_000  # bytes of the package as it is installed, without its needs
 
 
@@ -74,7 +74,11 @@ def test_recipe_and_metadata_need_what_the_project_needs():
     assert stated("codemeta.json")["softwareRequirements"] == PROJECT["dependencies"]
     wanted = {CONDA.get(name, name).lower(): bound for name, bound in map(split, PROJECT["dependencies"])}
     wanted["python"] = PROJECT["requires-python"]
-    assert dict(map(split, stated("recipe/recipe.yaml")["requirements"]["run"])) == wanted
+    requirements = stated("recipe/recipe.yaml")["requirements"]
+    assert dict(map(split, requirements["run"])) == wanted
+    extras = [need for needs in PROJECT["optional-dependencies"].values() for need in needs]
+    optional = {CONDA.get(name, name).lower(): bound for name, bound in map(split, extras)}
+    assert dict(map(split, requirements["run_constraints"])) == optional
 
 
 @pytest.mark.parametrize(
