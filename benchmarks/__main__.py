@@ -51,6 +51,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
     ("damping", "damping_stages"),
     ("intervals",),
     ("sensors",),
+    ("failures",),
     ("alarms",),
     ("hostile",),
     ("motion_table",),

@@ -5,16 +5,28 @@ part alone; `--fast` a tenth of it.
 """
 
 import argparse
+import json
 from collections.abc import Callable, Iterator
+from functools import partial
+from hashlib import sha256
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+import asperity
 from asperity.tracking.alarming import CRF_LEAST, LEVEL_LEAST
 from asperity.tracking.operating import ANY_CONTACT, LEVEL, Operating, conditions_of
 from asperity.wear import FALSE_ALARMS, Alarm, Sight, Watched, knee_weight, sequential_alarm, split_stages
 
+KEPT = Path("build/alarms.json")
+CODE = Path(asperity.__file__).parent
+SOURCES = [
+    Path(__file__),
+    *(CODE / "wear" / f"{name}.py" for name in ("alarm", "sequential", "regressors", "stages", "bends")),
+    *(CODE / "tracking" / f"{name}.py" for name in ("alarming", "operating")),
+]
 SERIES, RECORDINGS = 300, 40
 NUMBER = np.arange(float(RECORDINGS))
 CRF_HZ, RISE_HZ, AFTER = (
@@ -268,21 +280,46 @@ def _stated(values: np.ndarray | None) -> list[float | None]:
     return [None] * RECORDINGS if values is None else [*values]
 
 
+class Rows:
+    """Rows that are done, kept in a file as long as the code behind them is the same; a run goes on behind them."""
+
+    def __init__(self, file: Path = KEPT) -> None:
+        self.file, self.code = file, sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest()
+        self.done: dict[str, str] = {}
+        if file.is_file():
+            told = json.loads(file.read_text("utf-8"))
+            self.done = told["rows"] if told["code"] == self.code else {}
+
+    def row(self, name: str, made: Callable[[], str]) -> str:
+        """A row, made once."""
+        if name not in self.done:
+            self.done[name] = made()
+            self.file.parent.mkdir(exist_ok=True)
+            self.file.write_text(json.dumps({"code": self.code, "rows": self.done}), "utf-8")
+        return self.done[name]
+
+
 def lines(*, fast: bool = False) -> Iterator[str]:
-    """Markdown, a line at a time; `fast` takes a tenth of the series."""
+    """Markdown, a line at a time; `fast` takes a tenth of the series. What was cut off goes on where it stopped."""
     series = SERIES // (10 if fast else 1)
+    rows = Rows()
     yield f"## Alarms: {series} series of {RECORDINGS} recordings a row, one false alarm in {1.0 / FALSE_ALARMS:.0f}\n"
     yield "| nothing wears | ever an alarm | ever an alert | ever cannot tell, behind the baseline |"
     yield "|---|---|---|---|"
     for name, draw in (WITHOUT_WEAR | GIVEN).items():
-        states = [judged(draw(np.random.default_rng([11, number]))).states[8:] for number in range(series)]
-        shares = [100.0 * np.mean([kind in one for one in states]) for kind in ("alarm", "alert", "cannot-tell")]
-        yield f"| {name} | {' | '.join(f'{share:.1f} %' for share in shares)} |"
+        yield f"| {name} | {rows.row(f'{series} {name}', partial(quiet_row, draw, series))} |"
     yield "\n| the severe stage begins | found | too early | recordings until then, median | 90 % within |"
     yield "|---|---|---|---|---|"
     for name, draw in (KNEES | {"level alone, up 15 to 25 times by the end": to_failure}).items():
-        yield f"| {name} | {found_row(draw, series)} |"
-    yield from reliability_lines(10 * series)
+        yield f"| {name} | {rows.row(f'{series} {name}', partial(found_row, draw, series))} |"
+    yield rows.row(f"{series} P(severe)", lambda: "\n".join(reliability_lines(10 * series)))
+
+
+def quiet_row(draw: Callable[[np.random.Generator], Drawn], series: int) -> str:
+    """Shares of series without wear that are ever said to be anything but healthy."""
+    states = [judged(draw(np.random.default_rng([11, number]))).states[8:] for number in range(series)]
+    shares = [100.0 * np.mean([kind in one for one in states]) for kind in ("alarm", "alert", "cannot-tell")]
+    return " | ".join(f"{share:.1f} %" for share in shares)
 
 
 BETWEEN: tuple[Callable[[np.random.Generator], Drawn], ...] = (
