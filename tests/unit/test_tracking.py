@@ -65,7 +65,12 @@ def test_a_table_places_recordings(tmp_path):
     table = read_table(path)
     assert (table.x_name, table.places["a.wav"].x, table.places["a.wav"].x_std) == ("sq_um", 0.54, 0.1)
     assert table.place(Path("there/b.wav")).x_std is None
-    for text, said in (("name,x\na,1\n", "needs a column file"), ("file,x\na,one\n", "line 2: x must be a number")):
+    for text, said in (
+        ("name,x\na,1\n", "needs a column file"),
+        ("file,x\na,one\n", "line 2: x must be a number"),
+        ("file,x,load_n,load_n\na,1,500,900\n", "has 2 columns load_n; leave all but one"),
+        (f"file,x\n{'a' * 200_000},1\n", "cannot be read as a table"),
+    ):
         path.write_text(text)
         with pytest.raises(BadInput, match=said):
             read_table(path)

@@ -69,6 +69,8 @@ def infer(
     require_choice("--sampler", sampler, inference.SAMPLERS)
     setting, known = _setting(case_file, overrides, surface)
     limit = None if forecast is None else inference.read_limit(forecast, setting)
+    if design is not None:
+        inference.require_share("--design", design)
     require_output(page, ".html", option="--report")
     count, heard = workers or processes.cores(), inference.Listened()
     if paths:

@@ -1,6 +1,7 @@
 from .design import Design as Design
 from .design import Lever as Lever
 from .design import design_contact as design_contact
+from .design import require_share as require_share
 from .emulator import Emulator as Emulator
 from .emulator import Features as Features
 from .emulator import GridError as GridError

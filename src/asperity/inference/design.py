@@ -76,6 +76,12 @@ class Design:
                 "levers": [lever.scalars() for lever in self.levers]}  # fmt: skip
 
 
+def require_share(name: str, clr: float) -> None:
+    """BadInput for what is no load share."""
+    if not 0.0 < clr < 1.0:
+        raise BadInput(f"{name} must be a load share between 0 and 1, got {clr:g}; 0.3 is 30 %")
+
+
 def design_contact(forward: Forward, z: Field, *, clr: float) -> Design:
     """Which load, speed, viscosity (or temperature) or roughness keeps CLR below a value, at the first point.
 
@@ -92,8 +98,7 @@ def design_contact(forward: Forward, z: Field, *, clr: float) -> Design:
     BadInput
         for a load share that is none.
     """
-    if not 0.0 < clr < 1.0:
-        raise BadInput(f"--design must be a load share between 0 and 1, got {clr:g}; 0.3 is 30 %")
+    require_share("--design", clr)
     chosen = z[:: max(1, len(z) // CONTACTS)][:CONTACTS]
     own = replace(forward, points=forward.points[:1])
     levers = [_lever(own, chosen, entry, clr) for entry in _levers(own.setting)]

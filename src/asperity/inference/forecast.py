@@ -162,18 +162,21 @@ def read_limit(text: str, setting: Setting) -> Limit:
     Raises
     ------
     BadInput
-        for a name that is neither, or no amount.
+        for a name that is neither, no amount, or one that cannot be reached.
     """
     name, _, amount = (part.strip() for part in text.partition("="))
     known = {unknown.range.key.rpartition(".")[2]: unknown.key for unknown in setting.contact}
     if name not in (CLR, *known):
         raise BadInput(f"--forecast takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}")
     if name != CLR:
-        return Limit(known[name], read_amount(f"--forecast {name}", quantity(known[name]).unit, amount))
-    try:
-        return Limit(CLR, float(amount))
-    except ValueError:
-        raise BadInput(f"--forecast clr takes a share of the load such as clr=0.5, got {text!r}") from None
+        limit = Limit(known[name], read_amount(f"--forecast {name}", quantity(known[name]).unit, amount))
+    else:
+        try:
+            limit = Limit(CLR, float(amount))
+        except ValueError:
+            raise BadInput(f"--forecast clr takes a share of the load such as clr=0.5, got {text!r}") from None
+    require_limit(setting, limit)
+    return limit
 
 
 class _Model(NamedTuple):

@@ -129,7 +129,7 @@ def _table(folder: Path, stated: dict[str, Any], missing: list[str]) -> list[dic
     try:
         with _inside(folder, stated["recordings"]).open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-    except (BadInput, OSError, UnicodeDecodeError) as error:
+    except (BadInput, OSError, UnicodeDecodeError, csv.Error) as error:
         missing.append(f"the table {stated['recordings']} cannot be read ({error})")
         return []
     absent = [name for name in COLUMNS if not rows or name not in rows[0]]

@@ -173,18 +173,22 @@ def read_table(path: str | Path) -> Table:
     UnreadableFile
         for a file that is missing, no csv, or without the columns.
     BadInput
-        for a row without a number where one is due.
+        for a row without a number where one is due, and two columns of one name.
     """
     path = Path(path)
     require_file(path)
     try:
         text = path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        delimiter = ";" if text.partition("\n")[0].count(";") else ","
+        reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
+        columns = [(name or "").strip() for name in reader.fieldnames or []]
+        reader.fieldnames = columns
+        rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise UnreadableFile(f"{path} cannot be read as a table ({error}); give a csv with columns file, x") from None
-    delimiter = ";" if text.partition("\n")[0].count(";") else ","
-    reader = csv.DictReader(text.splitlines(), delimiter=delimiter)
-    columns = [(name or "").strip() for name in reader.fieldnames or []]
-    reader.fieldnames = columns
+    for name in columns:
+        if name and columns.count(name) > 1:
+            raise BadInput(f"{path} has {columns.count(name)} columns {name}; leave all but one of them out")
     others = [name for name in columns if name not in ("file", SENSOR, *OPERATING) and not name.endswith("_std")]
     _require_units(path, others)
     if "file" not in columns or not (others or set(columns) & {SENSOR, *OPERATING}):
@@ -193,11 +197,10 @@ def read_table(path: str | Path) -> Table:
         )
     x_name = "x" if "x" in others else next(iter(others), "")
     places = {}
-    for number, row in enumerate(reader, 2):
+    for number, row in enumerate(rows, 2):
         name = (row["file"] or "").strip()
         if not name:
             continue
-
         said = {
             column: _number((row.get(column) or "").strip(), delimiter, f"{path}, line {number}: {column}")
             for column in (x_name, f"{x_name}_std", *OPERATING)
