@@ -127,7 +127,8 @@ def lines(*, fast: bool = False) -> Iterator[str]:
             delays, left = [one.delay for one in every], [one.left for one in every]
             yield (
                 f"| {seconds:g} s at {rate_hz / 1e3:g} kHz | {fault} | {machines} | "
-                f"{sum(value > 0.0 for value in left)} | {sum(one.early for one in every)} | {np.median(delays):.0f} | {min(left):.0f} | "
+                f"{sum(value > 0.0 for value in left)} | {sum(one.early for one in every)} | "
+                f"{np.median(delays):.0f} | {min(left):.0f} | "
                 f"{sum(one.claims > 0 for one in every)} |"
             )
 

@@ -121,7 +121,7 @@ def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch,
     assert kept.sample(bench_main._said("certified", whole=whole, seconds=1.0)) == (7.0 if len(said) > 1 else 0.0)
 
 
-@pytest.mark.parametrize("part", ["inference", "forecast", "next_points"])
+@pytest.mark.parametrize("part", ["forecast", "next_points"])
 def test_a_part_that_had_no_time_says_so(tmp_path, part):
     said = [*importlib.import_module(f"benchmarks.{part}").tables(tmp_path)]
     assert any(line.startswith("Sample: 0 ") for line in said)
