@@ -71,6 +71,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "download_all_examples": False,
     "min_reported_time": 0,
+    "capture_repr": (),  # what is printed is shown, not what a line happens to return
     "plot_gallery": True,
     "abort_on_example_error": True,
     "remove_config_comments": True,
