@@ -107,6 +107,15 @@ def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
     assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
+def test_a_command_ends_without_a_search_for_garbage():
+    probe = (
+        "import atexit, gc\natexit.register(lambda: print('left', gc.get_freeze_count() > 1000))\n"
+        "from asperity.cli import main\nmain(['--version'])"
+    )
+    done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "left True"
+
+
 def test_numba_waits_for_a_solve():
     assert "numba" not in loaded_after("import asperity; asperity.read_surface; asperity.power_spectrum")
 

@@ -9,6 +9,7 @@ import xarray
 import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
 from asperity.cli.contact import run_table
+from asperity.coupling import contact_vibration
 from asperity.ehl import own_resonance
 from asperity.quantities import NO_VALUE, catalogue, quantity
 from asperity.report import write_report
@@ -65,6 +66,19 @@ def test_the_deviation_of_damping_is_of_one_further_surface(run):
         2.91999 * np.sqrt(4.0 / 3.0) * np.std(found, ddof=1), rel=1e-5
     )
     assert solve_case(run.case.with_overrides({"vibration": MASS})).scalars()["contact_damping_error"] is None
+
+
+def test_each_surface_vibrates_once(run, monkeypatch):
+    heard = []
+
+    def listening(*contact, **solved):
+        heard.append(contact)
+        return contact_vibration(*contact, **solved)
+
+    monkeypatch.setattr(results, "contact_vibration", listening)
+    several = solve_case(run.case.with_overrides({"vibration": MASS}), surfaces=3)
+    assert len(heard) == 3
+    assert several.vibration.resonance == contact_vibration(*heard[0], solution=several.solution).resonance
 
 
 def test_what_cannot_be_shaken_is_said_on_the_page(run, tmp_path):

@@ -15,6 +15,7 @@ import asperity
 from asperity import quantities
 from asperity.cli.options import with_flags
 from asperity.errors import AsperityError, BadInput
+from asperity.processes import end_quickly
 from asperity.quiet import printable
 
 GARBAGE_FROM = 100_000  # objects; libraries make that many while they load, and every hundredth search is of them all
@@ -36,6 +37,7 @@ app = typer.Typer(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; what asperity refuses is one line on stderr."""
     gc.set_threshold(GARBAGE_FROM)
+    end_quickly()
     codecs.register_error("plain", _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):

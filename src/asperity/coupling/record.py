@@ -1,6 +1,7 @@
 """The vibration of a contact: ride over it, record the acceleration, look for its resonance."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -32,9 +33,9 @@ class Vibration:
     """The vibration of a mass on a contact.
 
     `resonance` was searched in `band_hz`, which follows from the contact alone; `full_load_crf_hz` is the resonance
-    with all load on asperities [Hz]. `profile` [m], `response` [m/s^2] and its `spectrum` are the record; `expected`
-    is what `spectrum` scatters about, in closed form (of the linear spring), and `expected_crfa` its continuous height
-    at the oscillator's own frequency [(m/s^2)^2/Hz]. `dynamic_load` is the rms dynamic force over the spring's load
+    with all load on asperities [Hz]. `profile` [m] is drawn from the `excitation`, and with `response` [m/s^2] and its
+    `spectrum` the record; `expected_crfa` is the continuous height of what `spectrum` scatters about at the
+    oscillator's own frequency [(m/s^2)^2/Hz]. `dynamic_load` is the rms dynamic force over the spring's load
     (above 0.2 a linear spring misleads), `contact_loss` the share of the time in the air. When no asperity touches
     there is no spring and no record: all of these are None and `resonance.reason` says so.
     """
@@ -46,10 +47,20 @@ class Vibration:
     profile: Signal | None = None
     response: Signal | None = None
     spectrum: Spectrum | None = None
-    expected: Spectrum | None = None
+    excitation: Excitation | None = None
     expected_crfa: float | None = None
     dynamic_load: float | None = None
     contact_loss: float | None = None
+
+    @cached_property
+    def expected(self) -> Spectrum | None:
+        """What `spectrum` scatters about, in closed form (of the linear spring); None without a record."""
+        if self.oscillator is None or self.excitation is None or self.profile is None or self.spectrum is None:
+            return None
+        rate_hz = self.profile.rate_hz
+        heights = self.excitation.density(self.spectrum.frequency_hz, rate_hz)
+        below = replace(self.spectrum, density=heights, unit="m^2/Hz")
+        return expected_spectrum(self.oscillator, below, rate_hz=rate_hz)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +145,6 @@ def contact_vibration(
         motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
         response, contact_loss = Signal(motion.acceleration, profile.rate_hz, "m/s^2"), motion.contact_loss
     spectrum = power_spectrum(response, window="boxcar")
-    heights = below.density(spectrum.frequency_hz, model.rate_hz)
     f0 = np.array(spring.natural_frequency_hz)
     seen = None
     if model.method == "likelihood" and model.linear and isinstance(below, FilteredNoise):
@@ -147,7 +157,7 @@ def contact_vibration(
         profile=profile,
         response=response,
         spectrum=spectrum,
-        expected=expected_spectrum(spring, replace(spectrum, density=heights, unit="m^2/Hz"), rate_hz=model.rate_hz),
+        excitation=below,
         expected_crfa=float(spring.gain(f0) * below.density(f0, model.rate_hz)),
         dynamic_load=float(model.mass * np.std(response.values) / (spring.load or conditions.load)),
         contact_loss=contact_loss,

@@ -315,12 +315,22 @@ class Run:
         return self.contents().save(path)
 
 
-def run_of(case: Case, solution: ContactSolution, notes: Sequence[str], others: Sequence[Row] = ()) -> Run:
-    """The run of a case that is solved, its vibration worked out; `others` are the numbers of further surfaces."""
+def run_of(
+    case: Case,
+    solution: ContactSolution,
+    notes: Sequence[str],
+    others: Sequence[Row] = (),
+    vibration: Vibration | None = None,
+) -> Run:
+    """The run of a case that is solved, its vibration worked out, unless it is known.
+
+    `others` are the numbers of further surfaces.
+    """
     state = ehl.contact_state(solution)
     model = case.vibration
-    with case.naming("vibration"):
-        vibration = None if model is None else contact_vibration(state, case.conditions, model, solution=solution)
+    if model is not None and vibration is None:
+        with case.naming("vibration"):
+            vibration = contact_vibration(state, case.conditions, model, solution=solution)
     notes = (*notes, *ehl.solution_notes(solution))
     if solution.options.model == "conserving":
         notes = (*notes, _threshold(solution))

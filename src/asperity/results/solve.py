@@ -88,7 +88,7 @@ def solve_case(
     ]
     notes = [*json.loads(run.solution.attributes["notes"]), *left_out]
     kept = {**run.solution.attributes, "notes": json.dumps(notes), "surfaces": json.dumps(others)}
-    return run_of(case, replace(run.solution, attributes=kept), notes, others)
+    return run_of(case, replace(run.solution, attributes=kept), notes, others, run.vibration)
 
 
 def _first(case: Case, progress: Callable[[ehl.Iteration], None] | None, strict: bool) -> Run:
