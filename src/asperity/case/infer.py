@@ -1,12 +1,12 @@
 """[infer] of a case file: what is not known of the contact and how far, and where it may be run."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
 from asperity.case.amounts import Count, Seed
-from asperity.case.refusals import LocatedError, Section, quoted, validated
+from asperity.case.refusals import Section, quoted, validated, with_axes
 from asperity.errors import BadInput
 
 LEAST_POINTS, MOST_POINTS = 16, 4096
@@ -40,31 +40,16 @@ class InferSection(Section):
 
 
 def parse_infer(value: object) -> InferSection | None:
-    """The priors; quantities stand beside the section's own keys, as tables (contact.load) or by their bare names."""
-    if value is None or value == "none":
-        return None
-    if not isinstance(value, Mapping):
-        raise BadInput(f"must be a table, got {quoted(value)}")
-    known = set(InferSection.model_fields) - {"axes"}
-    own = {key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in known}
-    return validated(InferSection, {**own, "axes": dict(_axes({k: v for k, v in value.items() if k not in known}))})
+    """The priors; quantities stand beside the section's own keys."""
+    return with_axes(InferSection, value, _ENDS, _prior)
 
 
-def _axes(table: Mapping[str, object], parents: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
-    for key, value in table.items():
-        keys = (*parents, key)
-        if isinstance(value, Mapping) and not _ENDS & set(value):
-            yield from _axes(value, keys)
-        elif isinstance(value, Mapping):
-            try:
-                yield ".".join(keys), validated(PriorSection, value)
-            except LocatedError as mistake:
-                raise LocatedError(keys + mistake.keys, mistake.message) from None
-        elif value == "known":
-            yield ".".join(keys), value
-        else:
-            raise LocatedError(
-                keys,
-                'must be "known", or what is known of it such as { from = "0.5 um", to = "4 um" } or '
-                f'{{ value = "0.8 um", std = "0.1 um" }}, got {quoted(value)}',
-            )
+def _prior(value: object) -> object:
+    if isinstance(value, Mapping):
+        return validated(PriorSection, value)
+    if value != "known":
+        raise BadInput(
+            'must be "known", or what is known of it such as { from = "0.5 um", to = "4 um" } or '
+            f'{{ value = "0.8 um", std = "0.1 um" }}, got {quoted(value)}'
+        )
+    return value

@@ -1,6 +1,6 @@
 """What is wrong with a table of a case file, said in one sentence that names the key, the value and the remedy."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from difflib import get_close_matches
 from typing import Any, TypeVar, get_args
 
@@ -68,6 +68,37 @@ def validated(model: type[S], table: object) -> S:
         return model.model_validate(table)
     except ValidationError as error:
         raise _first_mistake(model, error) from None
+
+
+def with_axes(model: type[S], value: object, own: Set[str], read: Callable[[object], object]) -> S | None:
+    """A section whose further keys name quantities, as tables (contact.load) or by their bare names; None for none.
+
+    `own` are keys of which a table that is read has at least one; any other leads on to quantities.
+    """
+    if value is None or value == "none":
+        return None
+    if not isinstance(value, Mapping):
+        raise BadInput(f"must be a table, got {quoted(value)}")
+    known = set(model.model_fields) - {"axes"}
+    stated = {key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in known}
+    axes = dict(_axes({key: v for key, v in value.items() if key not in known}, own, read))
+    return validated(model, {**stated, "axes": axes})
+
+
+def _axes(
+    table: Mapping[str, object], own: Set[str], read: Callable[[object], object], parents: tuple[str, ...] = ()
+) -> Iterator[tuple[str, object]]:
+    for key, value in table.items():
+        keys = (*parents, key)
+        if isinstance(value, Mapping) and not own & set(value):
+            yield from _axes(value, own, read, keys)
+            continue
+        try:
+            yield ".".join(keys), read(value)
+        except LocatedError as mistake:
+            raise LocatedError(keys + mistake.keys, mistake.message) from None
+        except BadInput as mistake:
+            raise LocatedError(keys, str(mistake)) from None
 
 
 def choose(key: str, sections: Callable[[], Mapping[str, type[S]]], value: object) -> S:

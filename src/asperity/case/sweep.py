@@ -1,12 +1,12 @@
 """[study] of a case file: its own keys, and the quantities that it varies, each over a list or a range."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator
 
 from asperity.case.amounts import Count, Seed
-from asperity.case.refusals import LocatedError, Section, quoted, validated
+from asperity.case.refusals import Section, quoted, validated, with_axes
 from asperity.errors import BadInput
 
 
@@ -45,32 +45,16 @@ class StudySection(Section):
 
 
 def parse_study(value: object) -> StudySection | None:
-    """The plan of a study; quantities stand beside its own keys, as tables (contact.load) or by their bare names."""
-    if value is None or value == "none":
-        return None
-    if not isinstance(value, Mapping):
-        raise BadInput(f"must be a table, got {quoted(value)}")
-    known = set(StudySection.model_fields) - {"axes"}
-    own = {key: tuple(v) if isinstance(v, list) else v for key, v in value.items() if key in known}
-    axes = dict(_axes({key: v for key, v in value.items() if key not in known}))
-    return validated(StudySection, {**own, "axes": axes})
+    """The plan of a study; quantities stand beside its own keys."""
+    return with_axes(StudySection, value, {"from", "to", "step", "count"}, _values)
 
 
-def _axes(table: Mapping[str, object], parents: tuple[str, ...] = ()) -> Iterator[tuple[str, object]]:
-    for key, value in table.items():
-        keys = (*parents, key)
-        if isinstance(value, Mapping) and not {"from", "to", "step", "count"} & set(value):
-            yield from _axes(value, keys)
-        elif isinstance(value, Mapping):
-            try:
-                yield ".".join(keys), validated(RangeSection, value)
-            except LocatedError as mistake:
-                raise LocatedError(keys + mistake.keys, mistake.message) from None
-        elif isinstance(value, list) and value:
-            yield ".".join(keys), tuple(value)
-        else:
-            raise LocatedError(
-                keys,
-                f'must be a list of values or a range such as {{ from = "0.5 um", to = "4 um", step = "0.1 um" }}, '
-                f"got {quoted(value)}",
-            )
+def _values(value: object) -> object:
+    if isinstance(value, Mapping):
+        return validated(RangeSection, value)
+    if isinstance(value, list) and value:
+        return tuple(value)
+    raise BadInput(
+        'must be a list of values or a range such as { from = "0.5 um", to = "4 um", step = "0.1 um" }, '
+        f"got {quoted(value)}"
+    )
