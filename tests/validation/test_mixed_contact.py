@@ -242,6 +242,12 @@ def test_a_grid_that_does_not_hold_the_contact_is_refused(on, said):
         solve_contact(contact(), barus(), flat_surface(on))
 
 
+def test_a_load_beyond_what_the_cap_bears_on_the_grid_is_refused():
+    bears = contact().load / (contact().line_length * COARSE.extent[0])  # the mean pressure over the grid
+    with pytest.raises(BadInput, match="bears 495 N at the most, and the load is 500 N"):
+        solved(flat_surface(COARSE), hardness=0.99 * bears)
+
+
 def test_a_start_or_grid_that_does_not_fit_says_so(usual):
     with pytest.raises(BadInput, match="a point contact needs a grid"):
         solve_contact(contact(geometry="point", length=None), barus(), flat_surface(COARSE))

@@ -54,8 +54,8 @@ def solve_contact(
     Raises
     ------
     BadInput
-        for a grid that does not hold the contact or repeats along the wrong axis, factors that do not fit it, or an
-        oil whose viscosity is no number at Hertz's pressure.
+        for a grid that does not hold the contact or repeats along the wrong axis, factors that do not fit it, a load
+        beyond what the hardness bears on it, or an oil whose viscosity is no number at Hertz's pressure.
     NotConverged
         when strict and the tolerance was not met; carries the unfinished solution.
     """
@@ -189,6 +189,20 @@ def _check_grid(conditions: ContactConditions, lubricant: Lubricant | None, surf
                 f"cells of {spacing * 1e6:.3g} um along {axis} leave fewer than 8 across the contact of "
                 f"{2.0 * half * 1e6:.3g} um; use more cells"
             )
+    _check_cap(conditions, grid)
+
+
+def _check_cap(conditions: ContactConditions, grid: Grid) -> None:
+    """BadInput where the whole grid at the pressure cap bears less than the load."""
+    if conditions.hardness is None:
+        return
+    x, y = grid.extent
+    most = conditions.hardness * x * (conditions.line_length if conditions.endless else y)
+    if most <= conditions.load:
+        raise BadInput(
+            f"at a hardness of {conditions.hardness / 1e9:.3g} GPa this grid bears {most:.3g} N at the most, and the "
+            f"load is {conditions.load:.4g} N; lower the load, check the hardness, or widen the grid"
+        )
 
 
 def _check_weight(conditions: ContactConditions, lubricant: Lubricant) -> None:
