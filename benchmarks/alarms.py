@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 import asperity
-from asperity.tracking.alarming import CRF_LEAST, LEVEL_LEAST
+from asperity.tracking.alarming import CRF_LEAST, LEVEL_LEAST, RMS, Warming
 from asperity.tracking.operating import ANY_CONTACT, LEVEL, Operating, conditions_of
 from asperity.wear import FALSE_ALARMS, Alarm, Sight, Watched, knee_weight, sequential_alarm, split_stages
 
@@ -24,7 +24,7 @@ KEPT = Path("build/alarms.json")
 CODE = Path(asperity.__file__).parent
 SOURCES = [
     Path(__file__),
-    *(CODE / "wear" / f"{name}.py" for name in ("alarm", "sequential", "regressors", "stages", "bends")),
+    *(CODE / "wear" / f"{name}.py" for name in ("alarm", "sequential", "regressors", "warming", "stages", "bends")),
     *(CODE / "tracking" / f"{name}.py" for name in ("alarming", "operating")),
 ]
 SERIES, RECORDINGS = 300, 40
@@ -248,7 +248,7 @@ RELIABLE = (
     "straight trend, 5 to 30 %",
 )
 BINS = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 1.01)
-CHANNELS = ("level", "velocity", "band 1", "band 2", "depth")
+CHANNELS = (RMS, "velocity", "band 1", "band 2", "depth")
 
 
 def judged(one: Drawn) -> Alarm:
@@ -273,7 +273,8 @@ def judged(one: Drawn) -> Alarm:
 
     sight = Sight() if np.isfinite(one.crf).any() else Sight("cannot-tell", "no contact resonance")
     watched = [crf, *levels] if np.isfinite(one.crf).any() else levels
-    return sequential_alarm(NUMBER, watched, [sight] * RECORDINGS, confirmed=severe)
+    excuses = Warming(NUMBER, watched[:1], levels, "").excuses
+    return sequential_alarm(NUMBER, watched, [sight] * RECORDINGS, confirmed=severe, excused=excuses)
 
 
 def _stated(values: np.ndarray | None) -> list[float | None]:

@@ -128,8 +128,7 @@ def lines(*, fast: bool = False) -> Iterator[str]:
             yield (
                 f"| {seconds:g} s at {rate_hz / 1e3:g} kHz | {fault} | {machines} | "
                 f"{sum(value > 0.0 for value in left)} | {sum(one.early for one in every)} | "
-                f"{np.median(delays):.0f} | {min(left):.0f} | "
-                f"{sum(one.claims > 0 for one in every)} |"
+                f"{np.median(delays):.0f} | {min(left):.0f} | {sum(one.claims > 0 for one in every)} |"
             )
 
 

@@ -17,7 +17,18 @@ from asperity.tracking.learned import Before
 from asperity.tracking.model import TrackedRecording
 from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, PULSES, Follows, Response, conditions_of
 from asperity.tracking.reading import Reading
-from asperity.wear import Alarm, Condition, Said, Sight, Stages, StageSource, Watched, knee_weight, sequential_alarm
+from asperity.wear import (
+    Alarm,
+    Condition,
+    Said,
+    Sight,
+    Stages,
+    StageSource,
+    Watched,
+    knee_weight,
+    sequential_alarm,
+    warm_up,
+)
 
 CRF_LEAST = 0.05  # of itself: the asperities' load share up by a third, (1.05)^6
 DAMPING_LEAST = 0.2  # of its logarithm
@@ -25,7 +36,8 @@ LEVEL_LEAST = float(np.log(2.0))  # 6 dB, which ISO 13373-1 takes for a change w
 BASELINE = 8  # recordings by which a CRF is counted from 1
 UNSEEN = 3  # recordings without a resonance, from which on nobody sees the contact
 LAST = "last"
-KURTOSIS = "kurtosis"
+KURTOSIS, CRF, RMS = "kurtosis", "CRF", "the level (rms)"
+LEFT = 0.4  # of the least change, which a warm-up may leave unexplained
 
 
 def raise_alarm(
@@ -56,21 +68,56 @@ def raise_alarm(
     BadInput
         for a recording that is not there, or a rate that is none.
     """
-    contact = _of_the_contact(tracked, source, response)
+    contact, levels = _of_the_contact(tracked, source, response), _levels(tracked, response)
+    x = np.array([one.x for one in tracked])
+    warming = Warming(x, contact, levels, unit)
     alarm = sequential_alarm(
-        np.array([one.x for one in tracked]),
-        [*contact, *_levels(tracked, response)],
+        x,
+        [*contact, *levels],
         _sights(tracked, contact),
         false_alarm_rate=false_alarm_rate,
         confirmed=lambda number: _severe(stages_of(tracked[: number + 1])),
+        excused=warming.excuses,
         acknowledged=_acknowledged(tracked, acknowledge),
         unit=unit,
         said=_said(tracked, before),
     )
-    if stages is not None and stages.kind == "severe" and acknowledge is None:
+    if (said_of := warming.said(len(tracked) - 1)) and acknowledge is None:
+        alarm = replace(alarm, explained="; ".join(filter(None, [alarm.explained, said_of])))
+    elif stages is not None and stages.kind == "severe" and acknowledge is None:
         chance = f"not yet beyond what chance does once in {1.0 / false_alarm_rate:.0f} recordings"
         alarm = alarm.alerted(f"a severe stage is found, {chance}", source)
     return _by_zone(tracked, _acknowledged(tracked, acknowledge), alarm)
+
+
+class Warming:
+    """A warm-up known by its shape, where nobody states the temperature that would tell it."""
+
+    def __init__(self, x: Field, contact: Sequence[Watched], levels: Sequence[Watched], unit: str) -> None:
+        crf = next((one for one in contact if one.name == CRF), None)
+        level = next((one for one in levels if one.name.startswith(RMS)), None)
+        self.x, self.unit, self.crf, self.level = x, unit, crf, level
+        self.names = {CRF, *(one.name for one in levels if one.loud)}
+        stated = [] if crf is None else [one.name for one in crf.conditions]
+        self.known = crf is not None and level is not None and "temperature" not in " ".join(stated)
+
+    def said(self, number: int) -> str:
+        """That recordings up to one look like a warm-up; nothing where they do not."""
+        if not self.known or self.crf is None or self.level is None:
+            return ""
+        upto = slice(number + 1)
+        found = warm_up(self.x[upto], self.crf.values[upto], self.level.values[upto])
+        if found is None or abs(found.left[0]) > LEFT * CRF_LEAST or abs(found.left[1]) > LEFT * LEVEL_LEAST:
+            return ""
+        length = f"{found.length:.2g} {self.unit}".rstrip()
+        return (
+            f"this looks like a warm-up: CRF {_moved(found.crf)} and {self.level.name} {_times(found.level)}, both by "
+            f"one exponential of length {length} from the beginning; state the oil's temperature to be sure"
+        )
+
+    def excuses(self, number: int, name: str) -> str:
+        """The same, of a change that it explains."""
+        return self.said(number) if name in self.names else ""
 
 
 def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> Said:
@@ -114,7 +161,7 @@ def _crf(tracked: Sequence[TrackedRecording], response: Response) -> Watched | N
     if not np.isfinite(crf).any():
         return None
     return Watched(
-        name="CRF",
+        name=CRF,
         values=crf / _usual(tracked),
         least=CRF_LEAST,
         contact=True,
@@ -183,7 +230,7 @@ def _levels_on(
         return {f"{words} {name}": _getter(several, name) for name in names}
 
     heard = {
-        "the level (rms)": quality_of("rms"),
+        RMS: quality_of("rms"),
         KURTOSIS: quality_of("kurtosis"),
         "velocity (rms)": lambda one: one.velocity,
     }

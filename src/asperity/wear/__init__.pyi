@@ -42,3 +42,5 @@ from .stages import StageKind as StageKind
 from .stages import Stages as Stages
 from .stages import StageSource as StageSource
 from .stages import split_stages as split_stages
+from .warming import WarmUp as WarmUp
+from .warming import warm_up as warm_up

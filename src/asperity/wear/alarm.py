@@ -145,6 +145,7 @@ def sequential_alarm(
     *,
     false_alarm_rate: float = FALSE_ALARMS,
     confirmed: Callable[[int], bool] = lambda _: True,
+    excused: Callable[[int, str], str] = lambda _number, _name: "",
     acknowledged: int = 0,
     unit: str = "",
     said: Said = NOTHING_SAID,
@@ -159,6 +160,8 @@ def sequential_alarm(
     false_alarm_rate : alarms without wear, a recording
     confirmed : whether the stage detector finds the severe stage in the recordings up to this one; asked before an
         alarm by the contact
+    excused : what else than wear explains a change up to a recording by the indicator of a name, in words, or nothing;
+        asked before an alarm or alert
     acknowledged : how many recordings somebody has looked at; what comes behind them is judged by itself
     unit : of x
     said : what earlier judgements have said, which stays as it was said
@@ -185,6 +188,8 @@ def sequential_alarm(
             continue
         found = [_looked_at(one, x, acknowledged, number) for one in watched]
         state, reason, raised_by = _decided(watched, found, sights[number], false_alarm_rate, unit, number, confirmed)
+        if state in ("alert", "alarm") and (shape := excused(number, raised_by)):
+            state, reason, raised_by = "none", shape, ""
         states.append(state)
     state = states[-1] if len(states) > acknowledged else "none"
     if len(states) == acknowledged:
