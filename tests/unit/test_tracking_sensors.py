@@ -7,7 +7,7 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.recording import ReadOptions
-from asperity.tracking import keep_track, store_overview, track_recordings
+from asperity.tracking import keep_track, store_overview, track_recordings, watch_folder
 from asperity.wear import line_shape
 
 RATE, SECONDS, BAND = 10_000.0, 4.0, (1800.0, 4000.0)
@@ -122,3 +122,32 @@ def test_a_copy_is_no_second_sensor(tmp_path):
         np.savez(tmp_path / f"{number}.npz", a=a, b=a, fs=RATE, unit="m/s^2")
     with pytest.raises(BadInput, match="sensors a and b hold the same samples in 0"):
         track_recordings([tmp_path], channel="a,b", band_hz=BAND)
+
+
+def test_one_watch_follows_one_sensor(both, tmp_path):
+    with pytest.raises(BadInput, match="one watch follows one channel, got a,b"):
+        watch_folder(both / "whole", tmp_path, channel="a,b", band_hz=BAND)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for name in "ab":
+        for number in range(2):
+            to = folder / f"{name}{number}.npz"
+            to.write_bytes((both / "apart" / to.name).read_bytes())
+            to.with_suffix(".npz.toml").write_text(f'sensor = "{name}"\n')
+    with pytest.raises(BadInput, match="one watch follows one sensor, and these recordings are of 2"):
+        list(watch_folder(folder, tmp_path / "out", band_hz=BAND, once=True, settle_s=0.0))
+
+
+def test_sensors_are_laid_beside_one_another_by_number_where_there_are_as_many(both, tmp_path):
+    for name in "ab":
+        for number in range(3):
+            to = tmp_path / f"{name}{number}.npz"
+            to.write_bytes((both / "apart" / to.name).read_bytes())
+            to.with_suffix(".npz.toml").write_text(f'sensor = "{name}"\n')
+    track = track_recordings([tmp_path], band_hz=BAND)
+    assert [one.x for one in track.recordings] == [1.0, 2.0, 3.0]
+    assert [[*one.on_sensors] for one in track.recordings] == [["a", "b"]] * 3
+    assert "needs 6 recordings of a sensor, and has 3" in track.verdict()
+    (tmp_path / "b2.npz").unlink()
+    with pytest.raises(BadInput, match="3 of a, 2 of b"):
+        track_recordings([tmp_path], band_hz=BAND)
