@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from asperity.arrays import Field
 from asperity.errors import BadInput, require_choice
+from asperity.quantities import with_deviation
 from asperity.wear.bends import (
     CONSTANT,
     FEWEST_PLACES,
@@ -374,7 +375,7 @@ def _course(one: _Series, found: Compared, split: float, stick: bool, scale: tup
     return _Course(
         sign=sign,
         flattens=flattens,
-        mean=f"damping holds at {np.exp(-mean):.3g} ± {error * np.exp(-mean):.2g}",
+        mean=f"damping holds at {with_deviation(float(np.exp(-mean)), error * float(np.exp(-mean)))}",
         way=f"damping {'falls' if sign > 0 else 'rises'}",
         words=f"damping {goes[0]} from {ratios[0]} to {ratios[1]} before and {on}to {ratios[2]} after"
         if changes
