@@ -177,7 +177,7 @@ def test_a_setting_that_was_tried_is_clicked_back(visit):
     page.wait_for_function("() => location.search.includes('entrainment')")
     changed(page, first)
     page.get_by_text(re.compile("^Solved on")).wait_for()
-    click_mark(page, "Load share over roughness of what was tried", 0)
+    click_mark(page, "Load share over roughness", 0)
     page.wait_for_function("() => !location.search.includes('entrainment')")
     assert page.get_by_role("textbox", name="Entrainment speed, u").input_value() == speed
     assert tile(page).inner_text() == first

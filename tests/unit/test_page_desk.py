@@ -111,6 +111,18 @@ def test_the_spectrum_is_the_runs_near_its_band(run, answer):
     assert peak == pytest.approx(sound.crf_hz, abs=2.0 * float(np.diff(sound.frequency[:2])[0]))
 
 
+def test_titles_that_follow_what_is_tried_have_room_on_a_phone(answer):
+    pytest.importorskip("panel")
+    from asperity.page.contact import _heard
+    from asperity.page.figures import Trail
+
+    trail = Trail(lambda _: None)
+    titles = [_heard(answer), trail.share.title.text, trail.pitch.title.text]
+    assert titles[0].startswith("CRF ")
+    assert f"fitted to ± {answer.sound.crf_std_hz:.1f} Hz" in titles[0]
+    assert max(map(len, titles)) <= 36  # of 390 pixels
+
+
 def test_hertzs_pressure_carries_the_load():
     x = np.linspace(-1.2, 1.2, 1201)
     y = np.linspace(-2.4, 2.4, 1201)

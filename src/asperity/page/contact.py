@@ -260,7 +260,7 @@ def _heard(answer: Answer) -> str:
         return f"No contact resonance: {sound.reason}"
     crf = quantity("crf_hz")
     fitted = f", fitted to ± {crf.text(sound.crf_std_hz)}" if sound.crf_std_hz is not None else ""
-    return f"Contact resonance at {crf.text(sound.crf_hz)}{fitted}"
+    return f"{crf.named(sound.crf_hz)}{fitted}"
 
 
 def layout(view: ContactView) -> tuple[dict[str, Any], list[dict[str, Any]]]:

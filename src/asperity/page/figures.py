@@ -272,8 +272,8 @@ class Trail:
     def __init__(self, chosen: Callable[[int], None]) -> None:
         self.source = ColumnDataSource({"sq": [], "clr": [], "crf": [], "alpha": []})
         self.last = ColumnDataSource({"sq": [], "clr": [], "crf": []})
-        self.share = self._plane("sq_m", "clr", "sq", "clr", "Load share over roughness of what was tried")
-        self.pitch = self._plane("sq_m", "crf_hz", "sq", "crf", "Resonance over roughness of what was tried")
+        self.share = self._plane("sq_m", "clr", "sq", "clr", "Load share over roughness")
+        self.pitch = self._plane("sq_m", "crf_hz", "sq", "crf", "Resonance over roughness")
         self.source.selected.on_change("indices", lambda _name, _old, new: chosen(new[0]) if new else None)
 
     def _plane(self, x: str, y: str, across: str, up: str, label: str) -> Any:
