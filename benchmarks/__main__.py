@@ -42,6 +42,7 @@ ALONE = (  # whose times are their result: nothing runs beside them; those first
     "bounded",
     "certified",
     "monitor",
+    "gallery",
 )
 ABREAST = (  # what is counted, on each processor one of these, each one part or some that need what another keeps
     ("inference", "forecast", "next_points", "rings"),  # the longest first
@@ -60,7 +61,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
 # short enough as they are, whatever is asked
-WHOLE = ("certified", "chosen_films", "first_call", "stress", "surfaces", "rollers")
+WHOLE = ("certified", "chosen_films", "first_call", "stress", "surfaces", "rollers", "gallery")
 ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors
 TIMES = "times"  # the part that says how long the others took
 

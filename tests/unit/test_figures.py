@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from importlib.util import module_from_spec, spec_from_file_location
 
 import pytest
-from benchmarks import kept
+from benchmarks import gallery, kept
 from test_prose import paragraphs, sentences
 
 from support.pages import SPAN, Line, Page, pages, read
@@ -173,3 +173,10 @@ def test_the_benchmarks_figure_is_drawn_from_its_csv(tmp_path):
     other.write_text("\n".join(",".join(row) for row in (head, *rows)), "utf-8")
     (axes,) = module.figure(other).axes
     assert 0.0123 in axes.lines[0].get_ydata()
+
+
+def test_every_script_of_the_gallery_was_timed_and_is_short():
+    _, *rows = kept.read(kept.FOLDER / "gallery.csv")
+    assert [name for name, _ in rows] == sorted(path.name for path in gallery.SCRIPTS.glob("[0-9]*.py"))
+    assert len(rows) >= 15
+    assert max(float(seconds) for _, seconds in rows) < gallery.MOST

@@ -1,0 +1,37 @@
+"""What each script of the gallery takes, in a process of its own, on one thread."""
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+SCRIPTS = Path(__file__).parents[1] / "docs" / "scripts"
+MOST = 60  # seconds of a processor
+
+
+def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short as it is
+    """A row a script."""
+    scripts = sorted(SCRIPTS.glob("[0-9]*.py"))
+    yield "## The gallery's scripts"
+    yield ""
+    yield f"Processor time of the whole script, imports too; {MOST} s are allowed."
+    yield ""
+    yield "| script | time [s] |"
+    yield "|---|---|"
+    for script in scripts:
+        yield f"| {script.name} | {_taken(script):.1f} |"
+
+
+def _taken(script: Path) -> float:
+    """Processor time of a script, its processes' included [s]."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with tempfile.TemporaryDirectory() as folder:
+        limited = {"MPLBACKEND": "agg", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+        subprocess.run(
+            [sys.executable, str(script)], cwd=folder, env=os.environ | limited, check=True, stdout=subprocess.DEVNULL
+        )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
