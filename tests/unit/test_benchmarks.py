@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 from benchmarks import __main__ as bench_main
-from benchmarks import kept, unfinished
+from benchmarks import chosen_grids, kept, unfinished
 from benchmarks.__main__ import PARTS, TIMES, WHOLE
 from benchmarks.unfinished import Unfinished
 
@@ -125,6 +125,22 @@ def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch,
 def test_a_part_that_had_no_time_says_so(tmp_path, part):
     said = [*importlib.import_module(f"benchmarks.{part}").tables(tmp_path)]
     assert any(line.startswith("Sample: 0 ") for line in said)
+
+
+def test_hard_contacts_are_gone_on_with_and_kept_as_they_are_solved(tmp_path, monkeypatch):
+    solved = []
+
+    def solve(sample, _model, _most, finer):
+        solved.append((sample, finer))
+        return chosen_grids.Outcome((8, 8), True, 0.1, 0.5, (0.4, 0.6), True)
+
+    monkeypatch.setattr(chosen_grids, "KEPT", tmp_path)
+    monkeypatch.setattr(chosen_grids, "solved", solve)
+    assert list(chosen_grids.kept_pairs({10: "late", 9: "early"}, float("inf"))) == [9, 10]
+    pairs = chosen_grids.kept_pairs({9: "early", 11: "later"}, float("-inf"))
+    assert solved == [(name, finer) for name in ("late", "early") for finer in (1.0, 1.5)]
+    assert list(pairs) == [9, 10]
+    assert "2 of 2 solved on the chosen grid, median 0.1 s" in chosen_grids.summary(list(pairs.values()))
 
 
 def test_what_other_code_has_done_is_not_gone_on_with(tmp_path, monkeypatch):
