@@ -13,15 +13,21 @@ from scipy.io import wavfile
 from asperity.case import load_case
 from asperity.errors import BadInput
 from asperity.inference import (
+    Forward,
     Observation,
+    Point,
     build_emulator,
     design_contact,
+    extend_emulator,
     forecast_observations,
     infer_observations,
     listen,
     setting_of,
+    with_further,
 )
+from asperity.inference.posterior import emulated_share, posterior_shares
 from asperity.report import write_inference_report
+from asperity.study import overrides_at, plan_points, run_study
 from asperity.tracking import read_table
 from support.emulated import SMALL, formula_emulator, formula_setting
 from support.recordings import SHARED
@@ -63,6 +69,43 @@ def test_an_emulator_interrupted_goes_on(small, tmp_path):
         again = build_emulator(setting, folder=tmp_path / "half", executor=executor)
     at = np.full((1, 3), 0.4)
     assert again.values(at, "clr") == pytest.approx(emulator.values(at, "clr"), abs=1e-6)
+
+
+def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
+    """Contacts solved anew, that neither has seen: their error falls; and the extended one is what comes back."""
+    setting, first, folder = small
+    shutil.copytree(folder, tmp_path / "own")
+    emulator = replace(first, folder=tmp_path / "own")
+    points = [Point(load, speed) for load in (420.0, 580.0) for speed in (1.2, 2.8)]
+    z = np.zeros((1, len(setting.unknowns)))
+    shown = Forward(setting, emulator, tuple(points)).shown(z, "hertz-point")
+    heard = [
+        Observation(load_n=point.load_n, entrainment_m_s=point.entrainment_m_s, crf_hz=hertz, crf_std_hz=3.0)
+        for point, hertz in zip(points, np.exp(shown.crf[0]), strict=True)
+    ]
+    found = infer_observations(setting, emulator, heard)
+    with ThreadPoolExecutor(1) as executor:
+        wider = with_further(found, 24, executor=executor)
+        near = posterior_shares(found.forward, found.draws, 12, seed=99)
+        plan = plan_points(
+            setting.case, [overrides_at(setting.case, setting.ranges, one) for one in near], seeds=6, kind="still"
+        )
+        solved = run_study(plan, executor=executor).table
+    truth = solved.groupby("point")["clr"].mean().to_numpy()
+    before, after = (np.sqrt(np.mean((one.values(near, "clr") - truth) ** 2)) for one in (emulator, wider.emulator))
+    assert after < before
+    assert (wider.emulator.points, wider.emulator.further) == (40, 24)
+    assert f"makes {100 * emulated_share(wider.forward, wider.draws):.0f} % of the variance of CLR" in wider.notes[-1]
+    assert "before it was extended by 24 points where the posterior is" in wider.notes[-1]
+    again = build_emulator(setting, folder=tmp_path / "own")
+    assert np.array_equal(again(near, ["clr"])["clr"], wider.emulator(near, ["clr"])["clr"])
+    assert again.quality == wider.emulator.quality
+    kept = with_further(infer_observations(setting, formula_emulator(setting), heard), 8)
+    assert "it was not extended" in kept.notes[-1]
+    with pytest.raises(BadInput, match="holds no emulator"):
+        extend_emulator(setting, replace(emulator, folder=tmp_path), near)
+    with pytest.raises(BadInput, match="has 4096 points at most"):
+        extend_emulator(setting, replace(emulator, points=4090), near)
 
 
 def test_noise_cannot_be_told_by_command(asp, small):

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 from benchmarks import __main__ as bench_main
-from benchmarks import chosen_grids, kept, unfinished
+from benchmarks import chosen_grids, forecast, kept, next_points, unfinished
 from benchmarks.__main__ import PARTS, TIMES, WHOLE
+from benchmarks.rows import Rows
 from benchmarks.unfinished import Unfinished
 
 LINES = [
@@ -121,10 +122,10 @@ def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch,
     assert kept.sample(bench_main._said("certified", whole=whole, seconds=1.0)) == (7.0 if len(said) > 1 else 0.0)
 
 
-@pytest.mark.parametrize("part", ["forecast", "next_points"])
-def test_a_part_that_had_no_time_says_so(tmp_path, part):
-    said = [*importlib.import_module(f"benchmarks.{part}").tables(tmp_path)]
-    assert any(line.startswith("Sample: 0 ") for line in said)
+def test_a_part_that_had_no_time_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(forecast, "ROWS", tmp_path / "none.csv")
+    for said in (forecast.tables(), next_points.tables(tmp_path)):
+        assert any(line.startswith("Sample: 0 ") for line in said)
 
 
 def test_hard_contacts_are_gone_on_with_and_kept_as_they_are_solved(tmp_path, monkeypatch):
@@ -227,3 +228,18 @@ def test_named_parts_run_alone_and_leave_a_cut_off_run_as_it_is(bench):
     assert ran[1:] == ["b False", "c False", "d False"]
     assert "Going on with the run of then, after a" in printed
     assert "| a | 2 | measured |" in printed
+
+
+def test_rows_of_many_runs_add_up_and_say_whose_they_are(tmp_path):
+    path = tmp_path / "machines.csv"
+    first = Rows(path, ("machine", "law"))
+    first.code = "abc"
+    assert (1, "own") not in first
+    first.write([{"machine": 1, "law": "own", "clr": 0.123456}, {"machine": 1, "law": "other", "clr": ""}])
+    again = Rows(path, ("machine", "law"))
+    again.code = "def+"
+    assert (1, "own") in again
+    assert (1, "other") in first
+    again.write([{"machine": 2, "law": "own", "clr": 12345678.0}])
+    assert path.read_text("utf-8") == "code,machine,law,clr\nabc,1,own,0.1235\nabc,1,other,\ndef+,2,own,1.235e+07\n"
+    assert Rows(path, ("machine", "law")).codes() == "abc (2), def+ (1)"

@@ -91,9 +91,9 @@ def with_further(found: Inference, most: int, *, sampler: Sampler = "importance"
     """The same with an emulator that is extended where the posterior is, by up to `most` points; and a note of it.
 
     In rounds, each a posterior, as long as the emulator's own variance is more than a tenth of CLR's over the
-    posterior, on its scale, at the case's own operating point or any that was heard. Points are contacts drawn from
-    the posterior, at these operating points in turn; they are kept with the emulator. `how` is as `build_emulator`
-    takes it.
+    posterior, on its scale, at the case's own operating point. Further points are contacts drawn from the posterior, at
+    this operating point and those that were heard in turn; they are kept with the emulator. `how` is as
+    `build_emulator` takes it.
 
     Raises
     ------

@@ -165,10 +165,10 @@ def posterior_draws(
 
 
 def emulated_share(forward: Forward, draws: Draws) -> float:
-    """Share of CLR's variance over the posterior that is the emulator's own, on its scale: the largest of all."""
-    _, std = forward.emulated(draws.z, [CLR])[CLR]
-    whole = np.var(OUTPUTS[CLR].forward(draws.states[CLR]), axis=0)
-    return float(np.max(np.minimum(np.mean(std**2, axis=0) / whole, 1.0)))
+    """Share of CLR's variance over the posterior, on its scale, that is the emulator's own: at the case's own point."""
+    _, std = replace(forward, points=forward.points[:1]).emulated(draws.z, [CLR])[CLR]
+    whole = np.var(OUTPUTS[CLR].forward(draws.states[CLR][:, 0]))
+    return float(min(np.mean(std**2) / whole, 1.0))
 
 
 def posterior_shares(forward: Forward, draws: Draws, count: int, seed: int) -> Field:
