@@ -269,8 +269,8 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
 
 def tables() -> Iterator[str]:
     """Shares of intervals that hold, with 90 % of the binomial, and widths, as Markdown: of all rows that are kept."""
-    rows = Rows(ROWS, ("machine", "law"))
-    every = list(rows)
+    kept = Rows(ROWS, ("machine", "law"))
+    every = list(kept)
     yield "## Intervals of 90 % that hold the truth, of simulated machines"
     yield (
         "| truth | points | machines | CLR held | CLR held, laws exact | Sq held | Sq held, laws exact | stage held "
@@ -308,7 +308,7 @@ def tables() -> Iterator[str]:
     silent = {row["machine"] for row in every if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"}
     yield (
         f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of {len(silent)} too few "
-        f"recordings show a line, and nothing is said. Rows by the code that found them: {rows.codes()}."
+        f"recordings show a line, and nothing is said. Rows by the code that found them: {kept.codes()}."
     )
 
 

@@ -243,3 +243,14 @@ def test_rows_of_many_runs_add_up_and_say_whose_they_are(tmp_path):
     again.write([{"machine": 2, "law": "own", "clr": 12345678.0}])
     assert path.read_text("utf-8") == "code,machine,law,clr\nabc,1,own,0.1235\nabc,1,other,\ndef+,2,own,1.235e+07\n"
     assert Rows(path, ("machine", "law")).codes() == "abc (2), def+ (1)"
+
+
+def test_the_rows_that_are_kept_make_the_tables():
+    from benchmarks.inference import ROWS, tables
+
+    lines = list(tables())
+    rows = list(Rows(ROWS, ("machine", "law")))
+    assert lines[-1].startswith(f"{len({row['machine'] for row in rows})} machines with 12 surfaces")
+    told = [line for line in lines if line.startswith("| as the emulator has it | 6 |")]
+    heard = [row for row in rows if (row["law"], row["points"]) == ("as the emulator has it", "6") and row["clr_true"]]
+    assert f"| {len(heard)} |" in told[0]
