@@ -167,8 +167,8 @@ def posterior_draws(
 def emulated_share(forward: Forward, draws: Draws) -> float:
     """Share of CLR's variance over the posterior, on its scale, that is the emulator's own: at the case's own point."""
     _, std = replace(forward, points=forward.points[:1]).emulated(draws.z, [CLR])[CLR]
-    whole = np.var(OUTPUTS[CLR].forward(draws.states[CLR][:, 0]))
-    return float(min(np.mean(std**2) / whole, 1.0))
+    whole = float(np.var(OUTPUTS[CLR].forward(draws.states[CLR][:, 0])))
+    return min(float(np.mean(std**2)) / whole, 1.0)
 
 
 def posterior_shares(forward: Forward, draws: Draws, count: int, seed: int) -> Field:
