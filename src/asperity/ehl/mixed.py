@@ -192,8 +192,9 @@ def _evaluate(
     solid, solid_residual = _borne_by(problem, pressure, borne, touching, free)
 
     sunk = (solid == FREE) & (touching < 0.0) & ~yields
-    lacking = np.where(sunk, film.content_by_gap * (gap - problem.contact_gap), 0.0)
-    outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
+    if np.any(sunk):
+        lacking = np.where(sunk, film.content_by_gap * (gap - problem.contact_gap), 0.0)
+        outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
 
     closed = (solid != FREE) & (gap <= (1.0 + CLOSED_WITHIN) * problem.contact_gap)
     shut = closed | ((touching <= 0.0) & ~sunk)
@@ -329,7 +330,9 @@ def transported(problem: Problem, content: Field) -> Field:
     """What each cell gains and passes on of a content that moves with the oil, upwind to first order, (nx, ny)."""
     past, dx = problem.past, problem.spacing[0]
     if past is None or not past.followed:
-        outflow = np.diff(content, axis=0, prepend=np.zeros_like(content[:1])) / dx
+        outflow = content.copy()
+        outflow[1:] -= content[:-1]
+        outflow /= dx
     else:
         outflow = np.zeros_like(content)
         if not problem.conserve:

@@ -55,6 +55,7 @@ class MixedLinear:
             self.lean_own, self.lean_upstream = (part.astype(self.real) for part in lean_slopes(balance))
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale)
+        self.scale = np.where(self.lubricated, self.rows.fluid_scale, self.real(0.0))
         self.film = Film(*(part.astype(self.real) for part in balance.film))
         self.faces = single_faces(balance.faces, dtype)
         self.content_by_gap, self.content_by_pressure = self.film.content_by_gap, self.film.content_by_pressure
@@ -107,11 +108,11 @@ class MixedLinear:
         """What the first rows of followed oil draw in by the wedge is left out, as in `asperity.ehl.linear`."""
         if past is None:
             return None
-        scaled = self.rows.fluid_scale * self.real(past.rate)
+        scaled = self.scale * self.real(past.rate)
         return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
 
     def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
-        """Changes of the oil's equations and, in touching cells, of the asperities'; zero elsewhere."""
+        """Changes of the oil's equations and of touching cells'; of the unknown itself where it is known."""
         problem = self.balance.problem
         d_gap = problem.deflection(d_total)
         if d_approach:
@@ -132,22 +133,18 @@ class MixedLinear:
             rest = transported(problem, self.missing_by_oil * d_oil + self.surplus_by_gap * d_height)
             d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
             upwind_at_outlet(problem, d_content, rest)
-            wet += rest * self.rows.fluid_scale
+            wet += rest * self.scale
         elif self.leans:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
-            wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.rows.fluid_scale
-        zero = self.real(0.0)
-        return (
-            np.where(self.lubricated, wet, zero),
-            np.where(self.touching, d_gap * self.real(self.rows.contact_scale), zero),
-        )
+            wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.scale
+        return wet, d_gap * self.real(self.rows.contact_scale)
 
-    def answer(self, wet: Field, closed: Field) -> tuple[Field, Field]:
-        """Approximate changes of the oil's pressure and of touching cells' total pressure that answer both rows."""
+    def answer(self, wet: Field) -> Field:
+        """Approximate change of the oil's pressure that answers its rows; touching cells' answer themselves."""
         change = self.blocks(wet)
         if self.follows_wedge:
             change *= self.real(OVER)
-        return self.lines(wet, change), closed
+        return self.lines(wet, change)
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
         """Change of the total pressure: the oil's in free cells, their own in touching ones."""
@@ -158,11 +155,71 @@ class MixedLinear:
         return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
 
 
+class _Step:
+    """Newton's step as one vector: of the oil, of the total pressure of touching cells, and of the approach.
+
+    The last equation is the missing load, or nothing where the bodies are held.
+    """
+
+    def __init__(self, linear: MixedLinear) -> None:
+        self.linear, self.problem = linear, linear.balance.problem
+        self.count, self.touching = linear.balance.gap.size, np.flatnonzero(linear.touching)
+        self.moves = self.problem.held is None
+        self.weight = linear.real(1.0 / np.sqrt(self.count))
+        self.bearing = (linear.free & linear.full if linear.conserves else linear.free).astype(linear.real)
+        by_approach = linear.of_gap(np.zeros(linear.cells, linear.real), np.ones(linear.cells, linear.real))
+        self.response = self._answered(
+            self.joined(np.where(linear.lubricated, by_approach[0], 0.0), by_approach[1], 0.0)
+        )
+        self.whole = self._borne(self.response)
+
+    def joined(self, oil: Field, solid: Field, last: float) -> Field:
+        """A vector of what is known of the oil, of touching cells (both (nx, ny)) and of the load or the approach."""
+        vector = np.empty(self.count + self.touching.size + 1, self.linear.real)
+        vector[: self.count], vector[self.count : -1], vector[-1] = oil.ravel(), solid.ravel()[self.touching], last
+        return vector
+
+    def oil(self, vector: Field) -> Field:
+        """The part of the oil, (nx, ny)."""
+        return vector[: self.count].reshape(self.linear.cells)
+
+    def total(self, vector: Field) -> Field:
+        """Change of the total pressure, (nx, ny): the oil's in free cells, their own in touching ones."""
+        total: Field = self.oil(vector) * self.bearing
+        total.ravel()[self.touching] = vector[self.count : -1]
+        return total
+
+    def product(self, vector: Field) -> Field:
+        """The linearised equations applied to it."""
+        total, rows = self.total(vector), np.empty_like(vector)
+        wet, closed = self.linear.product(self.oil(vector), total, float(vector[-1]))
+        rows[: self.count], rows[self.count : -1] = wet.ravel(), closed.ravel()[self.touching]
+        rows[-1] = self.weight * total.sum() if self.moves else vector[-1]
+        return rows
+
+    def precondition(self, rows: Field) -> Field:
+        """About what answers them."""
+        change = self._answered(rows)
+        if self.moves:
+            d_approach = self.linear.real((self._borne(change) - rows[-1] / self.weight) / self.whole)
+            change -= d_approach * self.response
+            change[-1] = d_approach
+        return change
+
+    def _answered(self, rows: Field) -> Field:
+        change = rows.copy()
+        change[: self.count] = self.linear.answer(self.oil(rows)).ravel()
+        return change
+
+    def _borne(self, vector: Field) -> float:
+        """By how much more the pressures bear."""
+        return float(vector[: self.count] @ self.bearing.ravel() + vector[self.count : -1].sum())
+
+
 def newton_step(balance: MixedBalance) -> Pressures:
     """Changes of all unknowns that meet every linearised equation, and the load, to a tenth."""
     linear, problem = MixedLinear(balance), balance.problem
-    cells, real, count = linear.cells, linear.real, balance.gap.size
-    zero = real(0.0)
+    real, zero = linear.real, linear.real(0.0)
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
     known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
     known = np.where(linear.free, linear.pressure_of(known_oil) - balance.solid_residual, known)
@@ -170,54 +227,17 @@ def newton_step(balance: MixedBalance) -> Pressures:
     if np.any(known_oil) or np.any(known):
         by_known = linear.product(known_oil.astype(real), known.astype(real), 0.0)
         wet, closed = wet - by_known[0], closed - by_known[1]
-    wet = np.where(linear.lubricated, wet, zero).astype(real)
-    closed = np.where(linear.touching, closed, zero).astype(real)
     dx, dy = problem.spacing
-    moves = problem.held is None
-    missing = -balance.load_error * problem.load / (dx * dy) - known.sum() if moves else 0.0
-
-    # unknowns: of the oil, of touching cells and, last, the approach; last equation: the missing load, or none
-    weight = real(1.0 / np.sqrt(count))
-    by_approach = linear.of_gap(np.zeros(cells, real), np.ones(cells, real))
-    response = linear.answer(*by_approach)
-    whole = float(linear.total(*response).sum())
-    if whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
+    step = _Step(linear)
+    missing = -balance.load_error * problem.load / (dx * dy) - known.sum() if step.moves else 0.0
+    if step.whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
         return Pressures(known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale)
-
-    touching = np.flatnonzero(linear.touching)
-
-    def split(vector: Field) -> tuple[Field, Field]:
-        solid = np.zeros(count, real)
-        solid[touching] = vector[count:-1]
-        return vector[:count].reshape(cells), solid.reshape(cells)
-
-    def joined(oil: Field, solid: Field, last: float) -> Field:
-        vector = np.empty(count + touching.size + 1, real)
-        vector[:count], vector[count:-1], vector[-1] = oil.ravel(), solid.ravel()[touching], last
-        return vector
-
-    def product(vector: Field) -> Field:
-        d_oil, d_closed = split(vector)
-        d_total = linear.total(d_oil, d_closed)
-        wet, closed = linear.product(d_oil, d_total, float(vector[-1]))
-        carried = float(weight * d_total.sum()) if moves else float(vector[-1])
-        return joined(np.where(linear.lubricated, wet, d_oil), closed, carried)
-
-    def precondition(vector: Field) -> Field:
-        d_oil, d_closed = linear.answer(*split(vector))
-        if not moves:
-            return joined(d_oil, d_closed, float(vector[-1]))
-        d_approach = float((linear.total(d_oil, d_closed).sum() - vector[-1] / weight) / whole)
-        return joined(d_oil - d_approach * response[0], d_closed - d_approach * response[1], d_approach)
-
-    wanted = joined(wet, closed, float(weight * missing))
+    wanted = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))
     left = LEFT_SMOOTH if linear.follows_wedge else LEFT
     if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
         left = LEFT_NEAR
-    solved = gmres(product, precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
-    d_oil, d_closed = split(solved)
-    d_oil = known_oil + np.where(linear.lubricated, d_oil, zero)
-    d_total = np.where(
-        linear.free, linear.pressure_of(d_oil) - balance.solid_residual, np.where(linear.touching, d_closed, known)
-    )
+    solved = gmres(step.product, step.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
+    d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
+    d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
+    d_total.ravel()[step.touching] = solved[step.count : -1]
     return Pressures(d_oil, d_total, float(solved[-1]))

@@ -118,7 +118,7 @@ class _TwoPressures:
     def answer(self, rows: Field) -> Field:
         """As in Newton's step, but that touching cells answer together: here none of them changes sides."""
         wet, gap_rows = self._split(rows)
-        oil, _ = self.linear.answer(wet, gap_rows)
+        oil = self.linear.answer(wet)
         return self._joined(oil, self.deflection.undone(gap_rows * self.real(1.0 / self.linear.rows.contact_scale)))
 
     def pressures(self, vector: Waves) -> tuple[Any, Any]:

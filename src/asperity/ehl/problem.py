@@ -254,7 +254,8 @@ class Problem:
             3.0 * ambient / height[[0, -1]],
         )
         if least_mobility > 0.0:
-            film = film.no_stiffer_than(least_mobility * (self.contact_gap / height) ** 3)
+            closed = self.contact_gap / height
+            film = film.no_stiffer_than(least_mobility * closed * closed * closed)
         east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty((6, *self.cells))
         faces = Faces(
             east,

@@ -15,6 +15,7 @@ from asperity.ehl.problem import Problem
 from asperity.ehl.search import COARSE_TOLERANCE
 from asperity.ehl.transfer import interpolated
 
+DRY = 1e-2  # what the dry contact of bodies that yield is met to by Newton's steps: oil moves it far more
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
 
 
@@ -62,9 +63,9 @@ def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool
     """Where Newton's steps lead, and whether that is near enough for a start."""
     for step in newton(dry, pressure, approach):
         left = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if left < COARSE_TOLERANCE or step.number == MOST_DRY:
+        if left < DRY or step.number == MOST_DRY:
             break
-    return step, left < COARSE_TOLERANCE
+    return step, left < DRY
 
 
 def handed_up(problem: Problem, unknowns: Pressures) -> Pressures:
