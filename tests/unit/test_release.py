@@ -177,6 +177,14 @@ def test_the_package_stays_small():
     )
 
 
+def test_the_pythons_that_are_claimed_are_those_that_were_tested():
+    """3.14 is named where it is said that it was not."""
+    claimed = {one.rpartition(" ")[2] for one in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d", one)}
+    said = (ROOT / "docs" / "project" / "how-it-was-made.md").read_text("utf-8")
+    assert claimed == {"3.11", "3.12", "3.13"}
+    assert "tested on 3.11 to 3.13; 3.14 was not" in said
+
+
 def test_what_a_bug_report_says_has_versions_and_no_paths():
     command = [sys.executable, "-m", "asperity", "--version", "--verbose"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
