@@ -15,9 +15,7 @@ from .files import Place as Place
 from .files import Table as Table
 from .files import read_table as read_table
 from .files import recordings_in as recordings_in
-from .model import OnSensor as OnSensor
 from .model import Track as Track
-from .model import TrackedRecording as TrackedRecording
 from .operating import ZERO_CELSIUS as ZERO_CELSIUS
 from .operating import Operating as Operating
 from .order import unacknowledged as unacknowledged
@@ -26,6 +24,8 @@ from .overview import acknowledge_in as acknowledge_in
 from .overview import keep_track as keep_track
 from .overview import store_overview as store_overview
 from .reading import Reading as Reading
+from .recorded import OnSensor as OnSensor
+from .recorded import TrackedRecording as TrackedRecording
 from .target import Target as Target
 from .target import search_target as search_target
 from .track import track_recordings as track_recordings

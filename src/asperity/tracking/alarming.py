@@ -14,9 +14,9 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.tracking.learned import Before
-from asperity.tracking.model import TrackedRecording
 from asperity.tracking.operating import ANY_CONTACT, DAMPING, LEVEL, PULSES, Follows, Response, conditions_of
 from asperity.tracking.reading import Reading
+from asperity.tracking.recorded import TrackedRecording
 from asperity.wear import (
     Alarm,
     Condition,

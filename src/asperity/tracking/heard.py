@@ -17,9 +17,9 @@ from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.tracking.alike import COPIED, on_one_grid, spectrum_of, without_silence
 from asperity.tracking.files import Place, in_their_places
-from asperity.tracking.model import OnSensor, TrackedRecording
 from asperity.tracking.operating import operating_of
 from asperity.tracking.reading import Reading
+from asperity.tracking.recorded import OnSensor, TrackedRecording
 from asperity.tracking.target import Target
 from asperity.wear import (
     FEWEST_RECORDINGS,

@@ -20,10 +20,11 @@ from asperity.tracking.alike import copies, on_one_grid, spectrum_of, without_si
 from asperity.tracking.files import Place, Table, in_their_places, read_table, recordings_in
 from asperity.tracking.heard import heard_together, recording_of
 from asperity.tracking.learned import Before, Learned
-from asperity.tracking.model import Track, TrackedRecording
+from asperity.tracking.model import Track
 from asperity.tracking.operating import response_of, unstated
 from asperity.tracking.order import unacknowledged
 from asperity.tracking.reading import WINDOW, Reading, any_of, channels_in, common_spacing, read_spectra
+from asperity.tracking.recorded import TrackedRecording
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
     FALSE_ALARMS,
