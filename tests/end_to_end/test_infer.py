@@ -149,6 +149,7 @@ def test_refusals_are_one_sentence(asp):
         (("a.wav", "--case", "infer.toml", "--worn", "d"), "give --forecast, too"),
         (("a.wav", "--case", "infer.toml", "--forecast", "crf=3 kHz"), "--forecast takes a limit such as clr=0.5"),
         (("a.wav", "--case", "infer.toml", "--forecast", "clr=nan"), "a limit of CLR must lie between 0 and 1"),
+        (("a.wav", "--case", "infer.toml", "--forecast", "clr=0.5", "--worn", "d"), "d holds no wear"),
         (("a.wav", "--case", "infer.toml", "--forecast", "sq=1 m"), "a limit of Sq must lie within what [infer]"),
         (("--case", "infer.toml", "--design", "nan"), "--design must be a load share between 0 and 1"),
         (("empty", "--case", "infer.toml"), "holds no recordings"),

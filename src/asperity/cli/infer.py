@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from asperity import inference, processes, report
+from asperity import ageing, inference, processes, report
 from asperity import surface as surfaces
 from asperity.cli import options
 from asperity.cli.ahead import contacts_solved, emulated, require_forecast
@@ -18,7 +18,8 @@ from asperity.errors import BadInput, require_choice
 from asperity.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.inference import Design, Forecast, Inference, Sampler, Setting
+    from asperity.ageing import WearHistory
+    from asperity.inference import Design, Emulator, Forecast, Inference, Limit, Listened, Sampler, Setting
     from asperity.wear import SeriesMethod
 
 
@@ -69,6 +70,9 @@ def infer(
     require_choice("--sampler", sampler, inference.SAMPLERS)
     setting, known = _setting(case_file, overrides, surface)
     limit = None if forecast is None else inference.read_limit(forecast, setting)
+    if limit is not None:
+        inference.require_limit(setting, limit, worn=worn is not None)
+    history = None if worn is None else ageing.load_wear(worn)
     if design is not None:
         inference.require_share("--design", design)
     require_output(page, ".html", option="--report")
@@ -80,17 +84,33 @@ def infer(
                 shaft_hz=shaft or None, method=cast("SeriesMethod | None", method), workers=count,
             )  # fmt: skip
     answering = emulated(setting, emulator, count, quiet=quiet)
-    ahead = None if limit is None else inference.forecast_heard(setting, answering, heard, limit, worn=worn, seed=seed)
+    ahead = _forecast(setting, answering, heard, limit, history, seed)
     now = inference.latest(heard) if ahead is not None and ahead.told else heard
     now = replace(now, notes=(*now.notes, *known))
     by = cast("Sampler", sampler)
     found = inference.infer_heard(setting, answering, now, sampler=by, seed=seed)
     with contacts_solved(quiet=quiet) as step:
         found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
+    if found.emulator is not answering:
+        ahead = _forecast(setting, found.emulator, heard, limit, history, seed)
     kept = None if design is None else inference.design_contact(found.forward, found.draws.z, clr=design)
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)
     _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
+
+
+def _forecast(
+    setting: "Setting",
+    emulator: "Emulator",
+    heard: "Listened",
+    limit: "Limit | None",
+    history: "WearHistory | None",
+    seed: int,
+) -> "Forecast | None":
+    """When the limit is crossed; None where nobody asked."""
+    if limit is None:
+        return None
+    return inference.forecast_heard(setting, emulator, heard, limit, worn=history, seed=seed)
 
 
 def _setting(path: Path, overrides: list[str] | None, surface: Path | None) -> tuple["Setting", tuple[str, ...]]:
