@@ -140,6 +140,16 @@ def test_indicators_that_contradict_each_other_have_no_stage():
     assert "damping rises" in found.verdict
 
 
+def test_a_damping_that_holds_contradicts_nothing():
+    """A break in the damping alone may be the likeliest break of a CRF that goes straight: it is none for that."""
+
+    def straight(x):
+        return np.interp(x, [0.54, 3.49], [2900.0, 3750.0])
+
+    found = [trial(seed, crf=straight, damping=lambda x: level(x, 0.02), source="both", x=SQ) for seed in range(20)]
+    assert {one.kind for one in found} == {"no distinct stage"}
+
+
 @pytest.mark.parametrize("source", ["damping", "both"])
 def test_damping_known_at_too_few_places_is_not_determined(source):
     ratio = np.where(SQ < 2.0, narrowing(SQ), np.nan)

@@ -204,8 +204,9 @@ def _bayesian(x: Field, x_std: Field, series: Sequence[_Series], crfa: Field | N
     scatter = outcome.each[0].scatter if source != "damping" else np.nan
     after = after_break(x, x_std, breaks, outcome.density)
     low, split, high = quantiles(breaks, outcome.density, (0.05, 0.5, 0.95))
+    bent = outcome.broken < min(outcome.smooth, outcome.constant)  # else no series is taken to break
     courses = [
-        _course(one, outcome.each[number], split, outcome.sticks[number], (start, reach), unit)
+        _course(one, outcome.each[number], split, bent and outcome.sticks[number], (start, reach), unit)
         for number, one in enumerate(series)
     ]
     signs = {course.sign for course in courses} - {0}
