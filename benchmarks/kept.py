@@ -12,7 +12,7 @@ from pathlib import Path
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER, PAGE = DOCS / "benchmarks", DOCS / "benchmarks.md"
 CHANGED = 0.1  # relative, from which a number is told: less is a shared machine's mood
-IN_FULL, IN_SHORT = "Measured in full.", "Measured in short; `--whole` takes all of it."
+IN_FULL, IN_SHORT = "Measured in full.", "Measured in short; `python -m benchmarks --whole` takes all of it."
 SAMPLE = re.compile(r"Sample: (\d+) ")  # what a part says that goes on as long as it has time
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
