@@ -62,19 +62,12 @@ def infer(
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
-    if case_file is None:
-        raise BadInput("asperity infer needs the contact; give --case CASE.toml")
-    require_forecast(forecast, worn=worn)
-    if not paths and (design is None or forecast is not None):
-        raise BadInput("asperity infer needs recordings; name files, or their folder")
-    require_choice("--sampler", sampler, inference.SAMPLERS)
+    case_file = _required(case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design)
     setting, known = _setting(case_file, overrides, surface)
     limit = None if forecast is None else inference.read_limit(forecast, setting)
     if limit is not None:
         inference.require_limit(setting, limit, worn=worn is not None)
     history = None if worn is None else ageing.load_wear(worn)
-    if design is not None:
-        inference.require_share("--design", design)
     require_output(page, ".html", option="--report")
     count, heard = workers or processes.cores(), inference.Listened()
     if paths:
@@ -85,8 +78,8 @@ def infer(
             )  # fmt: skip
     answering = emulated(setting, emulator, count, quiet=quiet)
     ahead = _forecast(setting, answering, heard, limit, history, seed)
-    now = inference.latest(heard) if ahead is not None and ahead.told else heard
-    now = replace(now, notes=(*now.notes, *known))
+    latest = inference.latest(heard) if ahead is not None and ahead.told else heard
+    now = replace(latest, notes=(*latest.notes, *known))
     by = cast("Sampler", sampler)
     found = inference.infer_heard(setting, answering, now, sampler=by, seed=seed)
     with contacts_solved(quiet=quiet) as step:
@@ -97,6 +90,27 @@ def infer(
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)
     _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
+
+
+def _required(
+    case_file: Path | None,
+    paths: list[Path] | None,
+    *,
+    sampler: str,
+    forecast: str | None,
+    worn: Path | None,
+    design: float | None,
+) -> Path:
+    """The contact's file, where everything else that was asked for goes with it."""
+    if case_file is None:
+        raise BadInput("asperity infer needs the contact; give --case CASE.toml")
+    require_forecast(forecast, worn=worn)
+    if not paths and (design is None or forecast is not None):
+        raise BadInput("asperity infer needs recordings; name files, or their folder")
+    require_choice("--sampler", sampler, inference.SAMPLERS)
+    if design is not None:
+        inference.require_share("--design", design)
+    return case_file
 
 
 def _forecast(

@@ -223,12 +223,8 @@ def _bayesian(x: Field, x_std: Field, series: Sequence[_Series], crfa: Field | N
         reason = "asperities that take load over raise CRF and let damping fall: one of them is not the contact's."
         return without("disagree", f"{sentence}; {reason}", outcome.evidence, unknown, scatter)
     if outcome.broken - outcome.apart >= STRONG_EVIDENCE:
-        own = " and ".join(
-            f"{IN_WORDS[one.indicator]} at {start + reach * _own_break(found):.3g}"
-            for one, found in zip(series, outcome.each, strict=True)
-        )
-        sentence = f"No common stage over {over}: {own} change their pace, and one break does not explain both"
-        verdict = f"{sentence} (BIC {outcome.broken - outcome.apart:+.1f} against it)."
+        own = [start + reach * _own_break(found) for found in outcome.each]
+        verdict = _no_common(series, own, outcome.broken - outcome.apart, over)
         return without("no distinct stage", verdict, outcome.evidence, unknown, scatter)
     if outcome.smooth - outcome.broken < STRONG_EVIDENCE:
         verdict = (
@@ -261,6 +257,13 @@ _NAMES: dict[StageKind, tuple[str, tuple[str, str]]] = {
     "steepening": ("Wear gathers pace from", ("steady", "steepening")),
     "running-in": ("Running-in until", ("running-in", "steady")),
 }
+
+
+def _no_common(series: Sequence[_Series], own: Sequence[float], against: float, over: str) -> str:
+    """The verdict where each indicator breaks at a place of its own."""
+    places = " and ".join(f"{IN_WORDS[one.indicator]} at {place:.3g}" for one, place in zip(series, own, strict=True))
+    sentence = f"No common stage over {over}: {places} change their pace, and one break does not explain both"
+    return f"{sentence} (BIC {against:+.1f} against it)."
 
 
 def _too_few(indicator: Indicator, places: int) -> str:
