@@ -52,8 +52,9 @@ def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):
     code, out, _ = asp("solve", "case.toml")
     assert code == 0
     scalars = json.loads(asp("solve", "case.toml", "--json")[1])
-    coarse = "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4 are needed): "
-    assert out.splitlines()[0].startswith(f"{coarse}on this grid asperities carry ")
+    coarse = "Grid too coarse, CLR not determined (3.3 cells along the correlation length in x, where 4 are needed; "
+    unknown = "no coarser grid tells how far it may be off): "
+    assert out.splitlines()[0].startswith(f"{coarse}{unknown}on this grid asperities carry ")
     assert (scalars["determined"], scalars["cells"]) == (False, [64, 64])
     assert f"{100 * scalars['clr']:.1f} % of the load (± not determined" in out.splitlines()[0]
     assert f"on {100 * scalars['car']:.1f} % of the Hertz zone" in out.splitlines()[0]

@@ -161,6 +161,19 @@ def test_the_verdict_says_that_the_grid_is_too_coarse():
     assert fine.verdict().startswith("Full film")
 
 
+def test_a_chosen_grid_of_few_cells_still_has_a_coarser_one_that_tells_its_error():
+    """Long waves in a dry contact ask for few cells; CLR was called determined without an interval there."""
+    case = load_case(SOFT).with_overrides({"lubricant": "none", "grid": {"accuracy": 0.05}})
+    run = solve_case(case)
+    assert case.grid.cells == (96, 64)
+    assert run.error.clr.numerical is not None
+    assert run.determined
+    coarse = solve_case(case.with_overrides({"grid": {"cells": [64, 64], "accuracy": None}}))
+    assert coarse.error.clr.numerical is None
+    assert coarse.determined is False
+    assert "no coarser grid tells how far it may be off" in coarse.verdict()
+
+
 def test_films_that_carry_nothing_need_no_inlet():
     """Towards no speed the inlet vanishes, and CLR is 1 on any grid."""
     surface = gaussian_surface(

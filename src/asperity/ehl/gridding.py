@@ -21,6 +21,8 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface, correlation_lengths
 
 ACCURACY = 0.01  # of the film, unless another is asked for
+FEWEST_COARSE_CELLS = 48  # along the longer axis of a coarser grid, which starts a finer one and tells its error
+FEWEST_BESIDE = 16  # along an axis that is halved together with a longer one
 FEWEST_IN_INLET = 4.0  # cells, below which the film is wrong: 1 % thin at four, 4 % at two, and no film at one
 FEWEST_IN_CORRELATION = 4.0  # cells along a correlation length, below which asperities are not what they are
 CELLS_IN_INLET = {"smooth line": 9.0, "smooth": 4.5, "rough": 5.0}  # at ACCURACY; errors fall with their square
@@ -74,8 +76,8 @@ def auto_grid(
     The inlet begins where no more than half of `accuracy` of the inlet's pressure is still missing (twice of it in a
     rough contact), at most 30 half-widths out; the domain holds asperities out to where 2.5 Sq no longer reach. Cells:
     4.5 across the inlet length, 9 of a smooth line contact, 5 of a rough contact; 8 along a correlation length; 20
-    across the Hertz zone; more or fewer with the root of `accuracy`. A rough contact has about 130000 cells at most;
-    `grid_shortfalls` says where they are too few.
+    across the Hertz zone; more or fewer with the root of `accuracy`. A rough contact has 96 by 32 cells at least, so that
+    a coarser grid tells its error, and about 130000 at most; `grid_shortfalls` says where they are too few.
 
     Parameters
     ----------
@@ -294,6 +296,8 @@ def _cells(
             wanted = max(wanted[0] / fewer, fewest[0]), max(wanted[1] / fewer, fewest[1])
         too_many = max(1.0, math.sqrt(wanted[0] * wanted[1] / (1.15 * most)))
         wanted = wanted[0] / too_many, wanted[1] / too_many
+    if texture is not None:  # so many that a coarser grid tells how far the load share may be off
+        wanted = max(wanted[0], 2.0 * FEWEST_COARSE_CELLS), max(wanted[1], 2.0 * FEWEST_BESIDE)
     return _even(wanted[0]), _even(wanted[1])
 
 

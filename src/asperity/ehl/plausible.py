@@ -79,9 +79,12 @@ def undetermined(solution: ContactSolution, clr: Uncertainty) -> str | None:
     """Why the solution's grid cannot tell CLR, of which `clr` says how far it may be off; None where it can."""
     reasons = list(grid_shortfalls(solution.conditions, solution.lubricant, solution.surface))
     # between smooth bodies the coarser grid touches because it does not show the inlet, which this one does
-    if solution.surface.sq > 0.0 and clr.numerical is not None and max(clr.numerical) > WIDEST_BAR:
-        bar, most = (quantity("clr").text(value) for value in (max(clr.numerical), WIDEST_BAR))
-        reasons.append(f"an error bar of {bar}, where at most {most} tell something")
+    if solution.surface.sq > 0.0:
+        if clr.numerical is None:
+            reasons.append("no coarser grid tells how far it may be off")
+        elif max(clr.numerical) > WIDEST_BAR:
+            bar, most = (quantity("clr").text(value) for value in (max(clr.numerical), WIDEST_BAR))
+            reasons.append(f"an error bar of {bar}, where at most {most} tell something")
     return "; ".join(reasons) or None
 
 

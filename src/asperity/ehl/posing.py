@@ -8,15 +8,13 @@ from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.along import Along
 from asperity.ehl.films import least_films
-from asperity.ehl.gridding import inlet_length
+from asperity.ehl.gridding import FEWEST_BESIDE, FEWEST_COARSE_CELLS, inlet_length
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
 from asperity.ehl.problem import Form, Problem
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
-FEWEST_COARSE_CELLS = 48
-FEWEST_BESIDE = 16  # along an axis that is halved together with a longer one
 FEWEST_IN_COARSE_INLET = 2.0
 
 
