@@ -11,7 +11,7 @@ from asperity.ehl import Options, contact_state, mixed_iterate, solve_contact, s
 from asperity.ehl.dry import dry_contact
 from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.mixed_iterate import newton
-from asperity.ehl.mixed_linear import MixedLinear
+from asperity.ehl.mixed_linear import MixedLinear, foreseen
 from asperity.ehl.mixed_solve import MixedSearch
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
@@ -19,7 +19,7 @@ from asperity.ehl.shares import carried_share
 from asperity.ehl.starts import dry_start
 from asperity.ehl.state import balance_of
 from asperity.grid import Grid
-from asperity.kernels.reynolds import LUBRICATED, TOUCHING
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING
 from asperity.lubricant import Roelands
 from asperity.surface import flat_surface, gaussian_surface
 from support.paper import barus, contact, grid, rough
@@ -186,6 +186,52 @@ def test_newtons_steps_know_how_the_wedge_leans():
     ]
     slope = (outflows[0] - outflows[1]) / (2.0 * tiny) * balance.rows.fluid_scale
     np.testing.assert_allclose(wet[balance.solved], slope[balance.solved], atol=1e-6 * np.abs(wet).max())
+
+
+def test_newtons_steps_know_how_the_wedge_opens_where_the_gap_has_settled():
+    """Cells that open by half a contact film lean over: the outflow's slopes, but for what has not settled."""
+    surface = rough(COARSE, 1e-6, correlation_length=20e-6)
+    problem = contact_problem(contact(load=500.0), barus(), surface, Options(contact_film=0.1e-6))
+    start = 0.01 + 0.1 * hertz_pressure(problem)  # so that no mobility is the least one
+    shape = evaluate(problem, Pressures(start, start, 0.0), second_order=True).gap
+    at = Pressures(start, start, float(1.01 * problem.contact_gap - shape.min()))
+    balance = evaluate(problem, at, second_order=True)
+    opening = balance.gap < 1.5 * problem.contact_gap
+    assert balance.parted.all()
+    assert opening.sum() > 2
+    change = np.random.default_rng(3).standard_normal(start.shape) * balance.solved
+    tiny, scale = 1e-7, balance.rows.fluid_scale
+    outflows = [
+        evaluate(problem, Pressures(*(start + way * change,) * 2, at.approach), second_order=True).outflow
+        for way in (tiny, -tiny)
+    ]
+    slope = ((outflows[0] - outflows[1]) / (2.0 * tiny) * scale)[balance.solved]
+    held, told = (
+        MixedLinear(balance, float, settled).product(change, change, 0.0)[0][balance.solved]
+        for settled in (None, np.ones(start.shape, dtype=bool))
+    )
+    np.testing.assert_allclose(told, slope, atol=1e-4)
+    assert np.abs(held - slope).max() > 0.05
+
+
+def test_oil_that_fills_a_streak_of_closed_cells_goes_on_in_one_step():
+    """Ruptured cells that the cap holds closed are solved with those that fill, downstream and no farther."""
+    problem = contact_problem(contact(speed=10.0, hardness=0.9e9), barus(), rough(COARSE, 2e-6, seed=7), MIXED)
+    total, approach, _ = dry_contact(replace(problem, lubricant=None, contact_gap=0.0), hertz_pressure(problem))
+    oil = np.where(np.random.default_rng(5).random(total.shape) < 0.3, 0.3 * total, 0.0)
+    before = evaluate(problem, Pressures(oil, total, approach), second_order=False)
+    after = foreseen(before)
+    closed = (before.solid == CAPPED) & (before.gap <= 1.01 * problem.contact_gap)
+    fills, expected = np.zeros(problem.cells[1], dtype=bool), np.zeros(problem.cells, dtype=bool)
+    for i in range(problem.cells[0]):
+        fills = closed[i] & (fills | ((before.rows.state[i] == LUBRICATED) & (before.oil_residual[i] < 0.0)))
+        expected[i] = fills & (before.rows.state[i] == RUPTURED)
+    assert expected.sum() > 20
+    np.testing.assert_array_equal(after.rows.state != before.rows.state, expected)
+    assert (after.rows.state[expected] == LUBRICATED).all()
+    balanced = (before.outflow * before.rows.fluid_scale)[expected]
+    np.testing.assert_array_equal(after.oil_residual[expected], balanced)
+    np.testing.assert_array_equal(after.oil_residual[~expected], before.oil_residual[~expected])
 
 
 def test_the_asperities_bear_what_the_oil_does_not():

@@ -16,7 +16,10 @@ from asperity.kernels import relax, reynolds, stencils
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
 from asperity.kernels.stencils import Far, Stencil
 
-MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors
+MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors, where it has one more
+MOST_FACTORED, FEWEST_PAIRED = 1500, 16  # cells of the last grid of several; along an axis that is halved
+TURNS = 2  # of blocks and lines, on each of them
+LEAST_PIVOT = 0.02  # of a row's nearest entries, where it may vanish
 LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
 
 
@@ -110,10 +113,10 @@ class Linear:
 class LineRelaxation:
     """Zebra relaxation of a stencil of five points, or seven with `far` ones: its x lines are solved exactly.
 
-    Even, odd and even ones in turn.
+    Even, odd and even ones in turn. Lines of five, and `sums` over blocks, are not dominated by their centres.
     """
 
-    def __init__(self, stencil: Stencil, far: Far | None = None) -> None:
+    def __init__(self, stencil: Stencil, far: Far | None = None, *, sums: bool = False) -> None:
         nx, ny = stencil.centre.shape
         nothing = np.empty((0, 0), stencil.centre.dtype)
         self.stencil, self.far = stencil, far or Far(nothing, nothing)
@@ -121,7 +124,7 @@ class LineRelaxation:
             near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
             beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
             lines = relax.Lines(*near, *beyond)
-            relax.factor_lines(stencil, self.far, parity, lines)
+            relax.factor_lines(stencil, self.far, parity, LEAST_PIVOT if far or sums else 0.0, lines)
             if parity:
                 self.odd = lines
             else:
@@ -137,29 +140,78 @@ class LineRelaxation:
         relax.add_lines(even, odd, change)
         return change
 
+    def left(self, residual: Field, change: Field) -> Field:
+        """What the stencil leaves of a residual after a change, both (nx, ny)."""
+        even, odd = (np.empty_like(part.lower) for part in (self.even, self.odd))
+        relax.split_residual(self.stencil, self.far, residual, change, even, odd)
+        left = np.zeros_like(residual)
+        relax.add_lines(even, odd, left)
+        return left
+
 
 class SingularFactor(ArithmeticError):
     """Linearised equations that have no solution, or no single one."""
 
 
 class Blocks:
-    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
+    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU.
 
-    def __init__(self, stencil: Stencil, weight: Field) -> None:
-        self.weight, cells = weight, weight.shape
-        self.block = (_block(cells[0]), _block(cells[1]))
-        nx, ny = (-(-n // size) for n, size in zip(cells, self.block, strict=True))
-        self.pattern = five_point_pattern((nx, ny))
-        coarse = Stencil(*np.empty((5, nx, ny)))
+    Or `nested`: summed over blocks of two by two again and again, relaxed in between, and factored at last.
+    """
+
+    def __init__(self, stencil: Stencil, weight: Field, *, nested: bool = False) -> None:
+        self.weight, (nx, ny) = weight, weight.shape
+        self.block = (_pair(nx), _pair(ny)) if nested else (_block(nx), _block(ny))
+        self.cells = -(-nx // self.block[0]), -(-ny // self.block[1])
+        coarse = Stencil(*np.empty((5, *self.cells)))
         relax.aggregate_stencil(stencil, weight, self.block, coarse)
-        self.factors = self.pattern.factored(coarse)
+        relaxed = nested and coarse.centre.size > MOST_FACTORED
+        self.inverse = Relaxed(coarse, weight.dtype) if relaxed else Factored(coarse)
 
     def __call__(self, residual: Field) -> Field:
         """The change, one number a block, that answers a residual; none in cells without weight."""
-        coarse, change = np.empty(self.pattern.cells), np.zeros_like(self.weight)
+        coarse, change = np.empty(self.cells), np.zeros_like(self.weight)
         relax.restrict(residual, self.weight, self.block, coarse)
-        relax.prolong(self.pattern.solve(self.factors, coarse), self.weight, self.block, change)
+        relax.prolong(self.inverse(coarse), self.weight, self.block, change)
         return change
+
+
+class Factored:
+    """A five-point stencil and its LU factors."""
+
+    def __init__(self, stencil: Stencil) -> None:
+        nx, ny = stencil.centre.shape
+        self.pattern = five_point_pattern((nx, ny))
+        self.factors = self.pattern.factored(stencil)
+
+    def __call__(self, wanted: Field) -> Field:
+        """What the stencil turns into `wanted`, (nx, ny)."""
+        return self.pattern.solve(self.factors, wanted)
+
+
+class Relaxed:
+    """A five-point stencil's approximate inverse: its blocks' answer and its lines relaxed, in turns."""
+
+    def __init__(self, stencil: Stencil, dtype: Any) -> None:
+        self.scale = np.asarray(sum(np.abs(part) for part in stencil))
+        scaled = Stencil(*((part / self.scale).astype(dtype) for part in stencil))
+        empty = (stencil.centre == 1.0) & (self.scale == 1.0)  # a block without any cells
+        self.blocks = Blocks(scaled, np.where(empty, 0.0, self.scale).astype(dtype), nested=True)
+        self.lines = LineRelaxation(scaled, sums=True)
+
+    def __call__(self, wanted: Field) -> Field:
+        """About what the stencil turns into `wanted`, (nx, ny)."""
+        residual = (wanted / self.scale).astype(self.blocks.weight.dtype)
+        change = self.lines(residual, self.blocks(residual))
+        for _ in range(TURNS - 1):
+            change += self.blocks(self.lines.left(residual, change))
+            self.lines(residual, change)
+        return change
+
+
+def _pair(cells: int) -> int:
+    """How many cells along an axis the next coarser grid puts into one."""
+    return 1 if cells < FEWEST_PAIRED else 2
 
 
 def _block(cells: int) -> int:

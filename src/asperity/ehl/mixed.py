@@ -19,7 +19,7 @@ oil at the cap has pressed the gap open.
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -286,22 +286,44 @@ def _lean(problem: Problem, content: Field, gap: Field) -> Field:
     """
     upstream = _upstream(problem, content)
     lean = upstream * content / (upstream**2 + content**2)
-    closed = problem.contact_gap
-    opened = np.clip((gap - closed) / (OPEN_FROM * closed), 0.0, 1.0)
+    opened = _opened(problem, gap)
     lean *= opened
     lean[1:] *= opened[:-1]
     lean[0] = 0.0
     return lean
 
 
+def _opened(problem: Problem, gap: Field) -> Field:
+    """How open each cell is, 0 to 1, (nx, ny)."""
+    closed = problem.contact_gap
+    return np.asarray(np.clip((gap - closed) / (OPEN_FROM * closed), 0.0, 1.0))
+
+
 def lean_slopes(balance: MixedBalance) -> tuple[Field, Field]:
     """How far the wedge leans for a change of each cell's content, and back for one of that upstream, both (nx, ny).
 
-    Of m₁ m₂/(m₁² + m₂²) (m₂ - m₁); how open the cells are is held.
+    Of m₁ m₂/(m₁² + m₂²) (m₂ - m₁); how open the cells are is held, see `opening_slopes`.
     """
     content, upstream = balance.film.content, _upstream(balance.problem, balance.film.content)
     bend = (content - upstream) ** 2 * (content + upstream) / (content**2 + upstream**2)
     return balance.lean * (1.0 - bend / content), balance.lean * (1.0 - bend / upstream)
+
+
+def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]:
+    """How the wedge leans more at some eastern faces as some of the `moved` cells open: faces, cells and slopes.
+
+    Both as flat indices of cells, a cell once for its own face and once for the next one downstream.
+    """
+    problem, (_, ny) = balance.problem, balance.problem.cells
+    opened, content = _opened(problem, balance.gap).ravel(), balance.film.content.ravel()
+    cells = np.flatnonzero(moved.ravel() & (opened > 0.0) & (opened < 1.0))
+    faces = np.concatenate([cells, cells + ny])
+    inner = (faces >= ny) & (faces < content.size - ny)
+    faces, cells = faces[inner], np.tile(cells, 2)[inner]
+    here, upstream = content[faces], content[faces - ny]
+    other = np.where(faces == cells, opened[faces - ny], opened[faces])
+    leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
+    return faces, cells, leaning * other / (OPEN_FROM * problem.contact_gap)
 
 
 def _beyond_first_order(problem: Problem, content: Field, lean: Field, *, second_order: bool) -> Field:

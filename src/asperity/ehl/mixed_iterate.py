@@ -20,6 +20,7 @@ LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one st
 BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
 FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
 CLOSE, AWAY = 0.03, 1.5  # from less left than this (rms, of p_h), a step that leaves so many times as much is halved
+SETTLED = 0.1  # contact films by which a step has moved a gap at most whose opening the next one follows
 SHORTEST_CUT = 0.1  # until it is shorter than this share
 
 
@@ -54,16 +55,16 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change = 0.0, np.inf
     lowest, idle, share = np.inf, 0, 1.0
-    balance = evaluate(problem, unknowns, second_order=second_order)
+    balance, settled = evaluate(problem, unknowns, second_order=second_order), np.zeros(problem.cells, dtype=bool)
     for number in count():
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         try:
-            step = newton_step(balance)
+            step = newton_step(balance, settled)
         except SingularFactor:  # strayed so far that no step leads on
             yield Step(number + 1, balance, unknowns.approach, np.inf)
             return
-        change = float(np.mean(np.abs(step.total)) / wanted_mean)
+        change, gap = float(np.mean(np.abs(step.total)) / wanted_mean), balance.gap
         idle += 1
         if balance.residual_rms < PROGRESS * lowest:
             lowest, idle = balance.residual_rms, 0
@@ -79,6 +80,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         approach_before = step.approach
         by = Pressures(d_oil, d_total, float(np.clip(step.approach, -furthest, furthest)))
         balance = _led(_Moves(balance, by, share), second_order=second_order)
+        settled = np.abs(balance.gap - gap) < SETTLED * problem.contact_gap
 
 
 def _led(moves: _Moves, *, second_order: bool) -> MixedBalance:

@@ -10,15 +10,26 @@ cells let decay. And mobilities answer: beside asperities the oil's pressure cha
 this outweighs the mobilities themselves.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.arrays import Field, Mask
 from asperity.ehl.krylov import gmres
 from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces
-from asperity.ehl.mixed import FREE, MixedBalance, Pressures, added_by_lean, lean_slopes, transported, upwind_at_outlet
-from asperity.ehl.problem import Past
+from asperity.ehl.mixed import (
+    FREE,
+    OPEN_FROM,
+    MixedBalance,
+    Pressures,
+    added_by_lean,
+    lean_slopes,
+    opening_slopes,
+    transported,
+    upwind_at_outlet,
+)
+from asperity.ehl.problem import CLOSED_WITHIN, Past
 from asperity.kernels import reynolds, stencils
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
 from asperity.kernels.stencils import Far, Stencil
@@ -28,13 +39,15 @@ LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly strai
 LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... from so little left on, of followed oil that may not be lost: met far closer
 OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
 MOST_KRYLOV_STEPS = 60
+FEWEST_NESTED = 128  # cells along both axes from which on blocks are nested
+NEARLY_CLOSED = 0.1  # of the flattened cells: fewer are nearly closed where bodies touch firmly
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
 
 
 class MixedLinear:
     """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny)."""
 
-    def __init__(self, balance: MixedBalance, dtype: Any = np.float32) -> None:
+    def __init__(self, balance: MixedBalance, dtype: Any = np.float32, settled: Mask | None = None) -> None:
         self.balance, problem = balance, balance.problem
         self.cells, self.real = problem.cells, dtype
         self.full = balance.rows.state == LUBRICATED
@@ -61,11 +74,16 @@ class MixedLinear:
         self.content_by_gap, self.content_by_pressure = self.film.content_by_gap, self.film.content_by_pressure
         self.kept = self._kept(problem.past)
         self.follows_oil = problem.past is not None and problem.past.followed
+        self.opening = None
+        if self.leans and settled is not None and not self.follows_oil:
+            self.opening = opening_slopes(balance, settled)
         if self.follows_oil:
             self.film = self.film.followed
         stencil, far = self._stencil()
         self.blocks = Blocks(
-            stencil, np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
+            stencil,
+            np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0)),
+            nested=not self.follows_wedge and min(self.cells) >= FEWEST_NESTED,
         )
         self.lines = LineRelaxation(stencil, far)
 
@@ -137,6 +155,11 @@ class MixedLinear:
         elif self.leans:
             d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
             wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.scale
+        if self.opening is not None:
+            faces, cells, slopes = self.opening
+            through = (slopes / spacing[0]).astype(self.real) * d_gap.ravel()[cells]
+            for row, sign in ((faces, 1.0), (faces + self.cells[1], -1.0)):
+                np.add.at(wet.ravel(), row, self.real(sign) * through * self.scale.ravel()[row])
         return wet, d_gap * self.real(self.rows.contact_scale)
 
     def answer(self, wet: Field) -> Field:
@@ -216,9 +239,51 @@ class _Step:
         return float(vector[: self.count] @ self.bearing.ravel() + vector[self.count : -1].sum())
 
 
-def newton_step(balance: MixedBalance) -> Pressures:
-    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth."""
-    linear, problem = MixedLinear(balance), balance.problem
+def flattened(balance: MixedBalance) -> Mask:
+    """Cells that the cap holds closed: no oil that comes lifts them."""
+    closed = balance.gap <= (1.0 + CLOSED_WITHIN) * balance.problem.contact_gap
+    return np.asarray(closed & (balance.solid == CAPPED))
+
+
+def foreseen(balance: MixedBalance) -> MixedBalance:
+    """The same, but that flattened cells without oil are lubricated as far down the stream as oil fills those before.
+
+    A cell is ruptured until oil has come to it: oil that fills a streak of closed cells would go on by one a step.
+    """
+    closed = flattened(balance)
+    fills = closed & (balance.rows.state == LUBRICATED) & (balance.oil_residual < 0.0)
+    for before, here, shut in zip(fills, fills[1:], closed[1:], strict=False):
+        here |= before & shut
+    reached = fills & (balance.rows.state == RUPTURED) & ~balance.problem.rim
+    return replace(
+        balance,
+        rows=balance.rows._replace(state=np.where(reached, np.int8(LUBRICATED), balance.rows.state)),
+        oil_residual=np.where(reached, balance.outflow * balance.rows.fluid_scale, balance.oil_residual),
+    )
+
+
+def firm(balance: MixedBalance) -> bool:
+    """Whether few cells are nearly closed beside those that are flattened.
+
+    Where many are, films of about the contact film close and open from step to step, and how they open at one of them
+    tells little of the next.
+    """
+    gap, film = balance.gap, balance.problem.contact_gap
+    nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPEN_FROM) * film)
+    return bool(nearly.sum() < NEARLY_CLOSED * flattened(balance).sum())
+
+
+def newton_step(balance: MixedBalance, settled: Mask | None = None) -> Pressures:
+    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
+
+    How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly.
+    """
+    problem = balance.problem
+    stands = not problem.conserve and problem.past is None and problem.held is None
+    if stands:
+        balance = foreseen(balance)
+    settled = settled if stands and firm(balance) else None
+    linear = MixedLinear(balance, settled=settled)
     real, zero = linear.real, linear.real(0.0)
     known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
     known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)

@@ -12,8 +12,6 @@ from asperity.arrays import Field
 from asperity.kernels.compiled import njit
 from asperity.kernels.stencils import Far, Stencil
 
-LEAST_PIVOT = 0.02  # of a row's nearest entries
-
 
 class Lines(NamedTuple):
     """Every second x line of a stencil: its LU factors, and the couplings to the lines on both sides; (nx, lines).
@@ -31,15 +29,15 @@ class Lines(NamedTuple):
 
 
 @njit(cache=True)
-def factor_lines(stencil: Stencil, far: Far, parity: int, lines: Lines) -> None:
+def factor_lines(stencil: Stencil, far: Far, parity: int, least_pivot: float, lines: Lines) -> None:
     """Eliminate every second x line, starting with `parity`, in place of `lines`.
 
-    Where an odd number of lines goes round, the first and the last are not coupled. Lines of five are not dominated by
-    their centres: a pivot that vanishes beside its row is replaced.
+    Where an odd number of lines goes round, the first and the last are not coupled. A pivot below the share
+    `least_pivot` of its row's nearest entries is replaced by that; none for 0.
     """
     reaching = lines.far_east.size > 0
     nx, ny = stencil.centre.shape
-    one = stencil.centre.dtype.type(1.0)
+    one, least = stencil.centre.dtype.type(1.0), stencil.centre.dtype.type(least_pivot)
     count = lines.lower.shape[1]
     for i in range(nx):
         for k in range(count):
@@ -64,9 +62,9 @@ def factor_lines(stencil: Stencil, far: Far, parity: int, lines: Lines) -> None:
                 lines.lower[i, k] = factor
             else:
                 lines.lower[i, k] = 0.0
-            if reaching:
-                least = LEAST_PIVOT * (abs(stencil.west[i, j]) + abs(stencil.centre[i, j]) + abs(stencil.east[i, j]))
-                pivot = max(pivot, least)
+            if least > 0.0:
+                row = abs(stencil.west[i, j]) + abs(stencil.centre[i, j]) + abs(stencil.east[i, j])
+                pivot = max(pivot, least * row)
             lines.inverse[i, k] = one / pivot
         if ny % 2 == 1 and parity == 0:
             lines.north[i, count - 1] = 0.0
