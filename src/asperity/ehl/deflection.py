@@ -8,12 +8,15 @@ Source: K. L. Johnson, Contact Mechanics (1985), eqs 2.24b and 3.25; the Fourier
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 import scipy
 
 from asperity.arrays import Field
 
+BETWEEN, THROUGH = 1, 2  # where a mirror across y stands: behind the last line of cells, or in its middle
+COSINES: dict[int, Literal[2, 3]] = {BETWEEN: 2, THROUGH: 3}  # transforms into those counted from the mirror on
 FAR = 8  # cells along x beyond which the compliance counts as a background
 ALL_OF_K0 = 40.0  # to which its integral from 0 is π/2 to the last digit
 NEAR_ALIASES, FAR_ALIASES, NEAR_CELLS = 200, 2, 3
@@ -24,26 +27,42 @@ class Deflection:
     """Compliance of every cell on every other.
 
     `spectrum` is the transformed kernel, in double and in single precision, `padded` the lengths it was transformed at
-    and `row` the compliance of cells 0, 1, ... along x on one line, shape (nx,).
+    and `row` the compliance of cells 0, 1, ... along x on one line, shape (nx,). With a `mirror` (0 for none) cells end
+    there, and their image presses too.
     """
 
     cells: tuple[int, int]
     padded: tuple[int, int]
     spectrum: tuple[Field, Field]
     row: Field
+    mirror: int = 0
 
     def __call__(self, pressure: Field) -> Field:
         """Surface displacement V of a pressure P, both dimensionless, shape (nx, ny) and of one precision."""
-        (nx, ny), (long, wide) = self.cells, self.padded
-        waves = scipy.fft.fft(scipy.fft.rfft(pressure, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        waves = self._waves(pressure)
         waves *= self.spectrum[pressure.dtype == np.float32]
-        return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
+        return self._field(waves)
 
     def undone(self, displacement: Field) -> Field:
         """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
-        (nx, ny), (long, wide) = self.cells, self.padded
-        waves = scipy.fft.fft(scipy.fft.rfft(displacement, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        waves = self._waves(displacement)
         waves /= np.abs(self.spectrum[displacement.dtype == np.float32])  # a line contact's mean has a sign of its own
+        return self._field(waves)
+
+    def _waves(self, field: Field) -> np.ndarray:
+        """Of a padded field; with a mirror those along x of cosines across, counted from there."""
+        long, wide = self.padded
+        if self.mirror:
+            cosines = scipy.fft.dct(field[:, ::-1], type=COSINES[self.mirror], n=wide, axis=1)
+            return np.asarray(scipy.fft.rfft(cosines, n=long, axis=0))
+        return np.asarray(scipy.fft.fft(scipy.fft.rfft(field, n=wide, axis=1), n=long, axis=0, overwrite_x=True))
+
+    def _field(self, waves: np.ndarray) -> Field:
+        """What has these waves, (nx, ny)."""
+        (nx, ny), (long, wide) = self.cells, self.padded
+        if self.mirror:
+            cosines = scipy.fft.irfft(waves, n=long, axis=0, overwrite_x=True)[:nx]
+            return np.ascontiguousarray(scipy.fft.idct(cosines, type=COSINES[self.mirror], axis=1)[:, ny - 1 :: -1])
         return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
 
     def among(self, lines: int) -> "Deflection":
@@ -61,12 +80,20 @@ class Deflection:
 
 
 @lru_cache(maxsize=16)
-def deflection(cells: tuple[int, int], spacing: tuple[float, float], compliance: float, periodic: bool) -> Deflection:
-    """Compliance of a grid; spacing in Hertz half-widths."""
+def deflection(
+    cells: tuple[int, int], spacing: tuple[float, float], compliance: float, periodic: bool, mirror: int = 0
+) -> Deflection:
+    """Compliance of a grid, up to a mirror if there is one; spacing in Hertz half-widths."""
     nx, ny = cells
     # zero padded to no less than twice the length: the outlet must not feel the inlet
     padded = scipy.fft.next_fast_len(2 * nx - 1), ny if periodic else scipy.fft.next_fast_len(2 * ny - 1, real=True)
-    if periodic:
+    if mirror:
+        lines = 2 * ny + 1 - mirror
+        padded = scipy.fft.next_fast_len(2 * nx - 1, real=True), scipy.fft.next_fast_len(lines, real=True)
+        kernel = compliance * _love_kernel((nx, lines), spacing)
+        row = kernel[:, 0].copy()
+        spectrum = scipy.fft.rfft(_mirrored(_cosines(kernel, padded[1], mirror), padded[0]), axis=0).real
+    elif periodic:
         kernel = 2.0 * compliance * _line_kernel(cells, spacing)
         row = scipy.fft.irfft(kernel, n=ny, axis=1)[:, 0]
         spectrum = scipy.fft.fft(_mirrored(kernel, padded[0]), axis=0).real
@@ -77,7 +104,14 @@ def deflection(cells: tuple[int, int], spacing: tuple[float, float], compliance:
     both = np.ascontiguousarray(spectrum), spectrum.astype(np.float32)
     for array in (*both, row):
         array.flags.writeable = False
-    return Deflection(cells, padded, both, row)
+    return Deflection(cells, padded, both, row, mirror)
+
+
+def _cosines(kernel: Field, count: int, mirror: int) -> Field:
+    """The waves across y of a kernel of distances 0, 1, ..., made even about 0: whole ones, or halves in between."""
+    if mirror == BETWEEN:
+        return np.asarray(scipy.fft.dct(kernel, type=1, n=count + 1, axis=1)[:, :count])
+    return np.asarray(scipy.fft.dct(kernel, type=3, n=count, axis=1))
 
 
 def _mirrored(kernel: Field, length: int) -> Field:

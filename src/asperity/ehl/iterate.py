@@ -63,7 +63,7 @@ def newton(problem: Problem, pressure: Field, approach: float, *, held: bool = F
 
     With the bodies `held` at their approach the load is whatever it becomes.
     """
-    wanted_mean = problem.load / (pressure.size * problem.spacing[0] * problem.spacing[1])
+    wanted_mean = problem.mean_pressure
     longest: Field = np.full_like(pressure, LONGEST_STEP)
     before: Field = np.zeros_like(pressure)
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
@@ -110,10 +110,11 @@ def newton_step(balance: Balance, *, storing: float = 0.0, held: bool = False) -
 
     # unknowns: the pressure changes and, last, the approach; last equation: they make up the missing load
     weight = 1.0 / np.sqrt(unknown.size)
-    missing = -balance.load_error * problem.load / (problem.spacing[0] * problem.spacing[1]) - known_change.sum()
+    dx, dy = problem.spacing
+    missing = -balance.load_error * problem.load / (dx * dy) - problem.summed(known_change)
     response = np.where(unknown, linear.product(np.zeros(cells, real), 1.0), real(0.0))
     answer = linear(response)
-    total = float(answer.sum())
+    total = float(problem.summed(answer))
     if total == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
         return known_change, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
 
@@ -122,11 +123,11 @@ def newton_step(balance: Balance, *, storing: float = 0.0, held: bool = False) -
         left = linear.product(d_pressure, 0.0)
         if d_approach:
             left += real(d_approach) * response
-        return np.append(left.ravel(), real(weight * d_pressure.sum()))
+        return np.append(left.ravel(), real(weight * problem.summed(d_pressure)))
 
     def precondition(vector: Field) -> Field:
         d_pressure = linear(vector[:-1].reshape(cells))
-        d_approach = real((d_pressure.sum() - vector[-1] / weight) / total)
+        d_approach = real((problem.summed(d_pressure) - vector[-1] / weight) / total)
         return np.append((d_pressure - d_approach * answer).ravel(), d_approach)
 
     solved = _solved(product, precondition, np.append(wanted, real(weight * missing)))

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from asperity.arrays import Field
+from asperity.ehl.deflection import BETWEEN
 from asperity.ehl.problem import Balance, Past
 from asperity.kernels import relax, reynolds, stencils
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
@@ -107,7 +108,16 @@ class Linear:
             stencil.centre[:] += self.kept.by_gap * own + self.kept.by_pressure
             stencil.west[:] += self.kept.by_gap * neighbour
             stencil.east[:] += self.kept.by_gap * neighbour
+        turn_back(stencil, problem.mirror)
         return stencil
+
+
+def turn_back(stencil: Stencil, mirror: int) -> None:
+    """Couple the last line of cells to what is on its side of the mirror, where there is one, in place."""
+    if mirror:
+        image = stencil.centre if mirror == BETWEEN else stencil.south
+        image[:, -1] += stencil.north[:, -1]
+        stencil.north[:, -1] = 0.0
 
 
 class LineRelaxation:
@@ -223,7 +233,8 @@ def _block(cells: int) -> int:
 def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
     """In another precision; what would become denormal in it is none."""
     least = LEAST * float(max(faces.east.max(), faces.north.max()))
-    return Faces(*(np.where(part > least, part, 0.0).astype(dtype) for part in faces))
+    *parts, behind = faces
+    return Faces._make([*(np.where(part > least, part, 0.0).astype(dtype) for part in parts), behind])
 
 
 class _Pattern(NamedTuple):

@@ -24,7 +24,7 @@ MOST_OF_IT = 0.5  # ... if they leave this share of all, in squares
 LARGEST = 0.25  # share of the grid's cells that is still worth while
 NOTHING_LEFT = 1e-3  # a start that leaves less needs none
 AROUND, HELD = 6, 2  # cells around the ones that leave most, and of these the outer ones that are held
-MET, MOST_STEPS = 0.1, 8  # share of what the box has left at first, and steps to get there
+MET, MOST_STEPS = 0.03, 8  # share of what the box has left at first, and steps to get there
 
 
 def smoothed(problem: Problem, unknowns: Pressures) -> Pressures:
@@ -73,8 +73,8 @@ def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
     (x, y), (dx, dy) = problem.lower, problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
     held = np.ones(start.total.shape, dtype=bool)
-    inner = slice(HELD, -HELD)
-    held[inner, slice(None) if problem.form.periodic else inner] = False
+    inner, mirror = slice(HELD, -HELD), problem.mirror if across.stop == problem.cells[1] else 0
+    held[inner, slice(None) if problem.form.periodic else slice(HELD, None) if mirror else inner] = False
     factor = problem.viscosity_factor
     part = replace(
         problem,
@@ -82,6 +82,7 @@ def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
         roughness=problem.roughness[box],
         viscosity_factor=None if factor is None else factor[box],
         held=held,
+        mirror=mirror,
     )
     shape = balance.gap[box] - part.deflection(start.total)
     return replace(part, roughness=part.form.gap(part.x, part.y) - shape), start

@@ -50,7 +50,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     A closed cell whose oil would come to bear more than the total takes the total for its oil's pressure, and is free
     in the next step: the oil lifts the bodies apart. Not one that the cap decides.
     """
-    wanted_mean = problem.load / (unknowns.total.size * problem.spacing[0] * problem.spacing[1])
+    wanted_mean = problem.mean_pressure
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change = 0.0, np.inf

@@ -17,7 +17,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.krylov import gmres
-from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces
+from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces, turn_back
 from asperity.ehl.mixed import (
     FREE,
     OPEN_FROM,
@@ -104,6 +104,7 @@ class MixedLinear:
         if self.kept is not None:
             by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
             stencil.centre[:] += np.where(self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0)
+        turn_back(stencil, problem.mirror)
         if self.conserves:
             self._loosen(stencil)
         return stencil, far
@@ -217,7 +218,7 @@ class _Step:
         total, rows = self.total(vector), np.empty_like(vector)
         wet, closed = self.linear.product(self.oil(vector), total, float(vector[-1]))
         rows[: self.count], rows[self.count : -1] = wet.ravel(), closed.ravel()[self.touching]
-        rows[-1] = self.weight * total.sum() if self.moves else vector[-1]
+        rows[-1] = self.weight * self.problem.summed(total) if self.moves else vector[-1]
         return rows
 
     def precondition(self, rows: Field) -> Field:
@@ -236,6 +237,8 @@ class _Step:
 
     def _borne(self, vector: Field) -> float:
         """By how much more the pressures bear."""
+        if self.problem.mirror:
+            return float(self.problem.summed(self.total(vector)))
         return float(vector[: self.count] @ self.bearing.ravel() + vector[self.count : -1].sum())
 
 
@@ -294,7 +297,7 @@ def newton_step(balance: MixedBalance, settled: Mask | None = None) -> Pressures
         wet, closed = wet - by_known[0], closed - by_known[1]
     dx, dy = problem.spacing
     step = _Step(linear)
-    missing = -balance.load_error * problem.load / (dx * dy) - known.sum() if step.moves else 0.0
+    missing = -balance.load_error * problem.load / (dx * dy) - problem.summed(known) if step.moves else 0.0
     if step.whole == 0.0:  # every cell is ruptured or capped: only the distance of the bodies can change the load
         return Pressures(known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale)
     wanted = step.joined(np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing))

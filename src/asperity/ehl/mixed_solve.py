@@ -20,13 +20,20 @@ from asperity.ehl.posing import (
     contact_problem,
     first_guess,
     grid_levels,
+    least_part,
     levels_in_reach,
-    on_one_line,
     smooth_film,
 )
 from asperity.ehl.problem import Past, Problem
 from asperity.ehl.scales import Scales
-from asperity.ehl.search import COARSE_TOLERANCE, FAR_OFF, MOST_COARSE_ITERATIONS, Progress, Search
+from asperity.ehl.search import (
+    COARSE_TOLERANCE,
+    FAR_OFF,
+    MOST_COARSE_ITERATIONS,
+    Progress,
+    Search,
+    on_all_lines,
+)
 from asperity.ehl.shares import carried_share
 from asperity.ehl.solution import ContactSolution, Oil
 from asperity.ehl.starts import Lubricated, dry_start, handed_up, on_a_roller
@@ -71,7 +78,7 @@ def solve_mixed(
     assert lubricant is not None  # without oil there is one pressure
     scales = Scales.of(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = on_one_line(whole) if whole.uniform else whole
+    finest = least_part(whole)
     search = MixedSearch(options, scales.gap, progress)
     if conditions.geometry == "roller":
         search.most_work = MOST_WORK * options.max_iterations * finest.roughness.size
@@ -314,7 +321,7 @@ class MixedSearch(Search):
             total, approach = dry_start(problem, dry)
             dry = Pressures(np.zeros_like(total), total, approach + problem.contact_gap)
             finest = problem is levels[0]
-            start = dry if before is None else before.granted(dry, problem.p_cap)
+            start = dry if before is None else before.granted(problem, dry)
             if before is None:
                 step = self.finish(problem, start, coarsely=not finest)
             else:
@@ -352,8 +359,9 @@ def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) ->
     signed = total if solution.oil is None else _signed(solution.oil, problem, scales)
     if problem.cells[1] == 1:
         total, signed = (field[:, :1] for field in (total, signed))
-    if total.shape != problem.cells:
-        raise BadInput(f"start has {solution.grid.cells} cells, the surface {problem.cells}; solve without start")
+    if total.shape != problem.all_cells:
+        raise BadInput(f"start has {solution.grid.cells} cells, the surface {problem.all_cells}; solve without start")
+    signed, total = (np.ascontiguousarray(part[:, : problem.cells[1]]) for part in (signed, total))
     return Pressures(signed, total, solution.rigid_approach / scales.gap)
 
 
@@ -398,8 +406,8 @@ def _reached(step: Step) -> Pressures:
 def _oil(step: Step, surface: Surface, scales: Scales) -> Oil:
     balance = step.balance
     assert isinstance(balance, MixedBalance)
-    lines = surface.grid.cells[1] // balance.gap.shape[1]
     content, pressure, growth = (
-        np.repeat(part, lines, axis=1) for part in (balance.film_share, balance.oil_pressure, balance.growth)
+        on_all_lines(balance.problem, part, surface.grid.cells[1])
+        for part in (balance.film_share, balance.oil_pressure, balance.growth)
     )
     return Oil(content=content, pressure=pressure * scales.pressure, growth=growth * scales.gap)

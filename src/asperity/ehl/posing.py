@@ -7,7 +7,8 @@ import numpy as np
 from asperity.arrays import Field
 from asperity.conditions import ContactConditions
 from asperity.ehl.along import Along
-from asperity.ehl.films import least_films
+from asperity.ehl.deflection import BETWEEN, THROUGH
+from asperity.ehl.films import central_film, least_films
 from asperity.ehl.gridding import FEWEST_BESIDE, FEWEST_COARSE_CELLS, inlet_length
 from asperity.ehl.outcome import ATTEMPTS, CONSERVING, Options
 from asperity.ehl.problem import Form, Problem
@@ -67,6 +68,8 @@ def first_guess(
         film = smooth_film(conditions, lubricant) / scales.gap
         if not np.any(problem.roughness):  # too near, smooth bodies touch where oil has to part them, and stay so
             film = max(film, least_films(conditions, lubricant)["isoviscous-elastic"].film / scales.gap)
+            if not conditions.long:  # under Hertz's pressure the gap is even: it is that in the middle
+                film = max(film, central_film(conditions, lubricant) / scales.gap)
     smooth = problem.form.gap(problem.x, problem.y) + problem.deflection(pressure)
     return pressure, film - float(np.min(smooth))
 
@@ -82,7 +85,7 @@ def smooth_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
 def grid_levels(finest: Problem) -> list[Problem]:
     """The problem on its own grid and on coarser and coarser ones."""
     levels = [finest]
-    while (cells := _halved(levels[-1].cells)) != levels[-1].cells:
+    while (cells := _halved(levels[-1].all_cells)) != levels[-1].all_cells:
         levels.append(levels[-1].coarsened(cells))
     return levels
 
@@ -109,6 +112,25 @@ def _halved(cells: tuple[int, int]) -> tuple[int, int]:
     fewest = FEWEST_BESIDE if max(cells) // 2 >= FEWEST_COARSE_CELLS else FEWEST_COARSE_CELLS
     nx, ny = ((n + 1) // 2 if n // 2 >= fewest else n for n in cells)
     return nx, ny
+
+
+def least_part(problem: Problem) -> Problem:
+    """What tells all of a lubricated contact: one line of cells, or those on one side of Y = 0, if that will do."""
+    if problem.uniform:
+        return on_one_line(problem)
+    return one_side(problem) if problem.symmetric and problem.lubricant is not None else problem
+
+
+def one_side(problem: Problem) -> Problem:
+    """What has a mirror at Y = 0, on the cells up to there."""
+    factor, lines = problem.viscosity_factor, problem.cells[1]
+    half = -(-lines // 2)
+    return replace(
+        problem,
+        roughness=problem.roughness[:, :half],
+        viscosity_factor=None if factor is None else factor[:, :half],
+        mirror=THROUGH if lines % 2 else BETWEEN,
+    )
 
 
 def on_one_line(problem: Problem) -> Problem:

@@ -7,19 +7,21 @@ R is the cell's net oil outflow, J its derivative, k the compliance of near cell
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.along import Along
-from asperity.ehl.deflection import Deflection, deflection
+from asperity.ehl.deflection import THROUGH, Deflection, deflection
 from asperity.ehl.shares import within_ellipse
-from asperity.ehl.transfer import averaged
+from asperity.ehl.transfer import averaged, interpolated, mirrored
 from asperity.kernels import reynolds
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
 from asperity.lubricant import Lubricant
 
 CLOSED_WITHIN = 0.01  # of the contact film
+AS_GOOD_AS = 1e-6  # relative, of both sides of Y = 0: nothing beside what is left unsolved
 # weights of the next and the upstream cell in the wedge; the more accurate ones do not converge on all rough surfaces
 THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
 
@@ -88,6 +90,8 @@ class Problem:
     of cells at ambient pressure, a roller by all beyond its ends. `accurate` takes the third-order wedge and
     logarithmic mean mobilities. `conserve` lets no oil appear or vanish. `past` is None where nothing moves but the
     oil. `held` tells of the cells, (nx, ny), whose pressures are given, and the distance of the bodies with them.
+    Where `mirror` is not 0, cells are those up to the plane Y = 0, BETWEEN two lines of cells or THROUGH the last one,
+    and what lies behind it is their image.
     """
 
     form: Form
@@ -106,12 +110,52 @@ class Problem:
     conserve: bool = False
     past: Past | None = None
     held: Mask | None = None
+    mirror: int = 0
 
     @property
     def cells(self) -> tuple[int, int]:
         """(nx, ny)."""
         nx, ny = self.roughness.shape
         return nx, ny
+
+    @property
+    def all_cells(self) -> tuple[int, int]:
+        """The same with those behind a mirror."""
+        nx, ny = self.cells
+        return nx, 2 * ny + 1 - self.mirror if self.mirror else ny
+
+    def whole(self, field: Any) -> Any:
+        """A field, (nx', ny'), with its image behind the mirror, of this grid or a coarser one."""
+        return mirrored(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
+
+    def brought(self, field: Field, *, cubic: bool = False) -> Field:
+        """A coarser grid's field on this one, (nx, ny), by lines or cubics."""
+        finer = interpolated(self.whole(field), self.all_cells, cubic=cubic)
+        return np.ascontiguousarray(finer[:, : self.cells[1]])
+
+    def summed(self, field: Field) -> Any:
+        """Of a field, (nx, ny), over all cells of the contact, those behind a mirror too."""
+        total = field.sum()
+        return total if not self.mirror else 2.0 * total - (field[:, -1].sum() if self.mirror == THROUGH else 0.0)
+
+    @property
+    def mean_pressure(self) -> float:
+        """Over the whole grid."""
+        (nx, ny), (dx, dy) = self.all_cells, self.spacing
+        return self.load / (nx * ny * dx * dy)
+
+    @property
+    def unmirrored(self) -> "Problem":
+        """The same contact on all its cells."""
+        if not self.mirror:
+            return self
+        factor = self.viscosity_factor
+        return replace(
+            self,
+            roughness=self.whole(self.roughness),
+            viscosity_factor=None if factor is None else self.whole(factor),
+            mirror=0,
+        )
 
     @property
     def x(self) -> Field:
@@ -133,7 +177,7 @@ class Problem:
         """Lines of cells along x that are held at ambient pressure, shape (ny,)."""
         held = np.zeros(self.cells[1], dtype=bool)
         if not self.form.periodic:
-            held[[0, -1]] = True
+            held[[0] if self.mirror else [0, -1]] = True
         if self.form.along is not None:
             held |= self.form.along.beyond(self.y)
         return held
@@ -159,7 +203,7 @@ class Problem:
     @property
     def deflection(self) -> Deflection:
         """The elastic half-space on this grid."""
-        return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic)
+        return deflection(self.cells, self.spacing, self.form.compliance, self.form.periodic, self.mirror)
 
     @property
     def softness(self) -> float:
@@ -173,14 +217,28 @@ class Problem:
         fields = [self.roughness] if self.viscosity_factor is None else [self.roughness, self.viscosity_factor]
         return self.form.periodic and all(bool(np.all(field == field[:, :1])) for field in fields)
 
+    @property
+    def symmetric(self) -> bool:
+        """Whether the half of smooth bodies' contact up to Y = 0 tells all."""
+        if self.form.periodic or self.form.along is not None or np.any(self.roughness):
+            return False
+        (_, ny), dy, factor = self.cells, self.spacing[1], self.viscosity_factor
+        even = factor is None or bool(np.allclose(factor, factor[:, ::-1], rtol=AS_GOOD_AS, atol=0.0))
+        return even and abs(2.0 * self.lower[1] + ny * dy) < AS_GOOD_AS * dy
+
     def coarsened(self, cells: tuple[int, int]) -> "Problem":
-        """The same contact on a grid of fewer cells; fields are averaged over each cell."""
-        (nx, ny), (dx, dy) = self.cells, self.spacing
-        factor = self.viscosity_factor
+        """The same contact on a grid of fewer cells; fields are averaged over each cell.
+
+        A mirror stays in the middle of a line or between two, for which a line may be one more or fewer.
+        """
+        (nx, ny), (dx, dy) = self.all_cells, self.spacing
+        half = -(-cells[1] // 2)
+        cells, kept = (cells, cells[1]) if not self.mirror else ((cells[0], 2 * half + 1 - self.mirror), half)
+        roughness, factor = self.whole(self.roughness), self.viscosity_factor
         return replace(
             self,
-            roughness=averaged(self.roughness, cells),
-            viscosity_factor=None if factor is None else averaged(factor, cells),
+            roughness=averaged(roughness, cells)[:, :kept],
+            viscosity_factor=None if factor is None else averaged(self.whole(factor), cells)[:, :kept],
             spacing=(dx * (nx / cells[0]), dy * (ny / cells[1])),
         )
 
@@ -193,7 +251,7 @@ class Problem:
     def load_error(self, pressure: Field) -> float:
         """By how much a pressure carries more than the load, relative."""
         dx, dy = self.spacing
-        return float(pressure.sum() * dx * dy / self.load - 1.0)
+        return float(self.summed(pressure) * dx * dy / self.load - 1.0)
 
     def evaluate(self, pressure: Field, approach: float) -> "Balance":
         """What is left of every equation at a pressure and a rigid approach H0."""
@@ -266,6 +324,7 @@ class Problem:
             north_by_next,
             inlet=np.empty(self.cells[1]),
             wedge=np.array(wedge),
+            behind=self.cells[1] - self.mirror if self.mirror else 0,
         )
         mobility = film.mobility
         log_mobility = np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.shares import CENTRE, area_share, carried_share
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.transfer import interpolated
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
@@ -75,7 +75,7 @@ class Search:
             coarsest, finest = problem is levels[-1], problem is levels[0]
             tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
             if problem.cells != pressure.shape:
-                pressure = interpolated(pressure, problem.cells)
+                pressure = problem.brought(pressure)
             if held:
                 step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
             else:
@@ -171,10 +171,12 @@ class Search:
             same = (start.conditions, start.lubricant, alike) == (conditions, lubricant, self.options)
             same = same and start.grid == surface.grid and np.array_equal(start.surface.heights, surface.heights)
             discretisation = start.convergence.discretisation_error if same else None
-        scales, balance = Scales.of(conditions, lubricant), step.balance
+        scales, balance, lines = Scales.of(conditions, lubricant), step.balance, surface.grid.cells[1]
         stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
-        lines = surface.grid.cells[1] // balance.problem.cells[1]
-        pressure, height = np.repeat(balance.pressure, lines, axis=1), np.repeat(balance.height, lines, axis=1)
+        touching = balance.in_contact & (balance.pressure > 0.0)
+        pressure, height, in_contact = (
+            on_all_lines(balance.problem, part, lines) for part in (balance.pressure, balance.height, touching)
+        )
         return ContactSolution(
             conditions=conditions,
             lubricant=lubricant,
@@ -182,7 +184,7 @@ class Search:
             options=self.options,
             pressure=pressure * scales.pressure,
             gap=height * scales.gap,
-            in_contact=np.repeat(balance.in_contact & (balance.pressure > 0.0), lines, axis=1),
+            in_contact=in_contact,
             rigid_approach=step.approach * scales.gap,
             convergence=Convergence(
                 status=SolveStatus.CONVERGED if self.settled(self.options.tolerance) else stopped,
@@ -198,16 +200,24 @@ class Search:
 
     def _figures(self, step: Step) -> Figures:
         balance = step.balance
-        touching = balance.in_contact & (balance.pressure > 0.0)
-        return figures(balance.problem, balance.pressure, touching, balance.height, self.gap_scale)
+        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.whole
+        parts = whole(balance.pressure), whole(touching), whole(balance.height)
+        return figures(balance.problem.unmirrored, *parts, self.gap_scale)
 
     def _record(self, problem: Problem, step: Step) -> None:
         balance = step.balance
-        iteration = Iteration(problem.cells, step.number, balance.residual_rms, abs(balance.load_error), step.change)
+        left = balance.residual_rms, abs(balance.load_error), step.change
+        iteration = Iteration(problem.all_cells, step.number, *left)
         self.history.append(iteration)
         self.work += problem.roughness.size if step.number > 0 else 0
         if self.progress:
             self.progress(iteration)
+
+
+def on_all_lines(problem: Problem, field: Any, lines: int) -> Any:
+    """A field on the part of a contact that tells all, (nx', ny'), on all of so many lines of cells."""
+    whole = problem.whole(field)
+    return np.repeat(whole, lines // whole.shape[1], axis=1)
 
 
 def grid_error(

@@ -13,12 +13,11 @@ from asperity.ehl.films import central_film
 from asperity.ehl.iterate import Step, newton
 from asperity.ehl.mixed_solve import solve_mixed
 from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
-from asperity.ehl.posing import contact_problem, first_guess, levels_in_reach, on_one_line
+from asperity.ehl.posing import contact_problem, first_guess, least_part, levels_in_reach
 from asperity.ehl.problem import Problem
 from asperity.ehl.scales import Scales
 from asperity.ehl.search import COARSE_TOLERANCE, Progress, Search
 from asperity.ehl.solution import ContactSolution
-from asperity.ehl.transfer import interpolated
 from asperity.errors import BadInput, NotConverged
 from asperity.grid import Grid
 from asperity.lubricant import Lubricant, require_liquid
@@ -94,7 +93,7 @@ def solve_unified(
     began = time.perf_counter()
     scales = Scales.of(conditions, lubricant)
     whole = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = on_one_line(whole) if whole.uniform else whole
+    finest = least_part(whole)
     elastic = lubricant is None and conditions.hardness is None
     search = (ElasticSearch if elastic else Search)(options, scales.gap, progress)
     if start is None:
@@ -102,7 +101,7 @@ def solve_unified(
         guess = first_guess(levels[-1], conditions, lubricant, scales)
     else:
         levels = [finest]
-        guess = _warm_start(start, finest.cells, scales)
+        guess = _warm_start(start, finest, scales)
     for attempt in ATTEMPTS:
         if attempt == ATTEMPTS[1]:
             if not finest.accurate:
@@ -136,7 +135,7 @@ class ElasticSearch(Search):
             finest = problem is levels[0]
             tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
             if problem.cells != pressure.shape:
-                pressure = interpolated(pressure, problem.cells)
+                pressure = problem.brought(pressure)
             pressure, near, met = elastic_contact(problem, pressure, ELASTIC_TO * tolerance)
             if not met:
                 return super().climb(levels, start, approach, held=False)
@@ -150,13 +149,13 @@ class ElasticSearch(Search):
 SOLVERS = {"unified": solve_unified, "paper": solve_unified, "mixed": solve_mixed, "conserving": solve_mixed}
 
 
-def _warm_start(start: ContactSolution, cells: tuple[int, int], scales: Scales) -> tuple[Field, float]:
-    pressure = start.pressure / scales.pressure
+def _warm_start(start: ContactSolution, problem: Problem, scales: Scales) -> tuple[Field, float]:
+    pressure, cells = start.pressure / scales.pressure, problem.all_cells
     if cells[1] == 1:
         pressure = pressure.mean(axis=1, keepdims=True)
     if pressure.shape != cells:
         raise BadInput(f"start has {start.grid.cells} cells, the surface {cells}; solve without start")
-    return pressure, start.rigid_approach / scales.gap
+    return np.ascontiguousarray(pressure[:, : problem.cells[1]]), start.rigid_approach / scales.gap
 
 
 def _check_factor(factor: Field, surface: Surface) -> None:

@@ -13,7 +13,6 @@ from asperity.ehl.locally import smoothed
 from asperity.ehl.mixed import Pressures
 from asperity.ehl.problem import Problem
 from asperity.ehl.search import COARSE_TOLERANCE
-from asperity.ehl.transfer import interpolated
 
 DRY = 1e-2  # what the dry contact of bodies that yield is met to by Newton's steps: oil moves it far more
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
@@ -25,12 +24,11 @@ class Lubricated(NamedTuple):
     dry: Pressures
     wet: Pressures
 
-    def granted(self, dry: Pressures, cap: float) -> Pressures:
+    def granted(self, problem: Problem, dry: Pressures) -> Pressures:
         """About what oil makes of the dry contact on another grid."""
-        cells = dry.total.shape
-        changed = interpolated(self.wet.total - self.dry.total, cells)
-        total = np.clip(dry.total + changed, 0.0, cap)
-        oil = np.minimum(interpolated(np.maximum(self.wet.oil, 0.0), cells), total)
+        changed = problem.brought(self.wet.total - self.dry.total)
+        total = np.clip(dry.total + changed, 0.0, problem.p_cap)
+        oil = np.minimum(problem.brought(np.maximum(self.wet.oil, 0.0)), total)
         return Pressures(oil, total, dry.approach + self.wet.approach - self.dry.approach)
 
 
@@ -40,9 +38,13 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
     As elastic bodies, if these stay below the cap. Otherwise by Newton's steps from the coarser grid, and where that
     leads nowhere by conjugate gradients, and by Newton's steps where the cap is too busy for these.
     """
+    if problem.mirror:
+        whole = None if coarser is None else coarser._replace(total=problem.whole(coarser.total))
+        pressure, approach = dry_start(problem.unmirrored, whole)
+        return np.ascontiguousarray(pressure[:, : problem.cells[1]]), approach
     dry, guess = replace(problem, lubricant=None, contact_gap=0.0), problem.form.hertz(problem.x, problem.y)
     if coarser is not None:
-        guess = interpolated(coarser.total, problem.cells)
+        guess = problem.brought(coarser.total)
     if np.all(guess < problem.p_cap):
         pressure, approach, met = elastic_contact(dry, guess, COARSE_TOLERANCE)
         if met and np.all(pressure < problem.p_cap):
@@ -71,7 +73,7 @@ def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool
 def handed_up(problem: Problem, unknowns: Pressures) -> Pressures:
     """A coarser grid's pressures on this one; those of smooth bodies nearer to what this one has, where they jump."""
     total, oil = (
-        np.clip(interpolated(np.maximum(part, 0.0), problem.cells, cubic=problem.accurate), 0.0, problem.p_cap)
+        np.clip(problem.brought(np.maximum(part, 0.0), cubic=problem.accurate), 0.0, problem.p_cap)
         for part in (unknowns.total, unknowns.oil)
     )
     handed = Pressures(np.minimum(oil, total), total, unknowns.approach)
@@ -91,5 +93,5 @@ def on_a_roller(
     if before is None:
         film = approach + float((problem.undeformed + problem.deflection(pressure)).min())
         return dry, Pressures(total, total, distance + film)
-    start = before.granted(dry, problem.p_cap)
+    start = before.granted(problem, dry)
     return dry, smoothed(problem, Pressures(start.total, start.total, start.approach))

@@ -14,6 +14,12 @@ def averaged(field: Field, cells: tuple[int, int]) -> Field:
     return _moved(field, *(_averaging(fine, coarse) for fine, coarse in zip(field.shape, cells, strict=True)))
 
 
+def mirrored(field: Any, lines: int) -> Any:
+    """A field on so many lines of cells, of which it holds the first half: the others are their mirror image."""
+    beyond = lines - field.shape[1]
+    return np.concatenate([field, field[:, :beyond][:, ::-1]], axis=1)
+
+
 def interpolated(field: Field, cells: tuple[int, int], *, cubic: bool = False) -> Field:
     """A field on more cells, bilinear between cell centres, or `cubic` along both; y wraps round, x ends level.
 

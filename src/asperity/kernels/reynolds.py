@@ -63,6 +63,8 @@ class Faces(NamedTuple):
     """Mobility of the faces east and north of each cell, and its slopes in the logarithms of both nodes' mobilities.
 
     The last face to the east is the outlet; `inlet` holds the first one to the west, shape (ny,); `wedge` is (a, b).
+    `behind` is the line of cells behind the north faces of the last one: the first, where lines go round, or by a
+    mirror the last or the one before. With a mirror no equation of the first line is the oil's.
     """
 
     east: Field
@@ -73,6 +75,7 @@ class Faces(NamedTuple):
     north_by_next: Field
     inlet: Field
     wedge: Field
+    behind: int = 0
 
 
 class Rows(NamedTuple):
@@ -112,7 +115,7 @@ def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, ends: Ma
             else:
                 mean, own, following = 0.5 * (eps[i, j] + film.ambient[1, j]), 0.5 * eps[i, j], 0.0
             faces.east[i, j], faces.east_by_own[i, j], faces.east_by_next[i, j] = mean, own, following
-            jn = j + 1 if j < ny - 1 else 0
+            jn = j + 1 if j < ny - 1 else faces.behind
             ratio = log_mobility[i, j] - log_mobility[i, jn] if logarithmic else 0.0
             if ends[j] and not logarithmic and eps[i, j] > 0.0 and eps[i, jn] > 0.0:
                 ratio = np.log(eps[i, j]) - np.log(eps[i, jn])
@@ -142,7 +145,7 @@ def net_outflow(
             out[i, j] = (flux - upstream[j]) / dx
             upstream[j] = flux
         for j in range(ny):
-            jn = j + 1 if j < ny - 1 else 0
+            jn = j + 1 if j < ny - 1 else faces.behind
             js = j - 1 if j > 0 else ny - 1
             north = faces.north[i, j] * (pressure[i, j] - pressure[i, jn])
             south = faces.north[i, js] * (pressure[i, js] - pressure[i, j])
@@ -236,7 +239,7 @@ def jacobian_product(
             north = _through_north(faces, pressure, d_pressure, d_log, i, j, j + 1)
             out[i, j] += over_dy2 * north
             out[i, j + 1] -= over_dy2 * north
-        north = _through_north(faces, pressure, d_pressure, d_log, i, last, 0)
+        north = _through_north(faces, pressure, d_pressure, d_log, i, last, faces.behind)
         out[i, last] += over_dy2 * north
         out[i, 0] -= over_dy2 * north
         for j in range(ny):

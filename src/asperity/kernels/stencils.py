@@ -106,14 +106,14 @@ def add_mobility_slopes(
                 if rows.state[i + 1, j] == LUBRICATED:
                     out.centre[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_next
                     out.west[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_own
-            jn = j + 1 if j < ny - 1 else 0
+            jn = j + 1 if j < ny - 1 else faces.behind
             falling = over_dy2 * (pressure[i, j] - pressure[i, jn])
             by_own = falling * faces.north_by_own[i, j] * slope[i, j]
             by_next = falling * faces.north_by_next[i, j] * slope[i, jn]
             if here:
                 out.centre[i, j] += scale * by_own
                 out.north[i, j] += scale * by_next
-            if rows.state[i, jn] == LUBRICATED:
+            if rows.state[i, jn] == LUBRICATED and (jn == j + 1 or jn == 0):
                 out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
                 out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own
 
@@ -217,7 +217,7 @@ def _add_across(
     """Add the flows between the x lines, the gap answering to each cell's `own` pressure, to row `i` of a stencil."""
     ny = pressure.shape[1]
     for j in range(ny):
-        jn = j + 1 if j < ny - 1 else 0
+        jn = j + 1 if j < ny - 1 else faces.behind
         through, falling = over_dy2 * faces.north[i, j], over_dy2 * (pressure[i, j] - pressure[i, jn])
         slope = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
         slope_next = film.log_mobility_by_pressure[i, jn] + own * film.log_mobility_by_gap[i, jn]
@@ -226,6 +226,6 @@ def _add_across(
         if rows.state[i, j] == LUBRICATED:
             out.centre[i, j] += rows.fluid_scale[i, j] * by_own
             out.north[i, j] += rows.fluid_scale[i, j] * by_next
-        if rows.state[i, jn] == LUBRICATED:
+        if rows.state[i, jn] == LUBRICATED and (jn == j + 1 or jn == 0):
             out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
             out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own
