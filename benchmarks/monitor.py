@@ -20,9 +20,11 @@ import scipy
 from asperity.recording import ReadOptions
 from asperity.tracking import watch as watching
 from asperity.tracking.reading import read_spectrum
+from asperity.tracking.sensor import Sensor
+from asperity.tracking.sensors import settings_of
 from asperity.tracking.store import Place, Store, Version
 from asperity.tracking.target import search_target
-from asperity.tracking.watch import settings_of, watch_folder
+from asperity.tracking.watch import watch_folder
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)
 SPACING, MORE = 5.0, 12
@@ -46,7 +48,7 @@ def write(path: Path, rng: np.random.Generator) -> None:
 def filled(folder: Path, store: Path, many: int) -> None:
     """A folder and a store of `many` recordings, of which 200 differ."""
     rng, target, options = np.random.default_rng(1), search_target(None, BAND), ReadOptions()
-    sensor = Store(store).sensor(Place("machine", folder.name, "sensor"), settings_of(target, options))
+    sensor = Sensor(Store(store), Place("machine", folder.name, "sensor"), settings_of(target, options))
     sensor.settle_spacing(SPACING)
     write(folder / "first.npz", rng)
     content = (folder / "first.npz").read_bytes()

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from asperity.tracking import calls
+from asperity.tracking.sensors import Sensors
 from asperity.tracking.store import Place, Store
 
 STORE = "in/asperity-watch/asperity.db"
@@ -171,7 +172,7 @@ def test_what_waits_is_told_in_its_order(asp):
     snapshots(np.ones(3))
     with served([500, 500, 204]) as (url, heard):
         watched(asp, "--webhook", url)
-        sensor = Store(STORE).sensor(Place("Pump 3", "DE", "sensor"), {})
+        sensor = Sensors(Store(STORE), Place("Pump 3", "DE", "sensor"), {})
         last = sensor.said()
         sensor.tell([calls.Webhook(url).name], last | {"alarm": last["alarm"] | {"state": "alarm"}})
         assert len(calls.deliver(sensor, [calls.Webhook(url)], now=True)) == 1
@@ -184,7 +185,7 @@ def test_a_call_that_keeps_failing_is_made_ever_more_seldom(asp):
     snapshots(np.ones(3))
     with served([500]) as (url, heard):
         watched(asp, "--webhook", url)
-        sensor = Store(STORE).sensor(Place("Pump 3", "DE", "sensor"), {})
+        sensor = Sensors(Store(STORE), Place("Pump 3", "DE", "sensor"), {})
         assert calls.deliver(sensor, [calls.Webhook(url)]) == ()  # not due yet
         assert len(heard) == 1
         with sensor.store.transaction() as run:

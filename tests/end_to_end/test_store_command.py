@@ -22,13 +22,13 @@ from asperity.tracking.store import Store
 ONCE = ("--once", "--settle", "0", "--quiet")
 
 
-def snapshots(folder, levels, seconds=0.1, first=0):
+def snapshots(folder, levels, seconds=0.1, first=0, sensors=("acc",)):
     """Noise of a machine without a contact resonance: a tenth of a second each."""
     Path(folder).mkdir(exist_ok=True)
     for number, level in enumerate(levels, first):
         rng = np.random.default_rng(number)
-        values = level * rng.standard_normal(round(seconds * 20e3))
-        np.savez(Path(folder) / f"s-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
+        heard = {name: level * rng.standard_normal(round(seconds * 20e3)) for name in sensors}
+        np.savez(Path(folder) / f"s-{number:03}.npz", **heard, fs=20e3, unit="m/s^2")
 
 
 def failing(steady=12, loud=24):
@@ -44,9 +44,9 @@ def asked(store, query):
 def without_times(store):
     """All that a store holds, but for when it was written."""
     return [
-        asked(store, "SELECT file, started, state, row, reading FROM recording ORDER BY file"),
-        asked(store, "SELECT state, since, reason, raised_by, verdict, recordings FROM judgement ORDER BY id"),
-        asked(store, "SELECT name, settings, said FROM sensor"),
+        asked(store, "SELECT sensor, file, started, state, row, reading FROM recording ORDER BY sensor, file"),
+        asked(store, "SELECT sensor, state, since, reason, raised_by, verdict, recordings FROM judgement ORDER BY id"),
+        asked(store, "SELECT name, settings, json_remove(said, '$.numbers') FROM sensor ORDER BY id"),
     ]
 
 
@@ -94,14 +94,16 @@ def test_another_question_is_judged_again(asp, change):
     assert len(states) == 2
 
 
-def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path):
+@pytest.mark.parametrize("channels", [(), ("--channel", "acc,other")])
+def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path, channels):
     levels = failing()
-    snapshots(tmp_path / "in", levels)
-    command = [sys.executable, "-m", "asperity", "watch", "in", *ONCE, "--workers", "1", "--store"]
+    snapshots(tmp_path / "in", levels, sensors=("acc", "other")[: 1 + bool(channels)])
+    command = [sys.executable, "-m", "asperity", "watch", "in", *ONCE, *channels, "--workers", "1", "--store"]
     assert subprocess.run([*command, "whole.db"], cwd=tmp_path, check=False).returncode == 3
     store = tmp_path / "killed.db"
     heard = [0]
-    while len(heard) < 5 and heard[-1] < len(levels) - 6:
+    every = len(levels) * (1 + bool(channels))
+    while len(heard) < 5 and heard[-1] < every - 6:
         process = subprocess.Popen([*command, "killed.db"], cwd=tmp_path)
         while process.poll() is None and (not store.is_file() or _count(store) < heard[-1] + 6):
             time.sleep(0.005)
@@ -109,7 +111,7 @@ def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path):
         process.wait()
         heard.append(_count(store))
     assert heard[1] > 0
-    assert heard[-1] < len(levels)  # it was killed before the end
+    assert heard[-1] < every  # it was killed before the end
     assert subprocess.run([*command, "killed.db"], cwd=tmp_path, check=False).returncode == 3
     assert without_times(store) == without_times(tmp_path / "whole.db")
 
@@ -169,14 +171,10 @@ def _empty(path):
 
 def test_a_store_that_another_program_holds_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("asperity.tracking.store.BUSY_S", 0.05)
+    snapshots(tmp_path / "in", [1.0])
     store = Store(tmp_path / "plant.db")
     with store.transaction(), pytest.raises(AsperityError, match="another program holds it"):
-        next(watch_folder(_folder(tmp_path), tmp_path / "out", store=tmp_path / "plant.db", once=True))
-
-
-def _folder(tmp_path):
-    snapshots(tmp_path / "in", [1.0])
-    return tmp_path / "in"
+        next(watch_folder(tmp_path / "in", tmp_path / "out", store=tmp_path / "plant.db", once=True, settle_s=0.0))
 
 
 def test_a_damaged_recording_of_the_store_is_read_again(tmp_path):
@@ -248,6 +246,18 @@ def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
         "the store has no sensor 'Fan 2'; it has Fan 1/DE/sensor"
         in asp("store", "out/asperity.db", "--acknowledge", "Fan 2")[2]
     )
+
+
+def test_a_store_of_the_last_version_goes_on(asp):
+    snapshots("in", failing())
+    asp("watch", "in", *ONCE, "--store", "plant.db")
+    with closing(sqlite3.connect("plant.db")) as connection:
+        connection.execute("ALTER TABLE recording DROP COLUMN duration")  # as 0.2.0 left it
+        connection.execute("PRAGMA user_version = 1")
+    snapshots("in", [20.0], first=36)
+    assert asp("watch", "in", *ONCE, "--store", "plant.db")[0] == 3
+    durations = asked("plant.db", "SELECT duration FROM recording")
+    assert durations == [(pytest.approx(0.1),)] * 37
 
 
 def test_a_track_acknowledges_in_the_store_and_ends_as_the_store_does(asp):

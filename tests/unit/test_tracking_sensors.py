@@ -7,26 +7,8 @@ import pytest
 
 from asperity.errors import BadInput
 from asperity.recording import ReadOptions
-from asperity.tracking import keep_track, store_overview, track_recordings, watch_folder
-from asperity.wear import line_shape
-
-RATE, SECONDS, BAND = 10_000.0, 4.0, (1800.0, 4000.0)
-TRUTH = np.linspace(2900.0, 3750.0, 8)
-
-
-def hears(rng, f0, heights):
-    """What sensors hear [m/s^2]: the contact's line, one wave for all, and noise of their own."""
-    samples = round(RATE * SECONDS)
-    frequency = np.fft.rfftfreq(samples, 1.0 / RATE)
-
-    def waves():
-        return (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)) / np.sqrt(2.0)
-
-    line = np.sqrt(line_shape(frequency, f0, 0.02)) * waves()
-    return [
-        np.fft.irfft((np.sqrt(height) * line + 0.3 * waves()) * np.sqrt(RATE * samples / 2.0), samples)
-        for height in heights
-    ]
+from asperity.tracking import keep_track, store_overview, track_recordings
+from support.heard import BAND, RATE, TRUTH, hears
 
 
 @pytest.fixture(scope="module")
@@ -122,20 +104,6 @@ def test_a_copy_is_no_second_sensor(tmp_path):
         np.savez(tmp_path / f"{number}.npz", a=a, b=a, fs=RATE, unit="m/s^2")
     with pytest.raises(BadInput, match="sensors a and b hold the same samples in 0"):
         track_recordings([tmp_path], channel="a,b", band_hz=BAND)
-
-
-def test_one_watch_follows_one_sensor(both, tmp_path):
-    with pytest.raises(BadInput, match="one watch follows one channel, got a,b"):
-        watch_folder(both / "whole", tmp_path, channel="a,b", band_hz=BAND)
-    folder = tmp_path / "folder"
-    folder.mkdir()
-    for name in "ab":
-        for number in range(2):
-            to = folder / f"{name}{number}.npz"
-            to.write_bytes((both / "apart" / to.name).read_bytes())
-            to.with_suffix(".npz.toml").write_text(f'sensor = "{name}"\n')
-    with pytest.raises(BadInput, match="one watch follows one sensor, and these recordings are of 2"):
-        list(watch_folder(folder, tmp_path / "out", band_hz=BAND, once=True, settle_s=0.0))
 
 
 def test_sensors_are_laid_beside_one_another_by_number_where_there_are_as_many(both, tmp_path):

@@ -132,7 +132,8 @@ StoreFile = Annotated[
 Machine = Annotated[str | None, typer.Option(metavar="NAME", help="Whose recordings these are, in the store.")]
 Point = Annotated[str | None, typer.Option(metavar="NAME", help="Measuring point on it; by default the folder.")]
 SensorName = Annotated[
-    str | None, typer.Option("--sensor", metavar="NAME", help="Sensor there; by default the channel.")
+    str | None,
+    typer.Option("--sensor", metavar="NAME", help="Sensor there; by default as sidecar, table or channel names it."),
 ]
 OnAlarm = Annotated[
     str | None,

@@ -316,9 +316,9 @@ def _show_update(
     """One update of a watch: a JSON object a line, or a verdict with what is new."""
     verdict = "Nothing to judge yet: no recording has arrived." if said is None else said["verdict"]
     if waiting:
-        verdict += f" {waiting} more may still be written and wait for the next look."
+        verdict += f" {waiting} more wait for the next look: they may still be written, or are not in the table yet."
     values: dict[str, Any] = {"verdict": verdict} if said is None else dict(said)
-    arrived = [recording.file for recording in new]
+    arrived = [*dict.fromkeys(recording.file for recording in new)]
     show(
         verdict,
         lambda: {**values, "new": arrived, "waiting": waiting, "results": str(results)},
@@ -330,9 +330,9 @@ def _show_update(
 
 
 def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
-    rows = {row["file"]: row for row in recordings}
+    rows = {one["file"]: row for row in recordings for one in (row, *row["sensors"].values())}
     selected = [quantity(key) for key in ("crf_hz", "severe_probability")]
-    for arrived in new:
+    for arrived in {reading.file: reading for reading in new}.values():
         row = rows.get(arrived.file)
         if row is None:
             outcome = arrived.reason

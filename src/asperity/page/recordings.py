@@ -179,7 +179,7 @@ class RecordingsView:
     def show(self, heard: Heard) -> None:
         """Draw a series."""
         self.heard = heard
-        waiting = f", {heard.waiting} may still be written" if heard.waiting else ""
+        waiting = f", {heard.waiting} wait" if heard.waiting else ""
         watched = "; the folder is watched" if self.watches else ""
         self._tell(f"{len(heard.rows)} recordings read{waiting}{watched}.")
         self.verdict.text = sentences([heard.verdict], "alarm" if heard.alarm == "alarm" else "")

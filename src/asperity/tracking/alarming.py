@@ -123,8 +123,12 @@ class Warming:
 def _said(tracked: Sequence[TrackedRecording], before: Before | None) -> Said:
     if before is None:
         return Said()
-    known = {number: before.states.get(one.file) for number, one in enumerate(tracked)}
-    return Said({number: state for number, state in known.items() if state}, before.reason, before.raised_by)
+    states = {}
+    for number, one in enumerate(tracked):
+        for file in one.files:
+            if file in before.states:
+                states[number] = before.states[file]
+    return Said(states, before.reason, before.raised_by)
 
 
 def _severe(stages: Stages | None) -> bool:
@@ -303,6 +307,6 @@ def _acknowledged(tracked: Sequence[TrackedRecording], name: str | None) -> int:
     if name == LAST:
         return len(tracked)
     for number, one in enumerate(tracked, 1):
-        if name in (one.file, Path(one.file).name):
+        if any(name in (file, Path(file).name) for file in one.files):
             return number
     raise BadInput(f"{name} is not among the {len(tracked)} recordings; acknowledge one of them, or {LAST}")

@@ -23,7 +23,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from asperity.errors import BadInput
 from asperity.quiet import first_line
-from asperity.tracking.store import Sensor
+from asperity.tracking.sensors import Sensors
 
 COMMAND_S, NETWORK_S = 30.0, 10.0  # for which an answer is waited for
 RETRY_S, SELDOM_S = 5.0, 3600.0  # between the first two tries; twice as long each time, up to this
@@ -240,22 +240,22 @@ def _require_address(url: str, schemes: Sequence[str], example: str) -> None:
         raise BadInput(f"an address such as {example} is needed, got {url!r}; it begins with {' or '.join(schemes)}")
 
 
-def deliver(sensor: Sensor, called: Sequence[Caller], *, now: bool = False) -> tuple[str, ...]:
-    """Make the calls of a sensor that are due, in their order; which have not worked, a sentence each.
+def deliver(sensors: Sensors, called: Sequence[Caller], *, now: bool = False) -> tuple[str, ...]:
+    """Make the calls that are due, in their order; which have not worked, a sentence each.
 
     `now` makes those too that would be tried later.
     """
     failed = []
     for caller in called:
-        for number, attempts, due, text in sensor.waiting(caller.name):
+        for number, attempts, due, text in sensors.waiting(caller.name):
             if not now and due > time():
                 break
             try:
                 _within(COMMAND_S + NETWORK_S, partial(caller.call, json.loads(text)))
             except Exception as error:  # noqa: BLE001 (somebody else's program or network)
                 wait = min(RETRY_S * 2.0 ** min(attempts, 20), SELDOM_S)
-                sensor.called(number, failure=first_line(error), due=time() + wait)
+                sensors.called(number, failure=first_line(error), due=time() + wait)
                 failed.append(f"{caller.name} could not be called ({first_line(error)}); it is tried again")
                 break  # later ones wait, so that they are told in order
-            sensor.called(number)
+            sensors.called(number)
     return tuple(failed)

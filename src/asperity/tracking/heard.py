@@ -5,18 +5,19 @@ Which line is the contact's is said by `asperity.wear`; what the recordings say 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import timedelta
 from itertools import combinations
+from math import nan
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.tracking.alike import COPIED, on_one_grid, spectrum_of, without_silence
 from asperity.tracking.files import Place, in_their_places
+from asperity.tracking.instants import Heard, by_time
+from asperity.tracking.learned import Learned, Together
 from asperity.tracking.operating import operating_of
 from asperity.tracking.reading import Reading
 from asperity.tracking.recorded import OnSensor, TrackedRecording
@@ -27,8 +28,6 @@ from asperity.wear import (
     Resonance,
     damping_objection,
     no_resonance,
-    remove_lines,
-    resonances_of_sensors,
 )
 
 
@@ -69,8 +68,11 @@ def heard_together(
     places: Mapping[str, Place] | None,
     x_name: str,
     shaft_hz: Sequence[float] | None,
+    learned: Learned | None = None,
 ) -> tuple[list[TrackedRecording], str, list[str]]:
     """Recordings of several sensors as those of one machine, by x; what x is; and what has to be said of them.
+
+    With `learned`, further recordings are judged beside what it holds.
 
     Raises
     ------
@@ -85,10 +87,11 @@ def heard_together(
     found = [Instant(one.place, {name: by_key[old.file, name] for name, old in one.readings.items()}) for one in found]
     usable = {name: sum(name in one.readings and one.readings[name].usable for one in found) for name in names}
     names.sort(key=lambda name: -usable[name])  # stable: the first named of equals leads
-    _require_no_copies(names, found)
+    found = _without_copies(names, found, refused=learned is None)
+    memory = Learned() if learned is None else learned
     cleaned = [
         {
-            name: remove_lines(spectrum_of(reading), shaft_hz=shaft_hz)
+            name: memory.clean((reading.file, name), spectrum_of(reading), shaft_hz)
             for name, reading in one.readings.items()
             if reading.usable
         }
@@ -96,29 +99,28 @@ def heard_together(
     ]
     if usable[names[0]] < FEWEST_RECORDINGS:
         reason = f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor, and has {usable[names[0]]}"
-        lines = [no_resonance(reason, target.band_hz, "joint")] * len(found)
-        heard_on: Sequence[tuple[str, ...]] = [()] * len(found)
-        alone: Mapping[str, Sequence[Resonance | None]] = {name: [None] * len(found) for name in names}
+        nothing = Together(no_resonance(reason, target.band_hz, "joint"), (), dict.fromkeys(names))
+        told = [nothing] * len(found)
     else:
-        spectra: dict[str, list[Spectrum | None]] = {}
-        kept: dict[str, list[Mask | None]] = {}
-        for name in names:
-            every = [clean.get(name) for clean in cleaned]
-            spectra[name] = [None if one is None else one.spectrum for one in every]
-            kept[name] = [None if one is None else one.kept for one in every]
-        told = resonances_of_sensors(spectra, band_hz=target.band_hz, kept=kept)
-        lines, heard_on, alone = list(told.resonances), told.heard_on, told.alone
-        if np.isfinite(told.common):
+        keys = [
+            tuple((one.readings[name].file, name) for name in clean) for one, clean in zip(found, cleaned, strict=True)
+        ]
+        every = {name: [clean.get(name) for clean in cleaned] for name in names}
+        spectra = {name: [None if one is None else one.spectrum for one in heard] for name, heard in every.items()}
+        kept = {name: [None if one is None else one.kept for one in heard] for name, heard in every.items()}
+        told = memory.lines(keys, spectra, kept, target.band_hz)
+        if np.isfinite(memory.common):
             notes.append(
-                f"Of the errors of a line, sensors have {100 * told.common:.0f} % in common: intervals are no narrower "
-                "than the rest allows."
+                f"Of the errors of a line, sensors have {100 * memory.common:.0f} % in common: intervals are no "
+                "narrower than the rest allows."
             )
     tracked = []
     for number, one in enumerate(found):
         first = next((name for name in names if name in cleaned[number]), next(iter(one.readings)))
-        recording = recording_of(one.readings[first], one.place, cleaned[number].get(first), lines[number])
+        line, heard_on, alone = told[number]
+        recording = recording_of(one.readings[first], one.place, cleaned[number].get(first), line)
         on_sensors = {
-            name: OnSensor(reading=reading, alone=alone[name][number], hears=name in heard_on[number])
+            name: OnSensor(reading=reading, alone=alone.get(name), hears=name in heard_on)
             for name, reading in one.readings.items()
         }
         tracked.append(replace(recording, on_sensors=on_sensors))
@@ -132,19 +134,19 @@ def _instants(
     by_sensor: dict[str, list[Reading]] = {}
     for reading in readings:
         by_sensor.setdefault(reading.sensor, []).append(reading)
+    keys: dict[tuple[str, str], tuple[float, ...]] = {}
     if (
         len({reading.file for reading in readings})
         == len(by_sensor[readings[0].sensor])
         == min(map(len, by_sensor.values()))
     ):  # channels of the same files
         files = [reading.file for reading in by_sensor[readings[0].sensor]]
-        keys: dict[tuple[str, str], tuple[float, int]] = {}
         times = [reading.time for reading in by_sensor[readings[0].sensor]]
         heard = [any(not one[number].refused for one in by_sensor.values()) for number in range(len(files))]
         stand, x_name = in_their_places(files, times, heard, places, x_name)
         keys = {(one.file, one.sensor): (stand[one.file].x, files.index(one.file)) for one in readings}
     elif x_name and places is not None:
-        stand, keys = dict(places), {}
+        stand = dict(places)
         for name, every in by_sensor.items():
             seen: dict[float, int] = {}
             for one in every:
@@ -152,7 +154,11 @@ def _instants(
                 keys[one.file, name] = (x, seen.setdefault(x, 0))
                 seen[x] += 1
     elif all(one.time is not None for one in readings if not one.refused):
-        stand, keys, x_name = *_by_time(readings, places), "time_h"
+        x_name, stand = "time_h", {}
+        laid = [Heard(one.file, one.sensor, one.time, _duration(one)) for one in readings]
+        for (file, sensor, *_), there in zip(laid, by_time(laid), strict=True):
+            stand[file] = replace((places or {}).get(file, Place(x=there.x)), x=there.x)
+            keys[file, sensor] = there
     else:
         counts = {name: len(every) for name, every in by_sensor.items()}
         if len({*counts.values()}) > 1:
@@ -161,53 +167,40 @@ def _instants(
                 f"recordings of different sensors are laid beside one another by number, and there are {said}; say "
                 "when they began, or where they stand in a table"
             )
-        stand, x_name, keys = {}, "recording", {}
+        stand, x_name = {}, "recording"
         for name, every in by_sensor.items():
             for number, one in enumerate(every, 1):
                 stand[one.file] = replace((places or {}).get(one.file, Place(x=number)), x=float(number))
                 keys[one.file, name] = (float(number), 0)
-    found: dict[tuple[float, int], Instant] = {}
+    found: dict[tuple[float, ...], Instant] = {}
     for one in readings:
         instant = found.setdefault(keys[one.file, one.sensor], Instant(stand[one.file], {}))
         instant.readings[one.sensor] = one
     return [found[key] for key in sorted(found)], x_name
 
 
-def _by_time(
-    readings: Sequence[Reading], places: Mapping[str, Place] | None
-) -> tuple[dict[str, Place], dict[tuple[str, str], tuple[float, int]]]:
-    """Places in hours since the first; recordings that overlap in time are one."""
-    known = [(one.time, number, one) for number, one in enumerate(readings) if one.time is not None]
-    timed = sorted(known, key=lambda one: one[:2])
-    stand: dict[str, Place] = {}
-    keys: dict[tuple[str, str], tuple[float, int]] = {}
-    began = until = timed[0][0]
-    taken: set[str] = set()
-    count = -1
-    for time, _, one in timed:
-        if count < 0 or time >= until or one.sensor in taken:
-            began, taken, count = time, set(), count + 1
-            until = time + timedelta(seconds=one.quality.duration_s if one.quality is not None else 0.0)
-        taken.add(one.sensor)
-        x = (began - timed[0][0]).total_seconds() / 3600.0
-        stand[one.file] = replace((places or {}).get(one.file, Place(x=x)), x=x)
-        keys[one.file, one.sensor] = (x, count)
-    for one in readings:  # what was refused takes no place: it stands at the end
-        if one.time is None:
-            count += 1
-            x = max(place.x for place in stand.values())
-            stand[one.file], keys[one.file, one.sensor] = Place(x=x), (x, count)
-    return stand, keys
+def _duration(reading: Reading) -> float:
+    return nan if reading.quality is None else reading.quality.duration_s
 
 
-def _require_no_copies(names: Sequence[str], found: Sequence[Instant]) -> None:
-    """BadInput where two sensors hold the same samples: they would agree on everything."""
+def _without_copies(names: Sequence[str], found: Sequence[Instant], *, refused: bool) -> list[Instant]:
+    """Sensors that hold the same samples would agree on everything: BadInput, or the second of them does not count."""
+    told = []
     for one in found:
-        for first, second in combinations([name for name in names if name in one.readings], 2):
-            spectra = [one.readings[name].spectrum for name in (first, second)]
-            if any(spectrum is None for spectrum in spectra):
+        readings = dict(one.readings)
+        for first, second in combinations([name for name in names if name in readings], 2):
+            here, there = (readings[name].spectrum for name in (first, second))
+            if here is None or there is None or not _alike(here, there):
                 continue
-            here, there = (spectrum.density for spectrum in spectra if spectrum is not None)
-            if here.shape == there.shape and bool(np.all(np.abs(here - there)[1:] <= COPIED * there[1:])):
-                name = Path(one.readings[first].file).name
+            if refused:
+                name = Path(readings[first].file).name
                 raise BadInput(f"sensors {first} and {second} hold the same samples in {name}; leave one of them out")
+            readings[second] = replace(readings[second], reason=f"it holds the same samples as {first}")
+        told.append(one._replace(readings=readings))
+    return told
+
+
+def _alike(one: Spectrum, other: Spectrum) -> bool:
+    if one.density.shape != other.density.shape:
+        return False
+    return bool(np.all(np.abs(one.density - other.density)[1:] <= COPIED * other.density[1:]))

@@ -59,18 +59,14 @@ class Track:
         """In how many recordings a contact resonance was found."""
         return sum(recording.resonance.found for recording in self.recordings)
 
-    def of_sensor(self, name: str) -> "Track":
-        """The recordings that one of several sensors has, with the judgement of all."""
-        there = [number for number, one in enumerate(self.recordings) if name in one.on_sensors]
-        recordings = [
-            replace(one, file=reading.file, reading=reading)
-            for one in (self.recordings[number] for number in there)
-            for reading in [one.on_sensors[name].reading]
-        ]
-        states = tuple(self.alarm.states[number] for number in there)
-        since = self.alarm.since
-        since = None if since is None else min(sum(number < since for number in there), len(there) - 1)
-        return replace(self, recordings=tuple(recordings), alarm=replace(self.alarm, states=states, since=since))
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of its sensors; none of one sensor."""
+        return tuple(dict.fromkeys(name for one in self.recordings for name in one.on_sensors))
+
+    def number_of(self, file: str) -> int | None:
+        """Which recording a file is of, None for none."""
+        return next((number for number, one in enumerate(self.recordings) if file in one.files), None)
 
     def silent(self, reason: str) -> "Track":
         """The same where no recording comes any more, for a `reason`: blind, unless an alarm stands."""

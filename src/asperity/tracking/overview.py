@@ -12,8 +12,10 @@ from asperity.files import whole_file, write_csv
 from asperity.recording import ReadOptions
 from asperity.tracking.alarming import LAST
 from asperity.tracking.model import Track, flat
-from asperity.tracking.store import ACKNOWLEDGED, FOLDER, Place, Store
-from asperity.tracking.watch import settings_of, spot_of, version_of
+from asperity.tracking.sensor import ACKNOWLEDGED
+from asperity.tracking.sensors import opened, those_of
+from asperity.tracking.store import Place, Store
+from asperity.tracking.watch import version_of
 
 if TYPE_CHECKING:
     import pandas
@@ -129,61 +131,30 @@ def keep_track(
     Parameters
     ----------
     options : by which the recordings were read
-    machine, point, sensor, acknowledge : as `watch_folder` takes them; of several sensors each is kept by its own name,
-        with the judgement of all
+    machine, point, sensor, acknowledge : as `watch_folder` takes them
 
     Raises
     ------
     BadInput
         for a sensor whose recordings were read otherwise before.
     """
-    names = list(dict.fromkeys(name for one in track.recordings for name in one.on_sensors))
-    if names and sensor is not None:
-        raise BadInput(f"these recordings are of the sensors {', '.join(names)}, got sensor {sensor}; leave it out")
-    if not names:
-        spot = (machine, point, sensor or options.channel)
-        return _kept(track, store, settings_of(track.target, options), spot, acknowledge)
-    kept = [
-        _kept(track.of_sensor(name), store, settings_of(track.target, options), (machine, point, name), acknowledge)
-        for name in names
-    ]
-    alarmed = next((one.alarm for one in kept if one.alarm.state == "alarm"), None)
-    if alarmed is None or track.alarm.state == "alarm":
-        return track
-    return replace(track, alarm=replace(track.alarm, state="alarm", since=0, reason=alarmed.reason))
-
-
-def _kept(
-    track: Track,
-    store: str | Path,
-    settings: dict[str, Any],
-    names: tuple[str | None, str | None, str | None],
-    acknowledge: str | None,
-) -> Track:
-    """A sensor's track appended to a store; the track with the alarm that stands there."""
-    whole = tuple(
-        replace(one, file=str(path), reading=replace(one.reading, file=str(path)))
-        for one in track.recordings
-        for path in [Path(one.file).resolve()]
-    )
-    track = replace(track, recordings=whole)
-    folder = Path(whole[0].file).parent
-    with closing(Store(store)) as opened:
-        if names[0] is None or names[1] is None:
-            settings[FOLDER] = str(folder)
-        entered = opened.sensor(spot_of(folder, *names), settings)
-        keys = {}
+    at = {file: str(Path(file).resolve()) for one in track.recordings for file in one.files}
+    track = replace(track, recordings=tuple(one.moved(at) for one in track.recordings))
+    folder = Path(track.recordings[0].file).parent
+    entered = opened(store, folder, (machine, point, sensor), track.target, options)
+    with closing(entered.store):
+        keys = {file: version_of(Path(file)) for file in at.values()}
         for recording in track.recordings:
-            key = keys[recording.file] = version_of(Path(recording.file))
-            if key not in entered.recordings:
-                entered.keep(key, recording.reading)
+            for reading in recording.readings.values():
+                if not entered.holds(keys[reading.file], reading):
+                    entered.keep(keys[reading.file], reading)
         if acknowledge is not None:
-            entered.acknowledge(Path(whole[-1].file if acknowledge == LAST else acknowledge).name)
+            entered.acknowledge(Path(track.recordings[-1].file if acknowledge == LAST else acknowledge).name)
         return entered.judged(track, keys, len(keys), "", None)
 
 
 def acknowledge_in(store: str | Path, named: str) -> None:
-    """Somebody has looked at a sensor, up to its last recording.
+    """Somebody has looked at a sensor, and at those that it is judged with, up to the last recording.
 
     Parameters
     ----------
@@ -194,11 +165,11 @@ def acknowledge_in(store: str | Path, named: str) -> None:
     BadInput
         for a sensor that is not there, or has no recordings.
     """
-    with closing(Store(store, make=False)) as opened:
-        places = {"/".join(place): place for _, place in opened.places()}
+    with closing(Store(store, make=False)) as found:
+        places = {"/".join(place): place for _, place in found.places()}
         if named not in places:
             raise BadInput(f"the store has no sensor {named!r}; it has {', '.join(places) or 'none'}")
-        entered = opened.sensor(places[named], {})
+        entered = those_of(found, places[named])
         told = entered.said()
         if told is None:
             raise BadInput(f"nothing has been judged of {named} yet; there is nothing to acknowledge")

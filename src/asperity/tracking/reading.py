@@ -85,23 +85,6 @@ def channels_in(channel: str | None) -> list[str | None]:
     return [*names] or [None]
 
 
-def one_channel(channel: str | None) -> str | None:
-    """The channel that is asked for, where it can be only one.
-
-    Raises
-    ------
-    BadInput
-        for several.
-    """
-    (name, *others) = channels_in(channel)
-    if others:
-        raise BadInput(
-            f"one watch follows one channel, got {channel}; start a watch for each, with the same store, and asperity "
-            "track takes them together"
-        )
-    return name
-
-
 def read_spectrum(
     path: Path, options: ReadOptions, target: Target, spacing_hz: float, place: Place | None = None
 ) -> Reading:
@@ -177,9 +160,10 @@ def segment_length(rate_hz: float, spacing_hz: float) -> int:
 def common_spacing(paths: Sequence[Path], options: ReadOptions, target: Target) -> float:
     """Distance of the lines [Hz] that suits a whole series, from the length of its first, middle and last recording."""
     lengths = []
+    first = replace(options, channel=channels_in(options.channel)[0])
     for path in {paths[0], paths[len(paths) // 2], paths[-1]}:
         try:
-            opened = open_recording(path, **asdict(options))
+            opened = open_recording(path, **asdict(first))
         except BadInput:
             continue
         if opened.samples is not None:
@@ -218,6 +202,27 @@ def read_spectra(
             yield waiting[done], reading
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def read_channels(
+    paths: Sequence[Path],
+    options: ReadOptions,
+    target: Target,
+    spacing_hz: float,
+    *,
+    places: Mapping[str, Place] | None = None,
+    workers: int = 1,
+    progress: Callable[[Reading], None] | None = None,
+) -> Iterator[tuple[int, Reading]]:
+    """The same on every channel that is asked for, one after another; of several each is a sensor."""
+    channels = channels_in(options.channel)
+    for channel in channels:
+        of_one = replace(options, channel=channel)
+        for number, reading in read_spectra(
+            paths, of_one, target, spacing_hz, places=places, workers=workers, progress=progress
+        ):
+            of_several = replace(reading, sensor=f"{reading.sensor} {channel}".strip())
+            yield number, of_several if len(channels) > 1 else reading
 
 
 def _size(path: Path) -> int:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from asperity.tracking.operating import Operating
 from asperity.tracking.reading import Reading
 from asperity.wear import DISAGREE, AlarmState, CleanSpectrum, Resonance
 
+MISSED = 3  # recordings without one of the sensors, from which on that is said
 NAMED = {"depths": "depth", "lines": "line", "bands": "band"}  # of a row: several numbers, each by its own name
 
 
@@ -76,6 +77,24 @@ class TrackedRecording:
     def readings(self) -> dict[str, Reading]:
         """What was read of it, by sensor."""
         return {name: one.reading for name, one in self.on_sensors.items()} or {self.reading.sensor: self.reading}
+
+    @property
+    def files(self) -> list[str]:
+        """Files that hold it, its own first."""
+        return [*dict.fromkeys([self.file, *(reading.file for reading in self.readings.values())])]
+
+    def moved(self, to: Mapping[str, str]) -> "TrackedRecording":
+        """The same, its files by other names."""
+        heard = {
+            name: replace(one, reading=replace(one.reading, file=to[one.reading.file]))
+            for name, one in self.on_sensors.items()
+        }
+        reading = replace(self.reading, file=to[self.reading.file])
+        return replace(self, file=to[self.file], reading=reading, on_sensors=heard)
+
+    def by_sensor(self) -> "list[TrackedRecording]":
+        """The same as each of its sensors has it."""
+        return [replace(self, file=reading.file, reading=reading) for reading in self.readings.values()]
 
     @property
     def dead(self) -> bool:
@@ -187,4 +206,6 @@ def heard_in_words(recordings: Sequence[TrackedRecording]) -> str:
         if silent:
             there = sum(name in one.on_sensors for one in recordings)
             sentence += f" Sensor {name} is of no use in {len(silent)} of {there}: {silent[-1]}."
+        if len(recordings) >= MISSED and all(name not in one.on_sensors for one in recordings[-MISSED:]):
+            sentence += f" Of sensor {name} nothing has come with the last {MISSED} recordings."
     return sentence

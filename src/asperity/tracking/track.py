@@ -23,7 +23,7 @@ from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
 from asperity.tracking.operating import response_of, unstated
 from asperity.tracking.order import unacknowledged
-from asperity.tracking.reading import WINDOW, Reading, any_of, channels_in, common_spacing, read_spectra
+from asperity.tracking.reading import WINDOW, Reading, any_of, channels_in, common_spacing, read_channels
 from asperity.tracking.recorded import TrackedRecording
 from asperity.tracking.target import Target, search_target
 from asperity.wear import (
@@ -135,16 +135,14 @@ def _read(
 ) -> list[Reading]:
     """What every channel that is asked for gave, file by file."""
     channels = channels_in(options.channel)
-    spacing = common_spacing(files, replace(options, channel=channels[0]), target)
+    spacing = common_spacing(files, options, target)
+    every = [*read_channels(files, options, target, spacing, places=places, workers=workers, progress=progress)]
     readings: list[Reading] = []
-    for channel in channels:
-        of_one = replace(options, channel=channel)
-        numbered = dict(read_spectra(files, of_one, target, spacing, places=places, workers=workers, progress=progress))
-        of_files = [numbered[number] for number in range(len(files))]
-        if len(channels) > 1:
-            if all(reading.refused for reading in of_files):
-                raise BadInput(f"channel {channel} cannot be read of any recording: {of_files[0].reason}")
-            of_files = [replace(one, sensor=f"{one.sensor} {channel}".strip()) for one in of_files]
+    for number, channel in enumerate(channels):
+        numbered = dict(every[number * len(files) : (number + 1) * len(files)])
+        of_files = [numbered[place] for place in range(len(files))]
+        if len(channels) > 1 and all(reading.refused for reading in of_files):
+            raise BadInput(f"channel {channel} cannot be read of any recording: {of_files[0].reason}")
         readings += of_files
     return readings
 
@@ -173,9 +171,9 @@ def judge(
     alarming = (false_alarm_rate, acknowledge, before)
     sensors = list(dict.fromkeys(one.sensor for one in readings if one.sensor or not one.refused))
     if len(sensors) > 1:
-        _require_together(sensors, method, watched=learned is not None)
+        _require_together(sensors, method)
         readings = [one if one.sensor in sensors else replace(one, sensor=sensors[0]) for one in readings]
-        several, x_name, told = heard_together(readings, target, places, x_name, shaft_hz)
+        several, x_name, told = heard_together(readings, target, places, x_name, shaft_hz, learned)
         return _staged(several, x_name, target, "joint", (detector, stages_from), alarming, [*notes, *told])
     names, times = [reading.file for reading in readings], [reading.time for reading in readings]
     places, x_name = in_their_places(names, times, [not reading.refused for reading in readings], places, x_name)
@@ -183,9 +181,9 @@ def judge(
     series, left_out = on_one_grid(without_silence([readings[number] for number in order]))
     notes += left_out
     spectra = {number: spectrum_of(reading) for number, reading in enumerate(series) if reading.usable}
-    files = [series[number].file for number in spectra]
+    keys = [(series[number].file, series[number].sensor) for number in spectra]
     memory = Learned() if learned is None else learned
-    cleaned = [memory.clean(file, one, shaft_hz) for file, one in zip(files, spectra.values(), strict=True)]
+    cleaned = [memory.clean(key, one, shaft_hz) for key, one in zip(keys, spectra.values(), strict=True)]
     chosen = method or ("joint" if len(spectra) >= FEWEST_RECORDINGS else ALONE)
     if method is None and chosen != "joint" and spectra:
         notes.append(
@@ -196,7 +194,7 @@ def judge(
     if groups > 1:
         notes.append(f"{len(spectra)} recordings were separated in {groups} groups, each spread over the whole series.")
     if learned is not None and chosen == "joint":
-        resonances = learned.resonances(files, cleaned, target.band_hz)
+        resonances = learned.resonances(keys, cleaned, target.band_hz)
     else:
         resonances = _resonances(cleaned, target, chosen, groups)
     if method is None and chosen == ALONE:
@@ -276,13 +274,8 @@ def _staged(
     )
 
 
-def _require_together(sensors: Sequence[str], method: SeriesMethod | None, *, watched: bool) -> None:
+def _require_together(sensors: Sequence[str], method: SeriesMethod | None) -> None:
     """BadInput for several sensors where one is due."""
-    if watched:
-        raise BadInput(
-            f"one watch follows one sensor, and these recordings are of {len(sensors)} ({', '.join(sensors)}); give "
-            "each sensor a folder of its own and the same store, and asperity track takes them together"
-        )
     if "" in sensors:
         raise BadInput(
             f"some recordings say of which sensor they are ({', '.join(filter(None, sensors))}) and others do not; say "

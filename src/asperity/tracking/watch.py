@@ -8,7 +8,7 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -26,10 +26,10 @@ from asperity.tracking.files import Table, may_be_recording, natural, read_table
 from asperity.tracking.learned import Before, Learned
 from asperity.tracking.model import Track
 from asperity.tracking.order import Order, file_name, longest, ordered, unacknowledged, window
-from asperity.tracking.reading import Reading, common_spacing, one_channel, read_spectra
+from asperity.tracking.reading import Reading, common_spacing, read_channels
+from asperity.tracking.sensors import Sensors, opened
 from asperity.tracking.silence import silence
-from asperity.tracking.store import FOLDER, STORE, Sensor, Store, Version
-from asperity.tracking.store import Place as Spot
+from asperity.tracking.store import STORE, Version
 from asperity.tracking.target import Target, search_target
 from asperity.tracking.track import judge
 from asperity.wear import ALARM_STATES, FALSE_ALARMS, AlarmState, Detector, SeriesMethod, StageSource
@@ -42,8 +42,8 @@ STRIDE = 80  # recordings that are judged together where many arrive at once
 class Update:
     """What is new: files just read, and the series with them; None as long as there is none.
 
-    `failed` are sentences on calls that have not worked, and on files that could not be taken.
-    `waiting` files have changed so lately that they may still be written. Where nothing was new, `said` is the last
+    `failed` are sentences on calls that have not worked, and on files that could not be taken or have to wait.
+    `waiting` files may still be written, or have no row in the table yet. Where nothing was new, `said` is the last
     judgement, as `Track.scalars` gave it, and `track` None, but for a sensor that has fallen silent.
     """
 
@@ -98,8 +98,8 @@ def watch_folder(
         recordings have come nine times
     acknowledge : as `track_recordings`; kept in the store, and every judgement with it: an alarm stands until then
     store : SQLite file for what was read and said, asperity.db in `out` by default; several watches may share one
-    machine, point, sensor : whose recordings these are, in the store; by default the folder above, the folder, the
-        channel
+    machine, point, sensor : whose recordings these are, in the store; by default the folder above, the folder, and
+        what names the sensor: table, sidecar or channel. Several sensors are judged as one, each kept by its own name
     foreteller : who foretells the series behind the last acknowledged recording; asked when a judgement has been kept
         and told, as often as takes no more than a tenth of the time. Its alarm is kept and told as any other
     call : who is told, as `callers` makes them, when the state is another than last; a call that fails is made again
@@ -116,10 +116,10 @@ def watch_folder(
         require_positive("the time without a recording (--expect)", expect_s, "s")
     folder, out = _folders(folder, out, tell)
     target = search_target(case, band_hz)
-    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=one_channel(channel), scale=scale)
-    opened = _opened(store or out / STORE, folder, (machine, point, sensor or channel), settings_of(target, options))
-    opened.tells = tell
-    memory = _Memory(opened, target, options, call, Ahead(foreteller))
+    options = ReadOptions(rate_hz=rate_hz, unit=unit, channel=channel, scale=scale)
+    sensors = opened(store or out / STORE, folder, (machine, point, sensor), target, options)
+    sensors.tells = tell
+    memory = _Memory(sensors, target, options, call, Ahead(foreteller))
     asked: dict[str, Any] = {"shaft_hz": shaft_hz, "method": method, "detector": detector}
     asked |= {"stages_from": stages_from, "false_alarm_rate": false_alarm_rate}
     pace = _Pace(recall, once, every_s, settle_s, expect_s)
@@ -135,15 +135,6 @@ def _folders(folder: str | Path, out: str | Path, tell: Sequence[AlarmState]) ->
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
     make_folder(out)
     return folder, out
-
-
-def _opened(
-    store: str | Path, folder: Path, names: tuple[str | None, str | None, str | None], settings: dict[str, Any]
-) -> Sensor:
-    """A sensor of the store; one that is not named whole is that of the folder, and of no other."""
-    machine, point, sensor = names
-    settings |= {} if machine and point else {FOLDER: str(folder)}
-    return Store(store).sensor(spot_of(folder, machine, point, sensor), settings)
 
 
 class _Pace(NamedTuple):
@@ -166,53 +157,50 @@ def _looks(
     read: Callable[[list[Version], Table | None], tuple[Reading, ...]],
 ) -> Iterator[Update]:
     """An update at the start and whenever recordings have arrived."""
-    with closing(memory.sensor.store):
+    with closing(memory.sensors.store):
         first, told = True, ""
         while True:
             present = memory.present(folder)
-            unread = [key for key in present if key not in memory.sensor.recordings]
+            unread = [key for key in present if not memory.sensors.knows(key)]
             arrived = memory.settled(unread, pace)
-            named = None if table is None or not (arrived or memory.sensor.recordings) else read_table(table)
+            named = None if table is None or not (arrived or memory.sensors.by_name) else read_table(table)
+            if named is not None:
+                arrived = [key for key in arrived if named.row(Path(key.file)) is not None]
             new = read(arrived, named)
-            known = sorted(memory.sensor.series(), key=lambda key: natural(file_name(key)))
+            known = sorted(memory.sensors.series(), key=lambda key: natural(file_name(key)))
             waiting = len(unread) - len(arrived)
-            reason = "" if new or (acknowledge and first) else silence(memory.sensor.arrivals(), pace.expect_s)
-            said = memory.sensor.fell_silent(reason, memory.who) if reason else None
+            reason = "" if new or (acknowledge and first) else silence(memory.sensors.arrivals(), pace.expect_s)
+            said = memory.sensors.fell_silent(reason, memory.who) if reason else None
             if said is not None:
-                failed = deliver(memory.sensor, memory.call, now=first)
+                failed = deliver(memory.sensors, memory.call, now=first)
                 if not told:
-                    track = memory.silent(partial(judge, **asked), ordered(known, named, memory.sensor), reason)
+                    track = memory.silent(partial(judge, **asked), ordered(known, named, memory.sensors), reason)
                     yield Update(new=(), track=track, waiting=waiting, said=said, failed=failed)
             elif new or first:
                 question = _digest({**asked, **memory.ahead.asked}, named, known, memory.target)
                 recalled = first and pace.recall and not new and acknowledge is None
                 said = memory.said(question) if recalled else None
                 if said is not None:
-                    memory.sensor.tell(memory.who, said)
-                    failed = deliver(memory.sensor, memory.call, now=True)
+                    memory.sensors.tell(memory.who, said)
+                    failed = deliver(memory.sensors, memory.call, now=True)
                     yield Update(new=(), track=None, waiting=waiting, said=said, failed=failed)
                 else:
-                    order = ordered(known, named, memory.sensor)
+                    order = ordered(known, named, memory.sensors)
                     judging = partial(judge, **asked)
                     track = memory.judged(judging, order, len(new), question, acknowledge if first else None)
-                    failed = (*memory.left_out(), *deliver(memory.sensor, memory.call, now=first))
+                    failed = (*memory.left_out(), *order.waits, *deliver(memory.sensors, memory.call, now=first))
                     ahead = memory.foretold()
-                    failed += deliver(memory.sensor, memory.call) if ahead is not None else ()
+                    failed += deliver(memory.sensors, memory.call) if ahead is not None else ()
                     yield Update(new=new, track=ahead or track, waiting=waiting, failed=failed)
             elif (ahead := memory.foretold()) is not None:
-                failed = deliver(memory.sensor, memory.call)
+                failed = deliver(memory.sensors, memory.call)
                 yield Update(new=(), track=ahead, waiting=waiting, failed=failed)
             else:
-                deliver(memory.sensor, memory.call)
+                deliver(memory.sensors, memory.call)
             if pace.once:
                 return
             first, told = False, reason
             sleep(pace.every_s)
-
-
-def spot_of(folder: Path, machine: str | None, point: str | None, sensor: str | None) -> Spot:
-    """Names of a sensor; by default those of the folder that its recordings lie in, and of the one above."""
-    return Spot(machine or folder.parent.name or "machine", point or folder.name or "point", sensor or "sensor")
 
 
 def version_of(path: Path) -> Version:
@@ -226,12 +214,6 @@ def version_of(path: Path) -> Version:
     return Version(str(path), " ".join(stamps))
 
 
-def settings_of(target: Target, options: ReadOptions) -> dict[str, Any]:
-    """By what recordings are read: recordings of one sensor are all read alike."""
-    machine = {"rates_per_turn": dict(target.rates_per_turn)} if target.rates_per_turn else {}
-    return {"band_hz": [round(end, 6) for end in target.band_hz]} | asdict(options) | machine
-
-
 def _digest(asked: Mapping[str, Any], table: Table | None, known: Sequence[Version], target: Target) -> str:
     """What a judgement depends on, besides what the store holds."""
     told = json.dumps([asked, repr(table), target.full_load_crf_hz], default=str)
@@ -239,14 +221,14 @@ def _digest(asked: Mapping[str, Any], table: Table | None, known: Sequence[Versi
 
 
 class _Memory:
-    """What a watch knows of its sensor: the store, and what of it this run has needed, at hand."""
+    """What a watch knows of its sensors: the store, and what of it this run has needed, at hand."""
 
     def __init__(
-        self, sensor: Sensor, target: Target, options: ReadOptions, call: Sequence[Caller], ahead: Ahead
+        self, sensors: Sensors, target: Target, options: ReadOptions, call: Sequence[Caller], ahead: Ahead
     ) -> None:
-        self.sensor, self.target, self.options, self.call, self.ahead = sensor, target, options, call, ahead
+        self.sensors, self.target, self.options, self.call, self.ahead = sensors, target, options, call, ahead
         self._unforetold: tuple[Track, Order, str] | None = None  # the last judgement, while its forecast is due
-        self._readings: dict[Version, Reading] = {}
+        self._readings: dict[Version, list[Reading]] = {}
         self._learned: Learned | None = None
         self.unnamed: set[str] = set()
         self._ahead: dict[Version, float] = {}  # files of a clock that is ahead, and when they were first seen
@@ -271,7 +253,7 @@ class _Memory:
                 continue
             beside = next((name for name in names_beside(entry.name) if name in sidecars), None) if sidecars else None
             key = Version(entry.path, stamp if beside is None else f"{stamp} {stamps[beside][1]}")
-            if key in self.sensor.recordings or may_be_recording(Path(key.file)):
+            if self.sensors.knows(key) or may_be_recording(Path(key.file)):
                 versions.append((natural(entry.name), key))
         return [key for _, key in sorted(versions)]
 
@@ -304,27 +286,29 @@ class _Memory:
         if not keys:
             return ()
         paths = [Path(key.file) for key in keys]
-        if self.sensor.spacing_hz is None:
-            self.sensor.settle_spacing(common_spacing(paths, self.options, self.target))
-        assert self.sensor.spacing_hz is not None  # just settled
-        stated = {} if table is None else table.placed([path for path in paths if table.row(path) is not None])
-        reader = read_spectra(
+        if self.sensors.spacing_hz is None:
+            self.sensors.settle_spacing(common_spacing(paths, self.options, self.target))
+        assert self.sensors.spacing_hz is not None  # just settled
+        stated = {} if table is None else table.placed(paths)
+        reader = read_channels(
             paths,
             self.options,
             self.target,
-            self.sensor.spacing_hz,
+            self.sensors.spacing_hz,
             places=stated,
             workers=workers,
             progress=progress,
         )
+        heard: dict[Version, list[Reading]] = {key: [] for key in keys}
         for number, reading in reader:
-            self.sensor.keep(keys[number], reading)
-            self._readings[keys[number]] = reading
-        return tuple(self._readings[key] for key in keys)
+            self.sensors.keep(keys[number], reading)
+            heard[keys[number]].append(reading)
+        self._readings |= heard
+        return tuple(reading for every in heard.values() for reading in every)
 
     def said(self, question: str) -> dict[str, Any] | None:
         """The last judgement, where it was of the same question."""
-        return self.sensor.said() if self.sensor.asked == question else None
+        return self.sensors.said() if self.sensors.asked == question else None
 
     def judged(
         self, judging: Callable[..., Track], order: Order, new: int, question: str, acknowledge: str | None
@@ -333,31 +317,35 @@ class _Memory:
 
         None where there is nothing to judge.
         """
-        self.sensor.look_up()
-        keys, again = order.keys, acknowledge is not None
-        if not keys:
+        self.sensors.look_up()
+        again, count = acknowledge is not None, len(order.instants)
+        if not count:
             return None
         if acknowledge is not None:
-            self.sensor.acknowledge(_named(acknowledge, keys))
-        unjudged = (number for number, key in enumerate(keys) if self.sensor.recordings[key].state is None)
-        first = max(next(unjudged, len(keys)) + STRIDE, longest())
-        for end in range(first, len(keys), STRIDE):
+            self.sensors.acknowledge(_named(acknowledge, order.keys))
+        unjudged = (number for number, keys in enumerate(order.instants) if not any(map(self._state, keys)))
+        first = max(next(unjudged, count) + STRIDE, longest())
+        for end in range(first, count, STRIDE):
             self._judged(judging, order, end, 0, "", again=again, who=())
         answers = question if self.ahead.foreteller is None else ""  # not answered before its forecast is made
-        track = self._judged(judging, order, len(keys), new, answers, again=again, who=self.who)
+        track = self._judged(judging, order, count, new, answers, again=again, who=self.who)
         self._unforetold = (track, order, question)
         return track
+
+    def _state(self, key: Version) -> AlarmState | None:
+        """What was said of a recording; None before it was judged."""
+        return next(filter(None, (one.state for one in self.sensors.kept(key).values())), None)
 
     def foretold(self) -> Track | None:
         """The last judgement with its forecast, kept; None where there is none to make, or none yet."""
         if self._unforetold is None or not self.ahead.due:
             return None
         (track, order, question), self._unforetold = self._unforetold, None
-        acknowledged = self.sensor.acknowledged
-        every = [row | {"x": order.places[row["file"]].x} for row in self.sensor.rows(order.keys)]
+        acknowledged = self.sensors.acknowledged
+        every = [row | {"x": order.places[row["file"]].x} for row in self.sensors.rows(order.instants)]
         rows = unacknowledged(every, acknowledged)
         made = self.ahead.make(rows, order.x_name, comparable=track.comparable, acknowledged=acknowledged)
-        return self.sensor.judged(
+        return self.sensors.judged(
             track.foretold(made), {key.file: key for key in order.keys}, 0, question, self._learned, self.who
         )
 
@@ -374,42 +362,38 @@ class _Memory:
     ) -> Track:
         """A judgement of the series up to an end, kept."""
         track, keys = self._looked_at(judging, order, end, again=again)
-        return self.sensor.judged(track, {key.file: key for key in keys}, new, question, self._learned, who)
+        return self.sensors.judged(track, {key.file: key for key in keys}, new, question, self._learned, who)
 
     def silent(self, judging: Callable[..., Track], order: Order, reason: str) -> Track | None:
         """The series as it is when no recording comes any more; nothing of it is kept. None where none is known."""
-        if not order.keys:
+        if not order.instants:
             return None
-        return self._looked_at(judging, order, len(order.keys), again=False)[0].silent(reason)
+        return self._looked_at(judging, order, len(order.instants), again=False)[0].silent(reason)
 
     def _looked_at(
         self, judging: Callable[..., Track], order: Order, end: int, *, again: bool
     ) -> tuple[Track, list[Version]]:
         """The series up to an end as it is judged beside what was said, and what of it was looked at."""
-        chosen = {order.keys[number]: order.place(number) for number in window(order, end, self.sensor)}
-        held = {key: self._readings.get(key) or self.sensor.reading(key) for key in chosen}
-        self._readings = {key: reading for key, reading in held.items() if reading is not None}
-        states: dict[str, AlarmState] = {}
-        for key in chosen:
-            state = self.sensor.recordings[key].state if key in self.sensor.recordings else None
-            if state is not None and not again:
-                states[key.file] = state
-        standing = self.sensor.standing
-        before = Before(states) if standing is None else Before(states, standing.reason, standing.raised_by)
+        chosen = window(order, end, self.sensors)
+        self._readings = {key: self._readings.get(key) or self.sensors.readings(key) for key in chosen}
+        said = {} if again else {key.file: state for key in chosen if (state := self._state(key)) is not None}
+        standing = self.sensors.standing
+        before = Before(said) if standing is None else Before(said, standing.reason, standing.raised_by)
         if self._learned is None:
-            self._learned = self.sensor.learned()
+            self._learned = self.sensors.learned()
         names = {file_name(key) for key in self._readings}
+        acknowledged = self.sensors.acknowledged
         track: Track = judging(
-            [*self._readings.values()],
+            [reading for every in self._readings.values() for reading in every],
             self.target,
-            {key.file: chosen[key] for key in self._readings},
+            {key.file: order.places[key.file] for key in chosen},
             order.x_name,
-            acknowledge=self.sensor.acknowledged if self.sensor.acknowledged in names else None,
+            acknowledge=acknowledged if acknowledged in names else None,
             learned=self._learned,
             before=before,
         )
-        last = self.ahead.standing(self.sensor.acknowledged)
-        return track if last is None else track.foretold(last), [*chosen]
+        last = self.ahead.standing(acknowledged)
+        return track if last is None else track.foretold(last), chosen
 
 
 def _named(acknowledge: str, keys: Sequence[Version]) -> str:

@@ -29,7 +29,10 @@ from .resonance import damping_objection as damping_objection
 from .resonance import line_shape as line_shape
 from .resonance import no_resonance as no_resonance
 from .sensors import DISAGREE as DISAGREE
+from .sensors import Agreement as Agreement
 from .sensors import SensorLines as SensorLines
+from .sensors import SharedBySensors as SharedBySensors
+from .sensors import learn_sensors as learn_sensors
 from .sensors import resonances_of_sensors as resonances_of_sensors
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
 from .series import SeriesMethod as SeriesMethod

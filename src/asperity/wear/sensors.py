@@ -17,18 +17,20 @@ from asperity.signals import Spectrum
 from asperity.wear.expected import Blocks, expected_density
 from asperity.wear.indicators import STRONG_EVIDENCE
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
-from asperity.wear.separation import Heard, Joint, Lines, alone_beside, best_of, coarser, each, places, search
+from asperity.wear.separation import Heard, Joint, Lines, alone_beside, coarser, each, levelled, places
 from asperity.wear.series import (
     FEWEST_RECORDINGS,
     LARGEST_MISFIT,
     JudgedLine,
     Separated,
+    Shared,
     gain_of,
     left_over,
     misfit_std,
     objection_to,
     rival_of,
     separated,
+    separated_beside,
     shares_of,
 )
 
@@ -36,6 +38,8 @@ APART, APART_WIDTHS = 3.0, 0.25  # deviations, and half-power widths, by both of
 ESTABLISHED, FEWEST_AGREED = 0.5, 3  # share and number of recordings in which sensors have heard one line
 DISAGREE = "the sensors disagree"
 MOST_COMMON = 0.9  # of the errors of two sensors, where they are compared
+SpectraBySensor = Mapping[str, Sequence[Spectrum | None]]  # one a recording, None where it has none
+MasksBySensor = Mapping[str, Sequence[Mask | None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,11 +57,23 @@ class SensorLines:
     common: float
 
 
+class Agreement(NamedTuple):
+    """How sensors agree, as a series has settled it.
+
+    `common` is the share of their errors that two have in common, `wider` by how much their lines differ more than
+    their deviations say, `established` who has mostly heard the line that others hear too.
+    """
+
+    common: Mapping[tuple[str, str], float]
+    wider: float
+    established: tuple[str, ...]
+
+
 def resonances_of_sensors(
-    spectra: Mapping[str, Sequence[Spectrum | None]],
+    spectra: SpectraBySensor,
     *,
     band_hz: tuple[float, float],
-    kept: Mapping[str, Sequence[Mask | None]] | None = None,
+    kept: MasksBySensor | None = None,
 ) -> SensorLines:
     """Find the contact resonance that the sensors of one machine have in common, in each recording.
 
@@ -76,35 +92,75 @@ def resonances_of_sensors(
     BadInput
         as `series_resonances`, or where no sensor has 6 recordings.
     """
-    rows = {name: [i for i, one in enumerate(every) if one is not None] for name, every in spectra.items()}
-    counted = [name for name, there in rows.items() if len(there) >= FEWEST_RECORDINGS]
+    return learn_sensors(spectra, band_hz=band_hz, kept=kept)[0]
+
+
+def learn_sensors(
+    spectra: SpectraBySensor,
+    *,
+    band_hz: tuple[float, float],
+    kept: MasksBySensor | None = None,
+) -> tuple[SensorLines, "SharedBySensors"]:
+    """The lines of `resonances_of_sensors`, and what they rest on, by which further recordings can be judged."""
+    counted = _counted(spectra)
     if not counted:
         raise BadInput(f"no sensor has {FEWEST_RECORDINGS} recordings, which the joint separation needs; record more")
-    by_sensor: dict[str, Separated] = {}
+    by_sensor = {}
     for name in counted:
-        used = [one for one in spectra[name] if one is not None]
-        masks = None if kept is None else [mask for mask in kept[name] if mask is not None]
+        used, masks = _used(spectra, kept, name)
         by_sensor[name] = separated(used, band_hz=band_hz, kept=masks)
-    count = len(next(iter(spectra.values())))
-    alone: dict[str, tuple[Resonance | None, ...]] = {}
-    for name, there in rows.items():
-        found: list[Resonance | None] = [None] * count
-        for place, number in enumerate(there):
-            found[number] = by_sensor[name].resonances[place] if name in by_sensor else _too_few(len(there), band_hz)
-        alone[name] = tuple(found)
-    if len(counted) == 1:
-        (only,) = counted
-        nothing = no_resonance(f"only {only} has enough recordings, and none here", band_hz, "joint")
-        every = tuple(one or nothing for one in alone[only])
-        return SensorLines(
-            resonances=every, heard_on=tuple((only,) * one.found for one in every), alone=alone, common=np.nan
-        )
-    return _Together(by_sensor, {name: rows[name] for name in counted}, alone, band_hz).judged(count)
+    lines, agreement = _Together(by_sensor, spectra, band_hz).judged()
+    shared = {name: one.shared for name, one in by_sensor.items()}
+    return lines, SharedBySensors(by_sensor=shared, agreement=agreement, band_hz=band_hz)
 
 
-def _too_few(count: int, band_hz: tuple[float, float]) -> Resonance:
-    reason = f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor, and this one has {count}"
-    return no_resonance(reason, band_hz, "joint")
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SharedBySensors:
+    """What the recordings of several sensors share, as some of them have settled it: enough to judge others beside."""
+
+    by_sensor: Mapping[str, Shared]
+    agreement: Agreement
+    band_hz: tuple[float, float]
+
+    def fits(self, spectra: SpectraBySensor, band_hz: tuple[float, float]) -> bool:
+        """Whether spectra are of these sensors, on their lines."""
+        if band_hz != self.band_hz or set(_counted(spectra)) != {*self.by_sensor}:
+            return False
+        first = {name: next(one for one in spectra[name] if one is not None) for name in self.by_sensor}
+        return all(shared.fits(first[name]) for name, shared in self.by_sensor.items())
+
+    def lines(self, spectra: SpectraBySensor, kept: MasksBySensor | None = None) -> SensorLines:
+        """The contact resonance in each of further recordings, as `resonances_of_sensors` finds it.
+
+        Raises
+        ------
+        BadInput
+            for spectra on other lines, or without any vibration.
+        """
+        there = [name for name, rows in _rows(spectra).items() if rows and name in self.by_sensor]
+        by_sensor = {name: separated_beside(self.by_sensor[name], *_used(spectra, kept, name)) for name in there}
+        return _Together(by_sensor, spectra, self.band_hz).judged(self.agreement)[0]
+
+
+def _count(spectra: SpectraBySensor) -> int:
+    """How many recordings there are."""
+    return len(next(iter(spectra.values())))
+
+
+def _rows(spectra: SpectraBySensor) -> dict[str, list[int]]:
+    """Which recordings each sensor has."""
+    return {name: [i for i, one in enumerate(every) if one is not None] for name, every in spectra.items()}
+
+
+def _counted(spectra: SpectraBySensor) -> list[str]:
+    """Sensors with enough recordings to be separated."""
+    return [name for name, there in _rows(spectra).items() if len(there) >= FEWEST_RECORDINGS]
+
+
+def _used(spectra: SpectraBySensor, kept: MasksBySensor | None, name: str) -> tuple[list[Spectrum], list[Mask] | None]:
+    """A sensor's spectra and masks, those that it has."""
+    masks = None if kept is None else [mask for mask in kept[name] if mask is not None]
+    return [one for one in spectra[name] if one is not None], masks
 
 
 class _Fit(NamedTuple):
@@ -124,59 +180,83 @@ class _Fit(NamedTuple):
 
 
 class _Together:
-    """Sensors whose series have been separated, to be judged together."""
+    """Recordings of sensors whose series have been separated, to be judged together."""
 
     def __init__(
-        self,
-        by_sensor: Mapping[str, Separated],
-        rows: Mapping[str, list[int]],
-        alone: Mapping[str, tuple[Resonance | None, ...]],
-        band_hz: tuple[float, float],
+        self, by_sensor: Mapping[str, Separated], spectra: SpectraBySensor, band_hz: tuple[float, float]
     ) -> None:
-        self.by_sensor, self.rows, self.alone, self.band_hz = by_sensor, rows, alone, band_hz
+        self.by_sensor, self.rows, self.band_hz = by_sensor, _rows(spectra), band_hz
+        self.count = len(next(iter(spectra.values())))
+        self.alone = {name: self._by_itself(name) for name in spectra}
 
-    def judged(self, count: int) -> SensorLines:
-        """Every recording, by the sensors that it has."""
+    def judged(self, agreement: Agreement | None = None) -> tuple[SensorLines, Agreement]:
+        """Every recording, by the sensors that it has; how they agree, of these recordings if it is not known."""
+        count = self.count
         there: dict[tuple[str, ...], list[int]] = {}
         for number in range(count):
-            there.setdefault(tuple(name for name, rows in self.rows.items() if number in rows), []).append(number)
+            there.setdefault(tuple(name for name in self.by_sensor if number in self.rows[name]), []).append(number)
         fits = [self._fitted([*names], numbers) for names, numbers in there.items() if len(names) > 1]
-        common = {
-            pair: share for pair in combinations(self.by_sensor, 2) if np.isfinite(share := _in_common(pair, fits))
-        }
-        wider = self._wider(common)
+        common = self._common(fits) if agreement is None else agreement.common
+        wider = self._wider(common) if agreement is None else agreement.wider
         heard_on: list[tuple[str, ...]] = [()] * count
-        lines: list[Resonance] = [no_resonance("no sensor has a spectrum here", self.band_hz, "joint")] * count
+        silent = no_resonance("no sensor has a spectrum here", self.band_hz, "joint")
+        lines = [next(filter(None, heard), silent) for heard in zip(*self.alone.values(), strict=True)]
         for fit in fits:
             for number, (line, names) in zip(fit.numbers, self._agreed(fit, common, wider), strict=True):
                 lines[number], heard_on[number] = line, names
+        established = self._established(heard_on) if agreement is None else agreement.established
         for number in range(count):
             if not heard_on[number] and not self._apart(number):
-                lines[number], heard_on[number] = self._by_one(number, lines[number], heard_on, wider)
+                lines[number], heard_on[number] = self._by_one(number, lines[number], established, wider)
         shares = [*common.values()]
-        return SensorLines(
+        told = SensorLines(
             resonances=tuple(lines),
             heard_on=tuple(heard_on),
             alone=self.alone,
             common=float(np.mean(shares)) if shares else np.nan,
         )
+        return told, Agreement(common, wider, established)
+
+    def _by_itself(self, name: str) -> tuple[Resonance | None, ...]:
+        """What a sensor's series says of each recording, None where it has none."""
+        own = self.by_sensor.get(name)
+        reason = f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor, and this one has fewer"
+        too_few = no_resonance(reason, self.band_hz, "joint")
+        found: list[Resonance | None] = [None] * self.count
+        for place, number in enumerate(self.rows[name]):
+            found[number] = too_few if own is None else own.resonances[place]
+        return tuple(found)
+
+    def _common(self, fits: Sequence[_Fit]) -> dict[tuple[str, str], float]:
+        """The share of their errors that two sensors have in common, where that can be told."""
+        pairs = combinations(self.by_sensor, 2)
+        return {pair: share for pair in pairs if np.isfinite(share := _in_common(pair, fits))}
+
+    def _established(self, heard_on: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+        """Sensors that have heard the line of others in most of the recordings in which they heard one."""
+        if len(self.by_sensor) == 1:
+            return (*self.by_sensor,)
+        found = []
+        for name, every in self.alone.items():
+            together = sum(name in names and len(names) > 1 for names in heard_on)
+            ever = sum(one is not None and one.found for one in every)
+            if together >= max(FEWEST_AGREED, ESTABLISHED * ever):
+                found.append(name)
+        return tuple(found)
 
     def _fitted(self, names: list[str], numbers: list[int]) -> _Fit:
         """One line for all sensors in each of some recordings, beside what each sensor's series has settled."""
-        heard, values, templates = [], [], self.by_sensor[names[0]].found.templates
-        total = np.zeros((len(numbers), templates.f0.size))
+        heard, templates = [], self.by_sensor[names[0]].found.templates
+        rows = {name: [self.rows[name].index(number) for number in numbers] for name in names}
+        total = np.sum([self.by_sensor[name].found.elsewhere[rows[name]] for name in names], axis=0)
+        best = np.argmin(total, axis=1)
         for name in names:
-            one = self.by_sensor[name]
-            rows = [self.rows[name].index(number) for number in numbers]
-            blocks = Blocks(one.blocks.centre, one.blocks.density[rows], one.blocks.weight[rows])
-            coarse, settled = coarser(blocks), one.found.joint.parameters
-            base = np.exp(np.interp(coarse.centre, blocks.centre, settled.base))
-            cost, at_best = search(coarse, base, templates)
-            total = total + cost
-            values.append(at_best)
-            heard.append(Heard(blocks, settled, one.found.joint.doubt))
-        starts = [best_of(total, at_best, templates) for at_best in values]
-        heard = [one._replace(at=one.at._replace(own=own)) for one, own in zip(heard, starts, strict=True)]
+            one, settled = self.by_sensor[name], self.by_sensor[name].found.joint
+            blocks = Blocks(one.blocks.centre, one.blocks.density[rows[name]], one.blocks.weight[rows[name]])
+            coarse = coarser(blocks)
+            base = np.exp(np.interp(coarse.centre, blocks.centre, settled.parameters.base))
+            own = levelled(coarse, base, templates, best)
+            heard.append(Heard(blocks, settled.parameters._replace(own=own), settled.doubt))
         return _Fit(names, numbers, heard, each(heard), total)
 
     def _wider(self, common: Mapping[tuple[str, str], float]) -> float:
@@ -265,26 +345,23 @@ class _Together:
         return resonance, tuple(names)
 
     def _by_one(
-        self, number: int, line: Resonance, heard_on: Sequence[tuple[str, ...]], wider: float
+        self, number: int, line: Resonance, established: Sequence[str], wider: float
     ) -> tuple[Resonance, tuple[str, ...]]:
         """A line that one sensor hears, where it has elsewhere been the one that others hear too."""
-        found = [(name, one) for name, all_ in self.alone.items() if (one := all_[number]) is not None and one.found]
+        there = {name: one for name, every in self.alone.items() if (one := every[number]) is not None}
+        found = [(name, one) for name, one in there.items() if one.found]
         if not found:
             return line, ()
         name, own = found[0]
-        together = [names for names in heard_on if name in names and len(names) > 1]
-        ever = sum(one is not None and one.found for one in self.alone[name])
-        if len(together) < max(FEWEST_AGREED, ESTABLISHED * ever):
-            others = " and ".join(other for other in self.by_sensor if other != name)
-            reason = (
-                f"a line at {own.crf_hz:.0f} Hz is heard on {name} only, not on {others}: a structure's looks the same"
-            )
+        if name not in established:
+            others = " and ".join(other for other in there if other != name)
+            only = f"only, not on {others}" if others else "and no other sensor heard this recording"
+            reason = f"a line at {own.crf_hz:.0f} Hz is heard on {name} {only}: a structure's looks the same"
             return no_resonance(reason, self.band_hz, "joint", evidence=own.evidence), ()
-        first = name == next(iter(self.alone))
-        height = (own.crfa, own.crfa_std) if first else (np.nan, np.nan)
+        height = (own.crfa, own.crfa_std) if name == next(iter(self.alone)) else (np.nan, np.nan)
+        said = f"{own.reason}, here on {name} only" if len(self.by_sensor) > 1 else own.reason
         return replace(
-            own, crf_std=own.crf_std * wider, crfa=height[0], crfa_std=height[1],
-            reason=f"{own.reason}, here on {name} only",
+            own, crf_std=own.crf_std * wider, crfa=height[0], crfa_std=height[1], reason=said,
         ), (name,)  # fmt: skip
 
     def _deviations(self, fit: _Fit, shares: Field) -> Field:

@@ -143,6 +143,16 @@ def best_of(cost: Field, values: Field, templates: Templates) -> Field:
     return np.stack([level, np.log(templates.f0[best]), np.log(templates.damping[best]), gain], axis=1)
 
 
+def levelled(blocks: Blocks, base: Field, templates: Templates, best: npt.NDArray[np.intp]) -> Field:
+    """The lines at given templates, one a recording, gain and height at their best: ln A, ln f, ln ζ, ln g."""
+    rows = []
+    for row, number in enumerate(best):
+        one = Templates(templates.f0[[number]], templates.damping[[number]], templates.shape[[number]])
+        heard = Blocks(blocks.centre, blocks.density[[row]], blocks.weight[[row]])
+        rows.append(best_of(*search(heard, base, one), one)[0])
+    return np.array(rows).reshape(-1, 4)
+
+
 def beside(
     blocks: Blocks,
     base: Field,

@@ -69,7 +69,7 @@ class Shared:
     @cached_property
     def _search(self) -> tuple[Templates, list[Model]]:
         """The search made ready; single precision, for it is some 30 MB and only begins the fit."""
-        empty = np.empty((1, self.centre.size))
+        empty = np.ones((1, self.centre.size))
         coarse = coarser(Blocks(self.centre, empty, empty)).centre
         templates = templates_on(coarse)
         ready = models(np.exp(np.interp(coarse, self.centre, self.base)), templates, coarse)
@@ -83,19 +83,7 @@ class Shared:
         BadInput
             for spectra on other lines, or without any vibration.
         """
-        for spectrum in spectra:
-            if not self.fits(spectrum):
-                raise BadInput(
-                    f"a spectrum of {spectrum.frequency_hz.size} lines every {spectrum.spacing_hz:g} Hz is not of this "
-                    f"series, whose lines are {self.spacing_hz:g} Hz apart; judge it by itself"
-                )
-        lines = self.first + np.arange(self.size * self.centre.size)
-        blocks = _blocked(spectra, lines, self.size, kept)
-        templates, ready = self._search
-        joint, elsewhere = beside(blocks, self.base, Transfer(*self.reach, self.transfer), self.doubt, templates, ready)
-        witnesses = Witnesses(self.counts, self.change, self.by_chance)
-        found = Found(joint, templates, elsewhere, witnesses, self.stands)
-        return _judged(blocks, found, self.band_hz)
+        return separated_beside(self, spectra, kept).resonances
 
 
 def series_resonances(
@@ -199,6 +187,24 @@ def separated(
         by_chance=witnesses.by_chance,
     )
     return Separated(blocks, found, resonances, shared)
+
+
+def separated_beside(shared: Shared, spectra: Sequence[Spectrum], kept: Sequence[Mask] | None = None) -> Separated:
+    """Further spectra separated by what a series has settled; otherwise as `Shared.resonances`."""
+    for spectrum in spectra:
+        if not shared.fits(spectrum):
+            raise BadInput(
+                f"a spectrum of {spectrum.frequency_hz.size} lines every {spectrum.spacing_hz:g} Hz is not of this "
+                f"series, whose lines are {shared.spacing_hz:g} Hz apart; judge it by itself"
+            )
+    lines = shared.first + np.arange(shared.size * shared.centre.size)
+    blocks = _blocked(spectra, lines, shared.size, kept)
+    templates, ready = shared._search
+    passed = Transfer(*shared.reach, shared.transfer)
+    joint, elsewhere = beside(blocks, shared.base, passed, shared.doubt, templates, ready)
+    witnesses = Witnesses(shared.counts, shared.change, shared.by_chance)
+    found = Found(joint, templates, elsewhere, witnesses, shared.stands)
+    return Separated(blocks, found, _judged(blocks, found, shared.band_hz), shared)
 
 
 def _blocked(
