@@ -45,6 +45,7 @@ def test_a_line_too_weak_for_either_sensor_is_found_by_both():
 
 
 def test_a_mode_that_moves_on_one_sensor_is_never_the_contacts():
+    """Three series here, forty in benchmarks/sensors.py."""
     for seed in range(3):
         told = resonances_of_sensors(two_sensors(seed, heights=(0.0, 0.0), moving=True), band_hz=BAND)
         assert all(one.found for one in told.alone["a"])

@@ -16,6 +16,7 @@ from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear.expected import Blocks, expected_density
 from asperity.wear.indicators import STRONG_EVIDENCE
+from asperity.wear.misfit import brought_std, left_over, shares_of
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Heard, Joint, Lines, alone_beside, coarser, each, levelled, places
 from asperity.wear.series import (
@@ -25,13 +26,10 @@ from asperity.wear.series import (
     Separated,
     Shared,
     gain_of,
-    left_over,
-    misfit_std,
     objection_to,
     rival_of,
     separated,
     separated_beside,
-    shares_of,
 )
 
 APART, APART_WIDTHS = 3.0, 0.25  # deviations, and half-power widths, by both of which two lines are not one
@@ -294,6 +292,7 @@ class _Together:
             misfits.append(left_over(heard.blocks, expected_density(heard.blocks, joint.parameters)))
             weights.append(heard.blocks.weight.sum(axis=1))
         hears = (np.array(gains) - np.log(weights) > STRONG_EVIDENCE) & (np.array(misfits) <= LARGEST_MISFIT)
+        hears &= ~np.array([self.by_sensor[name].found.shaped for name in fit.names])[:, None]
         evidence = np.sum(gains, axis=0) / counts_as - (2.0 + len(fit.names)) * np.log(np.sum(weights, axis=0))
         std = self._deviations(fit, shares)
         std[:, :, 1] *= wider
@@ -375,7 +374,7 @@ class _Together:
         of_base = []
         for sensor, heard in enumerate(fit.heard):
             at = places(sensor)
-            misfit = misfit_std(heard.blocks, fit.joint(sensor), self.by_sensor[fit.names[sensor]].found.witnesses)
+            misfit = brought_std(heard.blocks, fit.joint(sensor), self.by_sensor[fit.names[sensor]].found.witnesses)
             brought[:, [at[0], at[3]]] += misfit[:, [0, 3]]
             brought[:, [1, 2]] += part[sensor][:, None] * misfit[:, [1, 2]]
             base = self._of_the_base(fit, sensor)

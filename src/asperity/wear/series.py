@@ -15,11 +15,12 @@ import numpy.typing as npt
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
-from asperity.wear.expected import LOOSE, Blocks, expected_density, lines_and_slopes, whittle_costs
+from asperity.wear.expected import Blocks, expected_density, whittle_costs
 from asperity.wear.indicators import STRONG_EVIDENCE, IndicatorMethod, contact_resonance, require_band
+from asperity.wear.misfit import Witnesses, brought_std, left_over, witnesses_of
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Joint, Model, Templates, beside, coarser, models, separate, templates_on
-from asperity.wear.transfer import Transfer
+from asperity.wear.transfer import SPLINES, Transfer
 
 SeriesMethod = Literal["joint", IndicatorMethod]
 
@@ -30,10 +31,8 @@ HEAVIEST_DAMPING = 0.1  # of a contact: 0.01 dry to 0.1 in boundary lubrication,
 STANDING = 0.1  # standard deviation of a line's places over its width, below which it does not move
 MOVES = "moves against what all recordings share"
 STANDS = "keeps its place and changes its height; CRFA is the part that changes, a lower bound"
-COMMON_FROM = 0.1  # share of what all recordings share in a block, from which its residual is the machine's
-WITNESS_FROM = 0.8  # of a parameter's influence, that a witness has to cover
-TINY = 1e-100
 SAME_SPACING = 1e-9
+TENFOLD = float(np.log(10.0))  # change of a line across the band that a structure has to make
 RIVAL = 10.0  # ln likelihood by which the place found must beat every other place in the band
 
 
@@ -42,9 +41,9 @@ class Shared:
     """What all recordings of a series share, as some of them have settled it: enough to judge another beside them.
 
     `first`, `size` and `spacing_hz` say which lines stand in which blocks; `centre` [Hz] and `base` (ln density) are of
-    blocks, shape (blocks,); `reach` [Hz], `transfer` and `doubt` of what the lines come through; `stands` whether the
-    line keeps its place; `counts`, `change`, `by_chance` how far the recordings that settled it are from it, shape
-    (recordings, blocks).
+    blocks, shape (blocks,); `reach` [Hz], `transfer` and `doubt` of what the lines come through; `stands` and `shaped`
+    as `Found` has them; `counts`, `change`, `by_chance` how far the recordings that settled it are from it, shape
+    (recordings, blocks); `lacking` (blocks,) how far what was fitted to them.
     """
 
     band_hz: tuple[float, float]
@@ -57,9 +56,11 @@ class Shared:
     transfer: Field
     doubt: Field
     stands: bool
+    shaped: bool
     counts: Mask
     change: Field
     by_chance: Field
+    lacking: Field
 
     def fits(self, spectrum: Spectrum) -> bool:
         """Whether a spectrum has these lines."""
@@ -167,10 +168,13 @@ def separated(
     with threadpool_limits(1, "blas"):  # matrices too small for two threads: they would wait for one another
         separation = separate(blocks)
         joint = separation.joint
-        witnesses = _witnesses(blocks, joint, separation.witnesses)
+        witnesses = witnesses_of(blocks, joint, separation.witnesses)
         stands = _stands(joint, _evidence(blocks, joint)[0] > STRONG_EVIDENCE)
-        found = Found(joint, separation.templates, separation.elsewhere, witnesses, stands)
+        found = Found(joint, separation.templates, separation.elsewhere, witnesses, stands, shaped=False)
         resonances = _judged(blocks, found, band_hz)
+        if _shaped(joint, np.array([one.found for one in resonances])):
+            found = found._replace(shaped=True)
+            resonances = _judged(blocks, found, band_hz)
     shared = Shared(
         band_hz=band_hz,
         first=int(lines[0]),
@@ -182,9 +186,11 @@ def separated(
         transfer=joint.parameters.transfer.coefficients,
         doubt=joint.doubt,
         stands=stands,
+        shaped=found.shaped,
         counts=witnesses.counts,
         change=witnesses.change,
         by_chance=witnesses.by_chance,
+        lacking=witnesses.lacking,
     )
     return Separated(blocks, found, resonances, shared)
 
@@ -202,8 +208,8 @@ def separated_beside(shared: Shared, spectra: Sequence[Spectrum], kept: Sequence
     templates, ready = shared._search
     passed = Transfer(*shared.reach, shared.transfer)
     joint, elsewhere = beside(blocks, shared.base, passed, shared.doubt, templates, ready)
-    witnesses = Witnesses(shared.counts, shared.change, shared.by_chance)
-    found = Found(joint, templates, elsewhere, witnesses, shared.stands)
+    witnesses = Witnesses(shared.counts, shared.change, shared.by_chance, shared.lacking)
+    found = Found(joint, templates, elsewhere, witnesses, shared.stands, shared.shaped)
     return Separated(blocks, found, _judged(blocks, found, shared.band_hz), shared)
 
 
@@ -221,60 +227,18 @@ def _blocked(
     return Blocks(centre, mean, averages * share)
 
 
-class Witnesses(NamedTuple):
-    """How far recordings are from what was fitted to them, relative to what all share; (recordings, blocks) each."""
-
-    counts: Mask  # where what all share is most of what is there
-    change: Field
-    by_chance: Field  # variance that chance brings
-
-
 class Found(NamedTuple):
-    """A fit to be judged: lines and what they stand beside; -ln likelihood of a line at each template."""
+    """A fit to be judged: lines and what they stand beside; -ln likelihood of a line at each template.
+
+    `stands` is whether the line keeps its place, `shaped` whether it does so and is one by what it comes through alone.
+    """
 
     joint: Joint
     templates: Templates
     elsewhere: Field
     witnesses: Witnesses
     stands: bool
-
-
-def shares_of(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
-    """What line, place, damping and machine each have in what is expected (recordings, 4, blocks), and that."""
-    line, by_f0, by_damping = lines_and_slopes(blocks.centre, joint.parameters)
-    expected = expected_density(blocks, joint.parameters)
-    return np.stack([line, by_f0, by_damping, expected - line], axis=1) / expected[:, None], expected
-
-
-def _witnesses(blocks: Blocks, joint: Joint, rows: list[int]) -> Witnesses:
-    relative, expected = shares_of(blocks, joint)
-    common = relative[rows, 3]
-    counts = (common > COMMON_FROM) & (blocks.weight[rows] > 0.0)
-    share = np.where(counts, common, 1.0)
-    change = np.where(counts, (blocks.density / expected - 1.0)[rows] / share, 0.0)
-    by_chance = np.where(counts, 1.0 / (np.maximum(blocks.weight[rows], 1.0) * share**2), 0.0)
-    return Witnesses(counts, change, by_chance)
-
-
-def misfit_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
-    """Standard deviations (recordings, 4) that a machine brings which does not quite repeat itself, beside chance.
-
-    What the fit of one recording would make of the residuals that the others have where its line lies: its influence
-    a_b on each parameter, applied to r_jb of those recordings j whose own line is far; squared, averaged over them,
-    less what chance explains.
-    """
-    relative, _ = shares_of(blocks, joint)
-    information = np.einsum("npb,nqb,nb->npq", relative, relative, blocks.weight, optimize=True) + LOOSE * np.eye(4)
-    influence = np.linalg.solve(information, relative * blocks.weight[:, None])
-    felt = influence * relative[:, None, 3]  # what a relative change of the machine in block b does to each parameter
-    moved = np.einsum("npb,jb->npj", felt, witnesses.change, optimize=True) ** 2
-    expected_of_chance = np.einsum("npb,jb->npj", felt**2, witnesses.by_chance, optimize=True)
-    whole = np.einsum("npb,jb->npj", felt**2, witnesses.counts.astype(float), optimize=True)
-    # a witness has to cover nearly all that matters; the less chance blurs it, the more it counts
-    enough = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
-    witness = enough / np.maximum(expected_of_chance, TINY) ** 2
-    variance = np.sum((moved - expected_of_chance) * witness, axis=2) / np.maximum(np.sum(witness, axis=2), TINY)
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+    shaped: bool
 
 
 def gain_of(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
@@ -292,19 +256,20 @@ def _evidence(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
     return gain - 3.0 * np.log(blocks.weight.sum(axis=1)), alone
 
 
-def left_over(blocks: Blocks, expected: Field) -> Field:
-    """Rms of what a fit leaves of each recording's spectrum, relative, beyond chance."""
-    counted = blocks.weight > 0.0
-    off = blocks.density / expected - 1.0
-    excess = np.sum(counted * (off**2 - 1.0 / np.maximum(blocks.weight, 1.0)), axis=1) / np.sum(counted, axis=1)
-    return np.asarray(np.sqrt(np.maximum(excess, 0.0)))
-
-
 def _stands(joint: Joint, significant: Mask) -> bool:
     """A line that keeps its place can lend any part of its height to what all recordings share."""
     own = joint.parameters.own
     places, widths = own[significant, 1], 2.0 * np.exp(own[significant, 2])
     return places.size > 0 and float(np.std(places)) < STANDING * float(np.median(widths))
+
+
+def _shaped(joint: Joint, found: Mask) -> bool:
+    """Lines that keep their place cannot tell a structure that shapes them: any change of a spectrum would be one."""
+    passed = joint.parameters.transfer
+    if not found.any() or not passed.coefficients.size:
+        return False
+    bent = passed.columns(np.linspace(passed.low, passed.high, 10 * SPLINES))[:, 1:] @ passed.coefficients[1:]
+    return _stands(joint, found) and float(np.ptp(bent)) > TENFOLD
 
 
 def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple[Resonance, ...]:
@@ -314,7 +279,7 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
     evidence, alone = _evidence(blocks, joint)
     bare, expected = np.exp(base), expected_density(blocks, joint.parameters)
 
-    std = np.hypot(joint.std, misfit_std(blocks, joint, found.witnesses))
+    std = np.hypot(joint.std, brought_std(blocks, joint, found.witnesses))
     misfit = left_over(blocks, expected)
     way = STANDS if found.stands else MOVES
     resonances = []
@@ -324,7 +289,7 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
         _, f0, zeta, gain = (float(value) for value in fitted)
         rival = rival_of(f0, zeta, found.elsewhere[i], found.templates)
         line = JudgedLine(f0, float(deviations[1]), zeta, float(evidence[i]), float(misfit[i]), *rival)
-        objection = objection_to(line, band_hz)
+        objection = objection_to(line, band_hz) or (_of_shape(f0) if found.shaped else None)
         if objection is not None:
             background = (blocks.centre, alone[i])
             resonances.append(no_resonance(objection, band_hz, "joint", evidence=line.evidence, background=background))
@@ -341,6 +306,13 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
             )
         )
     return tuple(resonances)
+
+
+def _of_shape(f0: float) -> str:
+    return (
+        f"what stands out at {f0:.0f} Hz keeps its place and is a line only behind a structure that changes it tenfold "
+        "across the band: the machine's own spectrum may change like that"
+    )
 
 
 class JudgedLine(NamedTuple):

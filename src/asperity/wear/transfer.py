@@ -25,6 +25,11 @@ class Transfer(NamedTuple):
     high: float = 0.0
     coefficients: Field = np.zeros(0)
 
+    @property
+    def spacing_hz(self) -> float:
+        """From spline to spline: what is slower is followed."""
+        return (self.high - self.low) / (SPLINES - DEGREE)
+
     def columns(self, frequency_hz: Field) -> Field:
         """What the coefficients stand at, (frequencies, coefficients)."""
         if not self.coefficients.size:
