@@ -92,9 +92,10 @@ class TrackedRecording:
         reading = replace(self.reading, file=to[self.reading.file])
         return replace(self, file=to[self.file], reading=reading, on_sensors=heard)
 
-    def by_sensor(self) -> "list[TrackedRecording]":
-        """The same as each of its sensors has it."""
-        return [replace(self, file=reading.file, reading=reading) for reading in self.readings.values()]
+    def on(self, sensor: str) -> "TrackedRecording":
+        """The same as one of its sensors has it."""
+        reading = self.readings[sensor]
+        return replace(self, file=reading.file, reading=reading)
 
     @property
     def dead(self) -> bool:

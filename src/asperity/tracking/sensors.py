@@ -219,8 +219,8 @@ class Sensors:
             since, by = track.number_of(self.standing.file) or 0, self.standing.raised_by
             track = replace(track, alarm=replace(track.alarm, state="alarm", since=since, reason=reason, raised_by=by))
         said = track.scalars(every_way=False)
-        alarm, last = said["alarm"], said.pop("recordings")[-1]["file"]
-        rows = self._rows_of(track, keys)
+        alarm, lines = said["alarm"], said.pop("recordings")
+        last, rows = lines[-1]["file"], self._rows_of(track, lines, keys)
         told = {"asked": asked, "said": json.dumps({**said, "numbers": [number for number, *_ in rows[0]]})}
         judgement = {"false_alarm_rate": alarm["false_alarm_rate"], "verdict": said["verdict"]}
         judgement |= {name: alarm[name] for name in ("state", "since", "reason", "raised_by")}
@@ -246,18 +246,19 @@ class Sensors:
         return track
 
     def _rows_of(
-        self, track: Track, keys: Mapping[str, Version]
+        self, track: Track, rows: Sequence[dict[str, Any]], keys: Mapping[str, Version]
     ) -> list[list[tuple[int, dict[str, Any], Sensor, Version]]]:
-        """Lines of a track's recordings with their numbers: first those of the track, then what others heard of it."""
+        """Lines of a track's recordings with their numbers: `rows` of the track, then what others heard of each."""
         whole: list[tuple[int, dict[str, Any], Sensor, Version]] = []
         others: list[tuple[int, dict[str, Any], Sensor, Version]] = []
-        for recording in track.recordings:
-            for part in recording.by_sensor():
-                key = keys[part.file]
-                held = [one for name, one in self.by_name.items() if name in self.kept(key)]
-                named = next((one for one in held if one.place.sensor == part.reading.sensor), held[0])
-                line = (named.recordings[key].number, part.row(), named, key)
-                (whole if part.reading.sensor == recording.reading.sensor else others).append(line)
+        for recording, row in zip(track.recordings, rows, strict=True):
+            for name, reading in recording.readings.items():
+                key = keys[reading.file]
+                held = [one for one in self._each() if key in one.recordings]
+                named = next((one for one in held if one.place.sensor == name), held[0])
+                leads = name == recording.reading.sensor
+                line = row if leads else recording.on(name).row()
+                (whole if leads else others).append((named.recordings[key].number, line, named, key))
         return [whole, others]
 
     def arrivals(self) -> list[datetime]:

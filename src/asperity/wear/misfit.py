@@ -65,9 +65,7 @@ def misfit_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
     less what chance explains.
     """
     relative, _ = shares_of(blocks, joint)
-    felt = (
-        _influence(blocks, relative) * relative[:, None, 3]
-    )  # what a relative change of the machine in block b does to each parameter
+    felt = _influence(blocks, relative) * relative[:, None, 3]  # what a change of the machine does to each parameter
     moved = np.einsum("npb,jb->npj", felt, witnesses.change, optimize=True) ** 2
     expected_of_chance = np.einsum("npb,jb->npj", felt**2, witnesses.by_chance, optimize=True)
     whole = np.einsum("npb,jb->npj", felt**2, witnesses.counts.astype(float), optimize=True)
