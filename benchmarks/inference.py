@@ -3,16 +3,17 @@
 Truths are contacts solved anew (never the emulator's), means over many surfaces, with unknowns drawn from the case's
 priors; their recordings are the rig's, with structural modes, noise and tones, and go through the joint separation.
 The emulator is the product's; only where a truth is solved on the emulator's own grid is what a finer one changes no
-part of it. Emulator and contacts are kept in build/inference and gone on from, rows in
+part of it. Truths are kept in docs/benchmarks/inference-truths.csv, a line an operating point: when the inference has
+changed, they are judged anew without a solve. Emulator and contacts under way are kept in build/inference, intervals in
 docs/benchmarks/inference-machines.csv, of which the tables are made. `python -m benchmarks.inference` runs this part
-alone, `--machines 60` with fewer of them, `--finer 10` with as many whose truth is solved on twice the cells.
+alone, `--machines 60` with fewer of them, `--finer 10` with as many whose truth is solved on twice the cells,
+`--known` with those alone that were solved before.
 """
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
@@ -37,16 +38,16 @@ from asperity.inference.inference import STAGES, stages
 from asperity.inference.listening import band_of
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
-from asperity.study import load_study, overrides_at, plan_points, run_study
+from asperity.study import overrides_at, plan_points, run_study
 from asperity.wear import remove_lines, series_resonances
 from benchmarks.rows import FOLDER, Rows
 
 CASE = Path(__file__).parents[1] / "examples" / "infer.toml"
 KEPT = Path(__file__).parents[1] / "build" / "inference"
-ROWS = FOLDER / "inference-machines.csv"
-MACHINES, FEW, BATCH, SEED = 200, 6, 1, 21
+ROWS, TRUTHS = FOLDER / "inference-machines.csv", FOLDER / "inference-truths.csv"
+MACHINES, FEW, SEED = 200, 6, 21
 SURFACES = 12  # of a truth: their mean scatters by 2 points of CLR, and the emulator is off by 5
-ALSO_OUTSIDE = 100  # of the first so many machines every second is heard by a law that is neither of both, too
+ALSO_OUTSIDE = 50  # so many machines are heard by each law that is neither of both, too
 KEYS = ("clr", "car", "h_mean_m")
 PLACES = tuple((load, speed) for load in (300.0, 500.0, 900.0) for speed in (0.8, 2.5))
 ONE = PLACES[2]  # the operating point of those inferred from one: 500 N, 0.8 m/s
@@ -54,7 +55,7 @@ TESTS = 2  # recordings at each operating point
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
 LEAST_SHARE = 0.01  # CLR below which there is no line to be found
 INSIDE, FINER = "as the emulator has it", "on twice the cells"
-OUTSIDE = ("exponent 1/5", "5 % stiffer at 900 N")  # truths that neither law has
+OUTSIDE = ("exponent 1/5", "CRF 5 % higher at 900 N")  # truths that neither law has
 LEFT_S = 60.0  # of the time given, for what is written at the end
 
 
@@ -65,9 +66,10 @@ def main() -> None:
     arguments.add_argument("--finer", type=int, default=0, help="machines whose truth is on twice the cells")
     arguments.add_argument("--fast", action="store_true", help=f"{FEW} machines")
     arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps everything")
+    arguments.add_argument("--known", action="store_true", help="only machines whose truth is kept")
     wanted = arguments.parse_args()
     with threadpool_limits(1):
-        judge_all(FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept)
+        judge_all(FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept, known=wanted.known)
     print("\n".join(tables()))
 
 
@@ -78,27 +80,29 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
     yield from tables()
 
 
-def judge_all(machines: int, finer: int, kept: Path, *, end: float = float("inf")) -> None:
+def judge_all(machines: int, finer: int, kept: Path, *, known: bool = False, end: float = float("inf")) -> None:
     """Every machine, in turn; its rows as it is done."""
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
     print(emulator.sentence(), flush=True)
     on_its_grid = replace(emulator, grid={})
-    rows = Rows(ROWS, ("machine", "law"))
-    for number in range(machines):
-        outside = [OUTSIDE[number // 2 % len(OUTSIDE)]] if number % 2 == 0 and number < ALSO_OUTSIDE else []
-        for law in (INSIDE, *([FINER] if number < finer else []), *outside):
+    rows, truths = Rows(ROWS, ("machine", "law")), Truths(setting, kept)
+    for number, z in zip(range(machines), machines_of(setting), strict=False):
+        for law in (INSIDE, *([FINER] if number < finer else []), *(OUTSIDE if number < ALSO_OUTSIDE else [])):
             if perf_counter() > end:
                 return
-            if (number, law) not in rows:
-                began = process_time()
-                truth = _truth(setting, number, kept, finer=law == FINER)
-                solved_s, began = process_time() - began, process_time()
-                found = list(judged(setting, emulator if law == FINER else on_its_grid, Machine(number, law, *truth)))
-                rows.write([row | {"truth_s": solved_s, "seconds": process_time() - began} for row in found])
+            grid = GRIDS[law == FINER]
+            if (number, law) in rows or (known and (number, grid) not in truths.rows):
+                continue
+            machine = Machine(number, law, z, truths(number, z, grid))
+            began = process_time()
+            found = list(judged(setting, emulator if law == FINER else on_its_grid, machine))
+            rows.write([row | {"seconds": process_time() - began} for row in found])
 
 
 # Truths --------------------------------------------------------------------------------------------------------------
+
+GRIDS = ("as the emulator's", "twice the cells")
 
 
 @dataclass(frozen=True)
@@ -118,39 +122,53 @@ def machines_of(setting: Setting) -> Iterator[Field]:
         yield rng.standard_normal(len(setting.unknowns))
 
 
-def _truth(setting: Setting, number: int, kept: Path, *, finer: bool) -> tuple[Field, dict[str, Field] | None]:
-    if finer:
-        twice = setting.case.with_overrides({"grid.cells": [2 * count for count in setting.case.grid.cells]})
-        setting = replace(setting, case=twice)
-    return solved(setting, number // BATCH, kept / ("truth-finer" if finer else "truth"))[number % BATCH]
+@dataclass
+class Truths:
+    """States of machines' contacts at `PLACES`, means over surfaces: as they are kept, or solved now, and kept."""
 
+    setting: Setting
+    kept: Path
 
-def solved(setting: Setting, batch: int, folder: Path) -> list[tuple[Field, dict[str, Field] | None]]:
-    """A batch of machines: unknowns, and the contact's states at each operating point, means over surfaces."""
-    unknowns = list(islice(machines_of(setting), BATCH * batch, BATCH * (batch + 1)))
-    points = []
-    for z in unknowns:
-        shares = [float(unknown.share(z[place])) for place, unknown in enumerate(setting.contact)]
-        base = overrides_at(setting.case, [unknown.range for unknown in setting.contact], shares)
-        points += [
+    def __post_init__(self) -> None:
+        self.rows = Rows(TRUTHS, ("machine", "grid"))
+
+    def __call__(self, number: int, z: Field, grid: str) -> dict[str, Field] | None:
+        """Of one machine; None where a contact could not be solved."""
+        if (number, grid) not in self.rows:
+            states, seconds = self._solved(number, z, grid)
+            self.rows.write(
+                [
+                    {"machine": number, "grid": grid, "load_n": load, "entrainment_m_s": speed}
+                    | {key: "" if states is None else states[key][place] for key in KEYS}
+                    | {"seconds": seconds}
+                    for place, (load, speed) in enumerate(PLACES)
+                ]
+            )
+        own = [row for row in self.rows if (row["machine"], row["grid"]) == (str(number), grid)]
+        if any(row[key] == "" for row in own for key in KEYS):
+            return None
+        return {key: np.array([float(row[key]) for row in own]) for key in KEYS}
+
+    def _solved(self, number: int, z: Field, grid: str) -> tuple[dict[str, Field] | None, float]:
+        """The states, and how long all contacts took together."""
+        case = self.setting.case
+        if grid != GRIDS[0]:
+            case = case.with_overrides({"grid.cells": [2 * count for count in case.grid.cells]})
+        shares = [float(unknown.share(z[place])) for place, unknown in enumerate(self.setting.contact)]
+        base = overrides_at(case, [unknown.range for unknown in self.setting.contact], shares)
+        points = [
             {**base, "contact.load": f"{load:g} N", "contact.entrainment_speed": f"{speed:g} m/s"}
             for load, speed in PLACES
         ]
-    unheard = setting.case.with_overrides({"vibration": "none"})  # no stiffness of its own, which takes as long again
-    plan = plan_points(unheard, points, seeds=SURFACES, kind="solve")
-    there = folder / f"{batch:03d}"
-    finished = load_study(there) if (there / "table.parquet").exists() else None
-    if finished is None or finished.missing:
+        unheard = case.with_overrides({"vibration": "none"})  # no stiffness of its own, which takes as long again
+        plan = plan_points(unheard, points, seeds=SURFACES, kind="solve")
+        there = self.kept / ("truth" if grid == GRIDS[0] else "truth-finer") / f"{number:03d}"
         with ThreadPoolExecutor(1) as executor:  # a process for each machine would take as long to start
-            finished = run_study(plan, out=there, executor=executor)
-    done = finished.table[finished.table["status"] == "done"]
-    means = done.groupby("point")[list(KEYS)].agg(["mean", "count"])
-    found = []
-    for number, z in enumerate(unknowns):
-        own = [number * len(PLACES) + place for place in range(len(PLACES))]
-        whole = all(place in means.index and means.loc[place, ("clr", "count")] == SURFACES for place in own)
-        found.append((z, {key: means.loc[own, (key, "mean")].to_numpy() for key in KEYS} if whole else None))
-    return found
+            table = run_study(plan, out=there, executor=executor).table
+        means = table[table["status"] == "done"].groupby("point")[list(KEYS)].agg(["mean", "count"])
+        if len(means) < len(PLACES) or (means[KEYS[0], "count"] < SURFACES).any():
+            return None, float(table["seconds"].sum())
+        return {key: means[key, "mean"].to_numpy() for key in KEYS}, float(table["seconds"].sum())
 
 
 def recordings(setting: Setting, machine: Machine) -> list[Observation]:

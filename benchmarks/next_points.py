@@ -29,7 +29,6 @@ from asperity.inference import (
     infer_observations,
     setting_of,
 )
-from asperity.inference.likelihood import OF_DAMPING
 from asperity.inference.next_point import USUAL_DAMPING_STD, USUAL_STD
 from benchmarks.inference import CASE, KEPT, LEAST_SHARE, LEFT_S, share
 
@@ -120,10 +119,11 @@ def taught(found: Inference, there: Forward, heard: tuple[Field, Field]) -> Fiel
     for number, law in enumerate(LAWS):
         rows = draws.law == number
         if rows.any():
-            shown, size = there.shown(draws.z[rows], law, heights=False), draws.size[rows][:, None]
+            shown = there.shown(draws.z[rows], law, heights=False)
+            of_crf, of_damping = (draws.sizes[key][rows][:, None] for key in ("crf", "damping"))
             spreads = (
-                np.sqrt(shown.crf_std**2 + USUAL_STD**2 + size**2),
-                np.sqrt(shown.damping_std**2 + USUAL_DAMPING_STD**2 + (OF_DAMPING * size) ** 2),
+                np.sqrt(shown.crf_std**2 + USUAL_STD**2 + of_crf**2),
+                np.sqrt(shown.damping_std**2 + USUAL_DAMPING_STD**2 + of_damping**2),
             )
             for value, mean, spread in zip(heard, (shown.crf, shown.damping), spreads, strict=True):
                 logs[rows] += -0.5 * ((value - mean) / spread) ** 2 - np.log(spread)

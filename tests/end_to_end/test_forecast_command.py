@@ -50,13 +50,17 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     assert said["alarm"]["raised_by"] == "forecast"
     assert said["alarm"]["since"].endswith("6.h5")
     assert said["verdict"].startswith("ALARM since 6.h5: CLR rises above 75.0 % within")
-    assert "CLR rises above" in Path("track.html").read_text("utf-8")
-    code, out, _ = asp("track", *asked, *LIMIT, "--acknowledge", "last", "--json")
+    page = Path("track.html").read_text("utf-8")
+    assert "CLR rises above" in page
+    assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (1, 1)
+    code, out, _ = asp("track", *asked, *LIMIT, "--acknowledge", "last", "--report", "silent.html", "--json")
     said = json.loads(out)
     assert (code, said["alarm"]["state"]) == (0, "none")
     assert said["forecast"] == {"sentence": "No forecast: a forecast takes resonances of 4 recordings at different "
                                 "times or more, got 0; leave --forecast out, or record again."}  # fmt: skip
     assert said["verdict"].endswith(said["forecast"]["sentence"])
+    page = Path("silent.html").read_text("utf-8")
+    assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (1, 0)  # said, not drawn
     assert json.loads(asp("track", *asked[:-2], "--json")[1])["forecast"] is None
 
 

@@ -21,15 +21,15 @@ from asperity.inference import (
     read_limit,
     wear_drift,
 )
-from asperity.inference.course import DRIFT_STD, KNOTS, WEIGHTS, Course, Extra, Table, between_knots
+from asperity.inference.course import DRIFT_STD, KNOTS, Course, Extra, Table, between_knots
 from asperity.inference.forecast import Limit
-from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD
+from asperity.inference.likelihood import ALONG, EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, OWN, WEIGHTS
 from asperity.inference.process import Process
 from asperity.inference.visits import MOST, MOST_PLACES, series_of
 from support.emulated import formula, formula_emulator, formula_setting
 
 TIMES = np.array([0.0, 0.15, 0.4, 0.75, 1.0])
-SIZE, RESTLESS, SCATTER = 0.02, 0.2, 0.003
+SIZE, RESTLESS, SCATTER = {"crf": 0.02, "damping": 0.005, "crfa": 0.08}, 0.2, 0.003
 EMULATED, ALIKE = {"crf": 0.01, "damping": 0.02, "crfa": EMULATED_HEIGHT_STD}, 0.6  # deviations, and their correlation
 
 
@@ -81,7 +81,10 @@ def straight_table(share, memory, places=2):
         {key: np.tile(std**2 * np.array([[1.0, ALIKE], [ALIKE, 1.0]]), (count, 1, 1)) for key, std in EMULATED.items()},
         np.tile([-0.3, 0.3], (count, 1)),
         np.full(count, share),
-        Extra(*(np.full(count, value) for value in (SIZE, RESTLESS, SCATTER, memory))),
+        Extra(
+            {key: np.full(count, size) for key, size in SIZE.items()},
+            *(np.full(count, value) for value in (RESTLESS, SCATTER, memory)),
+        ),
     )
 
 
@@ -114,8 +117,10 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
                 covariance[row, column] += GAIN_STD**2
             if one.channel == other.channel:
                 covariance[row, column] += emulated**2 * (1.0 if one.place == other.place else ALIKE)
-            if (one.channel, one.place) == (other.channel, other.place):
-                covariance[row, column] += (weight * SIZE) ** 2
+            if one.channel == other.channel:
+                apart = 0.0 if one.place == other.place else 0.6  # of their levers
+                alike = OWN * (apart == 0.0) + (1.0 - OWN) * np.exp(-0.5 * (apart / ALONG) ** 2)
+                covariance[row, column] += (weight * SIZE[one.channel]) ** 2 * alike
             if memory and one.channel == other.channel == "crf":
                 covariance[row, column] += SCATTER**2 * memory ** (abs(one.at - other.at) * (len(TIMES) - 1))
         white = one.channel != "crf" or not memory
@@ -212,7 +217,7 @@ def test_a_wear_history_is_the_first_drift(setting, emulator):
     ends = []
     for drift in ((0.6, 0.05), (-0.6, 0.05)):
         found = forecast_observations(setting, emulator, heard, drift=drift, laws=("hertz-point",))
-        ends.append(found.bands["ends"][:, -1])
+        ends.append(found.bands.ends[:, -1])
     assert np.all(ends[0] > ends[1] + 0.03)
     assert ends[0][1] > ends[1][1] + 0.2
     with pytest.raises(BadInput, match="which cannot drift"):

@@ -19,6 +19,7 @@ from asperity.inference import (
     Inference,
     Observation,
     Point,
+    Shown,
     Unknown,
     infer_contact,
     infer_observations,
@@ -27,7 +28,16 @@ from asperity.inference import (
     with_observation,
 )
 from asperity.inference.estimates import bits, estimate
-from asperity.inference.likelihood import COMMON, _gaussian
+from asperity.inference.likelihood import (
+    ALONG,
+    COMMON,
+    EMULATED_HEIGHT_STD,
+    EXPONENT_STD,
+    GAIN_STD,
+    OWN,
+    SIZES,
+    log_likelihood,
+)
 from asperity.inference.next_point import _information
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.process import Process, fit_process
@@ -120,17 +130,35 @@ def test_priors_have_the_quantiles_that_are_stated():
         assert np.all((unknown.share(np.array([-9.0, 0.0, 9.0])) >= -1e-12) & (unknown.share(z) <= 1.0 + 1e-12))
 
 
-def test_the_likelihood_is_the_multivariate_normal():
+@pytest.mark.parametrize("discrepancy", [True, False])
+def test_the_likelihood_is_the_multivariate_normal(discrepancy):
+    """Of three channels, each with a size of the law's error of its own, covariances written out."""
     rng = np.random.default_rng(2)
-    shown, std, common = rng.standard_normal((3, 4)), rng.uniform(0.1, 1.0, (3, 4)), rng.standard_normal((3, 4))
+    crf, damping, crfa, lever = rng.standard_normal((4, 3, 4))
+    stds = rng.uniform(0.1, 0.3, (3, 3, 4))
+    shown = Shown(crf, stds[0], damping, stds[1], crfa, stds[2], lever)
     said = [Heard(0.3, 0.2), Heard(), Heard(-0.1, 0.5), Heard(1.0, 0.1)]
+    points = [Point(500.0, 1.0, crf=one, damping=one, crfa=one) for one in said]
     here = [0, 2, 3]
+    sizes = SIZES if discrepancy else (0.0,)
     for row in range(3):
-        covariance = np.outer(common[row, here], common[row, here])
-        covariance += COMMON * np.outer(std[row, here], std[row, here])
-        covariance += np.diag([said[i].std ** 2 + (1.0 - COMMON) * std[row, i] ** 2 + 0.3**2 for i in here])
-        expected = multivariate_normal(shown[row, here], covariance).logpdf([said[i].value for i in here])
-        assert _gaussian(said, shown, std, 0.3, common)[row] == pytest.approx(expected, abs=1e-9)
+        force, expected = lever[row, here], 0.0
+        steep = EXPONENT_STD * discrepancy * (force - force.mean())
+        common = {"crf": np.outer(steep, steep), "damping": 0.0, "crfa": GAIN_STD**2}
+        beyond = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
+        for number, (channel, weight) in enumerate({"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()):
+            std = np.hypot(stds[number, row, here], beyond[channel])
+            known = common[channel] + COMMON * np.outer(std, std)
+            known = known + np.diag([said[i].std ** 2 for i in here] + (1.0 - COMMON) * std**2)
+            alike = OWN * np.eye(3) + (1.0 - OWN) * norm.pdf(np.subtract.outer(force, force) / ALONG) / norm.pdf(0.0)
+            densities = [
+                multivariate_normal(getattr(shown, channel)[row, here], known + (weight * size) ** 2 * alike).pdf(
+                    [said[i].value for i in here]
+                )
+                for size in sizes
+            ]
+            expected += np.log(np.mean(densities))
+        assert log_likelihood(shown, points, discrepancy=discrepancy)[row] == pytest.approx(expected, abs=1e-8)
 
 
 def test_importance_and_nested_sampling_find_a_known_posterior():

@@ -16,7 +16,7 @@ from scipy.special import ndtr
 from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.inference.forward import Forward, Law
-from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, OF_DAMPING, OF_HEIGHT, SIZES
+from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, SIZES, WEIGHTS, law_correlations
 from asperity.inference.observations import Heard
 from asperity.inference.outputs import CLR
 from asperity.inference.priors import si
@@ -29,9 +29,8 @@ RESTLESS, RESTLESS_SPREAD = 0.1, 1.0  # how much a drift changes over the series
 SCATTER, SCATTER_SPREAD = 1e-3, 1.0  # of CRF from visit to visit beyond its own deviation, relative
 MEMORIES = (0.0, 0.4, 0.65, 0.85)  # correlation of the scatter of CRF from one visit to the next, evenly spaced ones
 ALIKE = (0.7, 0.1, 0.1, 0.1)  # how probable each is: as where stages are read off a series
-EXTRA = 4  # unknowns of a course: the law's error, restlessness, scatter and its memory
+EXTRA = 6  # unknowns of a course: the law's error in each channel, restlessness, scatter and its memory
 PASSES = 2  # of an update: the table is no straight line
-WEIGHTS = {"crf": 1.0, "damping": OF_DAMPING, "crfa": OF_HEIGHT}  # of the law's error and of scatter
 SHARE, SPEED, LEVER, GAIN, SLOW, FIRST = range(6)  # places in the state: the rest are errors of channels at places
 PROBES, STEPS = 256, (0.02, 0.02, 2.0)  # contacts, and steps (load, speed, K), by which sounds are moved
 
@@ -56,9 +55,9 @@ class Walked(NamedTuple):
 
 
 class Extra(NamedTuple):
-    """What a course adds to a contact's unknowns: shape (n,) each."""
+    """What a course adds to a contact's unknowns: shape (n,) each; `sizes` are the law's errors, relative to CRF."""
 
-    size: Field
+    sizes: Mapping[str, Field]
     restless: Field
     scatter: Field
     memory: Field
@@ -66,12 +65,12 @@ class Extra(NamedTuple):
     @classmethod
     def of(cls, z: Field) -> "Extra":
         """From standard normal numbers (n, EXTRA)."""
-        place = np.minimum((len(SIZES) * ndtr(z[:, 0])).astype(int), len(SIZES) - 1)
+        own = np.array(SIZES)[np.minimum((len(SIZES) * ndtr(z[:, :3])).astype(int), len(SIZES) - 1)]
         return cls(
-            np.array(SIZES)[place],
-            RESTLESS * np.exp(RESTLESS_SPREAD * z[:, 1]),
-            SCATTER * np.exp(SCATTER_SPREAD * z[:, 2]),
-            np.array(MEMORIES)[np.searchsorted(np.cumsum(ALIKE)[:-1], ndtr(z[:, 3]))],
+            dict(zip(CHANNELS, own.T, strict=True)),
+            RESTLESS * np.exp(RESTLESS_SPREAD * z[:, 3]),
+            SCATTER * np.exp(SCATTER_SPREAD * z[:, 4]),
+            np.array(MEMORIES)[np.searchsorted(np.cumsum(ALIKE)[:-1], ndtr(z[:, 5]))],
         )
 
 
@@ -248,15 +247,13 @@ class _State:
         variance = np.zeros_like(mean)
         variance[:, SPEED], variance[:, LEVER], variance[:, GAIN] = drift[1] ** 2, EXPONENT_STD**2, GAIN_STD**2
         variance[:, SLOW] = table.extra.scatter**2 * (table.extra.memory > 0.0)
-        for number, channel in enumerate(CHANNELS):
-            own = slice(FIRST + number * places, FIRST + (number + 1) * places)
-            variance[:, own] = (WEIGHTS[channel] * table.extra.size[:, None]) ** 2
         covariance = np.zeros((*mean.shape, mean.shape[1]))
         diagonal = np.arange(mean.shape[1])
         covariance[:, diagonal, diagonal] = variance
         for number, channel in enumerate(CHANNELS):
             own = slice(FIRST + number * places, FIRST + (number + 1) * places)
-            covariance[:, own, own] += table.errors[channel]
+            size = WEIGHTS[channel] * table.extra.sizes[channel]
+            covariance[:, own, own] += table.errors[channel] + size[:, None, None] ** 2 * law_correlations(table.lever)
         return cls(mean, covariance, np.zeros(count))
 
     def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:

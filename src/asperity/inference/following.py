@@ -11,6 +11,7 @@ from asperity.inference.forecast import Forecast, Limit, require_limit
 from asperity.inference.infer import forecast_heard
 from asperity.inference.listening import observed_rows
 from asperity.inference.settings import Setting
+from asperity.tracking import Bands
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +20,11 @@ class Foreseen:
 
     forecast: Forecast | None
     reason: str = ""
+
+    @property
+    def bands(self) -> Bands | None:
+        """The limit's quantity over the series and ahead."""
+        return None if self.forecast is None else self.forecast.bands
 
     @property
     def alarm(self) -> bool:

@@ -1,7 +1,7 @@
 """When a limit is crossed: the courses of all possible contacts, let run on."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -22,6 +22,7 @@ from asperity.inference.sampling import Pool, Sampled, importance
 from asperity.inference.settings import Setting
 from asperity.inference.visits import Series, series_of
 from asperity.quantities import quantity
+from asperity.tracking import Bands
 
 ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
 FEWEST, ROUGH = 20.0, 60.0  # draws that any model is worth, at least; fewer than the second are told
@@ -69,7 +70,7 @@ class Forecast:
         by the last visit; infinite where they do not so within the horizon
     horizon : how far ahead was looked
     clr, value : load share and what drifts, at the last visit
-    bands : ends and median of the limit's quantity at each visit and ahead, by x
+    bands : the limit's quantity at each visit and ahead
     effective : how many independent courses it rests on
     x_name : what x is
     """
@@ -87,7 +88,7 @@ class Forecast:
     clr: Interval
     value: Interval
     effective: float
-    bands: Mapping[str, Field] = field(repr=False)
+    bands: Bands = field(repr=False)
     x_name: str = ""
 
     @property
@@ -297,7 +298,7 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
         clr=Interval.of(clr),
         value=Interval.of(value),
         effective=float(1.0 / np.sum((np.exp(logs - logsumexp(logs))) ** 2 / [m.sampled.effective for m in models])),
-        bands={"x": np.concatenate([series.x, x_ahead]), "ends": np.quantile(whole, ENDS, axis=0)},
+        bands=Bands(*limit, np.concatenate([series.x, x_ahead]), series.x[-1], np.quantile(whole, ENDS, axis=0)),
     )
 
 
@@ -313,7 +314,7 @@ def _let_run(model: _Model, count: int, limit: Limit, rng: np.random.Generator) 
     if not model.moving:
         ahead = np.repeat(share[:, None], STEPS + 1, axis=1)
     scale, std = tabulated(course.forward, z, course.column, course.series.usual)
-    off = _offset(course, scale, std, share, error, extra.size, rng)[:, None]
+    off = _offset(course, scale, std, share, error, extra.sizes["crf"], rng)[:, None]
 
     def shown(key: str, shares: Field) -> Field:
         if key == CLR:

@@ -143,7 +143,7 @@ class Inference:
             rows = self.draws.law == number
             if rows.any():
                 shown = self.forward.shown(self.draws.z[rows], law, heights=False)
-                spread = np.hypot(shown.crf_std, self.draws.size[rows][:, None])
+                spread = np.hypot(shown.crf_std, self.draws.sizes["crf"][rows][:, None])
                 heard[rows] = shown.crf + spread * rng.standard_normal(shown.crf.shape)
         return heard
 
@@ -154,7 +154,7 @@ class Inference:
     @property
     def law_error(self) -> float:
         """The law's error, relative to CRF, in the mean over what is possible."""
-        return float(np.mean(self.draws.size))
+        return float(np.mean(self.draws.sizes["crf"]))
 
     @property
     def identifiable(self) -> bool:

@@ -1,73 +1,92 @@
 """How probable what was heard is, by a law, with or without a term for what the law itself gets wrong.
 
 Without the term, a frequency is off by its measurement and the emulator, whose error all operating points of a contact
-have in common in part. With it, each operating point has an error of the law; how large it is is not known, and three
-sizes are as probable. The law's exponent of the load is off too, by the same at all points. CRFA has a gain that nobody
-knows, for all recordings in common.
+have in common in part. With it, the law is off too, in frequency, damping and height each by a size of its own that is
+not known: three are as probable. A spring's law is a function of the force it bears, and so is half of its error's
+variance: points under the same force are off by the same. The other half is each point's own. The law's exponent of
+the load is off besides. CRFA has a gain that nobody knows, for all recordings in common.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from asperity.arrays import Field
 from asperity.inference.forward import Shown
-from asperity.inference.observations import Heard, Point
+from asperity.inference.observations import Point
 
 SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
-OF_DAMPING, OF_HEIGHT = 5.0, 10.0  # the same error in ln ζ and ln CRFA
+WEIGHTS: Mapping[str, float] = {"crf": 1.0, "damping": 5.0, "crfa": 10.0}  # the same in ln ζ and ln CRFA
+OWN = 0.5  # share of the law's variance that is each operating point's own
+ALONG = 1.0  # in ln force: how far the rest reaches
 EXPONENT_STD = 0.03  # of the power of the load that CRF goes with: as far as 1/5 is from 1/6
 COMMON = 0.25  # share of the emulator's variance that all operating points of a contact have in common
 GAIN_STD = 30.0  # of ln CRFA: an accelerometer and what excites it are free, and the height of one point says nothing
 EMULATED_HEIGHT_STD = 0.05  # of ln CRFA beyond what CAR's deviation makes: its process's own shape
+AT_ONCE = 2**20  # numbers of covariances that are held at a time
 
 
 def log_likelihood(shown: Shown, points: Sequence[Point], *, discrepancy: bool) -> Field:
     """Logarithm of p(heard | unknowns), shape (n,); `shown` has a column for each of the points."""
-    if not discrepancy:
-        return _at_size(shown, points, 0.0)
-    levels = log_at_sizes(shown, points)
-    return np.asarray(np.logaddexp.reduce(levels, axis=0) - np.log(len(SIZES)))
+    sizes = SIZES if discrepancy else (0.0,)
+    whole = [log_at_sizes(shown, points, channel, sizes) for channel in WEIGHTS]
+    return np.asarray(sum(np.logaddexp.reduce(logs, axis=0) - np.log(len(sizes)) for logs in whole))
 
 
-def log_at_sizes(shown: Shown, points: Sequence[Point]) -> Field:
-    """The same for each of `SIZES` of the law's error, shape (sizes, n)."""
-    return np.stack([_at_size(shown, points, size) for size in SIZES])
-
-
-def _at_size(shown: Shown, points: Sequence[Point], size: float) -> Field:
-    off = EXPONENT_STD if size > 0.0 else 0.0
-    lever = off * (shown.lever - shown.lever.mean(axis=1, keepdims=True))
-    total = _gaussian([point.crf for point in points], shown.crf, shown.crf_std, size, lever)
-    none = np.zeros_like(lever)
-    total = total + _gaussian(
-        [point.damping for point in points], shown.damping, shown.damping_std, OF_DAMPING * size, none
-    )
-    if np.isnan(shown.crfa).any():
-        return total
-    height_std = np.hypot(shown.crfa_std, EMULATED_HEIGHT_STD)
-    gain = np.full(shown.crfa.shape, GAIN_STD)
-    return total + _gaussian([point.crfa for point in points], shown.crfa, height_std, OF_HEIGHT * size, gain)
-
-
-def _gaussian(heard: Sequence[Heard], shown: Field, std: Field, size: float, common: Field) -> Field:
-    """Logarithm of a normal density of residuals: independent ones of three sources, and two in common.
-
-    One in common is by `common`, the other the emulator's `std` by its share COMMON. Covariance D + U Uᵀ, by Woodbury.
-    """
-    here = np.array([not np.isnan(one.value) for one in heard])
+def log_at_sizes(shown: Shown, points: Sequence[Point], channel: str, sizes: Sequence[float] = SIZES) -> Field:
+    """The same of one channel, for each size of the law's error, shape (sizes, n)."""
+    value, std = (np.array([getattr(getattr(point, channel), name) for point in points]) for name in ("value", "std"))
+    mean, lever = getattr(shown, channel), shown.lever
+    here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
+    logs = np.zeros((len(sizes), len(mean)))
     if not here.any():
-        return np.zeros(len(shown))
-    value = np.array([one.value for one in heard])[here]
-    measured = np.array([one.std for one in heard])[here]
-    variance = measured**2 + (1.0 - COMMON) * std[:, here] ** 2 + size**2
-    rest, first, second = value - shown[:, here], common[:, here], np.sqrt(COMMON) * std[:, here]
-    over = first / variance, second / variance
-    one, other = 1.0 + np.sum(over[0] * first, axis=1), 1.0 + np.sum(over[1] * second, axis=1)
-    both = np.sum(over[0] * second, axis=1)
-    along, across = np.sum(over[0] * rest, axis=1), np.sum(over[1] * rest, axis=1)
-    inner = one * other - both**2
-    taken = (other * along**2 - 2.0 * both * along * across + one * across**2) / inner
-    square = np.sum(rest**2 / variance, axis=1) - taken
-    logs = np.sum(np.log(2.0 * np.pi * variance), axis=1) + np.log(inner)
-    return np.asarray(-0.5 * (square + logs))
+        return logs
+    parts = max(1, len(mean) * int(here.sum()) ** 2 // AT_ONCE)
+    for rows in np.array_split(np.arange(len(mean)), parts):
+        rest = value[here] - mean[rows][:, here]
+        known = emulated_errors(channel, _deviation(shown, channel)[rows][:, here]) + np.diag(std[here] ** 2)
+        for number, size in enumerate(sizes):
+            law = law_errors(channel, lever[rows][:, here], np.full(len(rows), size))
+            logs[number, rows] = _log_normal(rest, known + law)
+    return logs
+
+
+def law_errors(channel: str, lever: Field, size: Field) -> Field:
+    """Covariance of the law's errors at operating points, (n, points, points); `lever` is ln force, (n, points).
+
+    `size` (n,) is relative to CRF; where it is 0, the law is exact.
+    """
+    errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * law_correlations(lever)
+    if channel == "crf":
+        steep = EXPONENT_STD * (lever - lever.mean(axis=1, keepdims=True)) * (size[:, None] > 0.0)
+        errors += steep[:, :, None] * steep[:, None, :]
+    return np.asarray(errors)
+
+
+def law_correlations(lever: Field) -> Field:
+    """Of the law's errors at operating points, but for its exponent, (n, points, points)."""
+    apart = lever[:, :, None] - lever[:, None, :]
+    return np.asarray((1.0 - OWN) * np.exp(-0.5 * (apart / ALONG) ** 2) + OWN * np.eye(lever.shape[1]))
+
+
+def emulated_errors(channel: str, std: Field) -> Field:
+    """Covariance of the emulator's errors by their deviations (n, points), and of a height with its free gain."""
+    alike = COMMON + (1.0 - COMMON) * np.eye(std.shape[1])
+    errors = std[:, :, None] * std[:, None, :] * alike
+    return np.asarray(errors + GAIN_STD**2 if channel == "crfa" else errors)
+
+
+def _deviation(shown: Shown, channel: str) -> Field:
+    std = getattr(shown, f"{channel}_std")
+    return np.asarray(np.hypot(std, EMULATED_HEIGHT_STD) if channel == "crfa" else std)
+
+
+def _log_normal(rest: Field, covariance: Field) -> Field:
+    """Logarithms of normal densities of residuals (n, points) of no mean."""
+    lower = np.linalg.cholesky(covariance)
+    white = np.empty_like(rest)
+    for place in range(rest.shape[1]):
+        before = np.einsum("nj,nj->n", lower[:, place, :place], white[:, :place])
+        white[:, place] = (rest[:, place] - before) / lower[:, place, place]
+    spread = np.log(np.einsum("nii->ni", lower)).sum(axis=1)
+    return np.asarray(-0.5 * np.sum(white**2, axis=1) - spread - 0.5 * rest.shape[1] * np.log(2.0 * np.pi))

@@ -8,7 +8,6 @@ from scipy.special import logsumexp
 
 from asperity.arrays import Field
 from asperity.inference.forward import LAWS, Forward
-from asperity.inference.likelihood import OF_DAMPING
 from asperity.inference.observations import Point
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import Draws
@@ -75,9 +74,9 @@ def expected_information(
                 heard[of_law] = OUTPUTS[CLR].back(emulated[CLR][0]) > SILENT
             crf[of_law], crf_std[of_law] = shown.crf, shown.crf_std
             damping[of_law], damping_std[of_law] = shown.damping, shown.damping_std
-    size = draws.size[rows][:, None]
-    channels = [(crf, np.sqrt(crf_std**2 + std**2 + size**2))]
-    channels.append((damping, np.sqrt(damping_std**2 + USUAL_DAMPING_STD**2 + (OF_DAMPING * size) ** 2)))
+    of_crf, of_damping = (draws.sizes[key][rows][:, None] for key in ("crf", "damping"))
+    channels = [(crf, np.sqrt(crf_std**2 + std**2 + of_crf**2))]
+    channels.append((damping, np.sqrt(damping_std**2 + USUAL_DAMPING_STD**2 + of_damping**2)))
     gains = [
         _information([(mean[:, number], spread[:, number]) for mean, spread in channels], rng)
         for number in range(len(points))

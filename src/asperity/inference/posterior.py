@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from asperity.arrays import Field
 from asperity.errors import AsperityError
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
-from asperity.inference.likelihood import SIZES, log_at_sizes, log_likelihood
+from asperity.inference.likelihood import SIZES, WEIGHTS, emulated_errors, law_errors, log_at_sizes, log_likelihood
 from asperity.inference.observations import Point
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
 from asperity.inference.sampling import FEWEST, QUICKLY, Pool, Sampled, importance, nested
@@ -49,12 +49,13 @@ class Model:
 class Draws:
     """Equally probable contacts: unknowns z (n, dims), states (n, points) in their own units, which law each is by.
 
-    `size` is the law's error that each has, relative to CRF; `effective` how many independent ones they are worth.
+    `sizes` are the law's errors that each has in ln CRF, ln ζ and ln CRFA; `effective` how many independent ones they
+    are worth.
     """
 
     z: Field
     law: Field  # number in LAWS
-    size: Field
+    sizes: Mapping[str, Field]
     states: Mapping[str, Field]
     effective: float
 
@@ -190,8 +191,7 @@ def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draw
                   for key, (mean, std) in emulated.items()}  # fmt: skip
     if known is not None:
         states = {key: np.hstack([known.states[key], *([states[key]] if states else [])]) for key in STATE}
-    zero = np.zeros(DRAWS)
-    return Draws(z, zero.astype(int), zero, states, float(DRAWS))
+    return Draws(z, np.zeros(DRAWS, int), dict.fromkeys(WEIGHTS, np.zeros(DRAWS)), states, float(DRAWS))
 
 
 def _drawn(
@@ -202,48 +202,67 @@ def _drawn(
     z = sampled.z[chosen]
     emulated = forward.emulated(z, tuple(dict.fromkeys((*STATE, *forward.outputs(law)))))
     shown = forward.shown_by(z, law, emulated)
-    size: Field = _sizes(shown, forward.points, rng) if discrepancy else np.zeros(count)
+    none = dict.fromkeys(WEIGHTS, np.zeros(count))
+    sizes = _sizes(shown, forward.points, rng) if discrepancy else none
     states = {}
     for key in STATE:
         mean, std = emulated[key]
-        scaled: Field = mean + std * rng.standard_normal(mean.shape)
         if key == CLR and law == "hertz-point":
-            scaled = _corrected(scaled, mean, std, shown, forward.points, size, rng)
+            scaled = _corrected(mean, std, shown, forward.points, sizes["crf"], rng)
+        else:
+            scaled = mean + std * rng.standard_normal(mean.shape)
         states[key] = OUTPUTS[key].back(scaled)
-    return Draws(z, np.full(count, LAWS.index(law)), size, states, sampled.effective)
+    return Draws(z, np.full(count, LAWS.index(law)), sizes, states, sampled.effective)
 
 
-def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) -> Field:
-    """How large the law's error is, drawn for each contact from what was heard."""
-    logs = log_at_sizes(shown, points)
-    shares = np.exp(logs - logsumexp(logs, axis=0))
-    place = np.sum(np.cumsum(shares, axis=0) < rng.random(shares.shape[1]), axis=0)
-    return np.asarray(np.array(SIZES)[np.minimum(place, len(SIZES) - 1)])
+def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) -> dict[str, Field]:
+    """How large the law's errors are, drawn for each contact from what was heard."""
+    found = {}
+    for channel, weight in WEIGHTS.items():
+        logs = log_at_sizes(shown, points, channel)
+        shares = np.exp(logs - logsumexp(logs, axis=0))
+        place = np.sum(np.cumsum(shares, axis=0) < rng.random(shares.shape[1]), axis=0)
+        found[channel] = weight * np.array(SIZES)[np.minimum(place, len(SIZES) - 1)]
+    return found
 
 
 def _corrected(
-    scaled: Field, mean: Field, std: Field, shown: Shown, points: tuple[Point, ...], size: Field,
-    rng: np.random.Generator,
-) -> Field:  # fmt: skip
-    """Load shares that the emulator left open, drawn anew with what each point's CRF says of them.
+    mean: Field, std: Field, shown: Shown, points: tuple[Point, ...], size: Field, rng: np.random.Generator
+) -> Field:
+    """Load shares that the emulator left open, drawn with what all CRF together say of them: on CLR's scale.
 
-    By Matheron's rule: a joint draw of share and frequency, moved by what the frequency heard differs from it.
+    By Matheron's rule: a joint draw of shares and frequencies, moved by what the frequencies heard differ from it.
     """
     heard = np.array([point.crf.value for point in points])
-    measured = np.array([point.crf.std for point in points])
+    here = ~np.isnan(heard)
+    emulator = emulated_errors("crf", std)
+    errors = _drawn_normal(emulator, rng)
+    if not here.any():
+        return mean + errors
     share = OUTPUTS[CLR].back(mean)
     slope = 1.0 / (6.0 * np.maximum(share, LEAST_SHARE) * OUTPUTS[CLR].slope(share))  # d ln CRF / d scale
-    noise = np.sqrt(measured**2 + size[:, None] ** 2)
-    drawn = shown.crf + slope * (scaled - mean) + noise * rng.standard_normal(mean.shape)
-    gain = std**2 * slope / (std**2 * slope**2 + noise**2)
-    return np.where(np.isnan(heard), scaled, scaled + gain * (heard - drawn))
+    slope = slope[:, here]
+    measured = np.array([point.crf.std for point in points])[here]
+    rest = law_errors("crf", shown.lever[:, here], size) + np.diag(measured**2)
+    across = emulator[:, :, here] * slope[:, None]  # of shares and frequencies
+    whole = across[:, here] * slope[:, :, None] + rest
+    off = heard[here] - shown.crf[:, here] - slope * errors[:, here] - _drawn_normal(rest, rng)
+    moved = across @ np.linalg.solve(whole, off[:, :, None])
+    return np.asarray(mean + errors + moved[:, :, 0])
+
+
+def _drawn_normal(covariance: Field, rng: np.random.Generator) -> Field:
+    """A draw of no mean for each covariance, (n, points)."""
+    count, points, _ = covariance.shape
+    lower = np.linalg.cholesky(covariance + 1e-12 * np.eye(points))
+    return np.asarray((lower @ rng.standard_normal((count, points, 1)))[:, :, 0])
 
 
 def _joined_draws(parts: list[Draws]) -> Draws:
     return Draws(
         np.concatenate([part.z for part in parts]),
         np.concatenate([part.law for part in parts]),
-        np.concatenate([part.size for part in parts]),
+        {key: np.concatenate([part.sizes[key] for part in parts]) for key in WEIGHTS},
         {key: np.concatenate([part.states[key] for part in parts]) for key in STATE},
         sum(part.effective for part in parts),
     )

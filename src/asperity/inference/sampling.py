@@ -136,8 +136,10 @@ def importance(
 
     `best` is the ln evidence of another model: beside one that is far better, no draws are spent after `probed` rounds.
     """
+    target: Field = np.empty(0)
     for number in range(rounds + 1):
-        target = log_target(pool.shown)
+        fresh = pool.take(pool.shown, slice(len(target), None))
+        target = np.concatenate([target, log_target(fresh)])
         weights = pool.log_weights(target)
         hopeless = number >= probed and float(logsumexp(weights)) - np.log(pool.drawn) < best - HOPELESS
         if _effective(weights) >= enough or number == rounds or hopeless:

@@ -1,4 +1,5 @@
 from .ahead import FORECAST as FORECAST
+from .ahead import Bands as Bands
 from .ahead import Foreteller as Foreteller
 from .ahead import Foretold as Foretold
 from .alarming import BASELINE as BASELINE

@@ -9,12 +9,36 @@ from math import inf
 from time import monotonic
 from typing import Any, Protocol
 
+from asperity.arrays import Field
+
 SHARE = 0.1  # of a watch's time, which forecasts may take
 FORECAST = "forecast"  # raises the alarm
 
 
+@dataclass(frozen=True)
+class Bands:
+    """A quantity over a series and ahead of it, SI.
+
+    Parameters
+    ----------
+    key, limit : which quantity, and what it is not to cross
+    x, last : of the visits and of times behind them; the last visit's
+    ends : ends of 90 % with the median between them, (3, times): as each visit was known then, and what is foretold
+    """
+
+    key: str
+    limit: float
+    x: Field
+    last: float
+    ends: Field
+
+
 class Foretold(Protocol):
     """A forecast, or why there is none; `alarm` is whether somebody is to act on it."""
+
+    @property
+    def bands(self) -> Bands | None:
+        """What can be drawn of it; None where there is no forecast."""
 
     @property
     def alarm(self) -> bool:

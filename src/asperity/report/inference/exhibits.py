@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from asperity.arrays import Field
-from asperity.inference import CRUCIAL, Design, Forecast, Inference
+from asperity.inference import CRUCIAL, Design, Inference
 from asperity.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import legend_below, panels_in_rows
@@ -161,31 +161,6 @@ def following(found: Inference) -> Exhibit:
         "What one more recording is expected to tell of all unknowns together, over the loads and speeds that the case "
         "permits.",
         "Expected information over load and speed, with the points recorded and the one to run next",
-    )
-
-
-def ahead(forecast: Forecast) -> Exhibit:
-    """The limit's quantity over the series and ahead, with the limit and when it is crossed."""
-    entry, x = quantity(forecast.limit.key), forecast.bands["x"]
-    low, middle, high = entry.factor * forecast.bands["ends"]
-    last = forecast.series.x[-1]
-
-    def draw(medium: Medium) -> Figure:
-        figure, axes = medium.panel(3.2)
-        for here, colour, name in ((x <= last, BLUE, "as heard"), (x >= last, VERMILION, "foretold")):
-            axes.fill_between(x[here], low[here], high[here], color=colour, alpha=0.25, linewidth=0, label=name)
-            axes.plot(x[here], middle[here], color=colour)
-        axes.axhline(entry.factor * forecast.limit.value, color="black", linestyle="--", label="limit")
-        axes.set(xlabel=forecast.x_name or "x", ylabel=entry.axis)
-        legend_below(figure, 3)
-        return figure
-
-    return Exhibit(
-        "ahead",
-        draw,
-        "What possible contacts do, 90 % and median: up to the last recording as each was known then, and behind it as "
-        "their drift goes on, restless as it was.",
-        f"{entry.name} over the series of recordings, and its forecast with the limit",
     )
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from asperity.inference import CRUCIAL, Design, Forecast, Inference, PointEstimates
 from asperity.quantities import quantity
+from asperity.report.ahead import ahead
 from asperity.report.base import Tile, heading, render, write_page
 from asperity.report.inference import exhibits
 
@@ -61,7 +62,7 @@ def render_inference_page(found: Inference, forecast: Forecast | None = None, de
         points=[one.cells() for one in found.at_points()],
         forecast=forecast,
         design=design,
-        ahead=None if forecast is None else exhibits.ahead(forecast).picture(),
+        ahead=None if forecast is None else ahead(forecast.bands, forecast.x_name or "x").picture(),
         levers=None if design is None else exhibits.levers(design).picture(),
         models=[
             (model.law, "with its error" if model.discrepancy else "exact",

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.quantities import NO_VALUE, in_print, quantity
+from asperity.report.ahead import ahead
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
 from asperity.report.track import exhibits
 from asperity.tracking import FORECAST, Track, TrackedRecording
@@ -61,6 +62,7 @@ def render_track_page(track: Track) -> str:
         tiles=_tiles(track),
         act=_act(track),
         trend=[exhibits.trend(track).picture_and_narrow()] if track.resonance_count else [],
+        ahead=_ahead(track),
         more=_pictures(_details(track)),
         heads=_heads(track),
         rows=[_row(recording, _with_clr(track)) for recording in track.recordings],
@@ -77,6 +79,12 @@ def render_track_page(track: Track) -> str:
         resolution=_resolution(track),
         false_alarms=f"{1.0 / track.alarm.false_alarm_rate:.0f}",
     )
+
+
+def _ahead(track: Track) -> Picture | None:
+    """What is foretold; None where nothing was asked, or nothing can be told."""
+    bands = None if track.forecast is None else track.forecast.bands
+    return None if bands is None else ahead(bands, exhibits.x_label(track)).picture()
 
 
 def _with_clr(track: Track) -> bool:
