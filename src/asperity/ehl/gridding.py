@@ -76,8 +76,8 @@ def auto_grid(
     The inlet begins where no more than half of `accuracy` of the inlet's pressure is still missing (twice of it in a
     rough contact), at most 30 half-widths out; the domain holds asperities out to where 2.5 Sq no longer reach. Cells:
     4.5 across the inlet length, 9 of a smooth line contact, 5 of a rough contact; 8 along a correlation length; 20
-    across the Hertz zone; more or fewer with the root of `accuracy`. A rough contact has 96 by 32 cells at least, so that
-    a coarser grid tells its error, and about 130000 at most; `grid_shortfalls` says where they are too few.
+    across the Hertz zone; more or fewer with the root of `accuracy`. A rough contact has 96 by 32 cells at least, so
+    that a coarser grid tells its error, and about 130000 at most; `grid_shortfalls` says where they are too few.
 
     Parameters
     ----------
