@@ -47,6 +47,8 @@ class _Moves(NamedTuple):
 def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iterator[Step]:
     """Yield the start and then where each Newton step leads.
 
+    Once steps have led nowhere for long, oil is no longer foreseen, nor how the wedge opens: these may go round.
+
     A closed cell whose oil would come to bear more than the total takes the total for its oil's pressure, and is free
     in the next step: the oil lifts the bodies apart. Not one that the cap decides.
     """
@@ -54,13 +56,13 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change = 0.0, np.inf
-    lowest, idle, share = np.inf, 0, 1.0
+    lowest, idle, share, astray = np.inf, 0, 1.0, False
     balance, settled = evaluate(problem, unknowns, second_order=second_order), np.zeros(problem.cells, dtype=bool)
     for number in count():
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         try:
-            step = newton_step(balance, settled)
+            step = newton_step(balance, None if astray else settled)
         except SingularFactor:  # strayed so far that no step leads on
             yield Step(number + 1, balance, unknowns.approach, np.inf)
             return
@@ -69,7 +71,7 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         if balance.residual_rms < PROGRESS * lowest:
             lowest, idle = balance.residual_rms, 0
         elif idle == PATIENCE:
-            lowest, idle, share = balance.residual_rms, 0, 1.5 - share
+            lowest, idle, share, astray = balance.residual_rms, 0, 1.5 - share, True
         closed = (balance.solid != FREE) & (balance.gap <= problem.contact_gap) & (balance.oil_pressure == unknowns.oil)
         d_oil = np.where(
             closed | (unknowns.oil < 0.0), step.oil, oil_limit.limited(step.oil, np.abs(unknowns.oil), 0.0)

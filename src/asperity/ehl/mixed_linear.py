@@ -279,10 +279,11 @@ def firm(balance: MixedBalance) -> bool:
 def newton_step(balance: MixedBalance, settled: Mask | None = None) -> Pressures:
     """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
 
-    How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly.
+    How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly, and oil is foreseen
+    in flattened streaks; neither without `settled`.
     """
     problem = balance.problem
-    stands = not problem.conserve and problem.past is None and problem.held is None
+    stands = settled is not None and not problem.conserve and problem.past is None and problem.held is None
     if stands:
         balance = foreseen(balance)
     settled = settled if stands and firm(balance) else None

@@ -1,12 +1,16 @@
 """numba's compilation with a cache that can be damaged, emptied or nowhere to be kept: then kernels compile anew.
 
 numba loads what its cache holds as it stands, machine code included, and raises where it holds nothing sensible. Here
-a digest follows everything in it; what does not fit is thrown away.
+a digest follows everything in it; what does not fit is thrown away. Against others who may write there it is no guard.
+
+A kernel holds what it calls and constants of modules beside its own: it is stale when any of them has changed. numba
+numbers what it keeps, and two processes may take one number for two signatures: so all of it says what it is.
 """
 
 import pickle
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -20,6 +24,15 @@ _DIGEST = 32  # bytes behind what is kept; pickle passes over them
 
 class _CheckedFile(IndexDataCacheFile):
     """The cache of one function on disk."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled, with what it was compiled from and for."""
+        super().save(key, (self._source_stamp, key, data))
+
+    def load(self, key: Any) -> Any:
+        """What was kept for a key; None where there is nothing, or something else."""
+        stamp, known, data = super().load(key) or (None, None, None)
+        return data if (stamp, known) == (self._source_stamp, key) else None
 
     def _dump(self, obj: Any) -> bytes:
         body: bytes = super()._dump(obj)
@@ -50,13 +63,23 @@ class _CheckedFile(IndexDataCacheFile):
         return None
 
 
+@lru_cache
+def _sources(folder: Path) -> str:
+    """A digest of all modules in a folder."""
+    told = sha256()
+    for path in sorted(folder.glob("*.py")):
+        told.update(path.name.encode() + b"\0" + sha256(path.read_bytes()).digest())
+    return told.hexdigest()
+
+
 class _Cache(FunctionCache):
     """The cache of one function; where nothing can be written, nothing is kept."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         kept = self._cache_file
-        self._cache_file = _CheckedFile(kept._cache_path, self._impl.filename_base, kept._source_stamp)
+        stamp = (kept._source_stamp, _sources(Path(function.__code__.co_filename).parent))
+        self._cache_file = _CheckedFile(kept._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was compiled before; numba loads all that compiling needs first, which takes longer than a solve."""
