@@ -27,6 +27,7 @@ from asperity.inference import (
     with_measured,
     with_observation,
 )
+from asperity.inference import emulator as emulator_module
 from asperity.inference.estimates import bits, estimate
 from asperity.inference.likelihood import (
     ALONG,
@@ -412,3 +413,19 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
         with_measured(setting, replace(measured, heights=10.0 * measured.heights))
     with pytest.raises(BadInput, match="the case knows its Sq"):
         with_measured(replace(setting, contact=setting.contact[1:]), measured)
+
+
+def test_further_points_never_take_a_folder_that_is_there(monkeypatch, tmp_path):
+    """A damaged one is deleted, as its error says, and the next stands behind those that are left."""
+    base = formula_emulator(formula_setting())
+    held = replace(base, folder=tmp_path)
+    (tmp_path / "emulator.json").write_text("{}")
+    monkeypatch.setattr(emulator_module, "build_emulator", lambda *_, **__: held)
+    for _ in range(3):
+        emulator_module.extend_emulator(formula_setting(), held, np.full((1, 2), 0.5))
+    (tmp_path / "further" / "001" / "shares.json").unlink()
+    (tmp_path / "further" / "001").rmdir()
+    emulator_module.extend_emulator(formula_setting(), held, np.full((1, 2), 0.25))
+    kept = {path.parent.name: path.read_text() for path in (tmp_path / "further").glob("*/shares.json")}
+    assert [*sorted(kept)] == ["000", "002", "003"]
+    assert "0.5" in kept["002"]

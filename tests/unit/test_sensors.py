@@ -7,7 +7,8 @@ import pytest
 from benchmarks.sensors import BAND, NINETY, TRUTH, two_sensors
 
 from asperity.errors import BadInput
-from asperity.wear import DISAGREE, resonances_of_sensors
+from asperity.wear import DISAGREE, no_resonance, resonances_of_sensors
+from asperity.wear.sensors import _Together
 
 
 def pulls(told):
@@ -77,3 +78,15 @@ def test_where_sensors_have_agreed_one_of_them_is_enough_for_a_recording():
     deaf = [replace(one, density=np.ones_like(one.density)) for one in sensors["b"]]
     silent = resonances_of_sensors({"a": sensors["a"], "b": deaf}, band_hz=BAND)
     assert not any(one.found for one in silent.resonances)
+
+
+@pytest.mark.parametrize("order", ["abc", "bca"])
+def test_who_may_stand_alone_does_not_hang_on_the_order_of_sensors(order):
+    """a hears a line for the first time; b hears what b and c have heard together elsewhere."""
+    line = resonances_of_sensors(two_sensors(100, size=0.3), band_hz=BAND).resonances[0]
+    nothing = no_resonance("nothing", BAND, "joint")
+    together = _Together({}, {name: [None] for name in order}, BAND)
+    together.alone = {name: (nothing if name == "c" else line,) for name in order}
+    found, names = together._by_one(0, nothing, ["b", "c"], 1.0)
+    assert found.found
+    assert names == ("b",)

@@ -97,6 +97,16 @@ def test_channels_that_are_none_are_refused(both, channel, named):
         track_recordings([both / "whole"], channel=channel, band_hz=BAND)
 
 
+def test_sensors_that_are_off_together_are_no_copies(both, tmp_path):
+    for number in range(TRUTH.size):
+        with np.load(both / "whole" / f"{number}.npz") as kept:
+            running = 0.0 if number == 4 else 1.0
+            np.savez(tmp_path / f"{number}.npz", a=running * kept["a"], b=running * kept["b"], fs=RATE, unit="m/s^2")
+    track = track_recordings([tmp_path], channel="a,b", band_hz=BAND)
+    assert "on a and b in 7" in track.verdict()
+    assert [one.resonance.found for one in track.recordings] == [number != 4 for number in range(TRUTH.size)]
+
+
 def test_a_copy_is_no_second_sensor(tmp_path):
     rng = np.random.default_rng(1)
     for number, f0 in enumerate(TRUTH[:6]):

@@ -257,7 +257,8 @@ def extend_emulator(setting: Setting, emulator: Emulator, shares: Field, **how: 
         raise BadInput(
             f"an emulator has {MOST_POINTS} points at most, got {emulator.points} and {len(shares)}; extend it by less"
         )
-    place = emulator.folder / FURTHER / f"{len(_further(emulator.folder)):03d}"
+    last = max((int(path.name) for path in (emulator.folder / FURTHER).glob("[0-9][0-9][0-9]")), default=-1)
+    place = emulator.folder / FURTHER / f"{last + 1:03d}"
     make_folder(place)
     write_json(place / SHARES, {"shares": np.asarray(shares, dtype=float).tolist()})
     return build_emulator(setting, folder=emulator.folder, **how)

@@ -188,7 +188,8 @@ def _without_copies(names: Sequence[str], found: Sequence[Instant], *, refused: 
     told = []
     for one in found:
         readings = dict(one.readings)
-        for first, second in combinations([name for name in names if name in readings], 2):
+        usable = [name for name in names if name in readings and readings[name].usable]
+        for first, second in combinations(usable, 2):  # sensors that are off are alike, and no copies
             here, there = (readings[name].spectrum for name in (first, second))
             if here is None or there is None or not _alike(here, there):
                 continue

@@ -173,37 +173,6 @@ def common_spacing(paths: Sequence[Path], options: ReadOptions, target: Target) 
     return max(FINEST_HZ, min(PIECES / median(lengths), target.width_hz / LINES_IN_WIDTH))
 
 
-def read_spectra(
-    paths: Sequence[Path],
-    options: ReadOptions,
-    target: Target,
-    spacing_hz: float,
-    *,
-    places: Mapping[str, Place] | None = None,
-    workers: int = 1,
-    progress: Callable[[Reading], None] | None = None,
-) -> Iterator[tuple[int, Reading]]:
-    """Number and result of each file, as they are done; in processes of their own where that is worth it."""
-    jobs = [(path, options, target, spacing_hz, (places or {}).get(str(path))) for path in paths]
-    if min(workers, len(paths)) < 2 or sum(_size(path) for path in paths) < WORTH_A_POOL:
-        for number, job in enumerate(jobs):
-            reading = read_spectrum(*job)
-            if progress is not None:
-                progress(reading)
-            yield number, reading
-        return
-    pool = ProcessPoolExecutor(min(workers, len(paths)), get_context("spawn"), leave_interrupts_to_the_parent)
-    try:
-        waiting = {pool.submit(read_spectrum, *job): number for number, job in enumerate(jobs)}
-        for done in as_completed(waiting):
-            reading = done.result()
-            if progress is not None:
-                progress(reading)
-            yield waiting[done], reading
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
 def read_channels(
     paths: Sequence[Path],
     options: ReadOptions,
@@ -214,15 +183,33 @@ def read_channels(
     workers: int = 1,
     progress: Callable[[Reading], None] | None = None,
 ) -> Iterator[tuple[int, Reading]]:
-    """The same on every channel that is asked for, one after another; of several each is a sensor."""
-    channels = channels_in(options.channel)
+    """Number and result of each file on each channel that is asked for, in turn; of several each is a sensor.
+
+    Files of a channel come as they are done; in processes of their own where that is worth it.
+    """
+    channels, told = channels_in(options.channel), progress or (lambda _: None)
+    workers = workers if sum(_size(path) for path in paths) >= WORTH_A_POOL else 1
     for channel in channels:
         of_one = replace(options, channel=channel)
-        for number, reading in read_spectra(
-            paths, of_one, target, spacing_hz, places=places, workers=workers, progress=progress
-        ):
+        jobs = [(path, of_one, target, spacing_hz, (places or {}).get(str(path))) for path in paths]
+        for number, reading in _done(jobs, workers):
+            told(reading)
             of_several = replace(reading, sensor=f"{reading.sensor} {channel}".strip())
             yield number, of_several if len(channels) > 1 else reading
+
+
+def _done(jobs: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[int, Reading]]:
+    if min(workers, len(jobs)) < 2:
+        for number, job in enumerate(jobs):
+            yield number, read_spectrum(*job)
+        return
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), leave_interrupts_to_the_parent)
+    try:
+        waiting = {pool.submit(read_spectrum, *job): number for number, job in enumerate(jobs)}
+        for done in as_completed(waiting):
+            yield waiting[done], done.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _size(path: Path) -> int:

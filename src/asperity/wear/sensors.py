@@ -351,7 +351,7 @@ class _Together:
         found = [(name, one) for name, one in there.items() if one.found]
         if not found:
             return line, ()
-        name, own = found[0]
+        name, own = next((one for one in found if one[0] in established), found[0])
         if name not in established:
             others = " and ".join(other for other in there if other != name)
             only = f"only, not on {others}" if others else "and no other sensor heard this recording"
