@@ -1,14 +1,17 @@
 """The mixed contact with a pressure each for oil and asperities: its limits, and one answer whatever the start."""
 
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.chosen_grids import samples
 
 from asperity.case import load_case
 from asperity.ehl import Options, contact_state, mixed_iterate, solve_contact, starts
 from asperity.ehl.dry import dry_contact
+from asperity.ehl.gridding import auto_grid
 from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.mixed_iterate import newton
 from asperity.ehl.mixed_linear import MixedLinear, foreseen
@@ -292,3 +295,15 @@ def test_the_oil_that_lubricated_cells_lose_is_counted():
     carried = balance.content[zone].mean() * solution.grid.cells[1] * dy
     assert of_wet > 1e-4 * carried
     assert contact_state(solution).mass_flux_imbalance == pytest.approx(of_all / carried)
+
+
+def test_hard_steel_whose_films_are_nearly_closed_takes_no_more_steps_by_nested_blocks():
+    """On 192 x 144 cells: 232 steps where blocks are nested all the same, 176 where they are not."""
+    sample = next(islice(samples(6), 5, None))
+    grid = auto_grid(sample.conditions, sample.oil, sample.texture)
+    surface = gaussian_surface(
+        grid, sq=sample.texture.sq, correlation_length=sample.texture.lengths, rng=np.random.default_rng(sample.seed)
+    )
+    solution = solve_contact(sample.conditions, sample.oil, surface)
+    assert min(grid.cells) >= 128
+    assert len(solution.convergence.history) < 200

@@ -39,7 +39,7 @@ LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly strai
 LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... from so little left on, of followed oil that may not be lost: met far closer
 OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
 MOST_KRYLOV_STEPS = 60
-FEWEST_NESTED = 128  # cells along both axes from which on blocks are nested
+FEWEST_NESTED = 128  # cells along both axes from which on blocks are nested, where bodies touch firmly
 NEARLY_CLOSED = 0.1  # of the flattened cells: fewer are nearly closed where bodies touch firmly
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
 
@@ -83,7 +83,7 @@ class MixedLinear:
         self.blocks = Blocks(
             stencil,
             np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0)),
-            nested=not self.follows_wedge and min(self.cells) >= FEWEST_NESTED,
+            nested=not self.follows_wedge and min(self.cells) >= FEWEST_NESTED and firm(balance),
         )
         self.lines = LineRelaxation(stencil, far)
 
@@ -268,8 +268,8 @@ def foreseen(balance: MixedBalance) -> MixedBalance:
 def firm(balance: MixedBalance) -> bool:
     """Whether few cells are nearly closed beside those that are flattened.
 
-    Where many are, films of about the contact film close and open from step to step, and how they open at one of them
-    tells little of the next.
+    Where many are, films of about the contact film close and open from step to step. How they open at one of them tells
+    little of the next, and blocks of cells that are not alike answer badly when they are summed again and again.
     """
     gap, film = balance.gap, balance.problem.contact_gap
     nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPEN_FROM) * film)
