@@ -94,6 +94,7 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
         page.get_by_role("link", name="Turn its knobs").click()
+        page.wait_for_url(re.compile("/contact[?]"))
         page.get_by_text("Solved on 32 × 24 cells").wait_for()
         assert page.get_by_role("textbox", name="Composite roughness, Sq").input_value() == "1.5 um"
         assert page.locator("dl div", has_text="CLR").locator("dd").first.inner_text() == clr

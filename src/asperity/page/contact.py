@@ -129,7 +129,6 @@ class ContactView:
         warming = "" if self._workshop.is_warm else "Warming up: the solver is loaded, and compiled the first time. "
         kind = "alarm" if desk.problem or (desk.answer is not None and not desk.answer.converged) else "soft"
         status = desk.status if desk.stale or not self._unmade else "Drawing ..."
-        self.status.text = sentences([f"{warming}{status}"], kind)
         for key, widget in self.knobs.items():
             refusal = desk.refusals.get(key)
             widget.show(refusal.text if refusal else desk.settings.text(key), refusal.sentence if refusal else "")
@@ -140,6 +139,7 @@ class ContactView:
                 self._draw_answer(desk.answer, desk.pinned)
                 self._drawn = (desk.answer, desk.pinned)
         self.pin.label = "Unpin" if desk.pinned is not None else "Pin to compare"
+        self.status.text = sentences([f"{warming}{status}"], kind)  # last: who hears it finds everything there
 
     def _draw_answer(self, answer: Answer, pinned: Answer | None) -> None:
         self.pictures.show(answer, pinned)

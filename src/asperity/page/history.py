@@ -91,11 +91,11 @@ class HistoryView:
         at = moved.times[place] * clock.factor
         told = f"{moved.names[place]}, {at:.4g} {clock.display}, map {place + 1} of {len(moved.pictures)}"
         self.step.tags = ["Step", moved.names[place]]
-        self.status.text = sentences([told], "soft")
         self.pictures.make()
         self.pictures.show(moved.pictures[place])
         for mark in self._now:
             mark.location = at
+        self.status.text = sentences([told], "soft")
 
 
 def layout(view: HistoryView) -> tuple[dict[str, Any], list[dict[str, Any]]]:

@@ -179,9 +179,6 @@ class RecordingsView:
     def show(self, heard: Heard) -> None:
         """Draw a series."""
         self.heard = heard
-        waiting = f", {heard.waiting} wait" if heard.waiting else ""
-        watched = "; the folder is watched" if self.watches else ""
-        self._tell(f"{len(heard.rows)} recordings read{waiting}{watched}.")
         self.verdict.text = sentences([heard.verdict], "alarm" if heard.alarm == "alarm" else "")
         self.notes.text = notes(heard.notes)
         self.table.text = _table(heard)
@@ -191,6 +188,9 @@ class RecordingsView:
         kept = self.choice.value if self.choice.value in names else names[-1]
         self.choice.update(options=names, value=kept)
         self._show_one(kept)
+        waiting = f", {heard.waiting} wait" if heard.waiting else ""
+        watched = "; the folder is watched" if self.watches else ""
+        self._tell(f"{len(heard.rows)} recordings read{waiting}{watched}.")  # last: who hears it finds everything there
 
     def _draw_waterfall(self, heard: Heard) -> None:
         if not heard.levels.size:

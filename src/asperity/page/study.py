@@ -68,8 +68,6 @@ class StudyView:
         swept: Swept = result
         self.swept = swept
         self.verdict.text, self.notes.text = sentences([swept.verdict]), notes(swept.notes)
-        told = "Click a point to see its contact." if swept.axes else "Nothing was swept; choose a contact below."
-        self.status.text = sentences([told], "soft")
         self._rows = list(range(len(swept.numbers)))
         labels = [(str(row), in_print(f"{swept.numbers[row]}: {self._words(row)}")) for row in self._rows]
         self.point.update(options=[("", "choose one"), *labels], value="")
@@ -78,6 +76,8 @@ class StudyView:
             self.across.update(options=[axis.key for axis in swept.axes], value=swept.axes[0].key)
             self.up.update(options=[(key, quantity(key).title) for key in swept.outputs], value=first)
             self._draw()
+        told = "Click a point to see its contact." if swept.axes else "Nothing was swept; choose a contact below."
+        self.status.text = sentences([told], "soft")
 
     def _draw(self) -> None:
         swept = self.swept
@@ -118,13 +118,13 @@ class StudyView:
         if isinstance(result, Refused) or self.swept is None:
             self.chosen.text = sentences([result.sentence], "alarm")
             return
-        self.chosen.text = sentences([f"{self._words(row)}: {result.verdict}"])
         self._answer = result
         self._mark(old=False)
         self.pictures.make()
         self.pictures.show(result)
         link = Markup('<p><a href="contact?{}">Turn its knobs</a></p>')
         self.way.text = link.format(self._address(row))
+        self.chosen.text = sentences([f"{self._words(row)}: {result.verdict}"])  # last: all is there when it says so
 
     def _mark(self, *, old: bool) -> None:
         """Show the contact's numbers and pictures as those of the chosen point, or of the one before."""
