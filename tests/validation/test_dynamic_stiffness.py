@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from asperity.case import load_case
 from asperity.ehl import Options, ShakenContact, contact_state, dynamic_stiffness, solve_contact, tangent_stiffness
+from asperity.ehl.mixed_linear import MixedLinear
 from asperity.ehl.oscillating import elastic
 from asperity.ehl.scales import Scales
 from asperity.ehl.state import balance_of
@@ -123,6 +124,30 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
         expected = shaken_cells(balance, [crossing * frequency for frequency in hertz])
     found = [complex(ready.oscillating.answer(crossing * one, tolerance=1e-9).total.sum()) for one in hertz]
     assert found == pytest.approx(expected, rel=2e-4)
+
+
+def test_the_lines_follow_how_the_wedge_leans():
+    """Their stencil is the linearisation of a contact in which a cell gives way to its own pressure alone."""
+    balance = elastic(balance_of(papers(2.5, "mixed")))
+    linear = MixedLinear(balance, float, closely=True)
+    _, lines = linear.inverse
+    change = np.random.default_rng(2).standard_normal(linear.cells) * linear.lubricated
+    compliance = 1.0 / linear.rows.contact_scale
+    expected, _ = linear.of_gap(change, np.where(linear.free, compliance * change, 0.0))
+    found = -lines.left(np.zeros_like(change), change)
+    inner = linear.lubricated & (np.arange(linear.cells[0]) % (linear.cells[0] - 1) > 0)[:, None]  # no ambient oil
+    assert (inner & linear.touching).sum() > 100
+    np.testing.assert_allclose(found[inner], expected[inner], atol=1e-9 * np.abs(expected[inner]).max())
+    _, upright = MixedLinear(balance, float).inverse
+    assert np.abs(-upright.left(np.zeros_like(change), change) - expected)[inner].max() > 0.1
+
+
+def test_a_shaken_contact_whose_bodies_touch_takes_few_steps():
+    """With upright lines and blocks of their own it took 39."""
+    ready = ShakenContact(papers(1.0, "mixed", cells=(128, 128)))
+    answer = ready.oscillating.answer(ready.per_crossing(9e3), tolerance=3e-5)
+    assert answer.left <= 3e-5
+    assert answer.steps <= 30
 
 
 @pytest.mark.parametrize(("model", "sq_um"), [("unified", 0.0), ("unified", 2.5), ("mixed", 0.5)])

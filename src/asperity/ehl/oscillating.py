@@ -21,9 +21,10 @@ from asperity.ehl.problem import Balance
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
 
 MOST_STEPS = 200  # of GMRES at a time ...
-AT_A_TIME = 1e-4  # ... which leave no less of what was left before: about what single precision can tell
+AT_A_TIME = 3e-5  # ... which leave no less of what was left before: about what single precision can tell
 MOST_ROUNDS = 12
-STUCK = 0.3  # share left by a round in single precision, above which the next is taken in double
+STUCK = 0.3  # share left by a round in single precision, above which the next is taken in double ...
+ASKED = 1.5  # ... times what it was asked to leave, where that is more
 
 Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
@@ -89,7 +90,7 @@ class _TwoPressures:
     """The oil's pressure in every cell and, after these, the total one of touching cells."""
 
     def __init__(self, balance: MixedBalance, real: Any) -> None:
-        self.real, self.linear = real, (linear := MixedLinear(balance, real))
+        self.real, self.linear = real, (linear := MixedLinear(balance, real, closely=True))
         self.cells, self.count = linear.cells, balance.gap.size
         self.touching = np.flatnonzero(linear.touching)
         self.size = self.count + self.touching.size
@@ -156,10 +157,11 @@ class Oscillating:
         for _ in range(MOST_ROUNDS):
             if share <= tolerance:
                 break
-            change, taken = _solved(solver, left, frequency, max(tolerance / share, AT_A_TIME))
+            leaving = max(tolerance / share, AT_A_TIME)
+            change, taken = _solved(solver, left, frequency, leaving)
             left, now = self._left(wanted, vector + change, frequency, size)
             steps += taken
-            if now > STUCK * share:
+            if now > min(max(STUCK, ASKED * leaving), 1.0) * share:
                 if solver is self.exact:
                     break
                 solver = self.exact
