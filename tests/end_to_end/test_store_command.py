@@ -307,12 +307,13 @@ def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
     assert "is left out: its name is not UTF-8; rename it" in err
 
 
-def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch):
+@pytest.mark.parametrize("sensors", [1, 2])
+def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch, sensors):
     """`python -m benchmarks.hostile` in seconds: an untidy folder, two watches, one of them killed."""
     from benchmarks import hostile
 
     monkeypatch.setattr(hostile, "PARTS_S", 0.4)
-    said = hostile.run(0.12, 2, every=0.2, settle=0.3, say=lambda _: None)
+    said = hostile.run(0.12, 2, sensors, every=0.2, settle=0.3, say=lambda _: None)
     rows = [line.split("|")[1:3] for line in said if line.startswith("|")]
     told = {name.strip(): value.strip() for name, value in rows}
     assert told["nobody says what became of"] == "0"
