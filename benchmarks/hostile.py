@@ -167,7 +167,8 @@ def run(
         yield f"Sample: {minutes:.0f} minutes."
         yield "| a folder as loggers leave it | |"
         yield "|---|---|"
-        yield f"| minutes, arrivals, kills, sensors | {(monotonic() - began) / 60.0:.1f}, {number}, {kills}, {sensors} |"
+        took = (monotonic() - began) / 60.0
+        yield f"| minutes, arrivals, kills, sensors | {took:.1f}, {number}, {kills}, {sensors} |"
         yield from (f"| {what} | {many} |" for what, many in sorted(counts.items()))
         yield f"| nobody says what became of | {len(silent)} {' '.join(silent[:3])} |"
         same = len(first.keys() | second.keys()) - len(differ)
@@ -185,5 +186,7 @@ if __name__ == "__main__":
     arguments.add_argument("--kills", type=int, default=10)
     arguments.add_argument("--sensors", type=int, default=1)
     given = arguments.parse_args()
-    for line in run(given.minutes, given.kills, given.sensors, say=lambda text: print(text, file=sys.stderr, flush=True)):
+    for line in run(
+        given.minutes, given.kills, given.sensors, say=lambda text: print(text, file=sys.stderr, flush=True)
+    ):
         print(line, flush=True)

@@ -231,6 +231,23 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
     assert asked("in/asperity-watch/asperity.db", "SELECT count(*) FROM recording") == [(13,)]
 
 
+def test_lines_that_another_program_changed_are_written_again(tmp_path):
+    """Lines that stand as they were judged are not written again, unless somebody else has written meanwhile."""
+    snapshots(tmp_path / "in", np.ones(9))
+    looks = watch_folder(tmp_path / "in", tmp_path / "out", every_s=0.0, settle_s=0.0)
+    next(looks)
+    rows = "SELECT id, row FROM recording WHERE id <= 9 ORDER BY id"
+    before = asked(tmp_path / "out/asperity.db", rows)
+    with closing(sqlite3.connect(tmp_path / "out/asperity.db")) as connection:
+        connection.execute("UPDATE recording SET row = '{}' WHERE id = 3")
+        connection.commit()
+    for number in (9, 10):
+        snapshots(tmp_path / "in", [1.0], first=number)
+        next(looks)
+        assert asked(tmp_path / "out/asperity.db", rows) == before
+    looks.close()
+
+
 def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
     """A watch that runs for months, and a person who looks."""
     snapshots("in", failing())
