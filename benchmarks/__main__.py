@@ -53,7 +53,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
     ("intervals",),
     ("sensors",),
     ("failures",),
-    ("alarms",),
+    ("alarms", "soonest"),
     ("hostile",),
     ("motion_table",),
     ("robustness",),
@@ -61,7 +61,7 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
 # short enough as they are, whatever is asked
-WHOLE = ("certified", "chosen_films", "first_call", "stress", "surfaces", "rollers", "gallery")
+WHOLE = ("certified", "chosen_films", "first_call", "stress", "surfaces", "rollers", "gallery", "soonest")
 ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors
 TIMES = "times"  # the part that says how long the others took
 

@@ -1,8 +1,9 @@
 """`asperity watch` on a folder as loggers leave it, killed ten times beside one that is not.
 
 Files come late, in parts, twice, from a clock that is ahead, and from other programs. At the end every file has to be
-accounted for, and both stores have to hold the same. `python -m benchmarks.hostile --minutes 60 [--kills 10]` runs
-this part alone and prints what was found; processor time is small, the clock's is not.
+accounted for, on each of the sensors, and both stores have to hold the same.
+`python -m benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone and prints what was found;
+processor time is small, the clock's is not.
 """
 
 import argparse
@@ -29,29 +30,35 @@ PARTS_S = 3.0  # between the two halves of a file that is still being written
 KINDS = ("plain",) * 6 + ("late", "in parts", "twice", "ahead", "cut", "foreign", "half copied", "empty", "again")
 
 
-def recorded(number: int) -> np.ndarray:
-    return np.random.default_rng(number).standard_normal(round(SECONDS * RATE))
+def recorded(number: int, sensor: int) -> np.ndarray:
+    return np.random.default_rng([number, sensor]).standard_normal(round(SECONDS * RATE))
 
 
-def write(path: Path, number: int) -> None:
+def channels(sensors: int) -> list[str]:
+    """Names of what the sensors heard, in each file."""
+    return [f"acc{sensor}" for sensor in range(1, sensors + 1)]
+
+
+def write(path: Path, number: int, sensors: int) -> None:
+    heard = {name: recorded(number, sensor) for sensor, name in enumerate(channels(sensors))}
     with path.open("wb") as file:
-        np.savez(file, acc=recorded(number), fs=RATE, unit="m/s^2")
+        np.savez(file, **heard, fs=RATE, unit="m/s^2")
 
 
-def arrive(folder: Path, number: int, kind: str) -> None:
+def arrive(folder: Path, number: int, kind: str, sensors: int) -> None:
     """One arrival; what is written in parts takes `PARTS_S` twice."""
     path = folder / f"r-{number:04}.npz"
     if kind == "late":
         path = folder / f"r-{max(number - 7, 0):04}-late.npz"
     if kind == "in parts":
-        write(folder.parent / "whole", number)
+        write(folder.parent / "whole", number, sensors)
         content = (folder.parent / "whole").read_bytes()
         path.write_bytes(content[:900])
         sleep(PARTS_S)
         path.write_bytes(content)
         return
     if kind == "cut":
-        write(folder.parent / "whole", number)
+        write(folder.parent / "whole", number, sensors)
         path.write_bytes((folder.parent / "whole").read_bytes()[:700])
     elif kind == "foreign":
         (folder / f"n-{number:04}.txt").write_text("Nothing of note.\n")
@@ -62,35 +69,46 @@ def arrive(folder: Path, number: int, kind: str) -> None:
     elif kind == "empty":
         path.touch()
     else:
-        write(path, number)
+        write(path, number, sensors)
     if kind == "twice":
         shutil.copy(path, path.with_stem(f"{path.stem}-copy"))
     if kind == "ahead":
         os.utime(path, (time() + AHEAD_S,) * 2)
     if kind == "again":
         sleep(PARTS_S)
-        write(path, number + 5000)
+        write(path, number + 5000, sensors)
 
 
-def watch(folder: Path, out: Path, *words: str, every: float, settle: float) -> list[str]:
+def watch(folder: Path, out: Path, *words: str, sensors: int, every: float, settle: float) -> list[str]:
+    words += ("--channel", ",".join(channels(sensors)))
     own = ("--out", str(out), "--quiet", "--machine", "Fan 1", "--point", "DE", "--band", "2000", "4000")
     pace = ("--every", f"{every:g}", "--settle", f"{settle:g}")
     return [sys.executable, "-m", "asperity", "watch", str(folder), *own, *pace, *words]
 
 
-def latest(store: Path) -> dict[str, tuple[object, ...]]:
-    """Of each file the last version: what was read of it, and that it was judged."""
+def latest(store: Path) -> dict[str, list[tuple[object, ...]]]:
+    """Of each file what was read of the last version, and that it was judged; a row for each sensor."""
+    told: dict[str, dict[str, tuple[object, ...]]] = {}
     with closing(sqlite3.connect(store)) as connection:
-        rows = connection.execute("SELECT file, refused, reading, state FROM recording ORDER BY id").fetchall()
-    return {Path(file).name: (refused, reading, state) for file, refused, reading, state in rows}
+        rows = connection.execute(
+            "SELECT file, sensor.name, version, refused, reading, state FROM recording "
+            "JOIN sensor ON sensor.id = recording.sensor ORDER BY recording.id"
+        ).fetchall()
+    for file, sensor, version, refused, reading, state in rows:
+        of_file = told.setdefault(Path(file).name, {})
+        if any(version != other for other, *_ in of_file.values()):
+            of_file.clear()
+        of_file[sensor] = (version, sensor, refused, reading, state)
+    return {file: [row[1:] for _, row in sorted(of_file.items())] for file, of_file in told.items()}
 
 
-def accounted(folder: Path, store: Path) -> tuple[Counter[str], list[str]]:
-    """What became of every file of the folder, and those of which nobody said anything."""
+def accounted(folder: Path, store: Path, sensors: int) -> tuple[Counter[str], list[str]]:
+    """What became of every file of the folder, and those of which not every sensor says anything."""
     held, counts, silent = latest(store), Counter[str](), []
     for path in folder.iterdir():
-        if path.name in held:
-            counts["refused with a reason" if held[path.name][0] else "heard and judged"] += 1
+        rows = held.get(path.name, [])
+        if len(rows) == sensors:
+            counts["refused with a reason" if any(row[1] for row in rows) else "heard and judged"] += 1
         elif not path.name.isprintable() or b"\xff" in os.fsencode(path.name):
             counts["left out, its name said"] += 1
         elif not may_be_recording(path):
@@ -103,7 +121,12 @@ def accounted(folder: Path, store: Path) -> tuple[Counter[str], list[str]]:
 
 
 def run(
-    minutes: float, kills: int, every: float = 2.0, settle: float = 5.0, say: Callable[[str], None] = print
+    minutes: float,
+    kills: int,
+    sensors: int = 1,
+    every: float = 2.0,
+    settle: float = 5.0,
+    say: Callable[[str], None] = print,
 ) -> Iterator[str]:
     """Lines of a table."""
     with TemporaryDirectory() as name:
@@ -112,14 +135,15 @@ def run(
         rng, began = np.random.default_rng(1), monotonic()
         end = began + 60.0 * minutes
         outs = {"left alone": Path(name) / "alone", f"killed {kills} times": Path(name) / "killed"}
-        commands = [watch(folder, out, every=every, settle=settle) for out in outs.values()]
+        pace = {"every": every, "settle": settle}
+        commands = [watch(folder, out, sensors=sensors, **pace) for out in outs.values()]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         alone, killed = (subprocess.Popen(command, **quiet) for command in commands)
         deaths = sorted(rng.uniform(began + 1.0, end, kills))
         number = 0
         try:
             while monotonic() < end or deaths:
-                arrive(folder, number, str(rng.choice(KINDS)))
+                arrive(folder, number, str(rng.choice(KINDS)), sensors)
                 number += 1
                 while deaths and monotonic() > deaths[0]:
                     deaths.pop(0)
@@ -135,15 +159,16 @@ def run(
                 process.kill()
                 process.wait()
         for out in outs.values():
-            subprocess.run(watch(folder, out, "--once", every=every, settle=settle), check=False, **quiet)
+            subprocess.run(watch(folder, out, "--once", sensors=sensors, **pace), check=False, **quiet)
         stores = [out / "asperity.db" for out in outs.values()]
-        counts, silent = accounted(folder, stores[1])
+        counts, silent = accounted(folder, stores[1], sensors)
         first, second = (latest(store) for store in stores)
         differ = sorted(file for file in first.keys() | second.keys() if first.get(file) != second.get(file))
         yield f"Sample: {minutes:.0f} minutes."
         yield "| a folder as loggers leave it | |"
         yield "|---|---|"
-        yield f"| minutes, arrivals, kills | {(monotonic() - began) / 60.0:.1f}, {number}, {kills} |"
+        took = (monotonic() - began) / 60.0
+        yield f"| minutes, arrivals, kills, sensors | {took:.1f}, {number}, {kills}, {sensors} |"
         yield from (f"| {what} | {many} |" for what, many in sorted(counts.items()))
         yield f"| nobody says what became of | {len(silent)} {' '.join(silent[:3])} |"
         same = len(first.keys() | second.keys()) - len(differ)
@@ -159,6 +184,9 @@ if __name__ == "__main__":
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.hostile", description=__doc__)
     arguments.add_argument("--minutes", type=float, default=60.0)
     arguments.add_argument("--kills", type=int, default=10)
+    arguments.add_argument("--sensors", type=int, default=1)
     given = arguments.parse_args()
-    for line in run(given.minutes, given.kills, say=lambda text: print(text, file=sys.stderr, flush=True)):
+    for line in run(
+        given.minutes, given.kills, given.sensors, say=lambda text: print(text, file=sys.stderr, flush=True)
+    ):
         print(line, flush=True)

@@ -9,6 +9,7 @@ import resource
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,55 +20,64 @@ import scipy
 
 from asperity.recording import ReadOptions
 from asperity.tracking import watch as watching
-from asperity.tracking.reading import read_spectrum
-from asperity.tracking.sensor import Sensor
-from asperity.tracking.sensors import settings_of
-from asperity.tracking.store import Place, Store, Version
+from asperity.tracking.reading import read_channels
+from asperity.tracking.sensors import opened
+from asperity.tracking.store import STORE
 from asperity.tracking.target import search_target
-from asperity.tracking.watch import watch_folder
+from asperity.tracking.watch import Update, version_of, watch_folder
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)
 SPACING, MORE = 5.0, 12
+ELSEWHERE = 0.05  # of their frequencies, by which the modes of one sensor's structure lie beside the last one's
 LINES = ((3300.0, 0.004, 0.5), (2300.0, 0.01, 0.7))  # of the machine: frequency, damping, level
 
 
-def recorded(rng: np.random.Generator) -> np.ndarray:
-    """A second of a machine with two modes and a contact line that scatters by 1 %."""
-    values = 0.3 * rng.standard_normal(SAMPLES)
-    for frequency, damping, level in ((2800.0 * (1.0 + 0.01 * rng.standard_normal()), 0.02, 1.0), *LINES):
-        turn, decay = 2.0 * np.pi * frequency / RATE, np.exp(-damping * 2.0 * np.pi * frequency / RATE)
-        line = scipy.signal.lfilter([1.0], [1.0, -2.0 * decay * np.cos(turn), decay**2], rng.standard_normal(SAMPLES))
-        values += level * line / line.std()
-    return values
+def heard(rng: np.random.Generator, sensors: int) -> dict[str, np.ndarray]:
+    """A second of a machine with two modes and a contact line that scatters by 1 %, by channel."""
+    line_hz = 2800.0 * (1.0 + 0.01 * rng.standard_normal())
+    channels = {}
+    for sensor in range(sensors):
+        values = 0.3 * rng.standard_normal(SAMPLES)
+        modes = [(frequency * (1.0 + ELSEWHERE * sensor), damping, level) for frequency, damping, level in LINES]
+        for frequency, damping, level in ((line_hz, 0.02, 1.0), *modes):
+            turn, decay = 2.0 * np.pi * frequency / RATE, np.exp(-damping * 2.0 * np.pi * frequency / RATE)
+            fresh = rng.standard_normal(SAMPLES)
+            line = scipy.signal.lfilter([1.0], [1.0, -2.0 * decay * np.cos(turn), decay**2], fresh)
+            values += level * line / line.std()
+        channels[f"acc{sensor + 1}"] = values.astype(np.float32)
+    return channels
 
 
-def write(path: Path, rng: np.random.Generator) -> None:
-    np.savez(path, acc=recorded(rng).astype(np.float32), fs=RATE, unit="m/s^2")
+def write(path: Path, rng: np.random.Generator, sensors: int) -> None:
+    np.savez(path, **heard(rng, sensors), fs=RATE, unit="m/s^2")
 
 
-def filled(folder: Path, store: Path, many: int) -> None:
+def channel(sensors: int) -> str:
+    """All of them, as `watch` takes them."""
+    return ",".join(f"acc{sensor + 1}" for sensor in range(sensors))
+
+
+def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
     """A folder and a store of `many` recordings, of which 200 differ."""
-    rng, target, options = np.random.default_rng(1), search_target(None, BAND), ReadOptions()
-    sensor = Sensor(Store(store), Place("machine", folder.name, "sensor"), settings_of(target, options))
-    sensor.settle_spacing(SPACING)
-    write(folder / "first.npz", rng)
-    content = (folder / "first.npz").read_bytes()
-    (folder / "first.npz").unlink()
+    rng, target, options = np.random.default_rng(1), search_target(None, BAND), ReadOptions(channel=channel(sensors))
+    keeping = opened(store, folder.resolve(), (None, None, None), target, options)
+    keeping.settle_spacing(SPACING)
+    one = folder.parent / "one.npz"
     readings = []
     for _ in range(200):
-        write(folder.parent / "one.npz", rng)
-        readings.append(read_spectrum(folder.parent / "one.npz", options, target, SPACING))
+        write(one, rng, sensors)
+        readings.append([reading for _, reading in read_channels([one], options, target, SPACING)])
     for number in range(many):
         path = folder / f"r-{number:05}.npz"
-        path.write_bytes(content[:1])
-        status = path.stat()
-        key = Version(str(path), f"{status.st_size} {status.st_mtime_ns}")
-        sensor.keep(key, replace(readings[number % 200], file=str(path)))
-    with sensor.store.transaction() as run:
+        path.write_bytes(b"P")
+        key = version_of(path.resolve())
+        for reading in readings[number % 200]:
+            keeping.keep(key, replace(reading, file=key.file))
+    with closing(keeping.store), keeping.store.transaction() as run:
         run("UPDATE recording SET state = 'none'")  # as if each had been judged when it came
 
 
-def one_more(folder: Path, out: Path, many: int) -> tuple[list[float], list[float]]:
+def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[float], list[float]]:
     """Processor time [s] of judging one more recording, and of all that a look at the folder takes."""
     rng = np.random.default_rng(2)
     judged: list[float] = []
@@ -80,12 +90,12 @@ def one_more(folder: Path, out: Path, many: int) -> tuple[list[float], list[floa
         return track
 
     watching._Memory.judged = timed  # type: ignore[assignment,method-assign]
-    looks = watch_folder(folder, out, band_hz=BAND, every_s=0.05, settle_s=0.0)
-    next(looks)
+    looks = watch_folder(folder, out, band_hz=BAND, channel=channel(sensors), every_s=0.05, settle_s=0.0)
+    _require_known(next(looks))
     judged.clear()
     whole = []
     for number in range(MORE):
-        write(folder / f"r-{many + number:05}.npz", rng)
+        write(folder / f"r-{many + number:05}.npz", rng, sensors)
         began = process_time()
         next(looks)
         whole.append(process_time() - began)
@@ -93,10 +103,17 @@ def one_more(folder: Path, out: Path, many: int) -> tuple[list[float], list[floa
     return judged, whole
 
 
+def _require_known(update: Update) -> None:
+    """That the watch goes on with what was filled in, and that it was heard: nothing else is worth a time."""
+    track = update.track
+    if update.new or track is None or not all(one.resonance.found for one in track.recordings):
+        raise RuntimeError(f"the watch reads {len(update.new)} recordings that its store should know, or hears no line")
+
+
 def known(folder: Path, out: Path) -> float:
     """Processor time [s] of `asperity watch --once` where nothing is new, its imports too."""
     command = [sys.executable, "-m", "asperity", "watch", str(folder), "--out", str(out), "--once", "--quiet"]
-    command += ["--settle", "0", "--band", *(f"{end:g}" for end in BAND)]
+    command += ["--channel", channel(1), "--settle", "0", "--band", *(f"{end:g}" for end in BAND)]
     subprocess.run(command, check=False, capture_output=True)
     took = []
     for _ in range(3):
@@ -114,23 +131,28 @@ def lines(*, fast: bool = False) -> Iterator[str]:
     yield ""
     yield "| what | processor time |"
     yield "|---|---|"
+    for sensors in (1, 2):
+        with TemporaryDirectory() as name:
+            folder, out = _folders(name)
+            filled(folder, out / STORE, many, sensors)
+            judged, whole = one_more(folder, out, many, sensors)
+            size = (out / STORE).stat().st_size / 2**20
+            of = "a sensor" if sensors == 1 else f"{sensors} sensors"
+            yield f"| a store of {many} recordings of {of}: size | {size:.0f} MB |"
+            yield f"| {of}: one more judged, median of {MORE} | {1e3 * np.median(judged):.0f} ms |"
+            yield f"| {of}: one more looked for, read, judged and kept, median | {1e3 * np.median(whole):.0f} ms |"
+            yield f"| {of}: the same, longest | {1e3 * np.max(whole):.0f} ms |"
     with TemporaryDirectory() as name:
-        folder, out = Path(name) / "in", Path(name) / "out"
-        folder.mkdir()
-        out.mkdir()
-        filled(folder, out / "asperity.db", many)
-        judged, whole = one_more(folder, out, many)
-        size = (out / "asperity.db").stat().st_size / 2**20
-        yield f"| a store of {many} recordings: size | {size:.0f} MB |"
-        yield f"| one more judged, median of {MORE} | {1e3 * np.median(judged):.0f} ms |"
-        yield f"| one more looked for, read, judged and kept, median | {1e3 * np.median(whole):.0f} ms |"
-        yield f"| the same, longest | {1e3 * np.max(whole):.0f} ms |"
-    with TemporaryDirectory() as name:
-        folder, out = Path(name) / "in", Path(name) / "out"
-        folder.mkdir()
-        out.mkdir()
-        filled(folder, out / "asperity.db", 1001)
+        folder, out = _folders(name)
+        filled(folder, out / STORE, 1001, 1)
         yield f"| `watch --once` over 1001 known files | {known(folder, out):.2f} s |"
+
+
+def _folders(name: str) -> tuple[Path, Path]:
+    folder, out = Path(name) / "in", Path(name) / "out"
+    folder.mkdir()
+    out.mkdir()
+    return folder, out
 
 
 if __name__ == "__main__":

@@ -231,6 +231,23 @@ def test_every_file_of_an_untidy_folder_is_accounted_for(asp):
     assert asked("in/asperity-watch/asperity.db", "SELECT count(*) FROM recording") == [(13,)]
 
 
+def test_lines_that_another_program_changed_are_written_again(tmp_path):
+    """Lines that stand as they were judged are not written again, unless somebody else has written meanwhile."""
+    snapshots(tmp_path / "in", np.ones(9))
+    looks = watch_folder(tmp_path / "in", tmp_path / "out", every_s=0.0, settle_s=0.0)
+    next(looks)
+    rows = "SELECT id, row FROM recording WHERE id <= 9 ORDER BY id"
+    before = asked(tmp_path / "out/asperity.db", rows)
+    with closing(sqlite3.connect(tmp_path / "out/asperity.db")) as connection:
+        connection.execute("UPDATE recording SET row = '{}' WHERE id = 3")
+        connection.commit()
+    for number in (9, 10):
+        snapshots(tmp_path / "in", [1.0], first=number)
+        next(looks)
+        assert asked(tmp_path / "out/asperity.db", rows) == before
+    looks.close()
+
+
 def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
     """A watch that runs for months, and a person who looks."""
     snapshots("in", failing())
@@ -307,12 +324,13 @@ def test_a_name_that_is_not_utf_8_is_left_out_with_a_word(asp):
     assert "is left out: its name is not UTF-8; rename it" in err
 
 
-def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch):
+@pytest.mark.parametrize("sensors", [1, 2])
+def test_a_watch_that_is_killed_ends_with_the_store_of_one_that_is_not(monkeypatch, sensors):
     """`python -m benchmarks.hostile` in seconds: an untidy folder, two watches, one of them killed."""
     from benchmarks import hostile
 
     monkeypatch.setattr(hostile, "PARTS_S", 0.4)
-    said = hostile.run(0.12, 2, every=0.2, settle=0.3, say=lambda _: None)
+    said = hostile.run(0.12, 2, sensors, every=0.2, settle=0.3, say=lambda _: None)
     rows = [line.split("|")[1:3] for line in said if line.startswith("|")]
     told = {name.strip(): value.strip() for name, value in rows}
     assert told["nobody says what became of"] == "0"

@@ -6,7 +6,7 @@ from benchmarks.alarms import KNEES, NUMBER, RMS, WITHOUT_WEAR, judged, moved_se
 from benchmarks.alarms import warm_up as drawn_warm_up
 
 from asperity.tracking.alarming import Warming
-from asperity.wear import Watched, warm_up
+from asperity.wear import Watched, warm_up, warming
 
 
 def test_a_warm_up_is_measured_as_it_was_made():
@@ -20,6 +20,17 @@ def test_a_warm_up_is_measured_as_it_was_made():
     assert warm_up(NUMBER, crf, np.roll(level, 20)) is None  # the level goes its own way
     assert warm_up(NUMBER, 2.0 - crf, level) is None  # oil that warms makes CRF rise
     assert warm_up(NUMBER[:8], crf[:8], level[:8]) is None
+
+
+def test_costs_beside_columns_are_those_of_least_squares():
+    at = np.linspace(0.0, 1.0, 40)
+    values = 1.0 - 0.08 * np.exp(-5.0 * at) + 0.002 * np.random.default_rng(1).standard_normal(40)
+    columns = np.vstack([np.ones(40), at])
+    rows = np.maximum(at - at[2:-2, None], 0.0)
+    dense = [np.linalg.lstsq(np.vstack([columns, row]).T, values, rcond=None)[1][0] for row in rows]
+    assert warming._costs(columns, rows, values) == pytest.approx(40.0 * np.log(dense), rel=1e-10)
+    held = warming._costs(columns, 2.0 * columns, values)  # a row that the columns hold already adds nothing
+    assert held == pytest.approx(np.full(2, 40.0 * np.log(np.linalg.lstsq(columns.T, values, rcond=None)[1][0])))
 
 
 def test_most_warm_ups_are_known_and_no_other_course_is():

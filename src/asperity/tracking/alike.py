@@ -54,6 +54,8 @@ def on_one_grid(series: list[Reading]) -> tuple[list[Reading], list[str]]:
     for number, spectrum in spectra.items():
         same = spectrum.frequency_hz.shape == first.frequency_hz.shape
         apart = abs(spectrum.frequency_hz[-1] - first.frequency_hz[-1]) if same else np.inf
+        if same and np.array_equal(spectrum.frequency_hz, first.frequency_hz):
+            continue  # as nearly all are
         if apart <= SAME_LINES * first.spacing_hz:
             on_it = replace(spectrum, frequency_hz=first.frequency_hz)
             aligned[number] = replace(aligned[number], spectrum=on_it)

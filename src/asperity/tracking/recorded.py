@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from asperity.wear import DISAGREE, AlarmState, CleanSpectrum, Resonance
 
 MISSED = 3  # recordings without one of the sensors, from which on that is said
 NAMED = {"depths": "depth", "lines": "line", "bands": "band"}  # of a row: several numbers, each by its own name
+STATED = tuple(one.name for one in fields(Operating))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,7 +176,7 @@ class TrackedRecording:
                 for name in NAMED
             },
             "crf_reference_hz": finite_or_none(self.crf_reference_hz),
-            **asdict(self.operating),
+            **{name: getattr(self.operating, name) for name in STATED},
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
             "sensors": {name: one.row() for name, one in self.on_sensors.items()},
         }

@@ -20,7 +20,7 @@ from asperity.tracking.sensor import ACKNOWLEDGED, FOLDER, TOGETHER, Sensor, now
 from asperity.tracking.silence import SILENCE
 from asperity.tracking.store import Kept, Place, Standing, Store, Version
 from asperity.tracking.target import Target
-from asperity.wear import ALARM_STATES
+from asperity.wear import ALARM_STATES, AlarmState
 
 
 class Sensors:
@@ -51,6 +51,10 @@ class Sensors:
         self.tells: Collection[str] = ALARM_STATES
         self.by_name: dict[str, Sensor] = {}
         self._spacing_hz: float | None = None
+        self._lines: tuple[int | None, dict[int, dict[str, Any]]] = (
+            None,
+            {},
+        )  # of the last judgement, as they were kept
         for name, begun in store.sensors_at(place.machine, place.point):
             if name == place.sensor or (begun.get(TOGETHER) == place.sensor and not stated):
                 self._entered(name)
@@ -80,6 +84,14 @@ class Sensors:
     def kept(self, key: Version) -> dict[str, Kept]:
         """What is known of a version of a file, by sensor."""
         return {name: one.recordings[key] for name, one in self.by_name.items() if key in one.recordings}
+
+    def state(self, key: Version) -> AlarmState | None:
+        """What was said of a version of a file; None before it was judged."""
+        for one in self._each():
+            kept = one.recordings.get(key)
+            if kept is not None and kept.state is not None:
+                return kept.state
+        return None
 
     def series(self) -> list[Version]:
         """All recordings, of each file the last version, whether or not the file is still there."""
@@ -225,8 +237,11 @@ class Sensors:
         judgement = {"false_alarm_rate": alarm["false_alarm_rate"], "verdict": said["verdict"]}
         judgement |= {name: alarm[name] for name in ("state", "since", "reason", "raised_by")}
         with self.store.transaction() as run:
-            for every in rows:
-                for number, row, *_ in every:
+            ((version,),) = run("PRAGMA data_version").fetchall()
+            before = self._lines[1] if self._lines[0] == version else {}  # another program may have changed them
+            lines_now = {number: row for every in rows for number, row, *_ in every}
+            for number, row in lines_now.items():
+                if before.get(number) != row:
                     run("UPDATE recording SET row = ?, state = ? WHERE id = ?", (json.dumps(row), row["state"], number))
             for one in self._each():
                 one.enter(run, {**judgement, "recordings": len(track.recordings), "new": new})
@@ -237,6 +252,7 @@ class Sensors:
                 if learned.since == 0:
                     body = learned_bytes(learned.shared)
                     run("UPDATE sensor SET learned = ? WHERE id = ?", (body, self._first.number))
+        self._lines = (version, lines_now)
         for every in rows:
             for _, row, sensor, key in every:
                 sensor.recordings[key] = sensor.recordings[key]._replace(state=row["state"])

@@ -323,7 +323,7 @@ class _Memory:
             return None
         if acknowledge is not None:
             self.sensors.acknowledge(_named(acknowledge, order.keys))
-        unjudged = (number for number, keys in enumerate(order.instants) if not any(map(self._state, keys)))
+        unjudged = (number for number, keys in enumerate(order.instants) if not any(map(self.sensors.state, keys)))
         first = max(next(unjudged, count) + STRIDE, longest())
         for end in range(first, count, STRIDE):
             self._judged(judging, order, end, 0, "", again=again, who=())
@@ -331,10 +331,6 @@ class _Memory:
         track = self._judged(judging, order, count, new, answers, again=again, who=self.who)
         self._unforetold = (track, order, question)
         return track
-
-    def _state(self, key: Version) -> AlarmState | None:
-        """What was said of a recording; None before it was judged."""
-        return next(filter(None, (one.state for one in self.sensors.kept(key).values())), None)
 
     def foretold(self) -> Track | None:
         """The last judgement with its forecast, kept; None where there is none to make, or none yet."""
@@ -376,7 +372,7 @@ class _Memory:
         """The series up to an end as it is judged beside what was said, and what of it was looked at."""
         chosen = window(order, end, self.sensors)
         self._readings = {key: self._readings.get(key) or self.sensors.readings(key) for key in chosen}
-        said = {} if again else {key.file: state for key in chosen if (state := self._state(key)) is not None}
+        said = {} if again else {key.file: state for key in chosen if (state := self.sensors.state(key)) is not None}
         standing = self.sensors.standing
         before = Before(said) if standing is None else Before(said, standing.reason, standing.raised_by)
         if self._learned is None:

@@ -17,6 +17,7 @@ SURE = 10.0  # BIC by which one exponential for both is to be better than anythi
 LENGTHS = 40
 LATELY = 3  # recordings
 SETTLED = 2.5  # lengths that the series has to cover
+TINY = 1e-24  # of a row's squares: what rounding leaves of one that the columns hold already
 
 
 class WarmUp(NamedTuple):
@@ -41,15 +42,15 @@ def warm_up(x: Field, crf: Field, level: Field) -> WarmUp | None:
     constant = np.ones((1, at.size))
     lengths = np.geomspace(1.0 / at.size, 1.0 / SETTLED, LENGTHS)
     left = np.exp(-at / lengths[:, None])
-    costs = np.array([[_cost(np.vstack([constant, row]), one) for row in left] for one in both])
+    costs = np.array([_costs(constant, left, one) for one in both])
     best = int(np.argmin(costs.sum(axis=0)))
     price = float(np.log(at.size))
     warm = costs[:, best] + np.array([1.5, 1.5]) * price  # an amplitude each, and the length between them
     rivals = []
     for one in both:
-        sticks = [_cost(np.vstack([constant, at, np.maximum(at - k, 0.0)]), one) + 3.0 * price for k in at[2:-2]]
+        sticks = _costs(np.vstack([constant, at]), np.maximum(at - at[2:-2, None], 0.0), one) + 3.0 * price
         straight = _cost(np.vstack([constant, at]), one) + price
-        rivals.append(min(_cost(constant, one), straight, *sticks))
+        rivals.append(min(_cost(constant, one), straight, float(sticks.min())))
     alone = np.array([_cost(constant, one) for one in both])
     sure = sum(rivals) - warm.sum() > SURE and bool(np.all(alone - warm > SURE))
     columns = np.vstack([constant, left[best]])
@@ -63,6 +64,18 @@ def warm_up(x: Field, crf: Field, level: Field) -> WarmUp | None:
 
 def _fit(columns: Field, values: Field) -> Field:
     return np.asarray(np.linalg.lstsq(columns.T, values, rcond=None)[0])
+
+
+def _costs(columns: Field, rows: Field, values: Field) -> Field:
+    """`_cost` of the columns beside each row: what a row adds to them is taken off by itself."""
+    basis = np.linalg.qr(columns.T)[0]
+    off = values - basis @ (basis.T @ values)
+    beside = rows - (rows @ basis) @ basis.T
+    beside -= (beside @ basis) @ basis.T  # once more: what is left may be small beside what was taken out
+    own = np.sum(beside**2, axis=1)
+    shares = np.where(own > TINY * np.sum(rows**2, axis=1), (beside @ off) / np.maximum(own, 1e-300), 0.0)
+    left = np.sum((off - shares[:, None] * beside) ** 2, axis=1)
+    return np.asarray(values.size * np.log(np.maximum(left, 1e-300)))
 
 
 def _cost(columns: Field, values: Field) -> float:
