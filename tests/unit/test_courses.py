@@ -88,20 +88,23 @@ def straight_table(share, memory, places=2):
     )
 
 
-@pytest.mark.parametrize(("moving", "memory"), [(False, 0.0), (True, 0.0), (True, 0.65)])
-def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, emulator, moving, memory):
+@pytest.mark.parametrize(
+    ("moving", "memory", "aside"), [(False, 0.0, 0.0), (True, 0.0, 0.0), (True, 0.65, 0.0), (True, 0.0, 0.02)]
+)
+def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, emulator, moving, memory, aside):
     """Twenty logarithms' joint density, their covariance by the integrated Wiener process's own formula."""
     rng = np.random.default_rng(3)
     observations = [
         replace(recording(time, 2980.0 * (1.0 + 0.01 * rng.standard_normal()), 15.0, crfa=2.9, crfa_std=0.2),
-                load_n=load)
-        for time in TIMES for load in (400.0, 700.0)
+                load_n=load * (1.0 + aside * (number % 2)))
+        for number, time in enumerate(TIMES) for load in (400.0, 700.0)
     ]  # fmt: skip
     series = series_of(observations)
     forward = Forward(setting, emulator, series.places)
     course = Course(forward, series, "hertz-point", "sq_m")
     walked = course._walk(straight_table(0.4, memory), moving=moving)
-    sounds = series.sounds
+    sounds = course.sounds
+    assert len(course.leanings) == (3 if aside else 0)  # of each channel, with load
     slope = np.array([{"crf": 0.4, "crfa": 2.0}[sound.channel] for sound in sounds])
     begin = np.array([{"crf": 8.0, "crfa": 1.0}[sound.channel] for sound in sounds]) + 0.4 * slope
     lever = np.array([(-0.3, 0.3)[sound.place] if sound.channel == "crf" else 0.0 for sound in sounds])
@@ -121,6 +124,9 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
                 apart = 0.0 if one.place == other.place else 0.6  # of their levers
                 alike = OWN * (apart == 0.0) + (1.0 - OWN) * np.exp(-0.5 * (apart / ALONG) ** 2)
                 covariance[row, column] += (weight * SIZE[one.channel]) ** 2 * alike
+            if aside and one.channel == other.channel:  # a contact that is moved too far once is so each time
+                lean = course.leanings[one.channel, 0]
+                covariance[row, column] += one.aside[0] * lean[one.place] * other.aside[0] * lean[other.place]
             if memory and one.channel == other.channel == "crf":
                 covariance[row, column] += SCATTER**2 * memory ** (abs(one.at - other.at) * (len(TIMES) - 1))
         white = one.channel != "crf" or not memory
@@ -251,7 +257,8 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
     for load, moved, raw, sound in zip(loads, there.T, series.sounds[1:], course.sounds[1:], strict=False):
         change = moved - here
         assert raw.heard.value - sound.heard.value == pytest.approx(change.mean(), abs=2e-4)
-        assert sound.heard.std**2 - raw.heard.std**2 == pytest.approx(change.var(), rel=0.5, abs=1e-8)
+        assert sound.heard.std == raw.heard.std
+        assert (sound.aside[0] * course.leanings["crf", 0][0]) ** 2 == pytest.approx(change.var(), rel=0.5, abs=1e-8)
         assert np.sign(change.mean()) == np.sign(load - 500.0)
     many = [replace(recording(float(number)), load_n=250.0 + 45.0 * number) for number in range(15)]
     assert len(series_of(many).places) <= MOST_PLACES

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.sensors import BAND, NINETY, TRUTH, two_sensors
+from benchmarks.sensors import BAND, FREQUENCY, NINETY, TRUTH, two_sensors
 
 from asperity.errors import BadInput
-from asperity.wear import DISAGREE, no_resonance, resonances_of_sensors
+from asperity.wear import DISAGREE, learn_sensors, line_shape, no_resonance, resonances_of_sensors
 from asperity.wear.sensors import _Together
 
 
@@ -78,6 +78,31 @@ def test_where_sensors_have_agreed_one_of_them_is_enough_for_a_recording():
     deaf = [replace(one, density=np.ones_like(one.density)) for one in sensors["b"]]
     silent = resonances_of_sensors({"a": sensors["a"], "b": deaf}, band_hz=BAND)
     assert not any(one.found for one in silent.resonances)
+
+
+def test_a_spectrum_without_vibration_is_one_that_its_sensor_does_not_have():
+    sensors = two_sensors(4)
+    dead = [*sensors["b"][:9], replace(sensors["b"][9], density=np.zeros_like(FREQUENCY)), *sensors["b"][10:]]
+    told = resonances_of_sensors({"a": sensors["a"], "b": dead}, band_hz=BAND)
+    without = resonances_of_sensors({"a": sensors["a"], "b": [*dead[:9], None, *dead[10:]]}, band_hz=BAND)
+    assert [one.crf_hz for one in told.resonances] == [one.crf_hz for one in without.resonances]
+    assert told.heard_on[9] == ("a",)
+    assert "no vibration at all" in told.alone["b"][9].reason
+
+
+def test_a_sensor_that_was_moved_parts_the_series_of_all():
+    """The same recordings four times, behind the second time with b's line through another structure."""
+    once = two_sensors(9)
+    assert learn_sensors({name: 4 * every for name, every in once.items()}, band_hz=BAND)[0].moved == ()
+    mode = 1.0 + 0.04j / (1.0 - (FREQUENCY / 3300.0) ** 2 + 0.04j * FREQUENCY / 3300.0)
+    elsewhere = [
+        replace(one, density=one.density + 0.5 * (np.abs(mode) ** 2 - 1.0) * line_shape(FREQUENCY, f0, 0.02))
+        for one, f0 in zip(once["b"], TRUTH, strict=True)
+    ]
+    told, shared = learn_sensors({"a": 4 * once["a"], "b": [*2 * once["b"], *2 * elsewhere]}, band_hz=BAND)
+    assert told.moved == ((24, "b"),)
+    assert len(told.resonances) == len(told.alone["b"]) == 4 * TRUTH.size
+    assert shared.lines({"a": once["a"][-1:], "b": elsewhere[-1:]}).resonances[0].found
 
 
 @pytest.mark.parametrize("order", ["abc", "bca"])

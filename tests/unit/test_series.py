@@ -8,7 +8,8 @@ from asperity.signals import Spectrum
 from asperity.wear import learn_series, series_resonances
 from asperity.wear.expected import Blocks, Parameters, costs_at, point_at
 from asperity.wear.resonance import line_shape
-from asperity.wear.series import JudgedLine, objection_to
+from asperity.wear.separation import _lifted, _scored, separate
+from asperity.wear.series import JudgedLine, objection_to, separated
 from asperity.wear.transfer import through
 
 BAND = (1800.0, 4000.0)
@@ -63,7 +64,8 @@ def test_a_further_recording_is_judged_beside_what_others_have_settled():
     truth = 3300.0 + 300.0 * np.random.default_rng(5).standard_normal(60).clip(-1.3, 1.3)
     spectra = series(truth=truth, seed=5)
     together = series_resonances(spectra, band_hz=BAND)
-    first, shared = learn_series(spectra[:40], band_hz=BAND)
+    first, shared, moved = learn_series(spectra[:40], band_hz=BAND)
+    assert moved == ()
     assert [one.crf_hz for one in first] == [one.crf_hz for one in series_resonances(spectra[:40], band_hz=BAND)]
     beside = shared.resonances(spectra[40:])
     pulls = [(one.crf_hz - all_.crf_hz) / all_.crf_std for one, all_ in zip(beside, together[40:], strict=True)]
@@ -220,3 +222,54 @@ def test_every_line_that_is_not_the_contacts_is_refused_with_its_reason(changes,
     line = JudgedLine(f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0)
     said = objection_to(line._replace(**changes), BAND)
     assert said is None if words is None else words in said
+
+
+def through_structures(seed, *, moved):
+    """Twenty-four recordings through one structure, or through another one behind the twelfth."""
+    truth = np.tile(np.linspace(2700.0, 3700.0, 12), 2)
+    ways = []
+    for at, height in ((3000.0, 1.5), (3350.0, -0.8)):
+        passed = 1.0 + height * 2j * 0.02 / (1.0 - (FREQUENCY / at) ** 2 + 2j * 0.02 * FREQUENCY / at)
+        ways.append(np.abs(passed) ** 2)
+    first = series(truth=truth[:12], passed=ways[0], seed=seed)
+    return [*first, *series(truth=truth[12:], passed=ways[1 if moved else 0], seed=100 + seed)], truth
+
+
+def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
+    """Places twice over: what moves them there is the structure, and only the parts by themselves hold the truth."""
+    spectra, truth = through_structures(1, moved=True)
+    found, shared, moved = learn_series(spectra, band_hz=BAND)
+    assert moved == (12,)
+    errors = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(found, truth, strict=True)])
+    assert np.sqrt(np.mean(errors**2)) < 1.5
+    whole = separated(spectra, band_hz=BAND).resonances
+    together = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(whole, truth, strict=True)])
+    assert np.sqrt(np.mean(together**2)) > 2.0
+    (beside,) = shared.resonances(spectra[-1:])  # what is learned is the last part's
+    assert beside.crf_hz == pytest.approx(found[-1].crf_hz, abs=found[-1].crf_std)
+    spectra, _ = through_structures(1, moved=False)
+    assert learn_series(spectra, band_hz=BAND).moved == ()
+
+
+def test_a_louder_sensor_and_modes_that_drift_have_not_moved():
+    spectra, _ = through_structures(2, moved=False)
+    louder = [replace(one, density=(2.0 if i >= 12 else 1.0) * one.density) for i, one in enumerate(spectra)]
+    assert learn_series(louder, band_hz=BAND).moved == ()
+    drifting = [
+        replace(one, density=np.interp(FREQUENCY / (1.0 + 1e-4 * number), FREQUENCY, one.density))
+        for number, one in enumerate(spectra)
+    ]
+    assert learn_series(drifting, band_hz=BAND).moved == ()
+
+
+def test_a_base_that_was_nil_below_a_line_comes_back():
+    """The logarithm of nothing has no slope: a fit that began there stayed there, far from the best."""
+    blocks = separated(series(), band_hz=BAND).blocks
+    settled = separate(blocks).joint
+    below = np.argmin(np.abs(blocks.centre - 3300.0))
+    base = settled.parameters.base.copy()
+    base[below - 20 : below + 20] = -60.0
+    nil = settled.parameters._replace(base=base)
+    stays, comes_back = (_scored(blocks, start, settled.pace) for start in (nil, _lifted(blocks, nil)))
+    assert comes_back.cost == pytest.approx(settled.cost, abs=1.0)
+    assert stays.cost > settled.cost + 100.0

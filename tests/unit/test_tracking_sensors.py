@@ -129,3 +129,46 @@ def test_sensors_are_laid_beside_one_another_by_number_where_there_are_as_many(b
     (tmp_path / "b2.npz").unlink()
     with pytest.raises(BadInput, match="3 of a, 2 of b"):
         track_recordings([tmp_path], band_hz=BAND)
+
+
+@pytest.mark.parametrize(
+    ("x_name", "off", "together"), [("time_h", 0.5 / 3600.0, 8), ("sq_um", 1e-4, 8), ("sq_um", 0.2, 0)]
+)
+def test_x_that_are_one_but_for_a_clock_or_rounding_are_one(both, tmp_path, x_name, off, together):
+    rows = [
+        f"{name}{number}.npz,{number + off * (name == 'b')!r},{name}" for name in "ab" for number in range(TRUTH.size)
+    ]
+    (tmp_path / "table.csv").write_text("\n".join([f"file,{x_name},sensor", *rows]))
+    track = track_recordings([both / "apart"], table=tmp_path / "table.csv", band_hz=BAND)
+    assert sum(len(one.on_sensors) == 2 for one in track.recordings) == together
+    assert any("No recordings of two sensors stand at one x" in note for note in track.notes) == (together == 0)
+
+
+def test_a_file_that_nobody_knows_the_sensor_of_takes_no_place_from_another(both, tmp_path):
+    for name in "ab":
+        for number in range(TRUTH.size):
+            to = tmp_path / f"{name}{number}.npz"
+            to.write_bytes((both / "apart" / to.name).read_bytes())
+            to.with_suffix(".npz.toml").write_text(f'sensor = "{name}"\n')
+    (tmp_path / "a2b.npz").write_bytes(b"no recording")
+    track = track_recordings([tmp_path], band_hz=BAND)
+    assert sum(len(one.on_sensors) == 2 for one in track.recordings) == TRUTH.size
+    (tmp_path / "b4.npz").write_bytes(b"no recording, but its sidecar says whose")
+    track = track_recordings([tmp_path], band_hz=BAND)
+    assert [one.on_sensors["b"].reading.refused for one in track.recordings if len(one.on_sensors) == 2] == [
+        number == 4 for number in range(TRUTH.size)
+    ]
+
+
+def test_a_sensor_that_was_moved_is_noted_with_its_place(tmp_path, monkeypatch):
+    """Where: tests/unit/test_series.py; here, what a track makes of it."""
+    rng = np.random.default_rng(3)
+    for number, f0 in enumerate(np.linspace(2900.0, 3750.0, 14)):
+        (heard,) = hears(rng, f0, (1.0,))
+        np.savez(tmp_path / f"{number:02d}.npz", acc=heard, fs=RATE, unit="m/s^2")
+    assert not any("mounting" in note for note in track_recordings([tmp_path], band_hz=BAND).notes)
+    monkeypatch.setattr("asperity.wear.series.moved_at", lambda blocks, _: 6 if len(blocks.density) == 14 else None)
+    track = track_recordings([tmp_path], band_hz=BAND)
+    (said,) = [note for note in track.notes if "mounting" in note]
+    assert said.startswith("The sensor or its mounting changed at x = 7 (06.npz)")
+    assert [number for number, one in enumerate(track.recordings) if one.remounted is not None] == [6]

@@ -108,12 +108,21 @@ class Course:
         """Unknowns of a contact and of its course."""
         return self.forward.dims + EXTRA
 
-    @cached_property
+    @property
     def sounds(self) -> tuple[Sound, ...]:
         """All that was heard as it would have been at its place: moved there as contacts of the prior move in the mean.
 
-        By how much these differ is in its deviation.
+        By how much these differ is in `leanings`: whoever moves one recording too far moves all of them too far.
         """
+        return self._brought[0]
+
+    @property
+    def leanings(self) -> Mapping[tuple[str, int], Field]:
+        """By how much contacts differ in how a channel goes with load (0), speed (1) or temperature (2), (places,)."""
+        return self._brought[1]
+
+    @cached_property
+    def _brought(self) -> tuple[tuple[Sound, ...], Mapping[tuple[str, int], Field]]:
         asides = np.array([sound.aside for sound in self.series.sounds])
         z = np.random.default_rng(0).standard_normal((PROBES, self.forward.dims))
         here, moved = self.forward.shown(z, self.law, deviations=False), {}
@@ -121,13 +130,15 @@ class Course:
             forward, steps = _aside(self.forward, int(axis))
             there = forward.shown(z, self.law, deviations=False)
             moved[int(axis)] = {key: (getattr(there, key) - getattr(here, key)) / steps for key in CHANNELS}
-        return tuple(self._at_its_place(sound, moved) for sound in self.series.sounds)
-
-    def _at_its_place(self, sound: Sound, moved: Mapping[int, Mapping[str, Field]]) -> Sound:
-        slopes = {axis: slope[sound.channel][:, sound.place] for axis, slope in moved.items()}
-        by = sum((sound.aside[axis] * slope for axis, slope in slopes.items()), np.zeros(PROBES))
-        value, std = sound.heard.value - float(np.mean(by)), math.hypot(sound.heard.std, float(np.std(by)))
-        return sound._replace(heard=Heard(value, std))
+        sounds = []
+        for sound in self.series.sounds:
+            by = sum(
+                sound.aside[axis] * float(np.mean(slope[sound.channel][:, sound.place]))
+                for axis, slope in moved.items()
+            )
+            sounds.append(sound._replace(heard=Heard(sound.heard.value - by, sound.heard.std)))
+        leanings = {(key, axis): slope[key].std(axis=0) for axis, slope in moved.items() for key in CHANNELS}
+        return tuple(sounds), leanings
 
     def __call__(self, z: Field) -> Followed:
         """How probable what was heard makes contacts, shape (n, dims), without a course and with any."""
@@ -140,7 +151,7 @@ class Course:
 
     def _walk(self, table: "Table", *, moving: bool) -> Walked:
         places = len(self.forward.points)
-        state = _State.begin(table, places, self.drift if moving else (0.0, 0.0))
+        state = _State.begin(table, places, self.drift if moving else (0.0, 0.0), self.leanings)
         restless = table.extra.restless if moving else np.zeros(len(table.share))
         path = np.empty((len(table.share), len(self.series.x)))
         before = 0.0
@@ -237,16 +248,20 @@ class _State:
     mean: Field
     covariance: Field
     log: Field
+    leanings: Mapping[tuple[str, int], Field]  # of each, the last states say how far a contact has it
 
     @classmethod
-    def begin(cls, table: Table, places: int, drift: tuple[float, float]) -> "_State":
+    def begin(
+        cls, table: Table, places: int, drift: tuple[float, float], leanings: Mapping[tuple[str, int], Field]
+    ) -> "_State":
         """Before anything is heard: the share is the contact's, all else open."""
-        count = len(table.share)
-        mean = np.zeros((count, FIRST + len(CHANNELS) * places))
+        count, before = len(table.share), FIRST + len(CHANNELS) * places
+        mean = np.zeros((count, before + len(leanings)))
         mean[:, SHARE], mean[:, SPEED] = table.share, drift[0]
         variance = np.zeros_like(mean)
         variance[:, SPEED], variance[:, LEVER], variance[:, GAIN] = drift[1] ** 2, EXPONENT_STD**2, GAIN_STD**2
         variance[:, SLOW] = table.extra.scatter**2 * (table.extra.memory > 0.0)
+        variance[:, before:] = 1.0
         covariance = np.zeros((*mean.shape, mean.shape[1]))
         diagonal = np.arange(mean.shape[1])
         covariance[:, diagonal, diagonal] = variance
@@ -254,7 +269,7 @@ class _State:
             own = slice(FIRST + number * places, FIRST + (number + 1) * places)
             size = WEIGHTS[channel] * table.extra.sizes[channel]
             covariance[:, own, own] += table.errors[channel] + size[:, None, None] ** 2 * law_correlations(table.lever)
-        return cls(mean, covariance, np.zeros(count))
+        return cls(mean, covariance, np.zeros(count), leanings)
 
     def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:
         """Let the share drift on, its drift wander (an integrated Wiener process), and slow scatter be forgotten."""
@@ -278,11 +293,13 @@ class _State:
         noise = sound.heard.std**2 + (WEIGHTS[channel] * table.extra.scatter) ** 2
         if channel == "crf":
             noise = np.where(table.extra.memory > 0.0, sound.heard.std**2, noise)  # its scatter is in the state
+        leans, lean = self._lean(sound)
         share = self.mean[:, SHARE]
         for turn in range(PASSES):
             value, slope = table.at(channel, place, share)
-            said = value + slope * (self.mean[:, SHARE] - share) + self.mean[:, error]
-            with_share, spread = slope[:, None] * self.covariance[:, SHARE], self.covariance[:, error].copy()
+            said = value + slope * (self.mean[:, SHARE] - share) + self.mean[:, error] + self.mean[:, leans] @ lean
+            with_share = slope[:, None] * self.covariance[:, SHARE]
+            spread = self.covariance[:, error] + self.covariance[:, :, leans] @ lean
             if channel == "crf":
                 spread += table.lever[:, place, None] * self.covariance[:, LEVER] + self.covariance[:, SLOW]
                 said = said + table.lever[:, place] * self.mean[:, LEVER] + self.mean[:, SLOW]
@@ -290,7 +307,7 @@ class _State:
                 spread += self.covariance[:, GAIN]
                 said = said + self.mean[:, GAIN]
             across = with_share + spread
-            total = slope * across[:, SHARE] + across[:, error] + noise
+            total = slope * across[:, SHARE] + across[:, error] + across[:, leans] @ lean + noise
             if channel == "crf":
                 total += table.lever[:, place] * across[:, LEVER] + across[:, SLOW]
             elif channel == "crfa":
@@ -303,6 +320,16 @@ class _State:
         gain = across / total[:, None]
         self.mean += gain * rest[:, None]
         self.covariance -= gain[:, :, None] * across[:, None, :]
+
+    def _lean(self, sound: Sound) -> tuple[list[int], Field]:
+        """The states of how a contact goes with what a sound was heard aside in, and what they do to it."""
+        first = self.mean.shape[1] - len(self.leanings)
+        heard = [
+            (first + number, sound.aside[axis] * spread[sound.place])
+            for number, ((channel, axis), spread) in enumerate(self.leanings.items())
+            if channel == sound.channel and sound.aside[axis]
+        ]
+        return [state for state, _ in heard], np.array([by for _, by in heard])
 
 
 def tabulated(forward: Forward, z: Field, column: int, place: int) -> tuple[Field, Field]:

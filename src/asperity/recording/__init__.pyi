@@ -14,3 +14,4 @@ from .read import read_recording as read_recording
 from .sidecar import OPERATING as OPERATING
 from .sidecar import is_sidecar as is_sidecar
 from .sidecar import names_beside as names_beside
+from .sidecar import stated_beside as stated_beside

@@ -16,7 +16,7 @@ from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.tracking.alike import COPIED, on_one_grid, spectrum_of, without_silence
 from asperity.tracking.files import Place, in_their_places
-from asperity.tracking.instants import Heard, by_time
+from asperity.tracking.instants import Heard, Placed, by_place, by_time
 from asperity.tracking.learned import Learned, Together
 from asperity.tracking.operating import operating_of
 from asperity.tracking.reading import Reading
@@ -61,6 +61,10 @@ class Instant(NamedTuple):
     place: Place
     readings: dict[str, Reading]
 
+    def holds(self, file: str, sensor: str) -> bool:
+        """Whether a sensor's recording is of it."""
+        return sensor in self.readings and self.readings[sensor].file == file
+
 
 def heard_together(
     readings: Sequence[Reading],
@@ -80,9 +84,10 @@ def heard_together(
         where recordings of different sensors cannot be laid beside one another, or are copies.
     """
     found, x_name = _instants(readings, places, x_name)
-    names = list(dict.fromkeys(reading.sensor for reading in readings))
+    names = list(dict.fromkeys(reading.sensor for reading in readings if reading.sensor))
     made = without_silence([one.readings[name] for one in found for name in names if name in one.readings])
     made, notes = on_one_grid(made)
+    notes += _apart(found, names)
     by_key = {(reading.file, reading.sensor): reading for reading in made}
     found = [Instant(one.place, {name: by_key[old.file, name] for name, old in one.readings.items()}) for one in found]
     usable = {name: sum(name in one.readings and one.readings[name].usable for one in found) for name in names}
@@ -123,7 +128,8 @@ def heard_together(
             name: OnSensor(reading=reading, alone=alone.get(name), hears=name in heard_on)
             for name, reading in one.readings.items()
         }
-        tracked.append(replace(recording, on_sensors=on_sensors))
+        remounted = next((name for file, name in memory.moved if one.holds(file, name)), None)
+        tracked.append(replace(recording, on_sensors=on_sensors, remounted=remounted))
     return tracked, x_name, notes
 
 
@@ -133,26 +139,24 @@ def _instants(
     """Recordings laid beside one another: of one file, at one x, at one time, or each sensor's so-manieth."""
     by_sensor: dict[str, list[Reading]] = {}
     for reading in readings:
-        by_sensor.setdefault(reading.sensor, []).append(reading)
+        if reading.sensor:
+            by_sensor.setdefault(reading.sensor, []).append(reading)
+    lead = next(iter(by_sensor))  # by which is shown what nobody knows the sensor of
     keys: dict[tuple[str, str], tuple[float, ...]] = {}
     if (
-        len({reading.file for reading in readings})
-        == len(by_sensor[readings[0].sensor])
-        == min(map(len, by_sensor.values()))
+        len({reading.file for reading in readings}) == len(by_sensor[lead]) == min(map(len, by_sensor.values()))
     ):  # channels of the same files
-        files = [reading.file for reading in by_sensor[readings[0].sensor]]
-        times = [reading.time for reading in by_sensor[readings[0].sensor]]
+        files = [reading.file for reading in by_sensor[lead]]
+        times = [reading.time for reading in by_sensor[lead]]
         heard = [any(not one[number].refused for one in by_sensor.values()) for number in range(len(files))]
         stand, x_name = in_their_places(files, times, heard, places, x_name)
         keys = {(one.file, one.sensor): (stand[one.file].x, files.index(one.file)) for one in readings}
     elif x_name and places is not None:
         stand = dict(places)
-        for name, every in by_sensor.items():
-            seen: dict[float, int] = {}
-            for one in every:
-                x = stand[one.file].x
-                keys[one.file, name] = (x, seen.setdefault(x, 0))
-                seen[x] += 1
+        stated = [Placed(one.sensor, places[one.file].x, _duration(one)) for one in readings]
+        for one, there in zip(readings, by_place(stated, x_name), strict=True):
+            stand[one.file] = replace(places[one.file], x=there.x)
+            keys[one.file, one.sensor] = there
     elif all(one.time is not None for one in readings if not one.refused):
         x_name, stand = "time_h", {}
         laid = [Heard(one.file, one.sensor, one.time, _duration(one)) for one in readings]
@@ -162,21 +166,37 @@ def _instants(
     else:
         counts = {name: len(every) for name, every in by_sensor.items()}
         if len({*counts.values()}) > 1:
-            said = ", ".join(f"{count} of {name or 'no sensor'}" for name, count in counts.items())
+            said = ", ".join(f"{count} of {name}" for name, count in counts.items())
             raise BadInput(
                 f"recordings of different sensors are laid beside one another by number, and there are {said}; say "
                 "when they began, or where they stand in a table"
             )
         stand, x_name = {}, "recording"
-        for name, every in by_sensor.items():
-            for number, one in enumerate(every, 1):
-                stand[one.file] = replace((places or {}).get(one.file, Place(x=number)), x=float(number))
-                keys[one.file, name] = (float(number), 0)
+        numbers = dict.fromkeys(by_sensor, 0)
+        for place, one in enumerate(readings, 1):
+            if one.sensor:
+                numbers[one.sensor] += 1
+            number = numbers.get(one.sensor, numbers[lead])  # what nobody knows stands alone at that of the one before
+            stand[one.file] = replace((places or {}).get(one.file, Place(x=number)), x=float(number))
+            keys[one.file, one.sensor] = (float(number), 0 if one.sensor else place)
     found: dict[tuple[float, ...], Instant] = {}
     for one in readings:
         instant = found.setdefault(keys[one.file, one.sensor], Instant(stand[one.file], {}))
-        instant.readings[one.sensor] = one
+        instant.readings[one.sensor or lead] = replace(one, sensor=one.sensor or lead)
     return [found[key] for key in sorted(found)], x_name
+
+
+def _apart(found: Sequence[Instant], names: Sequence[str]) -> list[str]:
+    """A sentence where sensors that have recordings of their own were mostly not heard together."""
+    together = sum(len(one.readings) > 1 for one in found)
+    possible = sorted(sum(name in one.readings for one in found) for name in names)[-2]
+    if 2 * together >= possible:
+        return []
+    many = f"Only {together} of {possible}" if together else "No"
+    return [
+        f"{many} recordings of two sensors stand at one x; elsewhere no other sensor confirms a line. Sensors are laid "
+        "beside one another where their x or times agree."
+    ]
 
 
 def _duration(reading: Reading) -> float:

@@ -54,10 +54,14 @@ class Together(NamedTuple):
 
 @dataclass
 class Learned:
-    """The memory of one watched series, of one sensor or of several; empty at first."""
+    """The memory of one watched series, of one sensor or of several; empty at first.
+
+    `shared` is what the recordings behind the last of `moved` share, those with which a sensor was moved.
+    """
 
     shared: Shared | SharedBySensors | None = None
     since: int = 0  # recordings heard since
+    moved: tuple[Key, ...] = ()
     cleaned: dict[Key, tuple[Spectrum, CleanSpectrum]] = field(default_factory=dict)
     found: dict[Key, Resonance] = field(default_factory=dict)
     together: dict[tuple[Key, ...], Together] = field(default_factory=dict)
@@ -84,8 +88,9 @@ class Learned:
         known = isinstance(shared, Shared) and shared.band_hz == band_hz and shared.fits(cleaned[0].spectrum)
         if not isinstance(shared, Shared) or not known or self._outgrown(len(keys), len(new)):
             spectra, kept = [clean.spectrum for clean in cleaned], [clean.kept for clean in cleaned]
-            every, self.shared = learn_series(spectra, band_hz=band_hz, kept=kept)
+            every, self.shared, moved = learn_series(spectra, band_hz=band_hz, kept=kept)
             self.since, self.found = 0, dict(zip(keys, every, strict=True))
+            self.moved = tuple(keys[number] for number in moved)
         elif new:
             beside = [cleaned[number] for number in new]
             lines = shared.resonances([clean.spectrum for clean in beside], [clean.kept for clean in beside])
@@ -109,6 +114,9 @@ class Learned:
         if not isinstance(shared, SharedBySensors) or not known or self._outgrown(len(keys), len(new)):
             told, self.shared = learn_sensors(spectra, band_hz=band_hz, kept=kept)
             self.since, self.together = 0, dict(zip(keys, _by_recording(told), strict=True))
+            self.moved = tuple(
+                next((key for key in keys[number] if key[1] == name), keys[number][0]) for number, name in told.moved
+            )
         elif new:
             some = {name: [every[number] for number in new] for name, every in spectra.items()}
             told = shared.lines(some, {name: [every[number] for number in new] for name, every in kept.items()})

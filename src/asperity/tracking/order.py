@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from asperity.tracking.alarming import BASELINE, LAST
 from asperity.tracking.files import Place, Table, in_their_places
-from asperity.tracking.instants import Heard, by_time
+from asperity.tracking.instants import Heard, Placed, by_place, by_time
 from asperity.tracking.sensors import Sensors
 from asperity.tracking.store import Kept, Version
 
@@ -62,11 +62,12 @@ def _apart(
     """Recordings of sensors that have files of their own: what stands at one x, or was made at one time, is one."""
     stands: dict[Version, tuple[float, ...]] = {}
     if x_name and places is not None:
-        seen: dict[tuple[str, float], int] = {}
-        for key, heard in kept.items():
-            x, name = places[key.file].x, next(iter(heard))
-            seen[name, x] = seen.get((name, x), -1) + 1
-            stands[key] = (x, seen[name, x])
+        known = {name for heard in kept.values() for name, one in heard.items() if not one.refused}
+        stated = [
+            Placed(name if (name := next(iter(heard))) in known else "", places[key.file].x, _first(heard).duration_s)
+            for key, heard in kept.items()
+        ]
+        stands |= zip(kept, by_place(stated, x_name), strict=True)
     else:
         x_name = "time_h"
         waits = [key for key, heard in kept.items() if not _refused(heard) and _first(heard).time is None]

@@ -21,7 +21,7 @@ from asperity.errors import BadInput, UnreadableFile
 from asperity.kept import sealed, unsealed
 from asperity.processes import leave_interrupts_to_the_parent
 from asperity.rating import velocity_rms
-from asperity.recording import Gauge, OpenRecording, Quality, ReadOptions, open_recording
+from asperity.recording import Gauge, OpenRecording, Quality, ReadOptions, open_recording, stated_beside
 from asperity.signals import Spectrum, averaged_spectrum
 from asperity.tracking.beside import bands, beside, heard_at, lines, rates, steady
 from asperity.tracking.files import Place
@@ -92,7 +92,7 @@ def read_spectrum(
     try:
         opened = open_recording(path, **asdict(options))
     except BadInput as refusal:
-        return Reading(file=str(path), sensor=(place.sensor if place else None) or "", reason=str(refusal))
+        return Reading(file=str(path), sensor=_sensor_of_refused(path, place), reason=str(refusal))
     known = Reading(
         file=str(path),
         rate_hz=opened.rate_hz,
@@ -146,6 +146,16 @@ def _sensor(opened: OpenRecording, place: Place | None) -> str:
     if place is not None and place.sensor is not None:
         return place.sensor
     return str(opened.facts["sensor"].value) if "sensor" in opened.facts else ""
+
+
+def _sensor_of_refused(path: Path, place: Place | None) -> str:
+    """Who heard what cannot be read, as far as table and sidecar say it."""
+    if place is not None and place.sensor is not None:
+        return place.sensor
+    try:
+        return str(stated_beside(path)[0].get("sensor", ""))
+    except BadInput:
+        return ""
 
 
 def _text(value: object) -> str:

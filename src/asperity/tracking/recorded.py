@@ -54,7 +54,8 @@ class TrackedRecording:
     damping ratio that can be followed; empty where it is one. `crf_reference_hz` and `damping_reference` are CRF and
     damping ratio as they would be at the load, speed and temperature of the first recordings. `label` is the stage's
     name; `state` the alarm's after it. Of several sensors `on_sensors` has what each says, by name, and `reading` and
-    `file` are those of the first whose spectrum counts.
+    `file` are those of the first whose spectrum counts. `remounted` names the sensor, empty of the only one, that hears
+    through another structure from this recording on.
     """
 
     file: str
@@ -73,6 +74,7 @@ class TrackedRecording:
     label: str = "none"
     state: AlarmState = "none"
     on_sensors: Mapping[str, OnSensor] = field(default_factory=dict)
+    remounted: str | None = None
 
     @property
     def readings(self) -> dict[str, Reading]:

@@ -250,7 +250,7 @@ class Sensors:
             if learned is not None and learned.shared is not None and self._first is not None:
                 run("UPDATE sensor SET since = ? WHERE id = ?", (learned.since, self._first.number))
                 if learned.since == 0:
-                    body = learned_bytes(learned.shared)
+                    body = None if learned.moved else learned_bytes(learned.shared)  # of one part: all is learned anew
                     run("UPDATE sensor SET learned = ? WHERE id = ?", (body, self._first.number))
         self._lines = (version, lines_now)
         for every in rows:

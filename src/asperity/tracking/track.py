@@ -38,6 +38,7 @@ from asperity.wear import (
     StageSource,
     asperity_load_share,
     comparability,
+    learn_series,
     no_resonance,
     series_resonances,
     split_stages,
@@ -172,7 +173,6 @@ def judge(
     sensors = list(dict.fromkeys(one.sensor for one in readings if one.sensor or not one.refused))
     if len(sensors) > 1:
         _require_together(sensors, method)
-        readings = [one if one.sensor in sensors else replace(one, sensor=sensors[0]) for one in readings]
         several, x_name, told = heard_together(readings, target, places, x_name, shaft_hz, learned)
         return _staged(several, x_name, target, "joint", (detector, stages_from), alarming, [*notes, *told])
     names, times = [reading.file for reading in readings], [reading.time for reading in readings]
@@ -195,16 +195,19 @@ def judge(
         notes.append(f"{len(spectra)} recordings were separated in {groups} groups, each spread over the whole series.")
     if learned is not None and chosen == "joint":
         resonances = learned.resonances(keys, cleaned, target.band_hz)
+        moved = {keys.index(key) for key in learned.moved if key in keys}
     else:
-        resonances = _resonances(cleaned, target, chosen, groups)
+        resonances, moved = _resonances(cleaned, target, chosen, groups)
     if method is None and chosen == ALONE:
         resonances = [_not_the_contacts(line) if line.found else line for line in resonances]
     used = dict(zip(spectra, zip(cleaned, resonances, strict=True), strict=True))
+    first_behind = {number for place, number in enumerate(spectra) if place in moved}
     tracked = []
     for number, reading in enumerate(series):
         clean, found = used.get(number, (None, None))
         resonance = found or no_resonance(reading.reason, target.band_hz, chosen)
-        tracked.append(recording_of(reading, places[reading.file], clean, resonance))
+        one = recording_of(reading, places[reading.file], clean, resonance)
+        tracked.append(replace(one, remounted=reading.sensor) if number in first_behind else one)
     return _staged(tracked, x_name, target, chosen, (detector, stages_from), alarming, notes)
 
 
@@ -223,7 +226,9 @@ def _staged(
     met = [recording.operating for recording in tracked]
     response = response_of(target.case, met)
     tracked = at_reference(tracked, response)
-    stages_by = _Ways(tracked, staging[0], _unit_of(x_name), comparable)
+    remounted = _remounted(tracked)
+    heights = comparable and not remounted
+    stages_by = _Ways(tracked, staging[0], _unit_of(x_name), heights)
     stages = stages_by.get(staging[1])
     severe: Field = np.full(x.size, np.nan)
     labels: tuple[str, ...] = ("none",) * x.size
@@ -239,7 +244,7 @@ def _staged(
         tracked,
         staging[1],
         stages,
-        lambda part: _Ways(part, staging[0], "", comparable).get(staging[1]),
+        lambda part: _Ways(part, staging[0], "", heights).get(staging[1]),
         false_alarm_rate=alarming[0],
         acknowledge=alarming[1],
         before=alarming[2],
@@ -270,7 +275,7 @@ def _staged(
         alarm=alarm,
         comparable=comparable,
         problems=comparability([_facts_of(recording) for recording in used]),
-        notes=(*notes, *filter(None, [response.said]), *unstated(met), *_without_damping(tracked), *copied),
+        notes=(*notes, *filter(None, [response.said]), *unstated(met), *_without_damping(tracked), *copied, *remounted),
     )
 
 
@@ -337,6 +342,17 @@ class _Ways(Mapping[StageSource, Stages]):
         return self.known[source]
 
 
+def _remounted(tracked: Sequence[TrackedRecording]) -> list[str]:
+    """A sentence for each recording with which a sensor was moved."""
+    return [
+        f"{f'Sensor {one.remounted}' if one.remounted else 'The sensor'} or its mounting changed at x = {one.x:g} "
+        f"({Path(one.file).name}): the line comes through another structure from there on. Both parts were separated "
+        "by themselves, and stages do not compare CRFA between them."
+        for one in tracked
+        if one.remounted is not None
+    ]
+
+
 def _without_damping(tracked: Sequence[TrackedRecording]) -> list[str]:
     """A sentence on resonances whose damping is not determined."""
     reasons = [one.damping_reason for one in tracked if one.resonance.found and one.damping_reason]
@@ -362,15 +378,27 @@ def _stated_places(
     return "", None
 
 
-def _resonances(cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod, groups: int) -> list[Resonance]:
-    """One a spectrum; each group takes every so-manieth spectrum, so that all see the whole series."""
+def _resonances(
+    cleaned: list[CleanSpectrum], target: Target, method: SeriesMethod, groups: int
+) -> tuple[list[Resonance], set[int]]:
+    """One a spectrum, and with which of them the sensor was moved.
+
+    Each group takes every so-manieth spectrum, so that all see the whole series.
+    """
     resonances: dict[int, Resonance] = {}
+    moved: list[int] = []
     for first in range(min(groups, len(cleaned))):
         group = cleaned[first::groups]
         spectra, kept = [clean.spectrum for clean in group], [clean.kept for clean in group]
-        found = series_resonances(spectra, band_hz=target.band_hz, method=method, kept=kept)
+        if method == "joint":
+            found, _, behind = learn_series(spectra, band_hz=target.band_hz, kept=kept)
+            moved += [first + groups * number for number in behind]
+        else:
+            found = series_resonances(spectra, band_hz=target.band_hz, method=method, kept=kept)
         resonances |= zip(range(first, len(cleaned), groups), found, strict=True)
-    return [resonances[number] for number in range(len(cleaned))]
+    told = sorted(moved)  # groups tell one move within as many recordings as there are groups
+    once = {number for number, before in zip(told, [-groups, *told], strict=False) if number - before >= groups}
+    return [resonances[number] for number in range(len(cleaned))], once
 
 
 def _not_the_contacts(resonance: Resonance) -> Resonance:

@@ -1,3 +1,4 @@
+from .agreement import Agreement as Agreement
 from .alarm import ALARM_STATES as ALARM_STATES
 from .alarm import ALERTS as ALERTS
 from .alarm import FALSE_ALARMS as FALSE_ALARMS
@@ -29,12 +30,12 @@ from .resonance import damping_objection as damping_objection
 from .resonance import line_shape as line_shape
 from .resonance import no_resonance as no_resonance
 from .sensors import DISAGREE as DISAGREE
-from .sensors import Agreement as Agreement
 from .sensors import SensorLines as SensorLines
 from .sensors import SharedBySensors as SharedBySensors
 from .sensors import learn_sensors as learn_sensors
 from .sensors import resonances_of_sensors as resonances_of_sensors
 from .series import FEWEST_RECORDINGS as FEWEST_RECORDINGS
+from .series import LearnedSeries as LearnedSeries
 from .series import SeriesMethod as SeriesMethod
 from .series import Shared as Shared
 from .series import learn_series as learn_series

@@ -37,12 +37,12 @@ def lines_and_slopes(centre: Field, at: Parameters) -> tuple[Field, Field, Field
     """A L T(f)/T(f_i), and its derivatives by ln f_i and ln ζ_i, (recordings, blocks)."""
     level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
     line, by_f0, by_damping = line_and_slopes(centre[None, :], f0, damping)
-    passed = level * np.exp(_away(centre, at) @ at.transfer.coefficients)
+    passed = level * np.exp(away(centre, at) @ at.transfer.coefficients)
     steep = at.transfer.steepness(f0[:, 0])[:, None]
     return passed * line, passed * (by_f0 - steep * line), passed * by_damping
 
 
-def _away(centre: Field, at: Parameters) -> Field:
+def away(centre: Field, at: Parameters) -> Field:
     """What the transfer's coefficients stand at, less that at each line's place; (recordings, blocks, coefficients)."""
     here = at.transfer.columns(np.exp(at.own[:, 1]))
     return np.asarray(at.transfer.columns(centre)[None] - here[:, None])
@@ -95,7 +95,7 @@ def point_at(blocks: Blocks, at: Parameters, stiff: Field) -> Point:
     own_information = np.einsum("npb,nqb->npq", weighted, relative, optimize=True)
     own_information[:, 2, 2] += DAMPING_SPREAD**-2
     base_part = relative[:, 3]
-    passed = relative[:, 0, :, None] * _away(blocks.centre, at)
+    passed = relative[:, 0, :, None] * away(blocks.centre, at)
     coefficients = at.transfer.coefficients
     flat, weights = passed.reshape(blocks.weight.size, coefficients.size), blocks.weight.reshape(-1, 1)
     fit = float(np.sum(blocks.weight * (np.log(expected) + blocks.density / expected)) + np.sum(_prior(at.own)))

@@ -7,18 +7,19 @@ errors of two sensors have in common is measured: an interval narrows only by wh
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
+from asperity.wear.agreement import Agreement, Fit, differ, in_common, shares_in_common
 from asperity.wear.expected import Blocks, expected_density
 from asperity.wear.indicators import STRONG_EVIDENCE
 from asperity.wear.misfit import brought_std, left_over, shares_of
+from asperity.wear.moved import moved_at
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
-from asperity.wear.separation import Heard, Joint, Lines, alone_beside, coarser, each, levelled, places
+from asperity.wear.separation import Heard, alone_beside, coarser, each, levelled, places
 from asperity.wear.series import (
     FEWEST_RECORDINGS,
     LARGEST_MISFIT,
@@ -26,13 +27,13 @@ from asperity.wear.series import (
     Separated,
     Shared,
     gain_of,
+    is_silent,
     objection_to,
     rival_of,
     separated,
     separated_beside,
 )
 
-APART, APART_WIDTHS = 3.0, 0.25  # deviations, and half-power widths, by both of which two lines are not one
 ESTABLISHED, FEWEST_AGREED = 0.5, 3  # share and number of recordings in which sensors have heard one line
 DISAGREE = "the sensors disagree"
 MOST_COMMON = 0.9  # of the errors of two sensors, where they are compared
@@ -46,25 +47,15 @@ class SensorLines:
 
     `resonances` one a recording, its height that on the first sensor, nan where that hears none; `heard_on` the names
     of the sensors that hear its line; `alone` what each sensor's series says by itself, None where it has no spectrum.
-    `common` is the share of the sensors' errors that they have in common, nan where too little tells.
+    `common` is the share of the sensors' errors that they have in common, nan where too little tells. `moved` are
+    recordings with which a sensor hears through another structure, by number, and the sensor.
     """
 
     resonances: tuple[Resonance, ...]
     heard_on: tuple[tuple[str, ...], ...]
     alone: Mapping[str, tuple[Resonance | None, ...]]
     common: float
-
-
-class Agreement(NamedTuple):
-    """How sensors agree, as a series has settled it.
-
-    `common` is the share of their errors that two have in common, `wider` by how much their lines differ more than
-    their deviations say, `established` who has mostly heard the line that others hear too.
-    """
-
-    common: Mapping[tuple[str, str], float]
-    wider: float
-    established: tuple[str, ...]
+    moved: tuple[tuple[int, str], ...] = ()
 
 
 def resonances_of_sensors(
@@ -99,17 +90,48 @@ def learn_sensors(
     band_hz: tuple[float, float],
     kept: MasksBySensor | None = None,
 ) -> tuple[SensorLines, "SharedBySensors"]:
-    """The lines of `resonances_of_sensors`, and what they rest on, by which further recordings can be judged."""
-    counted = _counted(spectra)
+    """The lines of `resonances_of_sensors`, and what they rest on, by which further recordings can be judged.
+
+    Where a sensor is moved, all recordings behind it are a series of their own.
+    """
+    counted = _counted(spectra, band_hz)
     if not counted:
         raise BadInput(f"no sensor has {FEWEST_RECORDINGS} recordings, which the joint separation needs; record more")
     by_sensor = {}
     for name in counted:
-        used, masks = _used(spectra, kept, name)
+        used, masks = _used(spectra, kept, name, band_hz)
         by_sensor[name] = separated(used, band_hz=band_hz, kept=masks)
+    rows = _rows(spectra, band_hz)
+    moves = {name: moved_at(one.blocks, one.found.joint) for name, one in by_sensor.items()}
+    where = [(rows[name][first], name) for name, first in moves.items() if first is not None]
+    if where:
+        return _parted(spectra, band_hz, kept, min(where))
     lines, agreement = _Together(by_sensor, spectra, band_hz).judged()
     shared = {name: one.shared for name, one in by_sensor.items()}
     return lines, SharedBySensors(by_sensor=shared, agreement=agreement, band_hz=band_hz)
+
+
+def _parted(
+    spectra: SpectraBySensor, band_hz: tuple[float, float], kept: MasksBySensor | None, move: tuple[int, str]
+) -> tuple[SensorLines, "SharedBySensors"]:
+    """Recordings before a move and behind it, each part by itself; what it rests on is that of the last."""
+    first, _ = move
+    (before, _), (behind, shared) = (
+        learn_sensors(
+            {name: every[part] for name, every in spectra.items()},
+            band_hz=band_hz,
+            kept=None if kept is None else {name: every[part] for name, every in kept.items()},
+        )
+        for part in (slice(first), slice(first, None))
+    )
+    lines = SensorLines(
+        resonances=before.resonances + behind.resonances,
+        heard_on=before.heard_on + behind.heard_on,
+        alone={name: every + behind.alone[name] for name, every in before.alone.items()},
+        common=behind.common,
+        moved=(*before.moved, move, *((first + number, name) for number, name in behind.moved)),
+    )
+    return lines, shared
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,7 +144,7 @@ class SharedBySensors:
 
     def fits(self, spectra: SpectraBySensor, band_hz: tuple[float, float]) -> bool:
         """Whether spectra are of these sensors, on their lines."""
-        if band_hz != self.band_hz or set(_counted(spectra)) != {*self.by_sensor}:
+        if band_hz != self.band_hz or set(_counted(spectra, self.band_hz)) != {*self.by_sensor}:
             return False
         first = {name: next(one for one in spectra[name] if one is not None) for name in self.by_sensor}
         return all(shared.fits(first[name]) for name, shared in self.by_sensor.items())
@@ -135,8 +157,10 @@ class SharedBySensors:
         BadInput
             for spectra on other lines, or without any vibration.
         """
-        there = [name for name, rows in _rows(spectra).items() if rows and name in self.by_sensor]
-        by_sensor = {name: separated_beside(self.by_sensor[name], *_used(spectra, kept, name)) for name in there}
+        there = [name for name, rows in _rows(spectra, self.band_hz).items() if rows and name in self.by_sensor]
+        by_sensor = {
+            name: separated_beside(self.by_sensor[name], *_used(spectra, kept, name, self.band_hz)) for name in there
+        }
         return _Together(by_sensor, spectra, self.band_hz).judged(self.agreement)[0]
 
 
@@ -145,36 +169,28 @@ def _count(spectra: SpectraBySensor) -> int:
     return len(next(iter(spectra.values())))
 
 
-def _rows(spectra: SpectraBySensor) -> dict[str, list[int]]:
-    """Which recordings each sensor has."""
-    return {name: [i for i, one in enumerate(every) if one is not None] for name, every in spectra.items()}
+def _rows(spectra: SpectraBySensor, band_hz: tuple[float, float]) -> dict[str, list[int]]:
+    """Which recordings each sensor hears anything of."""
+    return {
+        name: [number for number, one in enumerate(every) if one is not None and not is_silent(one, band_hz)]
+        for name, every in spectra.items()
+    }
 
 
-def _counted(spectra: SpectraBySensor) -> list[str]:
+def _counted(spectra: SpectraBySensor, band_hz: tuple[float, float]) -> list[str]:
     """Sensors with enough recordings to be separated."""
-    return [name for name, there in _rows(spectra).items() if len(there) >= FEWEST_RECORDINGS]
+    return [name for name, there in _rows(spectra, band_hz).items() if len(there) >= FEWEST_RECORDINGS]
 
 
-def _used(spectra: SpectraBySensor, kept: MasksBySensor | None, name: str) -> tuple[list[Spectrum], list[Mask] | None]:
+def _used(
+    spectra: SpectraBySensor, kept: MasksBySensor | None, name: str, band_hz: tuple[float, float]
+) -> tuple[list[Spectrum], list[Mask] | None]:
     """A sensor's spectra and masks, those that it has."""
-    masks = None if kept is None else [mask for mask in kept[name] if mask is not None]
-    return [one for one in spectra[name] if one is not None], masks
-
-
-class _Fit(NamedTuple):
-    """Recordings fitted on the same sensors: what each hears of them, the lines, and how likely they are elsewhere."""
-
-    names: list[str]
-    numbers: list[int]
-    heard: list[Heard]
-    lines: Lines
-    elsewhere: Field  # -ln likelihood of a line at each template, all sensors together
-
-    def joint(self, sensor: int) -> Joint:
-        """The fit as one sensor has it."""
-        heard = self.heard[sensor]
-        own = self.lines.own[sensor]
-        return Joint(heard.at._replace(own=own), 0.0, np.full_like(own, np.nan), heard.doubt)
+    rows = _rows(spectra, band_hz)[name]
+    used = [one for number in rows if (one := spectra[name][number]) is not None]
+    if kept is None:
+        return used, None
+    return used, [mask for number in rows if (mask := kept[name][number]) is not None]
 
 
 class _Together:
@@ -183,9 +199,9 @@ class _Together:
     def __init__(
         self, by_sensor: Mapping[str, Separated], spectra: SpectraBySensor, band_hz: tuple[float, float]
     ) -> None:
-        self.by_sensor, self.rows, self.band_hz = by_sensor, _rows(spectra), band_hz
+        self.by_sensor, self.rows, self.band_hz = by_sensor, _rows(spectra, band_hz), band_hz
         self.count = len(next(iter(spectra.values())))
-        self.alone = {name: self._by_itself(name) for name in spectra}
+        self.alone = {name: self._by_itself(name, every) for name, every in spectra.items()}
 
     def judged(self, agreement: Agreement | None = None) -> tuple[SensorLines, Agreement]:
         """Every recording, by the sensors that it has; how they agree, of these recordings if it is not known."""
@@ -215,20 +231,24 @@ class _Together:
         )
         return told, Agreement(common, wider, established)
 
-    def _by_itself(self, name: str) -> tuple[Resonance | None, ...]:
+    def _by_itself(self, name: str, spectra: Sequence[Spectrum | None]) -> tuple[Resonance | None, ...]:
         """What a sensor's series says of each recording, None where it has none."""
         own = self.by_sensor.get(name)
         reason = f"the joint separation needs {FEWEST_RECORDINGS} recordings of a sensor, and this one has fewer"
         too_few = no_resonance(reason, self.band_hz, "joint")
-        found: list[Resonance | None] = [None] * self.count
+        low, high = self.band_hz
+        nothing = no_resonance(
+            f"the spectrum holds no vibration at all between {low:.0f} and {high:.0f} Hz", self.band_hz, "joint"
+        )
+        found = [None if one is None else nothing for one in spectra]
         for place, number in enumerate(self.rows[name]):
             found[number] = too_few if own is None else own.resonances[place]
         return tuple(found)
 
-    def _common(self, fits: Sequence[_Fit]) -> dict[tuple[str, str], float]:
+    def _common(self, fits: Sequence[Fit]) -> dict[tuple[str, str], float]:
         """The share of their errors that two sensors have in common, where that can be told."""
         pairs = combinations(self.by_sensor, 2)
-        return {pair: share for pair in pairs if np.isfinite(share := _in_common(pair, fits))}
+        return {pair: share for pair in pairs if np.isfinite(share := in_common(pair, fits))}
 
     def _established(self, heard_on: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
         """Sensors that have heard the line of others in most of the recordings in which they heard one."""
@@ -242,7 +262,7 @@ class _Together:
                 found.append(name)
         return tuple(found)
 
-    def _fitted(self, names: list[str], numbers: list[int]) -> _Fit:
+    def _fitted(self, names: list[str], numbers: list[int]) -> Fit:
         """One line for all sensors in each of some recordings, beside what each sensor's series has settled."""
         heard, templates = [], self.by_sensor[names[0]].found.templates
         rows = {name: [self.rows[name].index(number) for number in numbers] for name in names}
@@ -255,7 +275,7 @@ class _Together:
             base = np.exp(np.interp(coarse.centre, blocks.centre, settled.parameters.base))
             own = levelled(coarse, base, templates, best)
             heard.append(Heard(blocks, settled.parameters._replace(own=own), settled.doubt))
-        return _Fit(names, numbers, heard, each(heard), total)
+        return Fit(names, numbers, heard, each(heard), total)
 
     def _wider(self, common: Mapping[tuple[str, str], float]) -> float:
         """By how much sensors differ more than their deviations say: what is between changes their lines, too."""
@@ -263,7 +283,7 @@ class _Together:
         for first, second in combinations(self.by_sensor, 2):
             share = min(common.get((first, second), 0.0), MOST_COMMON)
             for one, other in zip(self.alone[first], self.alone[second], strict=True):
-                if one is not None and other is not None and one.found and other.found and not _differ(one, other):
+                if one is not None and other is not None and one.found and other.found and not differ(one, other):
                     variance = one.crf_std**2 + other.crf_std**2 - 2.0 * share * one.crf_std * other.crf_std
                     squares.append((one.crf_hz - other.crf_hz) ** 2 / variance)
         return float(np.sqrt(max(float(np.mean(squares)), 1.0))) if len(squares) >= FEWEST_AGREED else 1.0
@@ -272,7 +292,7 @@ class _Together:
         """That sensors hear different lines in a recording, in words; empty where they do not."""
         found = [(name, one) for name, all_ in self.alone.items() if (one := all_[number]) is not None and one.found]
         for (name, one), (other_name, other) in combinations(found, 2):
-            if _differ(one, other):
+            if differ(one, other):
                 return (
                     f"{DISAGREE}: a line at {one.crf_hz:.0f} ± {one.crf_std:.0f} Hz on {name}, at "
                     f"{other.crf_hz:.0f} ± {other.crf_std:.0f} Hz on {other_name}"
@@ -280,10 +300,10 @@ class _Together:
         return ""
 
     def _agreed(
-        self, fit: _Fit, common: Mapping[tuple[str, str], float], wider: float
+        self, fit: Fit, common: Mapping[tuple[str, str], float], wider: float
     ) -> list[tuple[Resonance, tuple[str, ...]]]:
         """The lines that two sensors hear, and who does; else why there is none."""
-        shares = _shares(fit.names, common)
+        shares = shares_in_common(fit.names, common)
         counts_as = 1.0 + np.sum(shares, axis=1).mean()  # one sensor and its copy are one
         gains, misfits, weights = [], [], []
         for sensor, heard in enumerate(fit.heard):
@@ -306,7 +326,7 @@ class _Together:
 
     def _line(
         self,
-        fit: _Fit,
+        fit: Fit,
         place: int,
         names: list[str],
         evidence: float,
@@ -363,7 +383,7 @@ class _Together:
             own, crf_std=own.crf_std * wider, crfa=height[0], crfa_std=height[1], reason=said,
         ), (name,)  # fmt: skip
 
-    def _deviations(self, fit: _Fit, shares: Field) -> Field:
+    def _deviations(self, fit: Fit, shares: Field) -> Field:
         """Standard deviations (sensors, recordings, 4): what is independent, what is common, what a machine brings."""
         inverse, dragged = fit.lines.inverse, fit.lines.dragged
         variance = np.einsum("npp->np", inverse).copy()
@@ -396,7 +416,7 @@ class _Together:
         std = np.hypot(np.sqrt(variance), brought)
         return np.stack([std[:, places(sensor)] for sensor in range(len(fit.heard))])
 
-    def _of_the_base(self, fit: _Fit, sensor: int) -> Field:
+    def _of_the_base(self, fit: Fit, sensor: int) -> Field:
         """What a base, known as well as its series tells, adds to the deviations of lines; (recordings, 4)."""
         name, heard = fit.names[sensor], fit.heard[sensor]
         rows = [self.rows[name].index(number) for number in fit.numbers]
@@ -404,41 +424,3 @@ class _Together:
         own = settled.parameters.own[rows]
         known = alone_beside(heard.blocks, settled.parameters._replace(own=own), heard.doubt).std
         return np.asarray(np.sqrt(np.maximum(settled.std[rows] ** 2 - known**2, 0.0)))
-
-
-def _differ(one: Resonance, other: Resonance) -> bool:
-    """Whether two lines are not one."""
-    apart = abs(one.crf_hz - other.crf_hz)
-    width = 2.0 * max(one.damping_ratio * one.crf_hz, other.damping_ratio * other.crf_hz)
-    return apart > max(APART * float(np.hypot(one.crf_std, other.crf_std)), APART_WIDTHS * width)
-
-
-def _shares(names: Sequence[str], common: Mapping[tuple[str, str], float]) -> Field:
-    """The share of their errors that sensors have in common, (sensors, sensors); 0 with themselves."""
-    shares = np.zeros((len(names), len(names)))
-    for (i, first), (j, second) in combinations(enumerate(names), 2):
-        shares[i, j] = shares[j, i] = common.get((first, second), common.get((second, first), 1.0))
-    return shares
-
-
-def _in_common(pair: tuple[str, str], fits: Sequence[_Fit]) -> float:
-    """The correlation of what is left of two sensors' spectra where it moves their line, and its own deviation."""
-    product, weights, squares, powers = 0.0, 0.0, 0.0, np.zeros(2)
-    for fit in fits:
-        if not set(pair) <= set(fit.names):
-            continue
-        felt, off = [], []
-        for name in pair:
-            sensor = fit.names.index(name)
-            blocks, joint = fit.heard[sensor].blocks, fit.joint(sensor)
-            relative, expected = shares_of(blocks, joint)
-            felt.append(np.sqrt(blocks.weight) * np.abs(relative[:, 1]))
-            off.append(np.sqrt(blocks.weight) * (blocks.density / expected - 1.0))
-        both = felt[0] * felt[1]
-        product += float(np.sum(both * off[0] * off[1]))
-        powers += [np.sum(both * one**2) for one in off]
-        weights += float(np.sum(both))
-        squares += float(np.sum(both**2))
-    if not np.all(powers > 0.0):
-        return np.nan
-    return float(np.clip(product / np.sqrt(np.prod(powers)) + np.sqrt(squares) / weights, 0.0, 1.0))

@@ -35,19 +35,21 @@ LONGEST_STEP = np.array([1.0, 0.03, 0.5, 1.0])  # of ln A, ln f, ln ζ, ln g
 MOST_STEPS = 60
 SETTLED = 1e-3  # ln likelihood that the next step promises
 PACES = (0.3, 1e-4)  # of the transfer from spline to spline: the first guess, and the least
+LIFTED = 0.1  # of the weakest line over it: what the base is at least when the transfer's fit begins
 SAME_PACE, MOST_PACES = 0.1, 8  # change of its logarithm that no longer counts
 
 
 class Joint(NamedTuple):
     """Where the joint fit ended: parameters, -ln likelihood, and standard deviations of the recordings' own.
 
-    `doubt` is the covariance of the transfer's coefficients.
+    `doubt` is the covariance of the transfer's coefficients, `pace` their prior deviation from spline to spline.
     """
 
     parameters: Parameters
     cost: float
     std: Field  # (recordings, 4)
     doubt: Field
+    pace: float = PACES[0]
 
 
 class Templates(NamedTuple):
@@ -203,7 +205,7 @@ def separate(blocks: Blocks) -> Separation:
         shared = joint.parameters
         own = _tracks(coarse, np.exp(np.interp(coarse.centre, blocks.centre, shared.base)), templates)
         own[chosen] = shared.own
-        joint = alone_beside(blocks, shared._replace(own=own), joint.doubt)
+        joint = alone_beside(blocks, shared._replace(own=own), joint.doubt)._replace(pace=joint.pace)
     elsewhere, _ = search(coarse, np.exp(np.interp(coarse.centre, blocks.centre, joint.parameters.base)), templates)
     return Separation(joint, templates, elsewhere, chosen)
 
@@ -235,7 +237,14 @@ def _together(blocks: Blocks, coarse: Blocks, templates: Templates) -> Joint:
     base = _settled_base(blocks, best.parameters.own, base)
     low, high = bounds_of(blocks)
     passed = through(float(np.exp(low[1])), float(np.exp(high[1])))
-    return _passed_on(blocks, Parameters(best.parameters.own, np.log(base), passed))
+    return _passed_on(blocks, _lifted(blocks, Parameters(best.parameters.own, np.log(base), passed)))
+
+
+def _lifted(blocks: Blocks, at: Parameters) -> Parameters:
+    """The same with a base that is nowhere nil below a line: in its logarithm no step would lead away from there."""
+    line = lines_and_slopes(blocks.centre, at)[0]
+    least = np.min(line / np.exp(at.own[:, 3, None]), axis=0)
+    return at._replace(base=np.maximum(at.base, np.log(LIFTED * least)))
 
 
 def _reduced(point: Point, damping: Field | float) -> tuple[Field, Field, Field]:
@@ -294,7 +303,7 @@ def _scored(blocks: Blocks, start: Parameters, pace: float = PACES[0]) -> Joint:
     covariance = np.linalg.inv(_reduced(point, 0.0)[0])
     own = at.own.size
     std = np.sqrt(np.diag(covariance)[:own]).reshape(at.own.shape)
-    return Joint(at, point.cost, std, covariance[own:, own:])
+    return Joint(at, point.cost, std, covariance[own:, own:], pace)
 
 
 class Heard(NamedTuple):

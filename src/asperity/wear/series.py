@@ -18,6 +18,7 @@ from asperity.signals import Spectrum
 from asperity.wear.expected import Blocks, expected_density, whittle_costs
 from asperity.wear.indicators import STRONG_EVIDENCE, IndicatorMethod, contact_resonance, require_band
 from asperity.wear.misfit import Witnesses, brought_std, left_over, witnesses_of
+from asperity.wear.moved import moved_at
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Joint, Model, Templates, beside, coarser, models, separate, templates_on
 from asperity.wear.transfer import SPLINES, Transfer
@@ -113,7 +114,15 @@ def series_resonances(
         raise BadInput(f"series method must be one of {', '.join(get_args(SeriesMethod))}, got {method!r}")
     if method != "joint":
         return tuple(contact_resonance(spectrum, band_hz=band_hz, method=method) for spectrum in spectra)
-    return learn_series(spectra, band_hz=band_hz, kept=kept)[0]
+    return learn_series(spectra, band_hz=band_hz, kept=kept).resonances
+
+
+class LearnedSeries(NamedTuple):
+    """The resonances of a series, what its last part shares, and with which recordings a new part begins."""
+
+    resonances: tuple[Resonance, ...]
+    shared: Shared
+    moved: tuple[int, ...]
 
 
 class Separated(NamedTuple):
@@ -127,10 +136,21 @@ class Separated(NamedTuple):
 
 def learn_series(
     spectra: Sequence[Spectrum], *, band_hz: tuple[float, float], kept: Sequence[Mask] | None = None
-) -> tuple[tuple[Resonance, ...], Shared]:
-    """The joint separation of `series_resonances`, and what it learned, by which further spectra can be judged."""
-    separation = separated(spectra, band_hz=band_hz, kept=kept)
-    return separation.resonances, separation.shared
+) -> LearnedSeries:
+    """The joint separation of `series_resonances`, and what it learned, by which further spectra can be judged.
+
+    Where what lies between contact and sensor changes, the recordings behind it are a series of their own.
+    """
+    whole = separated(spectra, band_hz=band_hz, kept=kept)
+    first = moved_at(whole.blocks, whole.found.joint)
+    if first is None:
+        return LearnedSeries(whole.resonances, whole.shared, ())
+    before, behind = (
+        learn_series(spectra[part], band_hz=band_hz, kept=None if kept is None else kept[part])
+        for part in (slice(first), slice(first, None))
+    )
+    moved = (*before.moved, first, *(first + one for one in behind.moved))
+    return LearnedSeries(before.resonances + behind.resonances, behind.shared, moved)
 
 
 def separated(
@@ -159,10 +179,10 @@ def separated(
     size = -(-lines.size // MOST_BLOCKS)
     lines = lines[: lines.size // size * size]
     blocks = _blocked(spectra, lines, size, kept)
-    silent = ~np.any(blocks.density > 0.0, axis=1)
-    if np.any(silent):
+    silent = [is_silent(spectrum, band_hz) for spectrum in spectra]
+    if any(silent):
         raise BadInput(
-            f"recording {int(np.argmax(silent))} holds no vibration at all between {band_hz[0]:.0f} and "
+            f"recording {silent.index(True)} holds no vibration at all between {band_hz[0]:.0f} and "
             f"{band_hz[1]:.0f} Hz; leave it out"
         )
     with threadpool_limits(1, "blas"):  # matrices too small for two threads: they would wait for one another
@@ -193,6 +213,11 @@ def separated(
         lacking=witnesses.lacking,
     )
     return Separated(blocks, found, resonances, shared)
+
+
+def is_silent(spectrum: Spectrum, band_hz: tuple[float, float]) -> bool:
+    """Whether a spectrum holds no vibration at all in the band."""
+    return not np.any(spectrum.density[require_band(spectrum, band_hz)] > 0.0)
 
 
 def separated_beside(shared: Shared, spectra: Sequence[Spectrum], kept: Sequence[Mask] | None = None) -> Separated:
