@@ -17,7 +17,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.inference.forward import Forward, Law
 from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, SIZES, WEIGHTS, law_correlations
-from asperity.inference.observations import Heard
+from asperity.inference.observations import Heard, likeness
 from asperity.inference.outputs import CLR
 from asperity.inference.priors import si
 from asperity.inference.settings import OPERATING, TEMPERATURE
@@ -140,7 +140,7 @@ class Course:
 
     def _walk(self, table: "Table", *, moving: bool) -> Walked:
         places = len(self.forward.points)
-        state = _State.begin(table, places, self.drift if moving else (0.0, 0.0))
+        state = _State.begin(table, likeness(self.forward.points), self.drift if moving else (0.0, 0.0))
         restless = table.extra.restless if moving else np.zeros(len(table.share))
         path = np.empty((len(table.share), len(self.series.x)))
         before = 0.0
@@ -239,9 +239,9 @@ class _State:
     log: Field
 
     @classmethod
-    def begin(cls, table: Table, places: int, drift: tuple[float, float]) -> "_State":
+    def begin(cls, table: Table, near: Field, drift: tuple[float, float]) -> "_State":
         """Before anything is heard: the share is the contact's, all else open."""
-        count = len(table.share)
+        count, places = len(table.share), len(near)
         mean = np.zeros((count, FIRST + len(CHANNELS) * places))
         mean[:, SHARE], mean[:, SPEED] = table.share, drift[0]
         variance = np.zeros_like(mean)
@@ -253,7 +253,9 @@ class _State:
         for number, channel in enumerate(CHANNELS):
             own = slice(FIRST + number * places, FIRST + (number + 1) * places)
             size = WEIGHTS[channel] * table.extra.sizes[channel]
-            covariance[:, own, own] += table.errors[channel] + size[:, None, None] ** 2 * law_correlations(table.lever)
+            covariance[:, own, own] += table.errors[channel] + size[:, None, None] ** 2 * law_correlations(
+                table.lever, near
+            )
         return cls(mean, covariance, np.zeros(count))
 
     def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:
