@@ -66,7 +66,7 @@ class Series:
 
 
 def series_of(observations: Sequence[Observation]) -> Series:
-    """Recordings by their x.
+    """Recordings by their x, in whichever order they are given.
 
     Raises
     ------
@@ -83,6 +83,9 @@ def series_of(observations: Sequence[Observation]) -> Series:
             "--forecast out, or record again"
         )
     require_temperatures(observations)
+    observations = sorted(
+        observations, key=lambda one: (one.x, one.load_n, one.entrainment_m_s, one.temperature_k or 0.0)
+    )
     groups = np.array_split(np.array(times), min(MOST, len(times)))
     x = tuple(float(group.mean()) for group in groups)
     places = _places(points_of(observations))
