@@ -262,6 +262,8 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
         assert np.sign(change.mean()) == np.sign(load - 500.0)
     many = [replace(recording(float(number)), load_n=250.0 + 45.0 * number) for number in range(15)]
     assert len(series_of(many).places) <= MOST_PLACES
+    near = [replace(recording(float(number)), load_n=500.0 * 1.02**number) for number in range(8)]
+    assert series_of(near[::-1]) == series_of(near)  # who is whose place hangs on no order
 
 
 def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():

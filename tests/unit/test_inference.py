@@ -139,8 +139,9 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
     stds = rng.uniform(0.1, 0.3, (3, 3, 4))
     shown = Shown(crf, stds[0], damping, stds[1], crfa, stds[2], lever)
     said = [Heard(0.3, 0.2), Heard(), Heard(-0.1, 0.5), Heard(1.0, 0.1)]
-    points = [Point(500.0, 1.0, crf=one, damping=one, crfa=one) for one in said]
+    points = [Point(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one) for i, one in enumerate(said)]
     here = [0, 2, 3]
+    near = norm.pdf(np.subtract.outer(here, here) * np.log(1.01) / 0.03) / norm.pdf(0.0)
     sizes = SIZES if discrepancy else (0.0,)
     for row in range(3):
         force, expected = lever[row, here], 0.0
@@ -149,9 +150,9 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
         beyond = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
         for number, (channel, weight) in enumerate({"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()):
             std = np.hypot(stds[number, row, here], beyond[channel])
-            known = common[channel] + COMMON * np.outer(std, std)
-            known = known + np.diag([said[i].std ** 2 for i in here] + (1.0 - COMMON) * std**2)
-            alike = OWN * np.eye(3) + (1.0 - OWN) * norm.pdf(np.subtract.outer(force, force) / ALONG) / norm.pdf(0.0)
+            known = common[channel] + np.outer(std, std) * (COMMON + (1.0 - COMMON) * near)
+            known = known + np.diag([said[i].std ** 2 for i in here])
+            alike = OWN * near + (1.0 - OWN) * norm.pdf(np.subtract.outer(force, force) / ALONG) / norm.pdf(0.0)
             densities = [
                 multivariate_normal(getattr(shown, channel)[row, here], known + (weight * size) ** 2 * alike).pdf(
                     [said[i].value for i in here]
@@ -334,6 +335,24 @@ def test_repeats_are_surer_together_and_no_surer_than_their_scatter(setting, emu
     point = found.forward.points[1]
     assert point.crf.std == pytest.approx(0.02 / np.sqrt(3.0), rel=0.01)
     assert point.crf.value == pytest.approx(np.log(one.crf_hz), abs=1e-3)
+
+
+def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
+    """Five recordings that agree at what is as good as one place do not speak for a small error."""
+    said = Heard(8.0, 2e-3)
+    off = np.linspace(-0.4, 0.4, 2001)[:, None]
+
+    def width(loads):
+        points = [Point(load, 1.0, crf=said) for load in loads]
+        nothing, lever = np.full((len(off), len(loads)), np.nan), np.tile(np.log(loads), (len(off), 1))
+        crf = 8.0 + off + np.zeros_like(nothing)
+        shown = Shown(crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, lever)
+        weights = np.exp(log_likelihood(shown, points, discrepancy=True))
+        return np.sqrt(weights @ off[:, 0] ** 2 / weights.sum())
+
+    assert width([200.0]) == pytest.approx(np.sqrt(np.mean(np.square(SIZES)) + 0.01**2), rel=0.02)
+    assert width(200.0 + 1e-6 * np.arange(5)) == pytest.approx(width([200.0]), rel=1e-3)
+    assert width([100.0, 150.0, 200.0, 300.0, 400.0]) < 0.5 * width([200.0])  # there agreement tells
 
 
 # What is refused -----------------------------------------------------------------------------------------------------

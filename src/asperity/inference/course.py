@@ -17,7 +17,7 @@ from asperity.arrays import Field
 from asperity.errors import BadInput
 from asperity.inference.forward import Forward, Law
 from asperity.inference.likelihood import EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, SIZES, WEIGHTS, law_correlations
-from asperity.inference.observations import Heard
+from asperity.inference.observations import Heard, likeness
 from asperity.inference.outputs import CLR
 from asperity.inference.priors import si
 from asperity.inference.settings import OPERATING, TEMPERATURE
@@ -151,7 +151,7 @@ class Course:
 
     def _walk(self, table: "Table", *, moving: bool) -> Walked:
         places = len(self.forward.points)
-        state = _State.begin(table, places, self.drift if moving else (0.0, 0.0), self.leanings)
+        state = _State.begin(table, likeness(self.forward.points), self.drift if moving else (0.0, 0.0), self.leanings)
         restless = table.extra.restless if moving else np.zeros(len(table.share))
         path = np.empty((len(table.share), len(self.series.x)))
         before = 0.0
@@ -252,10 +252,11 @@ class _State:
 
     @classmethod
     def begin(
-        cls, table: Table, places: int, drift: tuple[float, float], leanings: Mapping[tuple[str, int], Field]
+        cls, table: Table, near: Field, drift: tuple[float, float], leanings: Mapping[tuple[str, int], Field]
     ) -> "_State":
         """Before anything is heard: the share is the contact's, all else open."""
-        count, before = len(table.share), FIRST + len(CHANNELS) * places
+        count, places = len(table.share), len(near)
+        before = FIRST + len(CHANNELS) * places
         mean = np.zeros((count, before + len(leanings)))
         mean[:, SHARE], mean[:, SPEED] = table.share, drift[0]
         variance = np.zeros_like(mean)
@@ -268,7 +269,8 @@ class _State:
         for number, channel in enumerate(CHANNELS):
             own = slice(FIRST + number * places, FIRST + (number + 1) * places)
             size = WEIGHTS[channel] * table.extra.sizes[channel]
-            covariance[:, own, own] += table.errors[channel] + size[:, None, None] ** 2 * law_correlations(table.lever)
+            correlations = law_correlations(table.lever, near)
+            covariance[:, own, own] += table.errors[channel] + size[:, None, None] ** 2 * correlations
         return cls(mean, covariance, np.zeros(count), leanings)
 
     def wait(self, time: float, restless: Field, extra: Extra, visits: int) -> None:

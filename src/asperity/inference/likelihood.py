@@ -1,10 +1,11 @@
 """How probable what was heard is, by a law, with or without a term for what the law itself gets wrong.
 
 Without the term, a frequency is off by its measurement and the emulator, whose error all operating points of a contact
-have in common in part. With it, the law is off too, in frequency, damping and height each by a size of its own that is
-not known: three are as probable. A spring's law is a function of the force it bears, and so is half of its error's
-variance: points under the same force are off by the same. The other half is each point's own. The law's exponent of
-the load is off besides. CRFA has a gain that nobody knows, for all recordings in common.
+have in common in part, and those at one place wholly. With it, the law is off too, in frequency, damping and height
+each by a size of its own that is not known: three are as probable. A spring's law is a function of the force it bears,
+and so is half of its error's variance: points under the same force are off by the same. The other half is each place's
+own: what was run at nearly one load, speed and temperature is off by the same. The law's exponent of the load is off
+besides. CRFA has a gain that nobody knows, for all recordings in common.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,11 +14,11 @@ import numpy as np
 
 from asperity.arrays import Field
 from asperity.inference.forward import Shown
-from asperity.inference.observations import Point
+from asperity.inference.observations import Point, likeness
 
 SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
 WEIGHTS: Mapping[str, float] = {"crf": 1.0, "damping": 5.0, "crfa": 10.0}  # the same in ln ζ and ln CRFA
-OWN = 0.5  # share of the law's variance that is each operating point's own
+OWN = 0.5  # share of the law's variance that is each place's own
 ALONG = 1.0  # in ln force: how far the rest reaches
 EXPONENT_STD = 0.03  # of the power of the load that CRF goes with: as far as 1/5 is from 1/6
 COMMON = 0.25  # share of the emulator's variance that all operating points of a contact have in common
@@ -41,38 +42,38 @@ def log_at_sizes(shown: Shown, points: Sequence[Point], channel: str, sizes: Seq
     logs = np.zeros((len(sizes), len(mean)))
     if not here.any():
         return logs
+    near = likeness(points)[np.ix_(here, here)]
     parts = max(1, len(mean) * int(here.sum()) ** 2 // AT_ONCE)
     for rows in np.array_split(np.arange(len(mean)), parts):
         rest = value[here] - mean[rows][:, here]
-        known = emulated_errors(channel, _deviation(shown, channel)[rows][:, here]) + np.diag(std[here] ** 2)
+        known = emulated_errors(channel, _deviation(shown, channel)[rows][:, here], near) + np.diag(std[here] ** 2)
         for number, size in enumerate(sizes):
-            law = law_errors(channel, lever[rows][:, here], np.full(len(rows), size))
+            law = law_errors(channel, lever[rows][:, here], np.full(len(rows), size), near)
             logs[number, rows] = _log_normal(rest, known + law)
     return logs
 
 
-def law_errors(channel: str, lever: Field, size: Field) -> Field:
+def law_errors(channel: str, lever: Field, size: Field, near: Field) -> Field:
     """Covariance of the law's errors at operating points, (n, points, points); `lever` is ln force, (n, points).
 
-    `size` (n,) is relative to CRF; where it is 0, the law is exact.
+    `size` (n,) is relative to CRF; where it is 0, the law is exact. `near` is the points' likeness.
     """
-    errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * law_correlations(lever)
+    errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * law_correlations(lever, near)
     if channel == "crf":
         steep = EXPONENT_STD * (lever - lever.mean(axis=1, keepdims=True)) * (size[:, None] > 0.0)
         errors += steep[:, :, None] * steep[:, None, :]
     return np.asarray(errors)
 
 
-def law_correlations(lever: Field) -> Field:
+def law_correlations(lever: Field, near: Field) -> Field:
     """Of the law's errors at operating points, but for its exponent, (n, points, points)."""
     apart = lever[:, :, None] - lever[:, None, :]
-    return np.asarray((1.0 - OWN) * np.exp(-0.5 * (apart / ALONG) ** 2) + OWN * np.eye(lever.shape[1]))
+    return np.asarray((1.0 - OWN) * np.exp(-0.5 * (apart / ALONG) ** 2) + OWN * near)
 
 
-def emulated_errors(channel: str, std: Field) -> Field:
+def emulated_errors(channel: str, std: Field, near: Field) -> Field:
     """Covariance of the emulator's errors by their deviations (n, points), and of a height with its free gain."""
-    alike = COMMON + (1.0 - COMMON) * np.eye(std.shape[1])
-    errors = std[:, :, None] * std[:, None, :] * alike
+    errors = std[:, :, None] * std[:, None, :] * (COMMON + (1.0 - COMMON) * near)
     return np.asarray(errors + GAIN_STD**2 if channel == "crfa" else errors)
 
 

@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from asperity.arrays import Field
 from asperity.errors import BadInput, require_positive
 
 LEAST_STD = 1e-4  # relative, of a frequency: no machine is steadier
 LOST = math.nan
+ALIKE = np.array([0.03, 0.03, 1.5])  # load and speed, relative, and temperature [K], that are as good as one place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +103,17 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
         )
         for place, group in groups.items()
     )
+
+
+def conditions(point: Point) -> Field:
+    """Logarithms of load and speed, and temperature [K]."""
+    return np.array([math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0])
+
+
+def likeness(points: Sequence[Point]) -> Field:
+    """How far what is a point's own is the others' too, as a correlation, (points, points): 1 at one place."""
+    at = np.array([conditions(point) for point in points]) / ALIKE
+    return np.asarray(np.exp(-0.5 * np.sum((at[:, None] - at) ** 2, axis=-1)))
 
 
 def require_temperatures(observations: Sequence[Observation]) -> None:

@@ -14,7 +14,7 @@ from asperity.arrays import Field
 from asperity.errors import AsperityError
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
 from asperity.inference.likelihood import SIZES, WEIGHTS, emulated_errors, law_errors, log_at_sizes, log_likelihood
-from asperity.inference.observations import Point
+from asperity.inference.observations import Point, likeness
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
 from asperity.inference.sampling import FEWEST, QUICKLY, Pool, Sampled, importance, nested
 
@@ -235,7 +235,8 @@ def _corrected(
     """
     heard = np.array([point.crf.value for point in points])
     here = ~np.isnan(heard)
-    emulator = emulated_errors("crf", std)
+    near = likeness(points)
+    emulator = emulated_errors("crf", std, near)
     errors = _drawn_normal(emulator, rng)
     if not here.any():
         return mean + errors
@@ -243,7 +244,7 @@ def _corrected(
     slope = 1.0 / (6.0 * np.maximum(share, LEAST_SHARE) * OUTPUTS[CLR].slope(share))  # d ln CRF / d scale
     slope = slope[:, here]
     measured = np.array([point.crf.std for point in points])[here]
-    rest = law_errors("crf", shown.lever[:, here], size) + np.diag(measured**2)
+    rest = law_errors("crf", shown.lever[:, here], size, near[np.ix_(here, here)]) + np.diag(measured**2)
     across = emulator[:, :, here] * slope[:, None]  # of shares and frequencies
     whole = across[:, here] * slope[:, :, None] + rest
     off = heard[here] - shown.crf[:, here] - slope * errors[:, here] - _drawn_normal(rest, rng)

@@ -7,13 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
 from asperity.errors import BadInput
-from asperity.inference.observations import Heard, Observation, Point, points_of, require_temperatures
+from asperity.inference.observations import (
+    ALIKE,
+    Heard,
+    Observation,
+    Point,
+    conditions,
+    points_of,
+    require_temperatures,
+)
 
 FEWEST, MOST = 4, 60  # visits; neighbours of more are taken together
 CHANNELS = ("crf", "damping", "crfa")
-ALIKE = np.array([0.03, 0.03, 1.5])  # load and speed, relative, and temperature [K], that are taken for one place
 MOST_PLACES = 8  # more, and those further apart are taken for one
 WIDER = 1.5
 
@@ -60,7 +66,7 @@ class Series:
 
 
 def series_of(observations: Sequence[Observation]) -> Series:
-    """Recordings by their x.
+    """Recordings by their x, in whichever order they are given.
 
     Raises
     ------
@@ -77,6 +83,9 @@ def series_of(observations: Sequence[Observation]) -> Series:
             "--forecast out, or record again"
         )
     require_temperatures(observations)
+    observations = sorted(
+        observations, key=lambda one: (one.x, one.load_n, one.entrainment_m_s, one.temperature_k or 0.0)
+    )
     groups = np.array_split(np.array(times), min(MOST, len(times)))
     x = tuple(float(group.mean()) for group in groups)
     places = _places(points_of(observations))
@@ -94,18 +103,13 @@ def series_of(observations: Sequence[Observation]) -> Series:
     return Series(x, places, tuple(sounds))
 
 
-def _conditions(point: Point) -> Field:
-    """Logarithms of load and speed, and temperature; those that differ by 1 are as far apart as `ALIKE`."""
-    return np.array([math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0])
-
-
 def _places(points: Sequence[Point]) -> tuple[Point, ...]:
     """Operating points, in order, those left out that lie near one that is there: each is emulated by itself."""
     near = ALIKE
     while True:
         places: list[Point] = []
         for point in points:
-            if all(np.any(np.abs(_conditions(point) - _conditions(one)) > near) for one in places):
+            if all(np.any(np.abs(conditions(point) - conditions(one)) > near) for one in places):
                 places.append(point)
         if len(places) <= MOST_PLACES:
             return tuple(Point(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places)
@@ -114,7 +118,7 @@ def _places(points: Sequence[Point]) -> tuple[Point, ...]:
 
 def _nearest(point: Point, places: Sequence[Point]) -> tuple[int, tuple[float, float, float]]:
     """Which place an operating point is taken for, and by how much it is another."""
-    asides = [_conditions(point) - _conditions(one) for one in places]
+    asides = [conditions(point) - conditions(one) for one in places]
     place = int(np.argmin([np.sum((aside / ALIKE) ** 2) for aside in asides]))
     load, speed, temperature = (float(value) for value in asides[place])
     return place, (load, speed, temperature)
