@@ -80,15 +80,15 @@ def lacking_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
     """Standard deviations (recordings, 4) that a structure brings which the splines of its transfer do not follow.
 
     What fits leave where a line lies shows how far the model is off there. What it took up instead is taken to be as
-    large, and of one sign over less than a spline's spacing, as what is slower is followed.
+    large, and the less alike the further apart, up to a spline's spacing, as what is slower is followed.
     """
-    passed = joint.parameters.transfer
     relative, _ = shares_of(blocks, joint)
     line = relative[:, 0] ** 2
     square = np.maximum(line @ witnesses.lacking / np.maximum(line.sum(axis=1), TINY), 0.0)
-    part = np.floor((blocks.centre - blocks.centre[0]) / passed.spacing_hz).astype(int)
-    together = np.eye(part[-1] + 1)[part]
-    return np.asarray(np.sqrt(square)[:, None] * np.linalg.norm(_influence(blocks, relative) @ together, axis=2))
+    apart = np.abs(blocks.centre[:, None] - blocks.centre) / joint.parameters.transfer.spacing_hz
+    influence = _influence(blocks, relative)
+    felt = np.sum(influence @ np.maximum(1.0 - apart, 0.0) * influence, axis=2)
+    return np.asarray(np.sqrt(square[:, None] * np.maximum(felt, 0.0)))
 
 
 def brought_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
