@@ -11,7 +11,7 @@ import x3pio
 
 from asperity.page.knobs import knobs_of
 from asperity.page.opening import paper
-from support.browser import Visit, chromium, click_mark, require_operable, serving
+from support.browser import Visit, chromium, click_mark, expect, require_operable, serving
 
 uploads = pytest.importorskip("asperity.page.uploads", reason="the extra page is not installed")
 
@@ -80,11 +80,19 @@ def tile(page, name="CLR"):
     return page.locator("dl div", has_text=name).locator("dd").first
 
 
-def changed(page, text):
-    """Wait until the tile of the load share says something else."""
-    from playwright.sync_api import expect
+def changed(page, text, name="CLR"):
+    """Wait until a tile says something else."""
+    expect(tile(page, name)).not_to_have_text(text, use_inner_text=True)
 
-    expect(tile(page)).not_to_have_text(text, use_inner_text=True)
+
+def holds(page, text):
+    """Wait until the tile of the load share says this."""
+    expect(tile(page)).to_have_text(text, use_inner_text=True)
+
+
+def reads(page, name, text):
+    """Wait until a knob's box has this value."""
+    expect(page.get_by_role("textbox", name=name)).to_have_value(text)
 
 
 def film(page):
@@ -94,11 +102,6 @@ def film(page):
         " if (m.type === 'ColumnDataSource' && m.data.image?.[0]?.dtype === 'float32')"
         " return Array.from(m.data.image[0]).slice(0, 4000) }"
     )
-
-
-def opacity(page):
-    """How opaque the film map is shown."""
-    return page.locator(".block.film").evaluate("element => getComputedStyle(element).opacity")
 
 
 def turn(page, name, text):
@@ -115,15 +118,15 @@ def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
     turn(page, "Load, F", "800 N")
     page.wait_for_function("() => location.search.includes('contact.load=800')")
     changed(page, clr)
-    assert tile(page, "CRF").inner_text() != crf
+    changed(page, crf, "CRF")
     assert film(page) != map_before
     assert page.evaluate("() => Math.max(...window.tops) - Math.min(...window.tops)") < 4  # nothing jumps on the way
     again = tile(page).inner_text()
     page.reload()
     page.get_by_text("Solved on").wait_for()
     page.wait_for_function("() => location.search.includes('contact.load=800')")
-    assert tile(page).inner_text() == again
-    assert page.get_by_role("textbox", name="Load, F").input_value() == "800 N"
+    holds(page, again)
+    reads(page, "Load, F", "800 N")
 
 
 def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
@@ -136,8 +139,8 @@ def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
     page.get_by_role("slider", name="Load, F").focus()
     page.keyboard.press("ArrowRight")
     page.wait_for_function("() => location.search.includes('contact.load=530')")
-    assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "530 N"
-    assert page.get_by_role("textbox", name="Load, F").input_value() == "530 N"
+    expect(page.get_by_role("slider", name="Load, F")).to_have_attribute("aria-valuetext", "530 N")
+    reads(page, "Load, F", "530 N")
 
 
 def test_every_control_is_named_and_reached_by_the_keyboard(visit):
@@ -154,10 +157,10 @@ def test_a_wrong_value_is_named_beside_its_knob(visit):
     sentence.wait_for()
     below, above = sentence.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
-    assert opacity(page) != "1"
+    expect(page.locator(".block.film")).not_to_have_css("opacity", "1")
     turn(page, "Composite roughness, Sq", "1 um")
     sentence.wait_for(state="hidden")
-    assert opacity(page) == "1"
+    expect(page.locator(".block.film")).to_have_css("opacity", "1")
 
 
 def test_a_pinned_contact_is_compared_with(visit):
@@ -165,7 +168,7 @@ def test_a_pinned_contact_is_compared_with(visit):
     page.get_by_role("button", name="Pin to compare").click()
     turn(page, "Entrainment speed, u", "3 m/s")
     page.wait_for_function("() => location.search.includes('entrainment')")
-    assert re.search(r"[−-][\d.]+ % against pinned", tile(page).inner_text())
+    expect(tile(page)).to_have_text(re.compile(r"[−-][\d.]+ % against pinned"))
     page.get_by_role("button", name="Unpin").click()
     page.get_by_text("against pinned").first.wait_for(state="hidden")
 
@@ -179,8 +182,8 @@ def test_a_setting_that_was_tried_is_clicked_back(visit):
     page.get_by_text(re.compile("^Solved on")).wait_for()
     click_mark(page, "Load share over roughness", 0)
     page.wait_for_function("() => !location.search.includes('entrainment')")
-    assert page.get_by_role("textbox", name="Entrainment speed, u").input_value() == speed
-    assert tile(page).inner_text() == first
+    reads(page, "Entrainment speed, u", speed)
+    holds(page, first)
 
 
 def test_case_file_and_lines_are_taken_away(visit):
@@ -201,7 +204,7 @@ def test_a_dropped_surface_is_solved(visit, ring):
     page.get_by_text("Measured surface ring.x3p").wait_for()
     page.wait_for_function("() => location.search.includes('dropped=ring.x3p')")
     changed(page, clr)
-    assert page.get_by_role("textbox", name="Composite roughness, Sq").count() == 0
+    expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_count(0)
     clr = tile(page).inner_text()
     turn(page, "Load, F", "700 N")
     page.wait_for_function("() => location.search.includes('contact.load=700')")
@@ -210,7 +213,7 @@ def test_a_dropped_surface_is_solved(visit, ring):
     page.close()
     visit.page = visit.context.new_page()
     page = visit.solved(link.removeprefix(visit.server.url))  # as long as the server runs
-    assert tile(page).inner_text() == clr
+    holds(page, clr)
     assert page.get_by_text("dropped surface").count() == 0
 
 
@@ -229,7 +232,7 @@ def test_a_damaged_file_is_refused_in_a_sentence(visit, ring, tmp_path):
     (tmp_path / "cut.x3p").write_bytes(ring.read_bytes()[:3000])
     page.locator("input[type=file]").set_input_files(tmp_path / "cut.x3p")
     page.get_by_text(re.compile(r"cut\.x3p .*\.$")).wait_for()
-    assert tile(page).inner_text() == clr
+    holds(page, clr)
 
 
 def test_a_files_name_is_a_name_and_nothing_more(visit, server):
@@ -247,7 +250,7 @@ def test_an_address_is_values_and_nothing_more(visit, server):
         page = visit.go(f"contact?{query}")
         page.get_by_text(re.compile("^(The link|Of the link) ")).wait_for()
         assert page.evaluate("() => window.pwned") is None
-        assert page.get_by_role("textbox", name="Load, F").input_value() == "500 N"
+        reads(page, "Load, F", "500 N")
         assert page.get_by_text("root:").count() == 0
     assert not (server.log.parent / "pwned").exists()
 

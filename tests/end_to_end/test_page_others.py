@@ -11,7 +11,7 @@ from asperity.cli import main
 from asperity.history import run_history
 from asperity.paper import papers_case
 from asperity.study import plan_study, run_study
-from support.browser import Visit, chromium, click_mark, require_operable, serving
+from support.browser import Visit, chromium, click_mark, expect, require_operable, serving
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
@@ -55,12 +55,11 @@ def test_dropped_recordings_show_their_resonance_or_why_not(browser, tmp_path, r
         page.get_by_text(re.compile("contact resonance found in 7 of 8 recordings")).wait_for()
         require_operable(page)
         page.get_by_label("Recording", exact=True).select_option(index=1)
-        page.wait_for_function("() => true")
-        assert page.locator("table tbody tr").count() == 8
+        expect(page.locator("table tbody tr")).to_have_count(8)
         (tmp_path / "cut.h5").write_bytes(next(rig.glob("*.h5")).read_bytes()[:5000])
         page.locator("input[type=file]").set_input_files(tmp_path / "cut.h5")
         page.get_by_text("9 recordings read").wait_for()
-        assert "cut.h5" in page.locator("table tbody tr").last.inner_text()
+        expect(page.locator("table tbody tr").last).to_contain_text("cut.h5")
         visit.close()
 
 
@@ -96,8 +95,8 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page.get_by_role("link", name="Turn its knobs").click()
         page.wait_for_url(re.compile("/contact[?]"))
         page.get_by_text("Solved on 32 × 24 cells").wait_for()
-        assert page.get_by_role("textbox", name="Composite roughness, Sq").input_value() == "1.5 um"
-        assert page.locator("dl div", has_text="CLR").locator("dd").first.inner_text() == clr
+        expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_value("1.5 um")
+        expect(page.locator("dl div", has_text="CLR").locator("dd").first).to_have_text(clr, use_inner_text=True)
         visit.close()
 
 

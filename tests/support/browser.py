@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+PATIENCE_MS = 60_000
 REQUIRED = "ASPERITY_CHROMIUM"  # where it is set, as in CI, a browser that is not there fails the tests
 
 
@@ -82,6 +83,14 @@ def chromium():
         browser.close()
 
 
+def expect(locator):
+    """Playwright's expectation, which waits as long as a visit does: what is shown comes part by part."""
+    from playwright.sync_api import expect as expected
+
+    expected.set_options(timeout=PATIENCE_MS)
+    return expected(locator)
+
+
 class Visit:
     """A page in the browser, what it asked others for, and what went wrong in it."""
 
@@ -90,7 +99,7 @@ class Visit:
         self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 1000}, **settings})
         self.context.route(re.compile(".*"), self._let_through)
         self.page = self.context.new_page()
-        self.page.set_default_timeout(60_000)
+        self.page.set_default_timeout(PATIENCE_MS)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._heard)
         self.page.on("websocket", self._socket)

@@ -10,6 +10,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from asperity.errors import BadInput
 from asperity.inference import (
+    Follower,
     Forward,
     Listened,
     Observation,
@@ -66,6 +67,13 @@ def heard_along(setting, emulator, shares, *, seed=0, std=2e-3):
         for time, crf, zeta in zip(x, hertz, damping, strict=True)
     ]
     return heard, clr
+
+
+def test_a_kept_forecast_knows_how_many_contacts_its_emulator_had(setting, emulator):
+    asked = Follower(setting, emulator, Limit("clr", 0.5))
+    extended = Follower(setting, replace(emulator, points=emulator.points + 8), Limit("clr", 0.5))
+    assert asked.question != extended.question
+    assert asked.question == Follower(setting, emulator, Limit("clr", 0.5)).question
 
 
 # The filter ----------------------------------------------------------------------------------------------------------

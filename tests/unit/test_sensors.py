@@ -115,3 +115,21 @@ def test_who_may_stand_alone_does_not_hang_on_the_order_of_sensors(order):
     found, names = together._by_one(0, nothing, ["b", "c"], 1.0)
     assert found.found
     assert names == ("b",)
+
+
+def test_heights_stay_those_of_one_sensor_whoever_is_named_first_later():
+    sensors = two_sensors(1, heights=(0.7, 0.1))
+    first, shared = learn_sensors(sensors, band_hz=BAND)
+    turned = shared.lines(dict(reversed(sensors.items())))
+    heights = [[one.crfa for one in told.resonances] for told in (first, turned)]
+    assert np.all(np.isfinite(heights))
+    assert heights[1] == pytest.approx(heights[0], rel=0.1)
+    assert turned.heard_on[0] == first.heard_on[0]
+
+
+def test_a_line_that_the_first_sensor_does_not_hear_has_no_height():
+    two, other = two_sensors(100, size=0.3), two_sensors(5, heights=(0.0, 0.0))
+    told = resonances_of_sensors({"deaf": other["a"], **two}, band_hz=BAND)
+    found = [one for one, names in zip(told.resonances, told.heard_on, strict=True) if "deaf" not in names and names]
+    assert found
+    assert all(np.isnan(one.crfa) and np.isnan(one.crfa_std) for one in found)

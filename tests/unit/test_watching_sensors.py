@@ -230,11 +230,25 @@ def test_what_has_no_time_stands_where_the_one_before_does():
             Heard("a0", "a", START, 60.0),
             Heard("cut", "", None, np.nan),
             Heard("a1", "a", START + hour, 60.0),
-            Heard("b0", "b", START + timedelta(seconds=59), 60.0),
-            Heard("b1", "b", START + hour + timedelta(seconds=61), 60.0),
+            Heard("b0", "b", START + timedelta(seconds=29), 60.0),
+            Heard("b1", "b", START + hour + timedelta(seconds=31), 60.0),
         ]
     )
     assert [(one.x, one.number) for one in laid[:4]] == [(0.0, 0), (0.0, 0), (1.0, 1), (0.0, 0)]
-    assert laid[4].x == pytest.approx(1.0 + 61.0 / 3600.0)
+    assert laid[4].x == pytest.approx(1.0 + 31.0 / 3600.0)
     assert laid[1] not in (laid[0], laid[3])  # it stands alone
     assert laid[0] == laid[3]
+
+
+def test_recordings_end_to_end_are_laid_beside_those_made_at_the_time():
+    begin = [START + timedelta(seconds=10 * number) for number in range(8)]
+    a = [Heard(f"a{number}", "a", time, 10.0) for number, time in enumerate(begin)]
+    b = [Heard(f"b{number}", "b", time - timedelta(milliseconds=1), 10.0) for number, time in enumerate(begin)][1:]
+    laid = by_time([*a, *b])
+    assert [one.number for one in laid[:8]] == list(range(8))
+    assert [one.number for one in laid[8:]] == list(range(1, 8))
+
+
+def test_what_begins_at_one_time_is_one_however_long_it_is():
+    laid = by_time([Heard("a", "a", START, np.nan), Heard("b", "b", START, np.nan)])
+    assert laid[0] == laid[1]

@@ -67,7 +67,8 @@ class Follower:
     def question(self) -> str:
         """By which an answer that is kept is known again."""
         worn = "" if self.worn is None else f", {self.worn.hours:g} h of wear from {self.worn.folder}"
-        return f"{self.limit.key}={self.limit.value:g} by {self.emulator.folder}, seed {self.seed}{worn}"
+        emulator = f"{self.emulator.folder}, {self.emulator.points} contacts"  # of which there are more when extended
+        return f"{self.limit.key}={self.limit.value:g} by {emulator}, seed {self.seed}{worn}"
 
     def __call__(self, rows: Sequence[Mapping[str, Any]], x_name: str, *, comparable: bool) -> Foreseen:
         """When the limit is crossed; why that is not told, where it cannot be."""

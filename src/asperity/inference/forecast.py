@@ -27,7 +27,7 @@ from asperity.tracking import Bands
 ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
 FEWEST, ROUGH = 20.0, 60.0  # draws that any model is worth, at least; fewer than the second are told
 HORIZON, STEPS = 2.0, 80  # how far, over the span of the series; in so many steps
-ODDS = 100.0  # of a change over none, from which on it is told: chance gets there once in a hundred series, at most
+ODDS = 100.0  # of a change over none, from which on it is told: by chance once in a hundred series that are as modelled
 ENDS = (0.05, 0.5, 0.95)
 WORSE_ABOVE = (CLR, "sq_m")  # what may fall as far as it likes: running in is no alarm
 

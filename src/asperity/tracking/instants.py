@@ -36,7 +36,7 @@ class Stand(NamedTuple):
 
 
 def by_time(recordings: Sequence[Heard]) -> list[Stand]:
-    """Where each stands: what overlaps in time on different sensors is one.
+    """Where each stands: what overlaps on different sensors by half of the shorter, or begins at one time, is one.
 
     Who has no time, as nothing could be read of it, stands alone at the place of the one before.
     """
@@ -45,9 +45,11 @@ def by_time(recordings: Sequence[Heard]) -> list[Stand]:
     taken: set[str] = set()
     number, began, until = -1, datetime.min, datetime.min
     for time, place, one in timed:
-        if number < 0 or time >= until or one.sensor in taken:
-            began, taken, number = time, set(), number + 1
-            until = time + timedelta(seconds=one.duration_s if isfinite(one.duration_s) else 0.0)
+        end = time + timedelta(seconds=one.duration_s if isfinite(one.duration_s) else 0.0)
+        both, shorter = min(until, end) - time, min(until - began, end - time)
+        together = time == began or (time < until and 2 * both >= shorter)
+        if not together or one.sensor in taken:
+            began, until, taken, number = time, end, set(), number + 1
         taken.add(one.sensor)
         stands[place] = Stand((began - timed[0][0]).total_seconds() / 3600.0, number)
     before = Stand(0.0, -1)

@@ -152,11 +152,14 @@ class SharedBySensors:
     def lines(self, spectra: SpectraBySensor, kept: MasksBySensor | None = None) -> SensorLines:
         """The contact resonance in each of further recordings, as `resonances_of_sensors` finds it.
 
+        Its height is that on the first sensor of those that settled this, whichever is named first now.
+
         Raises
         ------
         BadInput
             for spectra on other lines, or without any vibration.
         """
+        spectra = {name: spectra[name] for name in dict.fromkeys((*self.by_sensor, *spectra)) if name in spectra}
         there = [name for name, rows in _rows(spectra, self.band_hz).items() if rows and name in self.by_sensor]
         by_sensor = {
             name: separated_beside(self.by_sensor[name], *_used(spectra, kept, name, self.band_hz)) for name in there
@@ -359,7 +362,8 @@ class _Together:
             evidence=evidence,
             background=(first.blocks.centre, np.exp(fit.lines.own[0, place, 3] + first.at.base)),
         )
-        if fit.names[0] != next(iter(self.alone)):
+        lead = next(iter(self.alone))
+        if fit.names[0] != lead or lead not in names:
             resonance = replace(resonance, crfa=np.nan, crfa_std=np.nan)
         return resonance, tuple(names)
 
