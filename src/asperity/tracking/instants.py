@@ -43,15 +43,16 @@ def by_time(recordings: Sequence[Heard]) -> list[Stand]:
     timed = sorted((one.time, place, one) for place, one in enumerate(recordings) if one.time is not None)
     stands: dict[int, Stand] = {}
     taken: set[str] = set()
-    number, began, until = -1, datetime.min, datetime.min
+    first = began = until = timed[0][0] if timed else datetime.min
+    number = -1
     for time, place, one in timed:
         end = time + timedelta(seconds=one.duration_s if isfinite(one.duration_s) else 0.0)
         both, shorter = min(until, end) - time, min(until - began, end - time)
         together = time == began or (time < until and 2 * both >= shorter)
-        if not together or one.sensor in taken:
+        if number < 0 or not together or one.sensor in taken:
             began, until, taken, number = time, end, set(), number + 1
         taken.add(one.sensor)
-        stands[place] = Stand((began - timed[0][0]).total_seconds() / 3600.0, number)
+        stands[place] = Stand((began - first).total_seconds() / 3600.0, number)
     before = Stand(0.0, -1)
     for place in range(len(recordings)):
         before = stands.setdefault(place, before._replace(alone=place + 1))
