@@ -265,12 +265,20 @@ def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
     )
 
 
-def test_a_store_of_the_last_version_goes_on(asp):
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_store_of_an_older_version_goes_on(asp, version):
     snapshots("in", failing())
     asp("watch", "in", *ONCE, "--store", "plant.db")
     with closing(sqlite3.connect("plant.db")) as connection:
-        connection.execute("ALTER TABLE recording DROP COLUMN duration")  # as 0.2.0 left it
-        connection.execute("PRAGMA user_version = 1")
+        if version == 1:  # as 0.2.0 left it
+            connection.execute("ALTER TABLE recording DROP COLUMN duration")
+        connection.execute("DROP TABLE learned")
+        connection.execute("ALTER TABLE sensor ADD COLUMN learned BLOB")
+        connection.execute("UPDATE sensor SET learned = x'0102'")
+        connection.execute(f"PRAGMA user_version = {version}")
+        connection.commit()
+    with closing(Store("plant.db")):
+        assert asked("plant.db", "SELECT body FROM learned") == [(b"\x01\x02",)]
     snapshots("in", [20.0], first=36)
     assert asp("watch", "in", *ONCE, "--store", "plant.db")[0] == 3
     durations = asked("plant.db", "SELECT duration FROM recording")

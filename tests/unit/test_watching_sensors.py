@@ -101,6 +101,18 @@ def test_files_of_sensors_are_laid_beside_one_another_as_they_arrive(machine, tm
     assert held(tmp_path, PER_SENSOR) == [("a", 9), ("b", 9)]
 
 
+def test_who_led_leads_on_though_another_has_more_recordings_later(machine, tmp_path):
+    """Rows that were given have its heights."""
+    arrive(machine, tmp_path / "in", *(f"{name}{number}" for number in range(7) for name in "ab"))
+    looks = looking(tmp_path)
+    assert [one.reading.sensor for one in next(looks).track.recordings] == ["a"] * 7
+    arrive(machine, tmp_path / "in", "b7", "b8")
+    assert [one.reading.sensor for one in next(looks).track.recordings] == [*"aaaaaaa", "b", "b"]
+    looks.close()
+    again = next(looking(tmp_path)).track  # from the store
+    assert [one.reading.sensor for one in again.recordings] == [*"aaaaaaa", "b", "b"]
+
+
 def test_a_recording_that_cannot_be_laid_beside_others_waits_and_is_told(machine, tmp_path):
     arrive(machine, tmp_path / "in", "a0", "b0", "a1", "b1")
     (tmp_path / "in" / "b1.npz.toml").write_text('sensor = "b"\n')  # no word of when
@@ -207,7 +219,7 @@ def test_further_recordings_are_judged_beside_what_the_series_has_shown(machine,
 def test_what_was_learned_of_sensors_is_kept_whole(machine, tmp_path):
     arrive(machine, tmp_path / "in", *"01234567")
     next(looking(tmp_path, channel="a,b", once=True))
-    ((body,), _) = held(tmp_path, "SELECT learned FROM sensor ORDER BY id")
+    ((body,),) = held(tmp_path, "SELECT body FROM learned")
     back = learned_from(body, 3)
     assert (back.since, [*back.shared.by_sensor]) == (3, ["a", "b"])
     assert back.shared.agreement.established == ("a", "b")

@@ -123,8 +123,9 @@ def in_their_places(
     if x_name and places is not None:
         return {file: places[file] for file in files}, x_name
     x, x_name = in_time(times, heard)
-    stated = places or {}
-    return {file: replace(stated.get(file, Place(x=at)), x=at) for file, at in zip(files, x, strict=True)}, x_name
+    if places is None:
+        return {file: Place(x=at) for file, at in zip(files, x, strict=True)}, x_name
+    return {file: replace(places.get(file, Place(x=at)), x=at) for file, at in zip(files, x, strict=True)}, x_name
 
 
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:

@@ -91,9 +91,10 @@ def heard_together(
     by_key = {(reading.file, reading.sensor): reading for reading in made}
     found = [Instant(one.place, {name: by_key[old.file, name] for name, old in one.readings.items()}) for one in found]
     usable = {name: sum(name in one.readings and one.readings[name].usable for one in found) for name in names}
-    names.sort(key=lambda name: -usable[name])  # stable: the first named of equals leads
-    found = _without_copies(names, found, refused=learned is None)
     memory = Learned() if learned is None else learned
+    led = memory.lead if usable.get(memory.lead, 0) >= FEWEST_RECORDINGS else ""
+    names.sort(key=lambda name: (name != led, -usable[name]))  # stable: of equals the first named leads
+    found = _without_copies(names, found, refused=learned is None)
     cleaned = [
         {
             name: memory.clean((reading.file, name), spectrum_of(reading), shaft_hz)

@@ -125,6 +125,11 @@ class Learned:
         return [self.together[key] for key in keys]
 
     @property
+    def lead(self) -> str:
+        """The sensor whose heights a line has, as rows that were given have them; none before sensors were learned."""
+        return next(iter(self.shared.by_sensor)) if isinstance(self.shared, SharedBySensors) else ""
+
+    @property
     def common(self) -> float:
         """The share of their errors that sensors have in common; nan of one sensor, or where too little tells."""
         shares = [*self.shared.agreement.common.values()] if isinstance(self.shared, SharedBySensors) else []

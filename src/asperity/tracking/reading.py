@@ -5,7 +5,7 @@ What the spectra mean together is left to `track`.
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from io import BytesIO
@@ -195,7 +195,7 @@ def read_channels(
 ) -> Iterator[tuple[int, Reading]]:
     """Number and result of each file on each channel that is asked for, in turn; of several each is a sensor.
 
-    Files of a channel come as they are done; in processes of their own where that is worth it.
+    Files of a channel come in their order, however long each takes; in processes of their own where that is worth it.
     """
     channels, told = channels_in(options.channel), progress or (lambda _: None)
     workers = workers if sum(_size(path) for path in paths) >= WORTH_A_POOL else 1
@@ -215,9 +215,7 @@ def _done(jobs: Sequence[tuple[Any, ...]], workers: int) -> Iterator[tuple[int, 
         return
     pool = ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), leave_interrupts_to_the_parent)
     try:
-        waiting = {pool.submit(read_spectrum, *job): number for number, job in enumerate(jobs)}
-        for done in as_completed(waiting):
-            yield waiting[done], done.result()
+        yield from enumerate(pool.map(read_spectrum, *zip(*jobs, strict=True)))
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

@@ -93,6 +93,11 @@ class Sensors:
                 return kept.state
         return None
 
+    def unjudged(self) -> set[Version]:
+        """Recordings of which nothing was said yet."""
+        silent = {key for one in self._each() for key, kept in one.recordings.items() if kept.state is None}
+        return {key for key in silent if self.state(key) is None}
+
     def series(self) -> list[Version]:
         """All recordings, of each file the last version, whether or not the file is still there."""
         every = ((kept.number, key) for one in self._each() for key, kept in one.recordings.items())
@@ -194,8 +199,11 @@ class Sensors:
         """What was learned of the series; empty at first."""
         if self._first is None:
             return Learned()
-        ((body, since),) = self.store.read("SELECT learned, since FROM sensor WHERE id = ?", self._first.number)
-        return Learned() if body is None else learned_from(body, since or 0)
+        held = self.store.read(
+            "SELECT body, since FROM learned JOIN sensor ON sensor.id = learned.sensor WHERE sensor = ?",
+            self._first.number,
+        )
+        return learned_from(held[0][0], held[0][1] or 0) if held else Learned()
 
     def judged(
         self,
@@ -250,8 +258,9 @@ class Sensors:
             if learned is not None and learned.shared is not None and self._first is not None:
                 run("UPDATE sensor SET since = ? WHERE id = ?", (learned.since, self._first.number))
                 if learned.since == 0:
-                    body = None if learned.moved else learned_bytes(learned.shared)  # of one part: all is learned anew
-                    run("UPDATE sensor SET learned = ? WHERE id = ?", (body, self._first.number))
+                    run("DELETE FROM learned WHERE sensor = ?", (self._first.number,))
+                    if not learned.moved:  # else it is of one part, and all is learned anew
+                        run("INSERT INTO learned VALUES (?, ?)", (self._first.number, learned_bytes(learned.shared)))
         self._lines = (version, lines_now)
         for every in rows:
             for _, row, sensor, key in every:

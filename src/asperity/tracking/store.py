@@ -17,16 +17,18 @@ from asperity.files import require_writable
 from asperity.wear import AlarmState
 
 STORE = "asperity.db"
-VERSION = 2  # 1 had no duration of a recording
+VERSION = 3  # 1 had no duration of a recording, 2 had what was learned of a sensor in its own row
 BUSY_S = 30.0  # another watch may be writing
 REMEDY = "delete it and its recordings are read again, or choose another store"
-SCHEMA = """
+LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, body BLOB NOT NULL)"
+SCHEMA = f"""
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
     id INTEGER PRIMARY KEY, machine INTEGER NOT NULL REFERENCES machine, name TEXT NOT NULL, UNIQUE (machine, name));
 CREATE TABLE sensor (
     id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL, settings TEXT NOT NULL,
-    asked TEXT, said TEXT, learned BLOB, since INTEGER, UNIQUE (point, name));
+    asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
+{LEARNED};
 CREATE TABLE recording (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL, version TEXT NOT NULL,
     heard TEXT NOT NULL, started TEXT, duration REAL, refused INTEGER NOT NULL, state TEXT, row TEXT,
@@ -112,8 +114,8 @@ class Store:
             self._connection.execute("PRAGMA foreign_keys = ON")
             if version == 0:
                 self._begin()
-            elif version == 1:
-                self._with_durations()
+            elif version in (1, 2):
+                self._from_before()
             elif version != VERSION:
                 raise UnreadableFile(
                     f"{self.path} is a store of version {version}, and this asperity writes {VERSION}; "
@@ -134,13 +136,18 @@ class Store:
                 run(statement)
             run(f"PRAGMA user_version = {VERSION}")
 
-    def _with_durations(self) -> None:
-        """Make a store of version 1 one of version 2."""
+    def _from_before(self) -> None:
+        """Make a store of an older version one of this."""
         with self.transaction() as run:
-            if run("PRAGMA user_version").fetchone()[0] == 1:  # no other watch was faster
+            if run("PRAGMA user_version").fetchone()[0] == 1:
                 run("ALTER TABLE recording ADD COLUMN duration REAL")
                 run("UPDATE recording SET duration = json_extract(row, '$.duration_s')")
                 run("PRAGMA user_version = 2")
+            if run("PRAGMA user_version").fetchone()[0] == 2:  # no other watch was faster
+                run(LEARNED)
+                run("INSERT INTO learned SELECT id, learned FROM sensor WHERE learned IS NOT NULL")
+                run("UPDATE sensor SET learned = NULL")  # the column stays: not every SQLite drops one
+                run("PRAGMA user_version = 3")
 
     @contextmanager
     def _understood(self) -> Iterator[None]:

@@ -323,8 +323,9 @@ class _Memory:
             return None
         if acknowledge is not None:
             self.sensors.acknowledge(_named(acknowledge, order.keys))
-        unjudged = (number for number, keys in enumerate(order.instants) if not any(map(self.sensors.state, keys)))
-        first = max(next(unjudged, count) + STRIDE, longest())
+        unjudged = self.sensors.unjudged()
+        begins = (number for number, keys in enumerate(order.instants) if unjudged.issuperset(keys))
+        first = max(next(begins, count) + STRIDE, longest())
         for end in range(first, count, STRIDE):
             self._judged(judging, order, end, 0, "", again=again, who=())
         answers = question if self.ahead.foreteller is None else ""  # not answered before its forecast is made

@@ -206,30 +206,37 @@ def _before(values: Field, first: float = 0.0) -> Field:
 
 
 def _products(columns: Field, y: Field) -> Field:
-    """Of each column with each and with y, at a place and across to the one before; (bends, 2 places, pairs)."""
-    whole = np.concatenate([columns, np.broadcast_to(y[:, None], (*columns.shape[:2], 1))], axis=-1)
-    behind = _before(np.swapaxes(whole, 1, 2)).swapaxes(1, 2)
-    one, other = np.triu_indices(whole.shape[-1])
-    across = whole[..., one] * behind[..., other] + whole[..., other] * behind[..., one]
-    return np.concatenate([whole[..., one] * whole[..., other], across], axis=1)
+    """Of each column with each and with y, at a place and across to the one before; (bends, pairs, 2 places)."""
+    bends, places, size = columns.shape
+    whole = np.concatenate([np.moveaxis(columns, 2, 0), np.broadcast_to(y, (1, bends, places))])
+    behind = _before(whole)
+    pairs = [*zip(*np.triu_indices(size + 1), strict=True)]
+    products = np.empty((bends, len(pairs), 2 * places))
+    for number, (one, other) in enumerate(pairs):
+        np.multiply(whole[one], whole[other], out=products[:, number, :places])
+        products[:, number, places:] = whole[one] * behind[other] + whole[other] * behind[one]
+    return products
 
 
 def _least_squares(precision: _Precision, products: Field, size: int) -> tuple[Field, Field, Field]:
-    """What `size` columns fit best (bends, scatters, linear), the squares left, ln det of their information."""
-    found = np.concatenate([precision.own, precision.next], axis=-1) @ products
-    one, other = np.triu_indices(size + 1)
-    whole = np.empty((*found.shape[:2], size + 1, size + 1))
-    whole[..., one, other] = whole[..., other, one] = found
-    right = whole[..., :-1, -1]
-    linear, determinant = _solved(whole[..., :-1, :-1], right)
-    return linear, whole[..., -1, -1] - np.sum(linear * right, axis=-1), determinant
+    """What `size` columns fit best (bends, scatters, linear), the squares left, ln det of their information.
 
-
-def _solved(information: Field, right: Field) -> tuple[Field, Field]:
-    """What solves the normal equations (bends, scatters, linear), and ln of their determinant."""
-    ridge = 1e-12 * np.einsum("bsii->bs", information)[..., None, None] * np.eye(information.shape[-1])
-    linear = np.linalg.solve(information + ridge, right[..., None])[..., 0]
-    return linear, np.linalg.slogdet(information + ridge)[1]
+    By elimination in all normal equations together, y's row the last: LAPACK takes thousands of so small ones in turn.
+    """
+    found = products @ np.swapaxes(np.concatenate([precision.own, precision.next], axis=-1), -1, -2)
+    rows = np.empty((size + 1, size + 1, found.shape[0], found.shape[2]))
+    for number, (one, other) in enumerate(zip(*np.triu_indices(size + 1), strict=True)):
+        rows[one, other] = rows[other, one] = found[:, number]
+    diagonal = np.arange(size)
+    rows[diagonal, diagonal] += 1e-12 * np.sum(rows[diagonal, diagonal], axis=0)
+    for i in range(size):
+        for j in range(i + 1, size + 1):
+            rows[j, i + 1 :] -= rows[j, i] / rows[i, i] * rows[i, i + 1 :]
+    linear = np.empty((*rows.shape[2:], size))
+    for i in reversed(range(size)):
+        known = sum((rows[i, j] * linear[..., j] for j in range(i + 1, size)), start=np.zeros(rows.shape[2:]))
+        linear[..., i] = (rows[i, size] - known) / rows[i, i]
+    return linear, rows[size, size], np.sum(np.log(rows[diagonal, diagonal]), axis=0)
 
 
 def sudden_bend(x: Field, crfa: Field, x_std: Field, breaks: Field) -> Field:
