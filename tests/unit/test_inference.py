@@ -39,7 +39,6 @@ from asperity.inference.likelihood import (
     SIZES,
     log_likelihood,
 )
-from asperity.inference.next_point import _information
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.process import Process, fit_process
 from asperity.inference.sampling import Pool, importance, nested
@@ -192,13 +191,6 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
     assert bits(rng.standard_normal(300), prior, 300.0) < 0.03
     against = estimate(2.0 + 0.2 * rng.standard_normal(4000), prior, 4000.0, bounded=True)
     assert (against.against, estimate(prior, prior, 4000.0, bounded=True).against) == ("high", "")
-
-
-def test_expected_information_is_that_of_a_normal_channel():
-    rng = np.random.default_rng(4)
-    mean = 0.7 * rng.standard_normal(1500)
-    told = _information([(mean, np.full(1500, 0.2))], rng)
-    assert told == pytest.approx(0.5 * np.log2(1.0 + (0.7 / 0.2) ** 2), abs=0.08)
 
 
 # Laws ----------------------------------------------------------------------------------------------------------------

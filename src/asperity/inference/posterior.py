@@ -59,6 +59,11 @@ class Draws:
     states: Mapping[str, Field]
     effective: float
 
+    def taken(self, rows: Any) -> "Draws":
+        """Some of them."""
+        sizes, states = ({key: one[rows] for key, one in whole.items()} for whole in (self.sizes, self.states))
+        return replace(self, z=self.z[rows], law=self.law[rows], sizes=sizes, states=states)
+
 
 def sample_models(
     forward: Forward, pools: Mapping[Law, Pool], *, sampler: Sampler, seed: int, quickly: bool = False
