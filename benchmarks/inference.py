@@ -205,6 +205,7 @@ def recordings(setting: Setting, machine: Machine) -> list[Observation]:
     return [
         Observation(
             load_n=load, entrainment_m_s=speed, crf_hz=one.crf_hz, crf_std_hz=one.crf_std,
+            crf_shared_std_hz=one.crf_shared_std,
             crfa=one.crfa if one.crfa_std > 0.0 else np.nan, crfa_std=one.crfa_std if one.crfa_std > 0.0 else np.nan,
             damping_ratio=one.damping_ratio, damping_std=one.damping_ratio_std,
         )

@@ -1,13 +1,13 @@
 """Whether the advised next operating point teaches more than twenty drawn at random, of machines heard at one.
 
-Machines have unknowns from the case's priors and show what the emulator says, off by a draw of its deviation. What a
-point teaches is how far the posterior's entropy falls by what is heard there: once, and in the mean over ten times.
+Machines have unknowns from the case's priors and show what the emulator says, off by draws of its deviation that go
+together at points as the likelihood has them: those at the first point stay, the others are drawn anew each time. What
+a point teaches is how far the posterior's entropy falls by what is heard there: once, and in the mean over ten times.
+Rows are kept in docs/benchmarks/next-points-machines.csv and gone on from.
 """
 
 import argparse
-import csv
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -18,10 +18,8 @@ from threadpoolctl import threadpool_limits
 from asperity.arrays import Field
 from asperity.case import load_case
 from asperity.inference import (
-    LAWS,
     Emulator,
     Forward,
-    Inference,
     Observation,
     Point,
     Setting,
@@ -29,11 +27,15 @@ from asperity.inference import (
     infer_observations,
     setting_of,
 )
-from asperity.inference.next_point import USUAL_DAMPING_STD, USUAL_STD
+from asperity.inference.likelihood import emulated_errors
+from asperity.inference.next_point import USUAL, WouldShow, would_show
+from asperity.inference.observations import likeness
 from benchmarks.inference import CASE, KEPT, LEAST_SHARE, LEFT_S, share
+from benchmarks.rows import FOLDER, Rows
 
 MACHINES, FEW, RANDOM, TIMES, SEED = 100, 8, 20, 10, 9
 FIRST = (500.0, 0.8)  # where each was heard
+ROWS = FOLDER / "next-points-machines.csv"
 
 
 def main() -> None:
@@ -44,31 +46,25 @@ def main() -> None:
     wanted = arguments.parse_args()
     with threadpool_limits(1):
         judge_all(wanted.machines, wanted.kept)
-    print("\n".join(tables(wanted.kept)))
+    print("\n".join(tables()))
 
 
 def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
     """What `python -m benchmarks next_points` prints: as many machines as there is time for."""
     judge_all(FEW if fast else MACHINES, KEPT, end=perf_counter() + seconds - LEFT_S)
-    yield from tables(KEPT)
+    yield from tables()
 
 
 def judge_all(machines: int, kept: Path, *, end: float = float("inf")) -> None:
     """A row for each machine, as it is done."""
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
-    path = kept / "next.csv"
-    done = {int(row["machine"]) for row in csv.DictReader(path.open())} if path.exists() else set()
+    rows = Rows(ROWS, ("machine",))
     for number in range(machines):
         if perf_counter() > end:
             return
-        if number not in done:
-            row = judged(setting, emulator, number)
-            with path.open("a", newline="") as file:
-                writer = csv.DictWriter(file, list(row))
-                if file.tell() == 0:
-                    writer.writeheader()
-                writer.writerow(row)
+        if (number,) not in rows:
+            rows.write([judged(setting, emulator, number)])
 
 
 def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
@@ -78,14 +74,15 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     z = rng.standard_normal((1, first.dims))
     while first.states(z, ["clr"])["clr"][0, 0] < 0.05:
         z = rng.standard_normal((1, first.dims))
-    crf, damping = (float(np.exp(values[0, 0])) for values in _heard(first, z, rng))
+    own, usual = rng.standard_normal(1), [USUAL[key] for key in ("crf", "damping")]
+    crf, damping = np.exp(_heard(first, z, own, rng)[:, 0])
     found = infer_observations(
         setting,
         emulator,
         [
             Observation(
-                load_n=FIRST[0], entrainment_m_s=FIRST[1], crf_hz=crf, crf_std_hz=USUAL_STD * crf,
-                damping_ratio=damping, damping_std=USUAL_DAMPING_STD * damping,
+                load_n=FIRST[0], entrainment_m_s=FIRST[1], crf_hz=crf, crf_std_hz=usual[0] * crf,
+                damping_ratio=damping, damping_std=usual[1] * damping,
             )
         ],
         seed=number,
@@ -93,50 +90,45 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
     loads, speeds = (next(e for e in setting.operating if e.key.endswith(key)) for key in ("load", "speed"))
     places = [(found.next_point.load_n, found.next_point.entrainment_m_s)]
     places += [(loads.value(rng.random()), speeds.value(rng.random())) for _ in range(RANDOM)]
-    there = replace(first, points=tuple(Point(*place) for place in places))
-    bits = np.array([taught(found, there, _heard(there, z, rng)) for _ in range(TIMES)])
-    shows = there.states(z, ["clr"])["clr"][0] > LEAST_SHARE
+    points = tuple(Point(*place) for place in places)
+    shown, every = would_show(found.forward, found.draws, points), Forward(setting, emulator, (Point(*FIRST), *points))
+    bits = np.array([taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)])
+    shows = every.states(z, ["clr"])["clr"][0, 1:] > LEAST_SHARE
     once, mean = bits[0], bits.mean(axis=0)
     return {
         "machine": number, "advised_shows": int(shows[0]), "once": once[0], "once_random": once[1:].mean(),
         "mean": mean[0], "mean_random": mean[1:].mean(), "best_random": mean[1:].max(),
-        "expected": found.next_point.information_bits,
+        "expected": found.next_point.information_bits, "load_n": places[0][0], "entrainment_m_s": places[0][1],
     }  # fmt: skip
 
 
-def _heard(forward: Forward, z: Field, rng: np.random.Generator) -> tuple[Field, Field]:
-    """Logarithms of frequency and damping as the true machine shows them once, (1, points) each."""
+def _heard(forward: Forward, z: Field, own: Field, rng: np.random.Generator) -> Field:
+    """Logarithms of frequency and damping as the true machine shows them once, (2, points).
+
+    `own` is the chance that its emulator's error at the first point has, which is the same each time.
+    """
     shown = forward.shown(z, "hertz-point", heights=False)
-    size = shown.crf.shape
-    crf = shown.crf + np.hypot(shown.crf_std, USUAL_STD) * rng.standard_normal(size)
-    return crf, shown.damping + USUAL_DAMPING_STD * rng.standard_normal(size)
+    lower = np.linalg.cholesky(emulated_errors("crf", shown.crf_std, likeness(forward.points))[0])
+    errors = lower @ np.concatenate([own, rng.standard_normal(len(lower) - 1)])
+    measured = rng.standard_normal((2, len(lower))) * [[USUAL["crf"]], [USUAL["damping"]]]
+    return np.stack([shown.crf[0] + errors, shown.damping[0]]) + measured
 
 
-def taught(found: Inference, there: Forward, heard: tuple[Field, Field]) -> Field:
+def taught(shown: WouldShow, heard: Field) -> Field:
     """Bits by which the entropy of what is possible falls at each point: by the weights that what is heard gives."""
-    draws = found.draws
-    logs = np.zeros((len(draws.z), len(there.points)))
-    for number, law in enumerate(LAWS):
-        rows = draws.law == number
-        if rows.any():
-            shown = there.shown(draws.z[rows], law, heights=False)
-            of_crf, of_damping = (draws.sizes[key][rows][:, None] for key in ("crf", "damping"))
-            spreads = (
-                np.sqrt(shown.crf_std**2 + USUAL_STD**2 + of_crf**2),
-                np.sqrt(shown.damping_std**2 + USUAL_DAMPING_STD**2 + of_damping**2),
-            )
-            for value, mean, spread in zip(heard, (shown.crf, shown.damping), spreads, strict=True):
-                logs[rows] += -0.5 * ((value - mean) / spread) ** 2 - np.log(spread)
+    logs = np.asarray(sum(
+        shown.channels[key].log_density(value, USUAL[key])
+        for key, value in zip(("crf", "damping"), heard, strict=True)
+    ))  # fmt: skip
     weights = np.exp(logs - logs.max(axis=0))
     weights /= weights.sum(axis=0)
     return np.asarray(np.sum(weights * np.log2(np.maximum(weights * len(weights), 1e-300)), axis=0))
 
 
-def tables(kept: Path) -> Iterator[str]:
-    """How often the advice is the better, as Markdown."""
-    path = kept / "next.csv"
-    read = list(csv.DictReader(path.open())) if path.exists() else []
-    rows = [{key: float(value) for key, value in row.items()} for row in read]
+def tables() -> Iterator[str]:
+    """How often the advice is the better, as Markdown: of all rows that are kept."""
+    kept = Rows(ROWS, ("machine",))
+    rows = [{key: float(value) for key, value in row.items() if key != "code"} for row in kept]
     yield f"## The advised next point against {RANDOM} drawn at random, machines heard at one"
     yield f"Sample: {len(rows)} machines."
     if not rows:
@@ -148,7 +140,10 @@ def tables(kept: Path) -> Iterator[str]:
         bits = [f"{np.median([row[name] for row in rows]):.2f}" for name in (key, f"{key}_random")]
         yield f"| {name} | {len(rows)} | {better} | {bits[0]} | {bits[1]} |"
     shows = share([row["advised_shows"] == 1.0 for row in rows])
-    yield f"At the advised point a line is to be heard (CLR over {100 * LEAST_SHARE:.0f} %) in {shows} of machines."
+    yield (
+        f"At the advised point a line is to be heard (CLR over {100 * LEAST_SHARE:.0f} %) in {shows} of machines. Rows "
+        f"by the code that found them: {kept.codes()}."
+    )
 
 
 if __name__ == "__main__":

@@ -123,9 +123,9 @@ def test_a_part_ends_with_how_much_of_it_that_was_unless_it_says_so(monkeypatch,
 
 
 def test_a_part_that_had_no_time_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(forecast, "ROWS", tmp_path / "none.csv")
-    for said in (forecast.tables(), next_points.tables(tmp_path)):
-        assert any(line.startswith("Sample: 0 ") for line in said)
+    for part in (forecast, next_points):
+        monkeypatch.setattr(part, "ROWS", tmp_path / "none.csv")
+        assert any(line.startswith("Sample: 0 ") for line in part.tables())
 
 
 def test_hard_contacts_are_gone_on_with_and_kept_as_they_are_solved(tmp_path, monkeypatch):

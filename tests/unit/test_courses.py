@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from asperity.errors import BadInput
@@ -26,6 +26,7 @@ from asperity.inference.course import DRIFT_STD, KNOTS, Course, Extra, Table, be
 from asperity.inference.forecast import Limit
 from asperity.inference.likelihood import ALONG, EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, OWN, WEIGHTS
 from asperity.inference.process import Process
+from asperity.inference.sampling import RULED_OUT, Pool, importance
 from asperity.inference.visits import MOST, MOST_PLACES, series_of
 from support.emulated import formula, formula_emulator, formula_setting
 
@@ -338,3 +339,25 @@ def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(se
     json.dumps(found.scalars(), allow_nan=False)
     with pytest.raises(BadInput, match="--design must be a load share"):
         design_contact(forward, z, clr=1.2)
+
+
+def test_a_posterior_that_is_hard_to_find_is_drawn_for_longer_unless_it_is_ruled_out():
+    """A narrow ridge in six dimensions: evidence in closed form; a model far behind costs no further round."""
+    lever = np.array([1.0, -2.0, 3.0, 1.0, -1.0, 2.0])
+
+    def target(z):
+        return -0.5 * ((z @ lever - 9.0) / 0.01) ** 2 - np.log(0.01 * np.sqrt(2.0 * np.pi))
+
+    evidence = norm(0.0, np.sqrt(lever @ lever + 0.01**2)).logpdf(9.0)
+
+    def found(best=-np.inf, longest=0):
+        pool = Pool(lambda z: z, lambda a, b: np.concatenate([a, b]), lambda a, rows: a[rows], 6, 0)
+        return importance(pool, target, rounds=2, best=best, least=200.0, longest=longest), pool.drawn
+
+    short, drawn = found()
+    assert short.effective < 200.0
+    longer, more = found(longest=60)
+    assert longer.effective >= 200.0
+    assert longer.log_evidence == pytest.approx(evidence, abs=4.0 * longer.log_evidence_std)
+    assert more > drawn
+    assert found(best=evidence + RULED_OUT + 5.0, longest=60)[1] == drawn

@@ -39,7 +39,7 @@ from asperity.inference.likelihood import (
     SIZES,
     log_likelihood,
 )
-from asperity.inference.next_point import _information
+from asperity.inference.observations import points_of
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.process import Process, fit_process
 from asperity.inference.sampling import Pool, importance, nested
@@ -194,13 +194,6 @@ def test_bits_are_those_of_a_narrowed_normal_and_nothing_of_chance():
     assert (against.against, estimate(prior, prior, 4000.0, bounded=True).against) == ("high", "")
 
 
-def test_expected_information_is_that_of_a_normal_channel():
-    rng = np.random.default_rng(4)
-    mean = 0.7 * rng.standard_normal(1500)
-    told = _information([(mean, np.full(1500, 0.2))], rng)
-    assert told == pytest.approx(0.5 * np.log2(1.0 + (0.7 / 0.2) ** 2), abs=0.08)
-
-
 # Laws ----------------------------------------------------------------------------------------------------------------
 
 
@@ -337,6 +330,12 @@ def test_repeats_are_surer_together_and_no_surer_than_their_scatter(setting, emu
     assert point.crf.value == pytest.approx(np.log(one.crf_hz), abs=1e-3)
 
 
+def test_what_repeats_have_in_common_does_not_average_away():
+    one = Observation(load_n=500.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=5.0, crf_shared_std_hz=3.0)
+    for count in (1, 4, 1000):
+        assert 3000.0 * points_of([one] * count)[0].crf.std == pytest.approx(np.hypot(3.0, 4.0 / np.sqrt(count)))
+
+
 def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     """Five recordings that agree at what is as good as one place do not speak for a small error."""
     said = Heard(8.0, 2e-3)
@@ -386,9 +385,9 @@ def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
         infer_observations(setting, emulator, [replace(far, load_n=500.0, temperature_k=340.0)])
 
 
-@pytest.mark.parametrize("wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_hz": -1.0}])
+@pytest.mark.parametrize("wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_shared_std_hz": 6.0}])
 def test_an_observation_that_is_none_is_refused(wrong):
-    with pytest.raises(BadInput, match="must be positive"):
+    with pytest.raises(BadInput, match=r"must be positive|is a part of crf_std_hz, 3 Hz, got 6 Hz"):
         Observation(**{"load_n": 500.0, "entrainment_m_s": 1.0, "crf_hz": 3000.0, "crf_std_hz": 3.0, **wrong})
 
 

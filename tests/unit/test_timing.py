@@ -107,3 +107,5 @@ def test_what_a_rate_is_in_doubt_by_crf_is_too():
     )
     assert known.found
     assert doubted.crf_std == pytest.approx(np.hypot(known.crf_std, 0.01 * known.crf_hz))
+    assert doubted.crf_shared_std == pytest.approx(np.hypot(known.crf_shared_std, 0.01 * known.crf_hz))
+    assert known.crf_shared_std <= known.crf_std

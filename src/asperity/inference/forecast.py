@@ -16,9 +16,9 @@ from asperity.inference.emulator import Emulator
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law
 from asperity.inference.observations import Observation
 from asperity.inference.outputs import CLR, OUTPUTS
-from asperity.inference.posterior import RULED_OUT, joined, taken
+from asperity.inference.posterior import joined, taken
 from asperity.inference.priors import si
-from asperity.inference.sampling import Pool, Sampled, importance
+from asperity.inference.sampling import RULED_OUT, Pool, Sampled, importance
 from asperity.inference.settings import Setting
 from asperity.inference.visits import Series, series_of
 from asperity.quantities import quantity
@@ -26,6 +26,7 @@ from asperity.tracking import Bands
 
 ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
 FEWEST, ROUGH = 20.0, 60.0  # draws that any model is worth, at least; fewer than the second are told
+LONGEST = 120  # rounds of drawing, where the usual number leaves fewer
 HORIZON, STEPS = 2.0, 80  # how far, over the span of the series; in so many steps
 ODDS = 100.0  # of a change over none, from which on it is told: by chance once in a hundred series that are as modelled
 ENDS = (0.05, 0.5, 0.95)
@@ -229,7 +230,7 @@ def forecast_observations(
         course = Course(forward, series, law, drifting, *([drift] if drift else []))
         pool = Pool(course, joined, taken, course.dims, seed)
         for moving in (True, False):
-            sampled = importance(pool, _target(moving=moving), enough=ENOUGH, best=best)
+            sampled = importance(pool, _target(moving=moving), enough=ENOUGH, best=best, least=ROUGH, longest=LONGEST)
             best = max(best, sampled.log_evidence)
             models.append(_Model(course, moving, sampled))
     for model in models:

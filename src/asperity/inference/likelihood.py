@@ -9,6 +9,7 @@ besides. CRFA has a gain that nobody knows, for all recordings in common.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,15 +37,14 @@ def log_likelihood(shown: Shown, points: Sequence[Point], *, discrepancy: bool) 
 
 def log_at_sizes(shown: Shown, points: Sequence[Point], channel: str, sizes: Sequence[float] = SIZES) -> Field:
     """The same of one channel, for each size of the law's error, shape (sizes, n)."""
-    value, std = (np.array([getattr(getattr(point, channel), name) for point in points]) for name in ("value", "std"))
+    value, std = _heard(points, channel)
     mean, lever = getattr(shown, channel), shown.lever
     here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
     logs = np.zeros((len(sizes), len(mean)))
     if not here.any():
         return logs
     near = likeness(points)[np.ix_(here, here)]
-    parts = max(1, len(mean) * int(here.sum()) ** 2 // AT_ONCE)
-    for rows in np.array_split(np.arange(len(mean)), parts):
+    for rows in _parts(len(mean), int(here.sum())):
         rest = value[here] - mean[rows][:, here]
         known = emulated_errors(channel, _deviation(shown, channel)[rows][:, here], near) + np.diag(std[here] ** 2)
         for number, size in enumerate(sizes):
@@ -53,14 +53,75 @@ def log_at_sizes(shown: Shown, points: Sequence[Point], channel: str, sizes: Seq
     return logs
 
 
-def law_errors(channel: str, lever: Field, size: Field, near: Field) -> Field:
+class Foretold(NamedTuple):
+    """What contacts would show: normal parts, one for each size of the law's error, shape (sizes, n, points) each.
+
+    `log_share` is ln probability of each part, `std` is without what a measurement adds.
+    """
+
+    log_share: Field
+    mean: Field
+    std: Field
+
+    def log_density(self, value: Field, measured: float) -> Field:
+        """Logarithm of p of values that are measured with so much deviation; `value` goes with (n, points)."""
+        spread = np.hypot(self.std, measured)
+        level = self.log_share - np.log(spread) - 0.5 * np.log(2.0 * np.pi)
+        parts = [
+            one - 0.5 * ((value - mean) / std) ** 2 for one, mean, std in zip(level, self.mean, spread, strict=True)
+        ]
+        peak = np.maximum.reduce(parts)
+        return np.asarray(peak + np.log(sum(np.exp(one - peak) for one in parts)))
+
+
+def foretold(shown: Shown, points: Sequence[Point], channel: str, sizes: Sequence[float] = SIZES) -> Foretold:
+    """What contacts would show at all points, by what was heard at some of them.
+
+    The errors of law and emulator are those that the likelihood counts, given what they were where something was heard;
+    so are the sizes of the law's.
+    """
+    value, measured = _heard(points, channel)
+    mean, lever, near = getattr(shown, channel), shown.lever, likeness(points)
+    here = ~np.isnan(value) & ~np.isnan(mean).any(axis=0)
+    logs = log_at_sizes(shown, points, channel, sizes)
+    share = logs - np.logaddexp.reduce(logs, axis=0)
+    expected, std = np.tile(mean, (len(sizes), 1, 1)), np.empty((len(sizes), *mean.shape))
+    for rows in _parts(len(mean), len(points)):
+        pivot = lever[rows][:, here].mean(axis=1, keepdims=True) if here.any() else lever[rows]
+        emulated = emulated_errors(channel, _deviation(shown, channel)[rows], near)
+        for number, size in enumerate(sizes):
+            errors = emulated + law_errors(channel, lever[rows], np.full(len(rows), size), near, pivot)
+            variance = np.einsum("nii->ni", errors).copy()
+            if here.any():
+                across = errors[:, here]
+                taught = np.linalg.solve(across[:, :, here] + np.diag(measured[here] ** 2), across)
+                expected[number, rows] += np.einsum("nh,nhp->np", value[here] - mean[rows][:, here], taught)
+                variance -= np.einsum("nhp,nhp->np", across, taught)
+            std[number, rows] = np.sqrt(np.maximum(variance, 0.0))
+    return Foretold(np.broadcast_to(share[:, :, None], std.shape), expected, std)
+
+
+def _heard(points: Sequence[Point], channel: str) -> tuple[Field, Field]:
+    """Values and deviations of a channel at points."""
+    heard = [getattr(point, channel) for point in points]
+    return np.array([one.value for one in heard]), np.array([one.std for one in heard])
+
+
+def _parts(count: int, points: int) -> list[Field]:
+    """Rows of which covariances are held at a time."""
+    return np.array_split(np.arange(count), max(1, count * points**2 // AT_ONCE))
+
+
+def law_errors(channel: str, lever: Field, size: Field, near: Field, pivot: Field | None = None) -> Field:
     """Covariance of the law's errors at operating points, (n, points, points); `lever` is ln force, (n, points).
 
-    `size` (n,) is relative to CRF; where it is 0, the law is exact. `near` is the points' likeness.
+    `size` (n,) is relative to CRF; where it is 0, the law is exact. `near` is the points' likeness. At `pivot` (ln
+    force) an exponent that is off changes nothing; by default it is the points' mean.
     """
     errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * law_correlations(lever, near)
     if channel == "crf":
-        steep = EXPONENT_STD * (lever - lever.mean(axis=1, keepdims=True)) * (size[:, None] > 0.0)
+        pivot = lever.mean(axis=1, keepdims=True) if pivot is None else pivot
+        steep = EXPONENT_STD * (lever - pivot) * (size[:, None] > 0.0)
         errors += steep[:, :, None] * steep[:, None, :]
     return np.asarray(errors)
 

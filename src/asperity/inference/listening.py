@@ -123,6 +123,7 @@ def observed_rows(rows: Sequence[Mapping[str, Any]], case: Case, *, comparable: 
                 temperature_k=None if celsius is None else celsius + ZERO_CELSIUS,
                 crf_hz=row["crf_hz"],
                 crf_std_hz=std,
+                crf_shared_std_hz=row.get("crf_shared_std_hz") or 0.0,  # lines of an older store do not say
                 crfa=crfa,
                 crfa_std=crfa_std,
                 damping_ratio=damping,

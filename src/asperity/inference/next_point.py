@@ -1,13 +1,15 @@
 """Which load and speed to run next: where what would be heard tells most, by what is known now."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
 from asperity.arrays import Field
 from asperity.inference.forward import LAWS, Forward
+from asperity.inference.likelihood import SIZES, Foretold, foretold
 from asperity.inference.observations import Point
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.posterior import Draws
@@ -16,9 +18,7 @@ from asperity.inference.settings import LOAD, SPEED, Setting
 
 ACROSS = 5  # loads and speeds that are asked
 CONTACTS = 400  # possible ones that a point is to tell apart
-HEARD = 4  # times each of them is heard
-USUAL_STD = 2e-3  # relative, of a frequency to be heard
-USUAL_DAMPING_STD = 0.05
+USUAL: Mapping[str, float] = {"crf": 2e-3, "damping": 0.05}  # relative deviations of what is to be heard
 SILENT = 0.01  # CLR below which asperities alone make no line that anybody hears
 
 
@@ -48,54 +48,83 @@ def candidate_points(setting: Setting, across: int = ACROSS) -> tuple[tuple[floa
     return tuple((load, speed) for load in axes[0] for speed in axes[1])
 
 
+class WouldShow(NamedTuple):
+    """What possible contacts would show at operating points, by all that was heard; arrays of (..., contacts, points).
+
+    `channels` are ln CRF and ln ζ, `heard` is whether there is a line.
+    """
+
+    channels: Mapping[str, Foretold]
+    heard: Field
+
+
+def would_show(forward: Forward, draws: Draws, places: Sequence[Point]) -> WouldShow:
+    """What contacts of the posterior would show at places: of the errors there is known what was heard of them."""
+    known = tuple(point for point in forward.points if not np.isnan(point.crf.value))
+    there = replace(forward, points=(*known, *places))
+    shape = len(SIZES), len(draws.z), len(places)
+    channels = {key: Foretold(*(np.empty(shape) for _ in range(3))) for key in USUAL}
+    heard = np.ones(shape[1:], dtype=bool)
+    for number, law in enumerate(LAWS):
+        of_law = draws.law == number
+        if not of_law.any():
+            continue
+        emulated = there.emulated(draws.z[of_law], there.outputs(law, heights=False))
+        shown = there.shown_by(draws.z[of_law], law, emulated, heights=False)
+        if CLR in emulated:
+            heard[of_law] = OUTPUTS[CLR].back(emulated[CLR][0][:, len(known) :]) > SILENT
+        for key, whole in channels.items():
+            for array, own in zip(whole, foretold(shown, there.points, key), strict=True):
+                array[:, of_law] = own[:, :, len(known) :]
+    return WouldShow(channels, heard)
+
+
 def expected_information(
     forward: Forward, draws: Draws, candidates: tuple[tuple[float, float], ...], *, seed: int
 ) -> list[NextPoint]:
     """What one more recording at each candidate is expected to tell of all unknowns together, in bits.
 
     By nested Monte Carlo: the mean of ln p(heard | contact) - ln p(heard) over possible contacts and what they would
-    show, with errors of measurement, emulator and law; times the probability that there is a line to be heard.
+    show, with errors of measurement, emulator and law; times the probability that there is a line to be heard. What
+    was heard says of each contact how far emulator and law are off there: that is no news, nor is it how large the
+    law's error is.
     """
     rng = np.random.default_rng([seed, 6])
     rows = rng.choice(len(draws.z), min(CONTACTS, len(draws.z)), replace=False)
     known = [point for point in forward.points if not np.isnan(point.crf.value)]
     temperature = known[0].temperature_k if known else None
-    std = float(np.median([point.crf.std for point in known])) if known else USUAL_STD
-    points = tuple(Point(load, speed, temperature) for load, speed in candidates)
-    there = replace(forward, points=points)
-    crf, crf_std, damping, damping_std = (np.empty((len(rows), len(points))) for _ in range(4))
-    heard = np.ones(crf.shape, dtype=bool)
-    for number, law in enumerate(LAWS):
-        of_law = draws.law[rows] == number
-        if of_law.any():
-            emulated = there.emulated(draws.z[rows[of_law]], there.outputs(law, heights=False))
-            shown = there.shown_by(draws.z[rows[of_law]], law, emulated, heights=False)
-            if CLR in emulated:
-                heard[of_law] = OUTPUTS[CLR].back(emulated[CLR][0]) > SILENT
-            crf[of_law], crf_std[of_law] = shown.crf, shown.crf_std
-            damping[of_law], damping_std[of_law] = shown.damping, shown.damping_std
-    of_crf, of_damping = (draws.sizes[key][rows][:, None] for key in ("crf", "damping"))
-    channels = [(crf, np.sqrt(crf_std**2 + std**2 + of_crf**2))]
-    channels.append((damping, np.sqrt(damping_std**2 + USUAL_DAMPING_STD**2 + of_damping**2)))
+    measured = dict(USUAL)
+    if known:
+        measured["crf"] = float(np.median([point.crf.std for point in known]))
+    places = [Point(load, speed, temperature) for load, speed in candidates]
+    shown = would_show(forward, draws.taken(rows), places)
+    chances = {key: (rng.random(len(rows)), rng.standard_normal(len(rows))) for key in USUAL}  # the same everywhere
     gains = [
-        _information([(mean[:, number], spread[:, number]) for mean, spread in channels], rng)
-        for number in range(len(points))
+        _information([(at_place(one, number), measured[key], chances[key]) for key, one in shown.channels.items()])
+        for number in range(len(places))
     ]
-    shares = heard.mean(axis=0)
+    shares = shown.heard.mean(axis=0)
     return [
         NextPoint(load, speed, float(share * gain))
         for (load, speed), gain, share in zip(candidates, gains, shares, strict=True)
     ]
 
 
-def _information(channels: list[tuple[Field, Field]], rng: np.random.Generator) -> float:
-    """Mutual information, in bits, of a contact's number and what it shows, of independent normal channels."""
-    count = len(channels[0][0])
-    total = np.zeros((HEARD, count, count))
-    own = np.zeros((HEARD, count))
-    for mean, spread in channels:
-        heard = mean + spread * rng.standard_normal((HEARD, count))
-        own += -0.5 * ((heard - mean) / spread) ** 2 - np.log(spread)
-        total += -0.5 * ((heard[:, :, None] - mean) / spread) ** 2 - np.log(spread)
-    marginal = logsumexp(total, axis=2) - np.log(count)
-    return max(float(np.mean(own - marginal) / np.log(2.0)), 0.0)
+def at_place(whole: Foretold, place: int) -> Foretold:
+    """At one of the points: (sizes, contacts)."""
+    return Foretold(*(array[:, :, place] for array in whole))
+
+
+def _information(channels: Sequence[tuple[Foretold, float, tuple[Field, Field]]]) -> float:
+    """Mutual information, in bits, of a contact's number and what it shows, of independent channels.
+
+    Each is what contacts would show, what a measurement adds, and chance: uniform and normal numbers, one a contact.
+    """
+    count = channels[0][0].mean.shape[1]
+    total = np.zeros((count, count))
+    for one, measured, (uniform, normal) in channels:
+        size = np.sum(np.cumsum(np.exp(one.log_share[:-1]), axis=0) < uniform, axis=0), np.arange(count)
+        heard = one.mean[size] + np.hypot(one.std[size], measured) * normal
+        total += one.log_density(heard[:, None], measured)
+    told = np.diag(total) - (logsumexp(total, axis=1) - np.log(count))
+    return max(float(np.mean(told) / np.log(2.0)), 0.0)

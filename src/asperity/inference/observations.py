@@ -25,6 +25,7 @@ class Observation:
     crf_hz, crf_std_hz : frequency of the resonance and its standard deviation [Hz]
     crfa, crfa_std : its height [(m/s^2)^2/Hz]; nan where it is not comparable
     damping_ratio, damping_std : its width; nan where it is not determined
+    crf_shared_std_hz : part of `crf_std_hz` that all recordings at its operating point have in common
     name, x : what it is called, and where it stands in a series (hours)
     """
 
@@ -37,6 +38,7 @@ class Observation:
     crfa_std: float = LOST
     damping_ratio: float = LOST
     damping_std: float = LOST
+    crf_shared_std_hz: float = 0.0
     name: str = ""
     x: float = LOST
 
@@ -51,6 +53,11 @@ class Observation:
             if not math.isnan(value):
                 require_positive(f"{what}{name}", value)
                 require_positive(f"{what}standard deviation of {name}", std)
+        if not 0.0 <= self.crf_shared_std_hz <= self.crf_std_hz * (1.0 + 1e-9):
+            raise BadInput(
+                f"{what}crf_shared_std_hz is a part of crf_std_hz, {self.crf_std_hz:g} Hz, got "
+                f"{self.crf_shared_std_hz:g} Hz"
+            )
         if self.temperature_k is not None:
             require_positive(f"{what}temperature_k", self.temperature_k, "K")
 
@@ -96,9 +103,9 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
     return tuple(
         Point(
             *place,
-            crf=_together([(one.crf_hz, one.crf_std_hz) for one in group], LEAST_STD),
-            damping=_together([(one.damping_ratio, one.damping_std) for one in group]),
-            crfa=_together([(one.crfa, one.crfa_std) for one in group]),
+            crf=_together([(one.crf_hz, one.crf_std_hz, one.crf_shared_std_hz) for one in group], LEAST_STD),
+            damping=_together([(one.damping_ratio, one.damping_std, 0.0) for one in group]),
+            crfa=_together([(one.crfa, one.crfa_std, 0.0) for one in group]),
             names=tuple(one.name for one in group),
         )
         for place, group in groups.items()
@@ -122,16 +129,25 @@ def require_temperatures(observations: Sequence[Observation]) -> None:
         raise BadInput("some recordings have a temperature and some have none; give it of all, or of none")
 
 
-def _together(pairs: Sequence[tuple[float, float]], least: float = 0.0) -> Heard:
-    """The logarithm that repeats measure: their weighted mean, and no surer of it than their scatter lets them be."""
-    known = np.array([(math.log(value), max(std / value, least)) for value, std in pairs if not math.isnan(value)])
+def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -> Heard:
+    """The logarithm that repeats measure, of values, deviations, and what of these is common to all of them.
+
+    Their weighted mean, and no surer of it than their scatter lets them be, nor than what they have in common.
+    """
+    known = np.array(
+        [
+            (math.log(value), max(math.sqrt(max(std**2 - common**2, 0.0)) / value, least), common / value)
+            for value, std, common in heard
+            if not math.isnan(value)
+        ]
+    )
     if not len(known):
         return Heard()
-    values, stds = known.T
+    values, stds, common = known.T
     weights = stds**-2.0 / np.sum(stds**-2.0)
     mean = float(weights @ values)
     std = float(np.sum(stds**-2.0) ** -0.5)
     if len(known) > 1:
         scatter = float(np.sqrt(np.sum((values - mean) ** 2) / (len(known) - 1) / len(known)))
         std = max(std, scatter)
-    return Heard(mean, std)
+    return Heard(mean, math.hypot(std, float(weights @ common)))

@@ -16,13 +16,12 @@ from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
 from asperity.inference.likelihood import SIZES, WEIGHTS, emulated_errors, law_errors, log_at_sizes, log_likelihood
 from asperity.inference.observations import Point, likeness
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
-from asperity.inference.sampling import FEWEST, QUICKLY, Pool, Sampled, importance, nested
+from asperity.inference.sampling import FEWEST, QUICKLY, RULED_OUT, Pool, Sampled, importance, nested
 
 Sampler = Literal["importance", "nested"]
 DRAWS = 2000  # equally probable ones, of each posterior
 STATE = (CLR, CAR, FILM, FRICTION)
 MODELS: tuple[tuple[Law, bool], ...] = tuple((law, discrepancy) for law in LAWS for discrepancy in (True, False))
-RULED_OUT = 12.0  # in ln evidence below the best: odds of 160 000 to one
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,11 @@ class Draws:
     sizes: Mapping[str, Field]
     states: Mapping[str, Field]
     effective: float
+
+    def taken(self, rows: Any) -> "Draws":
+        """Some of them."""
+        sizes, states = ({key: one[rows] for key, one in whole.items()} for whole in (self.sizes, self.states))
+        return replace(self, z=self.z[rows], law=self.law[rows], sizes=sizes, states=states)
 
 
 def sample_models(

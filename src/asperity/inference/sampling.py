@@ -24,6 +24,7 @@ LEARNT_FROM = 150.0  # effective samples that a proposal is learnt from, at leas
 NARROWER = 0.6  # width of a proposal's parts over the width of the whole
 FROM_PRIOR = 0.1
 HOPELESS = 40.0  # in ln evidence below another model, and no more draws are spent on it
+RULED_OUT = 12.0  # likewise, and it need not be found: odds of 160 000 to one
 PROBED = 4  # rounds before that is believed
 NEGLIGIBLE = 1e-5  # weight over the largest, of a draw that need not be kept
 LIVE = 400  # points of nested sampling
@@ -131,18 +132,23 @@ def importance(
     rounds: int = ROUNDS,
     best: float = -np.inf,
     probed: int = PROBED,
+    least: float = 0.0,
+    longest: int = 0,
 ) -> Sampled:
     """Sample a target from better and better proposals, until the draws are worth `enough` or for so many rounds.
 
     `best` is the ln evidence of another model: beside one that is far better, no draws are spent after `probed` rounds.
+    Where draws are worth less than `least` after all rounds, and the model is not ruled out, it goes on for `longest`.
     """
     target: Field = np.empty(0)
-    for number in range(rounds + 1):
+    for number in range(max(rounds, longest) + 1):
         fresh = pool.take(pool.shown, slice(len(target), None))
         target = np.concatenate([target, log_target(fresh)])
         weights = pool.log_weights(target)
-        hopeless = number >= probed and float(logsumexp(weights)) - np.log(pool.drawn) < best - HOPELESS
-        if _effective(weights) >= enough or number == rounds or hopeless:
+        behind = best - (float(logsumexp(weights)) - np.log(pool.drawn))
+        hopeless = number >= probed and behind > HOPELESS
+        found = number >= rounds and (_effective(weights) >= least or behind > RULED_OUT)
+        if _effective(weights) >= enough or hopeless or found or number >= max(rounds, longest):
             break
         pool.learn(weights)
     peak = float(logsumexp(weights))

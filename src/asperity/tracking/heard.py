@@ -32,9 +32,11 @@ from asperity.wear import (
 
 
 def recording_of(reading: Reading, place: Place, clean: CleanSpectrum | None, resonance: Resonance) -> TrackedRecording:
-    """A recording of a track; how far its clock may be off widens the interval of its CRF."""
-    clocked = float(np.hypot(resonance.crf_std, reading.rate_doubt * resonance.crf_hz))  # a rate off is a CRF off
-    resonance = replace(resonance, crf_std=clocked)
+    """A recording of a track; how far its clock may be off widens the interval of its CRF, and repeats share it."""
+    clock = reading.rate_doubt * resonance.crf_hz  # a rate off is a CRF off
+    if resonance.found:
+        whole, shared = (float(np.hypot(std, clock)) for std in (resonance.crf_std, resonance.crf_shared_std))
+        resonance = replace(resonance, crf_std=whole, crf_shared_std=shared)
     return TrackedRecording(
         file=reading.file,
         x=place.x,

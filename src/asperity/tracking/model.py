@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crf_reference_hz", "crfa", "crfa_std", "damping_ratio", "damping_std",
-           "clr", "clr_low", "clr_high", "severe_probability", "duration_s", "rate_hz")  # fmt: skip
+NUMBERS = ("x", "x_std", "crf_hz", "crf_std_hz", "crf_shared_std_hz", "crf_reference_hz", "crfa", "crfa_std",
+           "damping_ratio", "damping_std", "clr", "clr_low", "clr_high", "severe_probability", "duration_s",
+           "rate_hz")  # fmt: skip
 TEXTS = ("file", "reason", "damping_reason", "label", "started")
 ENDINGS = (".csv", ".parquet", ".nc")
 

@@ -150,6 +150,7 @@ class TrackedRecording:
             "x_std": finite_or_none(self.x_std),
             "crf_hz": finite_or_none(resonance.crf_hz),
             "crf_std_hz": finite_or_none(resonance.crf_std_hz),
+            "crf_shared_std_hz": finite_or_none(resonance.crf_shared_std) if resonance.found else None,
             "crfa": finite_or_none(resonance.crfa),
             "crfa_std": finite_or_none(resonance.crfa_std),
             "damping_ratio": finite_or_none(self.damping[0]),

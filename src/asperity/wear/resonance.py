@@ -25,7 +25,8 @@ class Resonance:
     curve; where more than a floor was fitted, `background` in its place: frequencies and densities. `evidence` is how
     much better, by BIC, a line and the rest explain the band than the rest alone (found needs 10, very strong). All of
     a line's figures are nan when it was not `found`; `reason` then says why.
-    `seen` is how the record's sampling bends that line, where that was known.
+    `seen` is how the record's sampling bends that line, where that was known. `crf_shared_std` is the part of `crf_std`
+    that lines at this place have in common: what a structure brings does not average away over repeats.
     The paper's peak has no standard deviation, damping, floor or evidence: nan.
     """
 
@@ -36,6 +37,7 @@ class Resonance:
     crf_hz: float = np.nan
     crfa: float = np.nan
     crf_std: float = np.nan
+    crf_shared_std: float = 0.0
     crfa_std: float = np.nan
     damping_ratio: float = np.nan
     damping_ratio_std: float = np.nan

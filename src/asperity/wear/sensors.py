@@ -16,7 +16,7 @@ from asperity.signals import Spectrum
 from asperity.wear.agreement import Agreement, Fit, differ, in_common, shares_in_common
 from asperity.wear.expected import Blocks, expected_density
 from asperity.wear.indicators import STRONG_EVIDENCE
-from asperity.wear.misfit import brought_std, left_over, shares_of
+from asperity.wear.misfit import brought_std, lacking_std, left_over, shares_of
 from asperity.wear.moved import moved_at
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Heard, alone_beside, coarser, each, levelled, places
@@ -317,12 +317,13 @@ class _Together:
         hears = (np.array(gains) - np.log(weights) > STRONG_EVIDENCE) & (np.array(misfits) <= LARGEST_MISFIT)
         hears &= ~np.array([self.by_sensor[name].found.shaped for name in fit.names])[:, None]
         evidence = np.sum(gains, axis=0) / counts_as - (2.0 + len(fit.names)) * np.log(np.sum(weights, axis=0))
-        std = self._deviations(fit, shares)
+        std, shared = self._deviations(fit, shares), wider * self._shared(fit)
         std[:, :, 1] *= wider
         return [
             self._line(
                 fit, place, [name for name, there in zip(fit.names, hears[:, place], strict=True) if there],
                 float(evidence[place]), float(np.min(np.array(misfits)[:, place])), float(counts_as), std[:, place],
+                float(shared[place]),
             )
             for place in range(len(fit.numbers))
         ]  # fmt: skip
@@ -336,6 +337,7 @@ class _Together:
         misfit: float,
         counts_as: float,
         std: Field,
+        shared: float,
     ) -> tuple[Resonance, tuple[str, ...]]:
         """One recording's line, if two sensors hear it."""
         number = fit.numbers[place]
@@ -361,6 +363,7 @@ class _Together:
             method="joint",
             evidence=evidence,
             background=(first.blocks.centre, np.exp(fit.lines.own[0, place, 3] + first.at.base)),
+            crf_shared_std=shared * f0,
         )
         lead = next(iter(self.alone))
         if fit.names[0] != lead or lead not in names:
@@ -384,7 +387,8 @@ class _Together:
         height = (own.crfa, own.crfa_std) if name == next(iter(self.alone)) else (np.nan, np.nan)
         said = f"{own.reason}, here on {name} only" if len(self.by_sensor) > 1 else own.reason
         return replace(
-            own, crf_std=own.crf_std * wider, crfa=height[0], crfa_std=height[1], reason=said,
+            own, crf_std=own.crf_std * wider, crf_shared_std=own.crf_shared_std * wider, crfa=height[0],
+            crfa_std=height[1], reason=said,
         ), (name,)  # fmt: skip
 
     def _deviations(self, fit: Fit, shares: Field) -> Field:
@@ -392,8 +396,7 @@ class _Together:
         inverse, dragged = fit.lines.inverse, fit.lines.dragged
         variance = np.einsum("npp->np", inverse).copy()
         relative = [shares_of(heard.blocks, fit.joint(sensor))[0] for sensor, heard in enumerate(fit.heard)]
-        information = np.array([point.own_information[:, 1, 1] for point in fit.lines.points])
-        part = information / information.sum(axis=0)
+        part = _parts(fit)
         brought = np.zeros(inverse.shape[:2])
         of_base = []
         for sensor, heard in enumerate(fit.heard):
@@ -420,6 +423,13 @@ class _Together:
         std = np.hypot(np.sqrt(variance), brought)
         return np.stack([std[:, places(sensor)] for sensor in range(len(fit.heard))])
 
+    def _shared(self, fit: Fit) -> Field:
+        """Of ln f, what structures bring that lines at one place have in common; (recordings,)."""
+        return np.asarray(sum(
+            part * lacking_std(heard.blocks, fit.joint(sensor), self.by_sensor[name].found.witnesses)[:, 1]
+            for sensor, (part, heard, name) in enumerate(zip(_parts(fit), fit.heard, fit.names, strict=True))
+        ))  # fmt: skip
+
     def _of_the_base(self, fit: Fit, sensor: int) -> Field:
         """What a base, known as well as its series tells, adds to the deviations of lines; (recordings, 4)."""
         name, heard = fit.names[sensor], fit.heard[sensor]
@@ -428,3 +438,9 @@ class _Together:
         own = settled.parameters.own[rows]
         known = alone_beside(heard.blocks, settled.parameters._replace(own=own), heard.doubt).std
         return np.asarray(np.sqrt(np.maximum(settled.std[rows] ** 2 - known**2, 0.0)))
+
+
+def _parts(fit: Fit) -> Field:
+    """What each sensor says of a line's place, as a share; (sensors, recordings)."""
+    information = np.array([point.own_information[:, 1, 1] for point in fit.lines.points])
+    return np.asarray(information / information.sum(axis=0))

@@ -17,7 +17,7 @@ from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear.expected import Blocks, expected_density, whittle_costs
 from asperity.wear.indicators import STRONG_EVIDENCE, IndicatorMethod, contact_resonance, require_band
-from asperity.wear.misfit import Witnesses, brought_std, left_over, witnesses_of
+from asperity.wear.misfit import Witnesses, lacking_std, left_over, misfit_std, witnesses_of
 from asperity.wear.moved import moved_at
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Joint, Model, Templates, beside, coarser, models, separate, templates_on
@@ -304,7 +304,8 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
     evidence, alone = _evidence(blocks, joint)
     bare, expected = np.exp(base), expected_density(blocks, joint.parameters)
 
-    std = np.hypot(joint.std, brought_std(blocks, joint, found.witnesses))
+    shared = lacking_std(blocks, joint, found.witnesses)
+    std = np.sqrt(joint.std**2 + misfit_std(blocks, joint, found.witnesses) ** 2 + shared**2)
     misfit = left_over(blocks, expected)
     way = STANDS if found.stands else MOVES
     resonances = []
@@ -328,6 +329,7 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
                 method="joint",
                 evidence=line.evidence,
                 background=(blocks.centre, gain * bare),
+                crf_shared_std=float(shared[i, 1] * f0),
             )
         )
     return tuple(resonances)
