@@ -65,6 +65,19 @@ def ring(tmp_path_factory):
     return path
 
 
+# a message to the server is a header, metadata, content and buffers
+NEVER_READY = """() => {
+  const send = WebSocket.prototype.send
+  let held = []
+  WebSocket.prototype.send = function (part) {
+    held.push(part)
+    if (held.length < 3 + 2 * (JSON.parse(held[0]).num_buffers ?? 0)) return
+    if (!held[2].includes("document_ready")) held.forEach((one) => send.call(this, one))
+    held = []
+  }
+}"""
+
+
 # where the film map begins, in every picture that the browser draws
 TOPS = """() => {
   window.tops = []
@@ -109,6 +122,11 @@ def turn(page, name, text):
     box.fill(text)
     box.press("Enter")
     return box
+
+
+def test_a_browser_that_never_says_it_is_ready_sees_the_contact(visit):
+    visit.context.add_init_script(f"({NEVER_READY})()")
+    visit.solved()
 
 
 def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):

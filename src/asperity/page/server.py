@@ -34,6 +34,7 @@ PASSWORD = "ASPERITY_PAGE_PASSWORD"
 USER = "asperity"  # under whom everybody comes in; the page for the password says so
 SHORTEST = 8  # characters of a password
 LOOK_MS, FRAME_MS = 5000, 250  # between two looks at a folder, and two steps of a history
+READY_MS = 4000  # after which figures are made, whether or not the browser has said that it has the page
 WAIT_MS = 120_000  # for a visitor that has not come yet: without the document it was sent it would see an empty page
 PING_S = 120  # between two questions whether a visitor is still there, who has as long to answer
 MESSAGE = 24_000_000  # bytes that a browser may send at a time
@@ -112,6 +113,7 @@ class House:
         parts, sections = contact.layout(view)
         view.begin(_query(), self.opened.answer)
         _document().on_event("document_ready", lambda _event: view.furnish())
+        _document().add_timeout_callback(view.furnish, READY_MS)  # a browser may never say so
         _document().js_on_event("document_ready", view.old.tell)
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections)
