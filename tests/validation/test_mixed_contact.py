@@ -220,6 +220,12 @@ def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
     assert contact_state(quiet).reynolds_residual > 1e-4
 
 
+def test_steps_from_a_coarser_grid_are_not_begun_anew_for_the_last_decimals():
+    numbers = [step.number for step in solved(rough(FINE, SQ)).convergence.history if step.cells == (128, 128)]
+    assert numbers == list(range(len(numbers)))
+    assert numbers[-1] > 3
+
+
 def test_progress_hears_of_every_step_from_coarse_to_fine():
     heard = []
     solution = solved(rough(FINE, 0.5 * SQ), progress=heard.append)

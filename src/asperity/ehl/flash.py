@@ -29,6 +29,7 @@ NODES = 4  # of Gauss's rule in a panel
 RATIO = 1.25  # of the s at both ends of a panel, at most
 EARLIEST, LATEST = 1.0 / 16.0, 1e4  # first s in cells; last s in lengths of the source
 HARMONICS = 6
+AT_ONCE = 256  # values of s: what they need stays in the processor's cache
 SHARING_TOLERANCE = 1e-6
 
 
@@ -69,10 +70,16 @@ def moving_source(
     along = np.arange(2 * nx)
     x = np.where(along < nx, along, along - 2.0 * nx) * dx  # downstream, then upstream of the source
     edges = np.append(np.sort(x) - dx / 2.0, (nx - 0.5) * dx)
-    share_x = np.diff(_gaussian(edges[:, None] - drift * s**2, s), axis=0)
-    share_x = np.roll(share_x, nx, axis=0)
-    share_y = _share_in_line(ny, dy, length, s) if length is not None else _share(np.arange(ny + 1) * dy, dy, s)
-    kernel = 2.0 / (solid.conductivity * np.sqrt(np.pi)) * ((share_x * weight) @ share_y.T)
+    kernel = np.zeros((2 * nx, ny if length is not None else ny + 1))
+    for first in range(0, s.size, AT_ONCE):
+        now, weighs = s[first : first + AT_ONCE], weight[first : first + AT_ONCE]
+        share_x = np.diff(_gaussian(edges[:, None] - drift * now**2, now), axis=0) * weighs
+        if length is None:
+            kernel += share_x @ _shares(ny + 1, dy, now).T
+        else:
+            kernel += _over_line(share_x, ny, dy, length, now)
+    kernel *= 2.0 / (solid.conductivity * np.sqrt(np.pi))
+    kernel = np.roll(kernel, nx, axis=0)
     mirrored = np.concatenate([kernel, kernel[:, -2:0:-1]], axis=1) if length is None else kernel
     spectrum = scipy.fft.fft(scipy.fft.rfft(mirrored, axis=1), axis=0)
     spectrum.flags.writeable = False
@@ -98,26 +105,29 @@ def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[F
 
 def _gaussian(x: Field, s: Field) -> Field:
     """Heat that has spread by s, left of x."""
-    return np.asarray(0.5 * scipy.special.erf(x / (2.0 * s)))
+    widths = x / (2.0 * s)
+    return np.asarray(0.5 * scipy.special.erf(widths, out=widths))
 
 
-def _share(y: Field, dy: float, s: Field) -> Field:
-    """A cell's share of heat that started at distance y, shape (y, s)."""
-    return _gaussian(y[:, None] + dy / 2.0, s) - _gaussian(y[:, None] - dy / 2.0, s)
+def _shares(cells: int, dy: float, s: Field) -> Field:
+    """Shares of cells 0, 1, ... of heat that started at cell 0, shape (cells, s)."""
+    edges = (np.arange(cells + 1) - 0.5) * dy
+    return np.diff(_gaussian(edges[:, None], s), axis=0)
 
 
-def _share_in_line(ny: int, dy: float, length: float, s: Field) -> Field:
-    """The same where heat repeats in y: images while it has not spread far, a few harmonics afterwards."""
-    width = ny * dy
-    y = np.arange(ny) * dy
-    near = s < width / 8.0
-    out = np.empty((ny, s.size))
-    out[:, near] = sum(_share(y + image * width, dy, s[near]) for image in (-2, -1, 0, 1))
-    order = np.arange(1, HARMONICS + 1)
-    wave = 2.0 * np.pi * order / width
-    decay = 2.0 * np.exp(-((wave[:, None] * s[~near]) ** 2)) * np.sinc(order / ny)[:, None]
-    out[:, ~near] = (1.0 + np.cos(y[:, None] * wave) @ decay) / ny
-    return out * 2.0 * _gaussian(np.array([[length / 2.0]]), s)  # heat from beyond the line's ends is missing
+def _over_line(share_x: Field, ny: int, dy: float, length: float, s: Field) -> Field:
+    """The sum over s of shares along x times those along a line, in which heat repeats, shape (shares, ny).
+
+    Images while heat has not spread far, a few harmonics afterwards.
+    """
+    share_x = share_x * 2.0 * _gaussian(np.array(length / 2.0), s)  # heat from beyond the line's ends is missing
+    near = s < ny * dy / 8.0
+    images = _shares(2 * ny + 1, dy, s[near])[np.abs(np.arange(-2 * ny, 2 * ny))].reshape(4, ny, -1).sum(axis=0)
+    order = np.arange(HARMONICS + 1)
+    wave = 2.0 * np.pi * order / (ny * dy)
+    decay = np.exp(-((wave[:, None] * s[~near]) ** 2)) * np.sinc(order / ny)[:, None]
+    cosines = np.where(order > 0, 2.0, 1.0) * np.cos(np.arange(ny)[:, None] * dy * wave) / ny
+    return np.asarray(share_x[:, near] @ images.T + share_x[:, ~near] @ decay.T @ cosines.T)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -178,8 +178,7 @@ class MixedSearch(Search):
             steps = newton(problem, unknowns, second_order=True)
             step = self.run(problem, steps, roughly, min(MOST_NEAR, soon), stray=STRAY)
             if self.settled(roughly) and not self.settled(tolerance):
-                steps = newton(problem, _reached(step), second_order=True)
-                step = self.run(problem, steps, tolerance, soon, stray=STRAY)
+                step = self.run(problem, steps, tolerance, step.number + soon, stray=STRAY, after=step)
             if self.settled(tolerance):
                 if not coarsely:
                     self.by_first_order = self._figures(_back_to_first_order(problem, step))

@@ -99,13 +99,15 @@ class Search:
         *,
         of_load: bool = True,
         stray: float = np.inf,
+        after: Step | None = None,
     ) -> Step:
         """Take steps until they meet the tolerance, `of_load` too, or there have been too many.
 
-        Or until what is left is `stray` times what was left at first.
+        Or until what is left is `stray` times what was left at first: `after` the step that they go on from, if any.
         """
-        before = step = next(steps)
-        astray = stray * max(step.balance.residual_rms, NEXT_TO_NOTHING)
+        step = next(steps)
+        before = after or step
+        astray = stray * max(before.balance.residual_rms, NEXT_TO_NOTHING)
         while True:
             self._record(problem, step)
             self.lost = step.number > 0 and not np.isfinite(step.change)
