@@ -20,7 +20,7 @@ from asperity.tracking.operating import (
     response_of,
     unstated,
 )
-from asperity.wear import Sight, Watched, sequential, sequential_alarm
+from asperity.wear import Condition, Sight, Watched, sequential, sequential_alarm
 from asperity.wear.regressors import explained
 
 NUMBER = np.arange(40.0)
@@ -137,6 +137,14 @@ def test_the_likelihood_beside_conditions_is_that_of_regression_with_a_prior(mem
     whites = sequential._whites_beside(20, beside)
     own = sequential._gains(values, rows, whites=whites)[list(sequential.MEMORY).index(memory)]
     assert own == pytest.approx([likelihood(row) for row in rows], abs=1e-6)
+
+
+def test_wear_and_a_condition_that_drift_alike_are_not_taken_for_one_another():
+    """Wear of 0.5 % a recording beside a load that grows by 1 % a recording and scatters: by its power of 0.1."""
+    load = 0.01 * NUMBER + 0.05 * np.random.default_rng(8).standard_normal(NUMBER.size)
+    met = Condition(name="load", values=load, low=0.0, high=1.0 / 3.0, shown=np.exp(load), unit="N")
+    told = explained(0.005 * NUMBER + 0.1 * load, [met], least=0.05)
+    assert told.coefficients[0] == pytest.approx(0.1, abs=1e-6)
 
 
 SMALL = """model = "mixed"

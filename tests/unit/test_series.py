@@ -6,7 +6,16 @@ import pytest
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear import learn_series, series_resonances
-from asperity.wear.expected import Blocks, Parameters, costs_at, point_at
+from asperity.wear.expected import (
+    Blocks,
+    Parameters,
+    away,
+    costs_at,
+    lines,
+    lines_and_slopes,
+    own_at,
+    point_at,
+)
 from asperity.wear.resonance import line_shape
 from asperity.wear.separation import _lifted, _scored, separate
 from asperity.wear.series import JudgedLine, objection_to, separated
@@ -87,7 +96,9 @@ def test_the_fit_scatters_as_it_says():
     assert np.mean(np.abs(pulls) < 1.645, axis=0) == pytest.approx(0.9, abs=0.06)
 
 
-def test_the_score_is_the_slope_of_the_cost():
+@pytest.fixture
+def fit_of_seven():
+    """Blocks of seven spectra of chance, and parameters that say something else of them."""
     rng = np.random.default_rng(4)
     centre = np.linspace(2000.0, 4000.0, 50)
     blocks = Blocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
@@ -96,7 +107,12 @@ def test_the_score_is_the_slope_of_the_cost():
     )
     passed = through(1900.0, 4100.0)
     passed = passed._replace(coefficients=rng.normal(0.0, 0.3, passed.coefficients.size))
-    at = Parameters(own, rng.normal(0.0, 0.5, 50), passed)
+    return blocks, Parameters(own, rng.normal(0.0, 0.5, 50), passed)
+
+
+def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
+    blocks, at = fit_of_seven
+    own, passed = at.own, at.transfer
     point, d = point_at(blocks, at, np.zeros((passed.coefficients.size,) * 2)), 1e-6
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
         shift = np.zeros_like(own)
@@ -114,6 +130,21 @@ def test_the_score_is_the_slope_of_the_cost():
         ends = [passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)]
         up, down = (np.sum(costs_at(blocks, at._replace(transfer=end))) for end in ends)
         assert point.passed_score[number] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
+
+
+def test_lines_beside_what_is_settled_are_those_of_the_whole_fit(fit_of_seven):
+    """What the transfer does to a line, in sums over blocks, is what it does block by block."""
+    blocks, at = fit_of_seven
+    whole = point_at(blocks, at, np.zeros((at.transfer.coefficients.size,) * 2))
+    alone = own_at(blocks, at)
+    np.testing.assert_array_equal(alone.score, whole.own_score)
+    np.testing.assert_array_equal(alone.information, whole.own_information)
+    np.testing.assert_allclose(alone.passed(blocks.centre, at), whole.passed_own, rtol=1e-12, atol=1e-9)
+    np.testing.assert_array_equal(lines(blocks.centre, at), lines_and_slopes(blocks.centre, at)[0])
+    level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
+    apart = np.exp(away(blocks.centre, at) @ at.transfer.coefficients)
+    told = level * apart * line_shape(blocks.centre, f0, damping)
+    np.testing.assert_allclose(lines(blocks.centre, at), told, rtol=1e-12)
 
 
 def test_a_line_heard_through_a_structure_is_held_by_its_interval():

@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 import scipy.linalg
 from benchmarks.alarms import AFTER, RISE_HZ
-from benchmarks.soonest import courses, distance, independent, power
+from benchmarks.soonest import (
+    Nearest,
+    beside,
+    courses,
+    distance,
+    in_season,
+    independent,
+    nearest,
+    power,
+    power_unknown,
+)
+from benchmarks.soonest import knee as course_of
 
 from asperity.wear.sequential import knee
 
@@ -21,6 +32,30 @@ def test_a_course_that_is_no_knee_has_no_distance():
     grown = [distance(18, behind, 30.0, 0.0, courses) for behind in range(1, 9)]
     assert all(np.diff(grown) > 0.0)
     assert distance(18, 5, 15.0, 0.0, courses) == pytest.approx(2.0 * grown[4])
+
+
+def test_in_scatter_of_its_own_a_course_is_told_by_what_dense_covariances_say():
+    """Slow twin: information (Kullback and Leibler) of one Gaussian against another, and no scatter that is nearer."""
+    near = nearest(18, 6, 30.0, 0.0, courses)
+    own = np.eye(25)
+    other = near.size**2 * scipy.linalg.toeplitz(near.memory ** np.arange(25))
+    inverse = np.linalg.inv(other)
+    told = np.trace(inverse @ own) - 25 + near.left @ near.left / near.size**2 + np.linalg.slogdet(other)[1]
+    assert near.apart == pytest.approx(0.5 * told)
+    assert near.apart < 0.5 * distance(18, 6, 30.0, 0.0, courses) ** 2
+    assert 0.0 < near.memory < 0.7
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.7])
+def test_where_scatter_is_known_the_drawn_power_is_the_derived_one(memory):
+    left = beside(course_of(18, 5) / 30.0, memory, courses)
+    same = Nearest(float(left @ left) / 2.0, left, memory, 1.0)
+    (derived,) = power(np.array([np.linalg.norm(left)]), np.array([5]), 0.02)
+    assert power_unknown(same, memory, 0.02) == pytest.approx(derived, abs=0.03)
+
+
+def test_a_season_hides_a_knee():
+    assert nearest(18, 6, 15.0, 0.0, in_season).apart < nearest(18, 6, 15.0, 0.0, courses).apart
 
 
 def test_the_alarms_own_test_finds_no_more_than_the_bound():

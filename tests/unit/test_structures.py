@@ -6,7 +6,7 @@ from benchmarks import failures
 from benchmarks.indicators import NINETY, drawn, heard, joint, transferred
 from benchmarks.sensors import BAND, FREQUENCY, _spectrum, machine
 
-from asperity.wear import line_shape, series, series_resonances
+from asperity.wear import line_shape, misfit, series_resonances
 
 
 def held(rig):
@@ -22,7 +22,7 @@ def without(monkeypatch):
     """Deviations as they were before they carried what fits leave."""
 
     def left_out():
-        monkeypatch.setattr(series, "lacking_std", lambda blocks, *_: np.zeros((blocks.density.shape[0], 4)))
+        monkeypatch.setattr(misfit, "_lacking_std", lambda _, line, *__: np.zeros((len(line), 4)))
 
     return left_out
 

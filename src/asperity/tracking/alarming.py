@@ -265,13 +265,14 @@ def _getter(several: str, name: str) -> Callable[[Reading], float]:
 
 def _by_zone(tracked: Sequence[TrackedRecording], first: int, alarm: Alarm) -> Alarm:
     """What ISO 20816-3 says: zone D twice running alarms, and stands as any alarm does; C at the end alerts."""
-    zones = [(number, one) for number, one in enumerate(tracked) if one.zone is not None and number >= first]
-    for (_, before), (number, one) in pairwise(zones):
-        if before.zone == one.zone == "D":
+    zones = [(number, zone) for number, one in enumerate(tracked) if number >= first and (zone := one.zone) is not None]
+    for (_, before), (number, zone) in pairwise(zones):
+        if before == zone == "D":
             sooner = alarm.state == "alarm" and alarm.since is not None and alarm.since <= number
-            return alarm if sooner else alarm.raised_from(number, one.severity(), "zone")
-    lately = [one.zone for _, one in zones][-2:]
-    if len(lately) == 2 and min(filter(None, lately)) == "C" and tracked[-1].zone is not None and alarm.state == "none":
+            return alarm if sooner else alarm.raised_from(number, tracked[number].severity(), "zone")
+    lately = zones[-2:]
+    known = len(lately) == 2 and lately[-1][0] == len(tracked) - 1
+    if known and min(zone for _, zone in lately) == "C" and alarm.state == "none":
         return alarm.alerted(tracked[-1].severity(), "zone")
     return alarm
 
@@ -289,14 +290,14 @@ def _sights(tracked: Sequence[TrackedRecording], contact: Sequence[Watched]) -> 
     seen = np.any([np.zeros(len(tracked), dtype=bool), *(np.isfinite(one.values) for one in contact)], axis=0)
     sights = []
     for number, recording in enumerate(tracked):
-        name, reason = Path(recording.file).name, recording.resonance.reason
         if recording.dead:
-            sights.append(Sight("blind", f"{name}: {recording.reading.reason}"))
+            sights.append(Sight("blind", f"{Path(recording.file).name}: {recording.reading.reason}"))
         elif seen[max(number - UNSEEN + 1, 0) : number + 1].any():
             sights.append(Sight())
         else:
+            why = recording.resonance.reason or "not determined"
             last = "recording shows" if number == 0 else f"{min(number + 1, UNSEEN)} recordings show"
-            sights.append(Sight("cannot-tell", f"none of the last {last} what decides ({reason or 'not determined'})"))
+            sights.append(Sight("cannot-tell", f"none of the last {last} what decides ({why})"))
     return sights
 
 

@@ -80,11 +80,16 @@ def copies(readings: Sequence[Reading]) -> list[str]:
     for reading in readings:
         if reading.spectrum is not None:
             density = reading.spectrum.density
-            name = Path(reading.file).name + (f" ({reading.sensor})" if reading.sensor else "")
-            sampled.append((density[:: max(1, density.size // 16)][1:], name))
-    sampled.sort(key=lambda pair: float(pair[0].sum()))
+            few = density[:: max(1, density.size // 16)][1:]
+            sampled.append((float(few.sum()), few, reading))
+    sampled.sort(key=lambda one: one[0])
     return [
-        f"{name} and {other} hold the same samples; leave one of them out."
-        for (first, name), (second, other) in pairwise(sampled)
+        f"{_named(one)} and {_named(other)} hold the same samples; leave one of them out."
+        for (_, first, one), (_, second, other) in pairwise(sampled)
         if first.shape == second.shape and bool(np.all(np.abs(first - second) <= COPIED * second))
     ]
+
+
+def _named(reading: Reading) -> str:
+    """Its file's name, and its sensor's if it has one."""
+    return Path(reading.file).name + (f" ({reading.sensor})" if reading.sensor else "")

@@ -98,7 +98,7 @@ def in_time(times: Sequence[datetime | None], heard: Sequence[bool]) -> tuple[li
     """
     known = [time for time, there in zip(times, heard, strict=True) if there]
     stated = [time for time in known if time is not None]
-    if len(stated) == len(known) and len(set(stated)) > 1:
+    if len(stated) == len(known) and any(time != stated[0] for time in stated):
         first = min(stated)
         x = iter([(time - first).total_seconds() / 3600.0 for time in stated])
         x_name = "time_h"
@@ -119,13 +119,28 @@ def in_their_places(
     places: Mapping[str, Place] | None,
     x_name: str,
 ) -> tuple[dict[str, Place], str]:
-    """Where each recording stands, and what x is: as a table says it, or by `in_time` where none does."""
+    """Where each recording stands, and what x is, by `where`."""
+    x, x_name = where(files, times, heard, places, x_name)
+    return {file: placed_at(at, (places or {}).get(file)) for file, at in x.items()}, x_name
+
+
+def where(
+    files: Sequence[str],
+    times: Sequence[datetime | None],
+    heard: Sequence[bool],
+    places: Mapping[str, Place] | None,
+    x_name: str,
+) -> tuple[dict[str, float], str]:
+    """The x of each recording, and what x is: as a table says it, or by `in_time` where none does."""
     if x_name and places is not None:
-        return {file: places[file] for file in files}, x_name
+        return {file: places[file].x for file in files}, x_name
     x, x_name = in_time(times, heard)
-    if places is None:
-        return {file: Place(x=at) for file, at in zip(files, x, strict=True)}, x_name
-    return {file: replace(places.get(file, Place(x=at)), x=at) for file, at in zip(files, x, strict=True)}, x_name
+    return dict(zip(files, x, strict=True)), x_name
+
+
+def placed_at(x: float, stated: Place | None) -> Place:
+    """A place at x, with what else is stated of it."""
+    return Place(x=x) if stated is None else replace(stated, x=x)
 
 
 def recordings_in(paths: Sequence[str | Path]) -> list[Path]:

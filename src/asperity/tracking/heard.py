@@ -31,10 +31,18 @@ from asperity.wear import (
 )
 
 
-def recording_of(reading: Reading, place: Place, clean: CleanSpectrum | None, resonance: Resonance) -> TrackedRecording:
+def recording_of(
+    reading: Reading,
+    place: Place,
+    clean: CleanSpectrum | None,
+    resonance: Resonance,
+    *,
+    on_sensors: Mapping[str, OnSensor] | None = None,
+    remounted: str | None = None,
+) -> TrackedRecording:
     """A recording of a track; how far its clock may be off widens the interval of its CRF, and repeats share it."""
     clock = reading.rate_doubt * resonance.crf_hz  # a rate off is a CRF off
-    if resonance.found:
+    if resonance.found and clock > 0.0:
         whole, shared = (float(np.hypot(std, clock)) for std in (resonance.crf_std, resonance.crf_shared_std))
         resonance = replace(resonance, crf_std=whole, crf_shared_std=shared)
     return TrackedRecording(
@@ -46,14 +54,17 @@ def recording_of(reading: Reading, place: Place, clean: CleanSpectrum | None, re
         resonance=resonance,
         damping_reason=resonance.reason if clean is None else _damping_reason(resonance, clean),
         operating=operating_of(reading, place),
+        on_sensors=on_sensors or {},
+        remounted=remounted,
     )
 
 
 def _damping_reason(resonance: Resonance, clean: CleanSpectrum) -> str:
     """Why its damping is not determined, or nothing. The joint separation knows which lines are missing."""
-    spectrum, half = clean.spectrum, resonance.damping_ratio * resonance.crf_hz
-    within = np.abs(spectrum.frequency_hz - resonance.crf_hz) <= half
-    missing = float(np.mean(~clean.kept[within])) if within.any() and resonance.method != "joint" else 0.0
+    spectrum, missing = clean.spectrum, 0.0
+    if resonance.method != "joint":
+        within = np.abs(spectrum.frequency_hz - resonance.crf_hz) <= resonance.damping_ratio * resonance.crf_hz
+        missing = float(np.mean(~clean.kept[within])) if within.any() else 0.0
     return damping_objection(resonance, spectrum.resolution_hz, taken_out=missing) or ""
 
 
@@ -122,18 +133,28 @@ def heard_together(
                 f"Of the errors of a line, sensors have {100 * memory.common:.0f} % in common: intervals are no "
                 "narrower than the rest allows."
             )
-    tracked = []
-    for number, one in enumerate(found):
-        first = next((name for name in names if name in cleaned[number]), next(iter(one.readings)))
-        line, heard_on, alone = told[number]
-        recording = recording_of(one.readings[first], one.place, cleaned[number].get(first), line)
-        on_sensors = {
-            name: OnSensor(reading=reading, alone=alone.get(name), hears=name in heard_on)
-            for name, reading in one.readings.items()
-        }
-        remounted = next((name for file, name in memory.moved if one.holds(file, name)), None)
-        tracked.append(replace(recording, on_sensors=on_sensors, remounted=remounted))
+    tracked = [
+        _together(one, clean, line, names, memory) for one, clean, line in zip(found, cleaned, told, strict=True)
+    ]
     return tracked, x_name, notes
+
+
+def _together(
+    one: Instant, cleaned: Mapping[str, CleanSpectrum], line: Together, names: Sequence[str], memory: Learned
+) -> TrackedRecording:
+    """What sensors heard at one time as one recording, with the reading of the first whose spectrum counts."""
+    first = next((name for name in names if name in cleaned), next(iter(one.readings)))
+    return recording_of(
+        one.readings[first],
+        one.place,
+        cleaned.get(first),
+        line.resonance,
+        on_sensors={
+            name: OnSensor(reading=reading, alone=line.alone.get(name), hears=name in line.heard_on)
+            for name, reading in one.readings.items()
+        },
+        remounted=next((name for file, name in memory.moved if one.holds(file, name)), None),
+    )
 
 
 def _instants(
@@ -185,7 +206,7 @@ def _instants(
     found: dict[tuple[float, ...], Instant] = {}
     for one in readings:
         instant = found.setdefault(keys[one.file, one.sensor], Instant(stand[one.file], {}))
-        instant.readings[one.sensor or lead] = replace(one, sensor=one.sensor or lead)
+        instant.readings[one.sensor or lead] = one if one.sensor else replace(one, sensor=lead)
     return [found[key] for key in sorted(found)], x_name
 
 
@@ -226,5 +247,8 @@ def _without_copies(names: Sequence[str], found: Sequence[Instant], *, refused: 
 
 def _alike(one: Spectrum, other: Spectrum) -> bool:
     if one.density.shape != other.density.shape:
+        return False
+    last, of_other = float(one.density[-1]), float(other.density[-1])
+    if abs(last - of_other) > COPIED * of_other:  # nearly all that are not are told by one of their values
         return False
     return bool(np.all(np.abs(one.density - other.density)[1:] <= COPIED * other.density[1:]))

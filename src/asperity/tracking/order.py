@@ -2,12 +2,11 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from asperity.tracking.alarming import BASELINE, LAST
-from asperity.tracking.files import Place, Table, in_their_places
+from asperity.tracking.files import Place, Table, placed_at, where
 from asperity.tracking.instants import Heard, Placed, by_place, by_time
 from asperity.tracking.sensors import Sensors
 from asperity.tracking.store import Kept, Version
@@ -16,21 +15,26 @@ LATEST = 112  # recordings of a long series that are judged with the first BASEL
 
 
 class Order(NamedTuple):
-    """Recordings in the order in which they are judged, what x is, and where each stands, by its file.
+    """Recordings in the order in which they are judged, what x is, and the x of each, by its file.
 
-    What several sensors heard at one time, each in a file of its own, is one of `instants`. `waits` are sentences on
-    recordings that cannot be laid beside the others yet.
+    What several sensors heard at one time, each in a file of its own, is one of `instants`. `stated` is what a table
+    says; `waits` are sentences on recordings that cannot be laid beside the others yet.
     """
 
     instants: list[tuple[Version, ...]]
     x_name: str
-    places: Mapping[str, Place]
+    x: Mapping[str, float]
+    stated: Mapping[str, Place] | None = None
     waits: tuple[str, ...] = ()
 
     @property
     def keys(self) -> list[Version]:
         """All of them, one by one."""
         return [key for instant in self.instants for key in instant]
+
+    def place(self, file: str) -> Place:
+        """Where a recording stands, and what else is stated of it."""
+        return placed_at(self.x[file], (self.stated or {}).get(file))
 
 
 def ordered(known: Sequence[Version], table: Table | None, sensors: Sensors) -> Order:
@@ -39,21 +43,21 @@ def ordered(known: Sequence[Version], table: Table | None, sensors: Sensors) -> 
     if table is not None:
         places = table.placed([Path(key.file) for key in known if table.row(Path(key.file)) is not None])
         known = [key for key in known if key.file in places]
-    kept = {key: sensors.kept(key) for key in known}
-    names = {name for heard in kept.values() for name, one in heard.items() if not one.refused}
+    names, own = sensors.heard(known), sensors.place.sensor
     waits: list[Version] = []
-    if len(names) > sensors.channels and sensors.place.sensor in names:
-        waits = [key for key, heard in kept.items() if _is_of(sensors.place.sensor, heard)]
-        names.discard(sensors.place.sensor)
+    if len(names) > sensors.channels and own in names:
+        waits = [key for key in known if _is_of(own, sensors.kept(key))]
+        names.discard(own)
+        waiting = {*waits}
+        known = [key for key in known if key not in waiting]
     said = _said(waits, "does not say of which sensor it is, and others do", "name it in a sidecar or a table")
-    kept = {key: heard for key, heard in kept.items() if key not in {*waits}}
     x_name = "" if table is None else table.x_name
     if len(names) > sensors.channels:
-        return _apart(kept, places, x_name, said)
-    files = [key.file for key in kept]
-    times = [next(iter(heard.values())).time for heard in kept.values()]
-    stand, x_name = in_their_places(files, times, [not _refused(heard) for heard in kept.values()], places, x_name)
-    return Order([(key,) for key in sorted(kept, key=lambda key: stand[key.file].x)], x_name, stand, said)
+        return _apart({key: sensors.kept(key) for key in known}, places, x_name, said)
+    first = [sensors.first(key) for key in known]
+    files, times, heard = [key.file for key in known], [one.time for one in first], [not one.refused for one in first]
+    x, x_name = where(files, times, heard, places, x_name)
+    return Order([(key,) for key in sorted(known, key=lambda key: x[key.file])], x_name, x, places, said)
 
 
 def _apart(
@@ -80,10 +84,8 @@ def _apart(
     instants: dict[tuple[float, ...], list[Version]] = {}
     for key, there in stands.items():
         instants.setdefault(there, []).append(key)
-    placed = {
-        key.file: replace((places or {}).get(key.file, Place(x=there[0])), x=there[0]) for key, there in stands.items()
-    }
-    return Order([tuple(instants[there]) for there in sorted(instants)], x_name, placed, said)
+    x = {key.file: there[0] for key, there in stands.items()}
+    return Order([tuple(instants[there]) for there in sorted(instants)], x_name, x, places, said)
 
 
 def _first(heard: Mapping[str, Kept]) -> Kept:

@@ -95,11 +95,6 @@ class TrackedRecording:
         reading = replace(self.reading, file=to[self.reading.file])
         return replace(self, file=to[self.file], reading=reading, on_sensors=heard)
 
-    def on(self, sensor: str) -> "TrackedRecording":
-        """The same as one of its sensors has it."""
-        reading = self.readings[sensor]
-        return replace(self, file=reading.file, reading=reading)
-
     @property
     def dead(self) -> bool:
         """Whether no sensor hears anything."""
@@ -143,18 +138,18 @@ class TrackedRecording:
 
     def row(self) -> dict[str, Any]:
         """Its line of the table, by the names of `asperity track --json`; None where there is nothing."""
-        resonance, quality = self.resonance, self.reading.quality
+        resonance, damping, read = self.resonance, self.damping, self._read(self.reading)
         return {
-            "file": self.file,
-            "x": None if self.reading.refused else finite_or_none(self.x),
+            "file": read["file"],
+            "x": read["x"],
             "x_std": finite_or_none(self.x_std),
             "crf_hz": finite_or_none(resonance.crf_hz),
             "crf_std_hz": finite_or_none(resonance.crf_std_hz),
             "crf_shared_std_hz": finite_or_none(resonance.crf_shared_std) if resonance.found else None,
             "crfa": finite_or_none(resonance.crfa),
             "crfa_std": finite_or_none(resonance.crfa_std),
-            "damping_ratio": finite_or_none(self.damping[0]),
-            "damping_std": finite_or_none(self.damping[1]),
+            "damping_ratio": finite_or_none(damping[0]),
+            "damping_std": finite_or_none(damping[1]),
             "damping_reason": self.damping_reason,
             "found": resonance.found,
             "reason": resonance.reason,
@@ -164,24 +159,34 @@ class TrackedRecording:
             "severe_probability": finite_or_none(self.severe_probability),
             "label": self.label,
             "state": self.state,
-            "started": self.reading.started or None,
-            "rate_hz": finite_or_none(self.reading.rate_hz),
-            "unit": self.reading.unit or None,
+            **read,
+            "zone": self.zone,
+            "crf_reference_hz": finite_or_none(self.crf_reference_hz),
+            **{name: getattr(self.operating, name) for name in STATED},
+            "sensors": {name: one.row() for name, one in self.on_sensors.items()},
+        }
+
+    def row_on(self, sensor: str, row: Mapping[str, Any]) -> dict[str, Any]:
+        """Its line of the table, `row`, as one of its sensors has it."""
+        return {**row, **self._read(self.readings[sensor])}
+
+    def _read(self, reading: Reading) -> dict[str, Any]:
+        """What a line has of the reading itself."""
+        quality = reading.quality
+        return {
+            "file": reading.file,
+            "x": None if reading.refused else finite_or_none(self.x),
+            "started": reading.started or None,
+            "rate_hz": finite_or_none(reading.rate_hz),
+            "unit": reading.unit or None,
             "duration_s": None if quality is None else quality.duration_s,
             **{
                 name: None if quality is None else finite_or_none(getattr(quality, name))
                 for name in ("rms", "crest", "kurtosis")
             },
-            "velocity_rms": finite_or_none(self.reading.velocity),
-            "zone": self.zone,
-            **{
-                name: {key: finite_or_none(value) for key, value in getattr(self.reading, name).items()}
-                for name in NAMED
-            },
-            "crf_reference_hz": finite_or_none(self.crf_reference_hz),
-            **{name: getattr(self.operating, name) for name in STATED},
+            "velocity_rms": finite_or_none(reading.velocity),
+            **{name: {key: finite_or_none(value) for key, value in getattr(reading, name).items()} for name in NAMED},
             "remarks": "; ".join(quality.remarks) if quality is not None else "",
-            "sensors": {name: one.row() for name, one in self.on_sensors.items()},
         }
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from asperity.errors import BadInput, UnreadableFile
 from asperity.tracking.reading import Reading, reading_bytes, reading_from
 from asperity.tracking.store import Kept, Place, Standing, Store, Version
+from asperity.wear import AlarmState
 
 ACKNOWLEDGED = "acknowledged"  # state of a judgement that a person has made
 FOLDER = "folder"  # among the settings of a sensor that was not named: nobody else's recordings are to be taken for its
@@ -23,8 +24,8 @@ class Sensor:
     """The recordings of one sensor.
 
     `settings` are those by which its recordings are read, and those given with `begin` where it is new. `recordings`
-    are all that the store holds; `acknowledged` names the one up to which somebody has looked, None for none;
-    `standing` is the alarm that stands since.
+    are all that the store holds, `unjudged` those of which nothing was said yet; `acknowledged` names the one up to
+    which somebody has looked, None for none; `standing` is the alarm that stands since.
 
     Raises
     ------
@@ -53,6 +54,7 @@ class Sensor:
                 self.number,
             )
         }
+        self.unjudged = {key for key, kept in self.recordings.items() if kept.state is None}
         self.acknowledged: str | None = None
         self.standing: Standing | None = None
         self.look_up()
@@ -96,6 +98,12 @@ class Sensor:
             found = run("SELECT id FROM recording WHERE sensor = ? AND file = ? AND version = ?", told[:3])
             (number,) = found.fetchone()
         self.recordings[key] = Kept(number, reading.time, None, reading.refused, nan if duration is None else duration)
+        self.unjudged.add(key)
+
+    def say(self, key: Version, state: AlarmState) -> None:
+        """What is said of a recording from now on."""
+        self.recordings[key] = self.recordings[key]._replace(state=state)
+        self.unjudged.discard(key)
 
     def reading(self, key: Version) -> Reading | None:
         """What was kept; None, and forgotten, where it is damaged."""
@@ -105,6 +113,7 @@ class Sensor:
         except UnreadableFile:
             with self.store.transaction() as run:
                 run("DELETE FROM recording WHERE id = ?", (self.recordings.pop(key).number,))
+            self.unjudged.discard(key)
             return None
 
     def enter(self, run: Any, judgement: Mapping[str, Any]) -> None:

@@ -77,13 +77,29 @@ class Sensors:
 
     # Recordings ------------------------------------------------------------------------------------------------------
 
-    def knows(self, key: Version) -> bool:
-        """Whether a version of a file has been read, on every channel."""
-        return sum(key in one.recordings for one in self._each()) >= self.channels
+    def unread(self, keys: Sequence[Version]) -> list[Version]:
+        """Those of some versions of files that have not been read on every channel."""
+        every = [one.recordings for one in self._each()]
+        if self.channels == 1:
+            return [key for key in keys if not any(key in read for read in every)]
+        return [key for key in keys if sum(key in read for read in every) < self.channels]
 
     def kept(self, key: Version) -> dict[str, Kept]:
         """What is known of a version of a file, by sensor."""
         return {name: one.recordings[key] for name, one in self.by_name.items() if key in one.recordings}
+
+    def first(self, key: Version) -> Kept:
+        """What is known of a version of a file by the first sensor that could read it, or else by the first."""
+        held = [one.recordings[key] for one in self._each() if key in one.recordings]
+        return next((kept for kept in held if not kept.refused), held[0])
+
+    def heard(self, keys: Sequence[Version]) -> set[str]:
+        """Sensors that could read any of some versions of files."""
+        return {
+            name
+            for name, one in self.by_name.items()
+            if any(key in one.recordings and not one.recordings[key].refused for key in keys)
+        }
 
     def state(self, key: Version) -> AlarmState | None:
         """What was said of a version of a file; None before it was judged."""
@@ -95,8 +111,7 @@ class Sensors:
 
     def unjudged(self) -> set[Version]:
         """Recordings of which nothing was said yet."""
-        silent = {key for one in self._each() for key, kept in one.recordings.items() if kept.state is None}
-        return {key for key in silent if self.state(key) is None}
+        return {key for one in self._each() for key in one.unjudged if self.state(key) is None}
 
     def series(self) -> list[Version]:
         """All recordings, of each file the last version, whether or not the file is still there."""
@@ -264,7 +279,7 @@ class Sensors:
         self._lines = (version, lines_now)
         for every in rows:
             for _, row, sensor, key in every:
-                sensor.recordings[key] = sensor.recordings[key]._replace(state=row["state"])
+                sensor.say(key, row["state"])
         for one in self._each():
             if alarm["state"] == "alarm" and one.standing is None:
                 one.standing = Standing(alarm["since"], alarm["reason"], alarm["raised_by"] or "")
@@ -282,7 +297,7 @@ class Sensors:
                 held = [one for one in self._each() if key in one.recordings]
                 named = next((one for one in held if one.place.sensor == name), held[0])
                 leads = name == recording.reading.sensor
-                line = row if leads else recording.on(name).row()
+                line = row if leads else recording.row_on(name, row)
                 (whole if leads else others).append((named.recordings[key].number, line, named, key))
         return [whole, others]
 

@@ -206,8 +206,8 @@ def judge(
     for number, reading in enumerate(series):
         clean, found = used.get(number, (None, None))
         resonance = found or no_resonance(reading.reason, target.band_hz, chosen)
-        one = recording_of(reading, places[reading.file], clean, resonance)
-        tracked.append(replace(one, remounted=reading.sensor) if number in first_behind else one)
+        remounted = reading.sensor if number in first_behind else None
+        tracked.append(recording_of(reading, places[reading.file], clean, resonance, remounted=remounted))
     return _staged(tracked, x_name, target, chosen, (detector, stages_from), alarming, notes)
 
 

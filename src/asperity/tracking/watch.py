@@ -160,8 +160,7 @@ def _looks(
     with closing(memory.sensors.store):
         first, told = True, ""
         while True:
-            present = memory.present(folder)
-            unread = [key for key in present if not memory.sensors.knows(key)]
+            unread = memory.unread(folder)
             arrived = memory.settled(unread, pace)
             named = None if table is None or not (arrived or memory.sensors.by_name) else read_table(table)
             if named is not None:
@@ -238,8 +237,8 @@ class _Memory:
         """Names of all who are called."""
         return [caller.name for caller in self.call]
 
-    def present(self, folder: Path) -> list[Version]:
-        """Recordings that lie in the folder now, by name with numbers in their order."""
+    def unread(self, folder: Path) -> list[Version]:
+        """Recordings in the folder that have not been read as they are now, by name with numbers in their order."""
         versions, stamps = [], {}
         with os.scandir(folder) as entries:
             for entry in entries:
@@ -253,9 +252,9 @@ class _Memory:
                 continue
             beside = next((name for name in names_beside(entry.name) if name in sidecars), None) if sidecars else None
             key = Version(entry.path, stamp if beside is None else f"{stamp} {stamps[beside][1]}")
-            if self.sensors.knows(key) or may_be_recording(Path(key.file)):
-                versions.append((natural(entry.name), key))
-        return [key for _, key in sorted(versions)]
+            versions.append(key)
+        new = [key for key in self.sensors.unread(versions) if may_be_recording(Path(key.file))]
+        return sorted(new, key=lambda key: natural(file_name(key)))
 
     def left_out(self) -> Iterator[str]:
         """A sentence on each file that cannot be entered."""
@@ -324,7 +323,9 @@ class _Memory:
         if acknowledge is not None:
             self.sensors.acknowledge(_named(acknowledge, order.keys))
         unjudged = self.sensors.unjudged()
-        begins = (number for number, keys in enumerate(order.instants) if unjudged.issuperset(keys))
+        begins = (
+            number for number, keys in enumerate(order.instants) if keys[0] in unjudged and unjudged.issuperset(keys)
+        )
         first = max(next(begins, count) + STRIDE, longest())
         for end in range(first, count, STRIDE):
             self._judged(judging, order, end, 0, "", again=again, who=())
@@ -339,7 +340,7 @@ class _Memory:
             return None
         (track, order, question), self._unforetold = self._unforetold, None
         acknowledged = self.sensors.acknowledged
-        every = [row | {"x": order.places[row["file"]].x} for row in self.sensors.rows(order.instants)]
+        every = [row | {"x": order.x[row["file"]]} for row in self.sensors.rows(order.instants)]
         rows = unacknowledged(every, acknowledged)
         made = self.ahead.make(rows, order.x_name, comparable=track.comparable, acknowledged=acknowledged)
         return self.sensors.judged(
@@ -383,7 +384,7 @@ class _Memory:
         track: Track = judging(
             [reading for every in self._readings.values() for reading in every],
             self.target,
-            {key.file: order.places[key.file] for key in chosen},
+            {key.file: order.place(key.file) for key in chosen},
             order.x_name,
             acknowledge=acknowledged if acknowledged in names else None,
             learned=self._learned,

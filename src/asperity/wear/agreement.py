@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.wear.misfit import shares_of
+from asperity.wear.expected import shares_of
 from asperity.wear.resonance import Resonance
 from asperity.wear.separation import Heard, Joint, Lines
 
@@ -70,7 +70,7 @@ def in_common(pair: tuple[str, str], fits: Sequence[Fit]) -> float:
         for name in pair:
             sensor = fit.names.index(name)
             blocks, joint = fit.heard[sensor].blocks, fit.joint(sensor)
-            relative, expected = shares_of(blocks, joint)
+            relative, expected = shares_of(blocks, joint.parameters)
             felt.append(np.sqrt(blocks.weight) * np.abs(relative[:, 1]))
             off.append(np.sqrt(blocks.weight) * (blocks.density / expected - 1.0))
         both = felt[0] * felt[1]

@@ -4,12 +4,13 @@ A machine does not quite repeat itself, a structure is not quite followed. The f
 means to `series`; docs/theory/indicators.md has the equations.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
-from asperity.wear.expected import LOOSE, Blocks, expected_density, lines_and_slopes
+from asperity.wear.expected import LOOSE, Blocks, shares_of
 from asperity.wear.separation import Joint
 
 COMMON_FROM = 0.1  # share of what all recordings share in a block, from which its residual is the machine's
@@ -30,16 +31,9 @@ class Witnesses(NamedTuple):
     lacking: Field
 
 
-def shares_of(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
-    """What line, place, damping and machine each have in what is expected (recordings, 4, blocks), and that."""
-    line, by_f0, by_damping = lines_and_slopes(blocks.centre, joint.parameters)
-    expected = expected_density(blocks, joint.parameters)
-    return np.stack([line, by_f0, by_damping, expected - line], axis=1) / expected[:, None], expected
-
-
 def witnesses_of(blocks: Blocks, joint: Joint, rows: list[int]) -> Witnesses:
     """How far some recordings are from what was fitted to all."""
-    relative, expected = shares_of(blocks, joint)
+    relative, expected = shares_of(blocks, joint.parameters)
     common = relative[rows, 3]
     counts = (common > COMMON_FROM) & (blocks.weight[rows] > 0.0)
     share = np.where(counts, common, 1.0)
@@ -51,49 +45,70 @@ def witnesses_of(blocks: Blocks, joint: Joint, rows: list[int]) -> Witnesses:
     return Witnesses(counts, change, by_chance, lacking)
 
 
-def _influence(blocks: Blocks, relative: Field) -> Field:
-    """What a relative change of a recording's spectrum in each block does to each of its own parameters."""
-    information = np.einsum("npb,nqb,nb->npq", relative, relative, blocks.weight, optimize=True) + LOOSE * np.eye(4)
-    return np.linalg.solve(information, relative * blocks.weight[:, None])
+class Brought(NamedTuple):
+    """Standard deviations (recordings, 4) that chance does not bring.
+
+    Of a machine that does not quite repeat itself, and of a structure that is not quite followed.
+    """
+
+    misfit: Field
+    lacking: Field
+
+    @property
+    def std(self) -> Field:
+        """Both together."""
+        return np.asarray(np.hypot(self.misfit, self.lacking))
 
 
-def misfit_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
-    """Standard deviations (recordings, 4) that a machine brings which does not quite repeat itself, beside chance.
+def brought(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Brought:
+    """What machine and structure bring to each recording's own parameters."""
+    relative, _ = shares_of(blocks, joint.parameters)
+    weighted = relative * blocks.weight[:, None]
+    # what a relative change of a recording's spectrum in each block does to each of its own parameters
+    influence = np.linalg.solve(weighted @ relative.swapaxes(1, 2) + LOOSE * np.eye(4), weighted)
+    spacing = joint.parameters.transfer.spacing_hz
+    return Brought(
+        _misfit_std(influence * relative[:, None, 3], witnesses),
+        _lacking_std(blocks.centre, relative[:, 0] ** 2, influence, spacing, witnesses),
+    )
+
+
+def _misfit_std(felt: Field, witnesses: Witnesses) -> Field:
+    """Of a machine that does not quite repeat itself, whose changes are `felt` so by each parameter.
 
     What the fit of one recording would make of the residuals that the others have where its line lies: its influence
     a_b on each parameter, applied to r_jb of those recordings j whose own line is far; squared, averaged over them,
     less what chance explains.
     """
-    relative, _ = shares_of(blocks, joint)
-    felt = _influence(blocks, relative) * relative[:, None, 3]  # what a change of the machine does to each parameter
-    moved = np.einsum("npb,jb->npj", felt, witnesses.change, optimize=True) ** 2
-    expected_of_chance = np.einsum("npb,jb->npj", felt**2, witnesses.by_chance, optimize=True)
-    whole = np.einsum("npb,jb->npj", felt**2, witnesses.counts.astype(float), optimize=True)
+    squares = felt**2
+    moved = (felt @ witnesses.change.T) ** 2
+    expected_of_chance = squares @ witnesses.by_chance.T
+    whole = squares @ witnesses.counts.T.astype(float)
     # a witness has to cover nearly all that matters; the less chance blurs it, the more it counts
-    enough = whole > WITNESS_FROM * np.sum(felt**2, axis=2)[:, :, None]
+    enough = whole > WITNESS_FROM * np.sum(squares, axis=2)[:, :, None]
     witness = enough / np.maximum(expected_of_chance, TINY) ** 2
     variance = np.sum((moved - expected_of_chance) * witness, axis=2) / np.maximum(np.sum(witness, axis=2), TINY)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def lacking_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
-    """Standard deviations (recordings, 4) that a structure brings which the splines of its transfer do not follow.
+def _lacking_std(centre: Field, line: Field, influence: Field, spacing_hz: float, witnesses: Witnesses) -> Field:
+    """Of a structure that the splines of its transfer do not follow; `line` is the line's share, squared.
 
     What fits leave where a line lies shows how far the model is off there. What it took up instead is taken to be as
     large, and the less alike the further apart, up to a spline's spacing, as what is slower is followed.
     """
-    relative, _ = shares_of(blocks, joint)
-    line = relative[:, 0] ** 2
     square = np.maximum(line @ witnesses.lacking / np.maximum(line.sum(axis=1), TINY), 0.0)
-    apart = np.abs(blocks.centre[:, None] - blocks.centre) / joint.parameters.transfer.spacing_hz
-    influence = _influence(blocks, relative)
-    felt = np.sum(influence @ np.maximum(1.0 - apart, 0.0) * influence, axis=2)
+    felt = np.sum(influence @ _alike(centre.tobytes(), spacing_hz) * influence, axis=2)
     return np.asarray(np.sqrt(square[:, None] * np.maximum(felt, 0.0)))
 
 
-def brought_std(blocks: Blocks, joint: Joint, witnesses: Witnesses) -> Field:
-    """Standard deviations (recordings, 4) of all that chance does not bring."""
-    return np.hypot(misfit_std(blocks, joint, witnesses), lacking_std(blocks, joint, witnesses))
+@lru_cache(maxsize=4)
+def _alike(centres: bytes, spacing_hz: float) -> Field:
+    """How alike blocks are, by how far their centres are apart: a series asks for the same ones each time."""
+    centre = np.frombuffer(centres)
+    alike = np.maximum(1.0 - np.abs(centre[:, None] - centre) / spacing_hz, 0.0)
+    alike.flags.writeable = False
+    return alike
 
 
 def left_over(blocks: Blocks, expected: Field) -> Field:

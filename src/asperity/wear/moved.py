@@ -7,8 +7,7 @@ that leaves. What is made of it is left to `series`. docs/theory/indicators.md h
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.wear.expected import LOOSE, Blocks, away
-from asperity.wear.misfit import shares_of
+from asperity.wear.expected import LOOSE, Blocks, away, shares_of
 from asperity.wear.separation import Joint
 
 LEAST_PART = 6  # recordings before a move and behind it
@@ -64,7 +63,7 @@ def moved_at(blocks: Blocks, joint: Joint) -> int | None:
 def _by_recording(blocks: Blocks, joint: Joint) -> tuple[Field, Field]:
     """Score and information of each recording in the transfer's coefficients, its own parameters eliminated."""
     at = joint.parameters
-    relative, expected = shares_of(blocks, joint)
+    relative, expected = shares_of(blocks, joint.parameters)
     off = blocks.weight * (blocks.density / expected - 1.0)
     size = at.transfer.coefficients.size
     score, information = np.zeros((off.shape[0], size)), np.zeros((off.shape[0], size, size))

@@ -59,7 +59,7 @@ NOTHING_EXPLAINED = Explained(np.zeros(1), np.zeros((0, 1)), np.zeros(0), np.zer
 def explained(values: Field, conditions: Sequence[Condition], *, least: float) -> Explained:
     """What conditions explain: bounded least squares on the differences of one recording to the next.
 
-    Differences, because wear and a condition may both drift: what goes slowly says little of either.
+    Differences beside their mean, because wear and a condition may both drift: what goes slowly says little of either.
 
     Parameters
     ----------
@@ -78,6 +78,7 @@ def explained(values: Field, conditions: Sequence[Condition], *, least: float) -
     rows = np.array([one.values - np.median(one.values[known][:BASELINE]) for one in counted])
     low, high = (np.array([getattr(one, end) for one in counted]) for end in ("low", "high"))
     change, along = np.diff(values[known]), np.diff(rows[:, known], axis=1)
+    change, along = change - change.mean(), along - along.mean(axis=1, keepdims=True)
     size = np.maximum(np.abs(along).max(axis=1), 1e-12)  # of one scale, so that the solver sees all of them
     fitted = scipy.optimize.lsq_linear((along / size[:, None]).T, change, (low * size, high * size))
     coefficients = fitted.x / size

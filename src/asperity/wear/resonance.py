@@ -107,20 +107,27 @@ def line_shape(frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field |
     T(f)/T(f0) with T = (f0^4 + (2ζ f0 f)^2) / ((f0^2 - f^2)^2 + (2ζ f0 f)^2), T(f0) = (1 + 4ζ^2)/(4ζ^2). Roughness
     whose spectrum falls as f^-4 (a second-order low pass, far above its cut-off) is white base acceleration.
     """
-    return line_and_slopes(frequency_hz, f0_hz, damping_ratio)[0]
+    return _line_and_parts(frequency_hz, f0_hz, damping_ratio)[0]
 
 
 def line_and_slopes(
     frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
 ) -> tuple[Field, Field, Field]:
     """The line L, dL/d(ln f0) and dL/d(ln ζ); shapes broadcast."""
-    x2 = (frequency_hz / f0_hz) ** 2
-    squared = 4.0 * damping_ratio**2
-    top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
-    line = squared / (1.0 + squared) * top / bottom
+    line, x2, squared, top, bottom = _line_and_parts(frequency_hz, f0_hz, damping_ratio)
     by_f0 = line * ((2.0 * squared * x2 - 4.0 * x2 * (1.0 - x2)) / bottom - 2.0 * squared * x2 / top)
     by_damping = line * (2.0 * squared * x2 * (1.0 / top - 1.0 / bottom) + 2.0 / (1.0 + squared))
     return line, by_f0, by_damping
+
+
+def _line_and_parts(
+    frequency_hz: Field, f0_hz: Field | float, damping_ratio: Field | float
+) -> tuple[Field, Field, Field | float, Field, Field]:
+    """The line L, (f/f0)^2, (2ζ)^2, and L's numerator and denominator."""
+    x2 = (frequency_hz / f0_hz) ** 2
+    squared = 4.0 * damping_ratio**2
+    top, bottom = 1.0 + squared * x2, (1.0 - x2) ** 2 + squared * x2
+    return squared / (1.0 + squared) * top / bottom, x2, squared, top, bottom
 
 
 def no_resonance(reason: str, band_hz: tuple[float, float], method: str, **known: Any) -> Resonance:

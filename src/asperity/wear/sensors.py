@@ -6,7 +6,7 @@ errors of two sensors have in common is measured: an interval narrows only by wh
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from asperity.arrays import Field, Mask
 from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear.agreement import Agreement, Fit, differ, in_common, shares_in_common
-from asperity.wear.expected import Blocks, expected_density
+from asperity.wear.expected import Blocks, expected_density, shares_of
 from asperity.wear.indicators import STRONG_EVIDENCE
-from asperity.wear.misfit import brought_std, lacking_std, left_over, shares_of
+from asperity.wear.misfit import Brought, brought, left_over
 from asperity.wear.moved import moved_at
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Heard, alone_beside, coarser, each, levelled, places
@@ -182,7 +182,9 @@ def _rows(spectra: SpectraBySensor, band_hz: tuple[float, float]) -> dict[str, l
 
 def _counted(spectra: SpectraBySensor, band_hz: tuple[float, float]) -> list[str]:
     """Sensors with enough recordings to be separated."""
-    return [name for name, there in _rows(spectra, band_hz).items() if len(there) >= FEWEST_RECORDINGS]
+    heard = {name: (one for one in every if one is not None and not is_silent(one, band_hz))
+             for name, every in spectra.items()}  # fmt: skip
+    return [name for name, some in heard.items() if len([*islice(some, FEWEST_RECORDINGS)]) == FEWEST_RECORDINGS]
 
 
 def _used(
@@ -317,7 +319,12 @@ class _Together:
         hears = (np.array(gains) - np.log(weights) > STRONG_EVIDENCE) & (np.array(misfits) <= LARGEST_MISFIT)
         hears &= ~np.array([self.by_sensor[name].found.shaped for name in fit.names])[:, None]
         evidence = np.sum(gains, axis=0) / counts_as - (2.0 + len(fit.names)) * np.log(np.sum(weights, axis=0))
-        std, shared = self._deviations(fit, shares), wider * self._shared(fit)
+        beyond = [
+            brought(heard.blocks, fit.joint(sensor), self.by_sensor[name].found.witnesses)
+            for sensor, (heard, name) in enumerate(zip(fit.heard, fit.names, strict=True))
+        ]
+        of_structures = sum(part * one.lacking[:, 1] for part, one in zip(_parts(fit), beyond, strict=True))
+        std, shared = self._deviations(fit, shares, beyond), wider * np.asarray(of_structures)
         std[:, :, 1] *= wider
         return [
             self._line(
@@ -391,17 +398,17 @@ class _Together:
             crfa_std=height[1], reason=said,
         ), (name,)  # fmt: skip
 
-    def _deviations(self, fit: Fit, shares: Field) -> Field:
+    def _deviations(self, fit: Fit, shares: Field, beyond: Sequence[Brought]) -> Field:
         """Standard deviations (sensors, recordings, 4): what is independent, what is common, what a machine brings."""
         inverse, dragged = fit.lines.inverse, fit.lines.dragged
         variance = np.einsum("npp->np", inverse).copy()
-        relative = [shares_of(heard.blocks, fit.joint(sensor))[0] for sensor, heard in enumerate(fit.heard)]
+        relative = [shares_of(heard.blocks, fit.joint(sensor).parameters)[0] for sensor, heard in enumerate(fit.heard)]
         part = _parts(fit)
         brought = np.zeros(inverse.shape[:2])
         of_base = []
         for sensor, heard in enumerate(fit.heard):
             at = places(sensor)
-            misfit = brought_std(heard.blocks, fit.joint(sensor), self.by_sensor[fit.names[sensor]].found.witnesses)
+            misfit = beyond[sensor].std
             brought[:, [at[0], at[3]]] += misfit[:, [0, 3]]
             brought[:, [1, 2]] += part[sensor][:, None] * misfit[:, [1, 2]]
             base = self._of_the_base(fit, sensor)
@@ -410,31 +417,25 @@ class _Together:
             for other in range(len(fit.heard)):
                 if other != sensor:
                     weight = np.sqrt(heard.blocks.weight * fit.heard[other].blocks.weight)
-                    score = np.einsum("npb,nqb,nb->npq", relative[sensor], relative[other], weight, optimize=True)
+                    score = (relative[sensor] * weight[:, None]) @ relative[other].swapaxes(1, 2)
                     both = inverse[:, :, at] @ score @ inverse[:, places(other), :]
                     variance += shares[sensor, other] * np.einsum("npp->np", both)
         alike = shares + np.eye(len(fit.heard))
         variance[:, [1, 2]] += np.einsum("snp,st,tnp->np", of_base, alike, of_base)
         of_transfer = [
-            np.sqrt(np.einsum("npc,cd,npd->np", one, heard.doubt, one, optimize=True))
-            for one, heard in zip(dragged, fit.heard, strict=True)
+            np.sqrt(np.sum(one @ heard.doubt * one, axis=2)) for one, heard in zip(dragged, fit.heard, strict=True)
         ]
         variance += np.einsum("snp,st,tnp->np", of_transfer, alike, of_transfer)
         std = np.hypot(np.sqrt(variance), brought)
         return np.stack([std[:, places(sensor)] for sensor in range(len(fit.heard))])
-
-    def _shared(self, fit: Fit) -> Field:
-        """Of ln f, what structures bring that lines at one place have in common; (recordings,)."""
-        return np.asarray(sum(
-            part * lacking_std(heard.blocks, fit.joint(sensor), self.by_sensor[name].found.witnesses)[:, 1]
-            for sensor, (part, heard, name) in enumerate(zip(_parts(fit), fit.heard, fit.names, strict=True))
-        ))  # fmt: skip
 
     def _of_the_base(self, fit: Fit, sensor: int) -> Field:
         """What a base, known as well as its series tells, adds to the deviations of lines; (recordings, 4)."""
         name, heard = fit.names[sensor], fit.heard[sensor]
         rows = [self.rows[name].index(number) for number in fit.numbers]
         settled = self.by_sensor[name].found.joint
+        if self.by_sensor[name].beside:  # the base's doubt is not in their deviations
+            return np.zeros_like(settled.std[rows])
         own = settled.parameters.own[rows]
         known = alone_beside(heard.blocks, settled.parameters._replace(own=own), heard.doubt).std
         return np.asarray(np.sqrt(np.maximum(settled.std[rows] ** 2 - known**2, 0.0)))
@@ -442,5 +443,5 @@ class _Together:
 
 def _parts(fit: Fit) -> Field:
     """What each sensor says of a line's place, as a share; (sensors, recordings)."""
-    information = np.array([point.own_information[:, 1, 1] for point in fit.lines.points])
+    information = np.array([point.information[:, 1, 1] for point in fit.lines.points])
     return np.asarray(information / information.sum(axis=0))

@@ -15,11 +15,13 @@ from asperity.wear.expected import (
     DAMPING_SPREAD,
     USUAL_DAMPING,
     Blocks,
+    OwnPoint,
     Parameters,
     Point,
     bounds_of,
     costs_at,
-    lines_and_slopes,
+    lines,
+    own_at,
     point_at,
 )
 from asperity.wear.resonance import line_shape
@@ -171,7 +173,7 @@ def beside(
 
 def _settled_base(blocks: Blocks, own: Field, base: Field) -> Field:
     """The base that fits best beside given lines and gains: Fisher scoring in ln B, each block by itself."""
-    line = lines_and_slopes(blocks.centre, Parameters(own, base))[0]
+    line = lines(blocks.centre, Parameters(own, base))
     gain = np.exp(own[:, 3, None])
     log_base = np.log(base)
     for _ in range(12):
@@ -242,7 +244,7 @@ def _together(blocks: Blocks, coarse: Blocks, templates: Templates) -> Joint:
 
 def _lifted(blocks: Blocks, at: Parameters) -> Parameters:
     """The same with a base that is nowhere nil below a line: in its logarithm no step would lead away from there."""
-    line = lines_and_slopes(blocks.centre, at)[0]
+    line = lines(blocks.centre, at)
     least = np.min(line / np.exp(at.own[:, 3, None]), axis=0)
     return at._replace(base=np.maximum(at.base, np.log(LIFTED * least)))
 
@@ -318,20 +320,15 @@ class Lines(NamedTuple):
     """Lines of recordings, each of one place and damping on all sensors.
 
     `own` (sensors, recordings, 4) are as in `Parameters`; `inverse` (recordings, n, n) is of the information in all
-    that is one's own, of which each sensor's are at `places`; `cost` (recordings,); `points` are by sensor.
+    that is one's own, of which each sensor's are at `places`; `cost` (recordings,); by sensor `points`, and `dragged`,
+    what each coefficient of its transfer does to all that is one's own (recordings, n, coefficients).
     """
 
     own: Field
     cost: Field
     inverse: Field
-    points: list[Point]
-
-    @property
-    def dragged(self) -> list[Field]:
-        """What each coefficient of a sensor's transfer does to all that is one's own; (recordings, n, coefficients)."""
-        return [
-            np.matmul(self.inverse[:, :, places(sensor)], point.passed_own) for sensor, point in enumerate(self.points)
-        ]
+    points: list[OwnPoint]
+    dragged: list[Field]
 
 
 def places(sensor: int) -> list[int]:
@@ -349,23 +346,20 @@ def each(sensors: Sequence[Heard]) -> Lines:
         every = [costs_at(one.blocks, one.at._replace(own=mine)) for one, mine in zip(sensors, own, strict=True)]
         return np.asarray(np.sum(every, axis=0) - 0.5 * again * (own[0, :, 2] - np.log(USUAL_DAMPING)) ** 2)
 
-    def placed(own: Field, cost: Field) -> tuple[Field, Field, list[Point], Field, Field]:
-        points = [
-            point_at(one.blocks, one.at._replace(own=mine), np.zeros_like(one.doubt))
-            for one, mine in zip(sensors, own, strict=True)
-        ]
+    def placed(own: Field, cost: Field) -> tuple[Field, Field, list[OwnPoint], Field, Field]:
+        points = [own_at(one.blocks, one.at._replace(own=mine)) for one, mine in zip(sensors, own, strict=True)]
         score, information = np.zeros((own.shape[1], size)), np.zeros((own.shape[1], size, size))
         for sensor, point in enumerate(points):
             at = np.array(places(sensor))
-            score[:, at] += point.own_score
-            information[:, at[:, None], at] += point.own_information
+            score[:, at] += point.score
+            information[:, at[:, None], at] += point.information
         score[:, 2] += again * (own[0, :, 2] - np.log(USUAL_DAMPING))
         information[:, 2, 2] -= again
         return own, cost, points, score, information
 
     def propose(
-        state: tuple[Field, Field, list[Point], Field, Field], damping: Field
-    ) -> tuple[Mask, Callable[[Mask], tuple[Field, Field, list[Point], Field, Field]]] | None:
+        state: tuple[Field, Field, list[OwnPoint], Field, Field], damping: Field
+    ) -> tuple[Mask, Callable[[Mask], tuple[Field, Field, list[OwnPoint], Field, Field]]] | None:
         own, cost, _, score, information = state
         diagonal = np.einsum("npp->np", information)
         damped = information + (damping[:, None] * diagonal)[:, :, None] * np.eye(size)
@@ -383,15 +377,20 @@ def each(sensors: Sequence[Heard]) -> Lines:
     state = placed(own, cost_of(own))
     state, _ = damped_scoring(state, propose, steps=MOST_STEPS, least=1e-7, most=1e6, fits=own.shape[1])
     own, cost, points, _, information = state
-    return Lines(own, cost, np.linalg.inv(information), points)
+    inverse = np.linalg.inv(information)
+    dragged: list[Field] = [
+        inverse[:, :, places(sensor)] @ point.passed(one.blocks.centre, one.at._replace(own=mine))
+        for sensor, (point, one, mine) in enumerate(zip(points, sensors, own, strict=True))
+    ]
+    return Lines(own, cost, inverse, points, dragged)
 
 
 def alone_beside(blocks: Blocks, start: Parameters, doubt: Field) -> Joint:
     """Lines of one sensor beside a base and a transfer that are known."""
-    lines = each([Heard(blocks, start, doubt)])
-    (dragged,) = lines.dragged
-    variance = np.einsum("npp->np", lines.inverse) + np.einsum("npc,cd,npd->np", dragged, doubt, dragged, optimize=True)
-    return Joint(start._replace(own=lines.own[0]), float(np.sum(lines.cost)), np.sqrt(variance), doubt)
+    found = each([Heard(blocks, start, doubt)])
+    (dragged,) = found.dragged
+    variance = np.einsum("npp->np", found.inverse) + np.sum(dragged @ doubt * dragged, axis=2)
+    return Joint(start._replace(own=found.own[0]), float(np.sum(found.cost)), np.sqrt(variance), doubt)
 
 
 def _passed_on(blocks: Blocks, start: Parameters) -> Joint:

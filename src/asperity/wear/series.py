@@ -17,7 +17,7 @@ from asperity.errors import BadInput
 from asperity.signals import Spectrum
 from asperity.wear.expected import Blocks, expected_density, whittle_costs
 from asperity.wear.indicators import STRONG_EVIDENCE, IndicatorMethod, contact_resonance, require_band
-from asperity.wear.misfit import Witnesses, lacking_std, left_over, misfit_std, witnesses_of
+from asperity.wear.misfit import Witnesses, brought, left_over, witnesses_of
 from asperity.wear.moved import moved_at
 from asperity.wear.resonance import Resonance, fitted_resonance, no_resonance
 from asperity.wear.separation import Joint, Model, Templates, beside, coarser, models, separate, templates_on
@@ -126,12 +126,16 @@ class LearnedSeries(NamedTuple):
 
 
 class Separated(NamedTuple):
-    """A series separated: its spectra in blocks, the fit, the resonances in it, and what it learned."""
+    """A series separated: its spectra in blocks, the fit, the resonances in it, and what it learned.
+
+    `beside` says whether what it shares was known before.
+    """
 
     blocks: Blocks
     found: "Found"
     resonances: tuple[Resonance, ...]
     shared: Shared
+    beside: bool = False
 
 
 def learn_series(
@@ -235,7 +239,7 @@ def separated_beside(shared: Shared, spectra: Sequence[Spectrum], kept: Sequence
     joint, elsewhere = beside(blocks, shared.base, passed, shared.doubt, templates, ready)
     witnesses = Witnesses(shared.counts, shared.change, shared.by_chance, shared.lacking)
     found = Found(joint, templates, elsewhere, witnesses, shared.stands, shared.shaped)
-    return Separated(blocks, found, _judged(blocks, found, shared.band_hz), shared)
+    return Separated(blocks, found, _judged(blocks, found, shared.band_hz), shared, beside=True)
 
 
 def _blocked(
@@ -303,9 +307,8 @@ def _judged(blocks: Blocks, found: Found, band_hz: tuple[float, float]) -> tuple
     own, base, _ = joint.parameters
     evidence, alone = _evidence(blocks, joint)
     bare, expected = np.exp(base), expected_density(blocks, joint.parameters)
-
-    shared = lacking_std(blocks, joint, found.witnesses)
-    std = np.sqrt(joint.std**2 + misfit_std(blocks, joint, found.witnesses) ** 2 + shared**2)
+    beyond = brought(blocks, joint, found.witnesses)
+    shared, std = beyond.lacking, np.hypot(joint.std, beyond.std)
     misfit = left_over(blocks, expected)
     way = STANDS if found.stands else MOVES
     resonances = []

@@ -16,6 +16,7 @@ SPLINES = 48  # cubic, across the band
 DEGREE = 3
 STEEPEST = 2.0  # deviation of the power of frequency
 LOOSE = 1e-2  # deviation 10: of what a line's own height takes up
+MANY = 32  # frequencies, from which on they are a series' blocks, and asked for in every step
 
 
 class Transfer(NamedTuple):
@@ -34,15 +35,16 @@ class Transfer(NamedTuple):
         """What the coefficients stand at, (frequencies, coefficients)."""
         if not self.coefficients.size:
             return np.zeros((frequency_hz.size, 0))
-        inside = np.clip(frequency_hz, self.low, self.high)
-        return np.column_stack([np.log(frequency_hz), _splines(self.low, self.high)(inside)])
+        if frequency_hz.size < MANY:
+            return _columns(self.low, self.high, frequency_hz)
+        return _kept_columns(self.low, self.high, frequency_hz.tobytes())
 
     def steepness(self, frequency_hz: Field) -> Field:
         """The power of frequency that T goes with there, (frequencies,)."""
         if not self.coefficients.size:
             return np.zeros(frequency_hz.size)
         inside = np.clip(frequency_hz, self.low, self.high)
-        bent = _splines(self.low, self.high).derivative()(inside) @ self.coefficients[1:]
+        bent = _slopes(self.low, self.high)(inside) @ self.coefficients[1:]
         return np.asarray(self.coefficients[0] + np.where(inside == frequency_hz, frequency_hz * bent, 0.0))
 
     def stiffness(self, pace: float) -> Field:
@@ -70,3 +72,19 @@ def _splines(low: float, high: float) -> scipy.interpolate.BSpline:
     inner = np.linspace(low, high, SPLINES - DEGREE + 1)
     knots = np.concatenate([[low] * DEGREE, inner, [high] * DEGREE])
     return scipy.interpolate.BSpline(knots, np.eye(SPLINES), DEGREE)
+
+
+@lru_cache(maxsize=4)
+def _slopes(low: float, high: float) -> scipy.interpolate.BSpline:
+    return _splines(low, high).derivative()
+
+
+def _columns(low: float, high: float, frequency_hz: Field) -> Field:
+    return np.column_stack([np.log(frequency_hz), _splines(low, high)(np.clip(frequency_hz, low, high))])
+
+
+@lru_cache(maxsize=8)
+def _kept_columns(low: float, high: float, frequencies: bytes) -> Field:
+    columns = _columns(low, high, np.frombuffer(frequencies))
+    columns.flags.writeable = False
+    return columns
