@@ -94,8 +94,9 @@ def tile(page, name="CLR"):
 
 
 def changed(page, text, name="CLR"):
-    """Wait until a tile says something else."""
+    """Wait until a tile says something else, and that is no coarse answer."""
     expect(tile(page, name)).not_to_have_text(text, use_inner_text=True)
+    expect(tile(page, name)).not_to_contain_text("coarse answer")
 
 
 def holds(page, text):

@@ -80,8 +80,6 @@ class Sensors:
     def unread(self, keys: Sequence[Version]) -> list[Version]:
         """Those of some versions of files that have not been read on every channel."""
         every = [one.recordings for one in self._each()]
-        if self.channels == 1:
-            return [key for key in keys if not any(key in read for read in every)]
         return [key for key in keys if sum(key in read for read in every) < self.channels]
 
     def kept(self, key: Version) -> dict[str, Kept]:
