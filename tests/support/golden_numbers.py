@@ -22,6 +22,8 @@ REFERENCE = TESTS / "reference" / "golden"
 EXAMPLES = TESTS.parent / "examples"
 ROUNDING = 1e-11  # of what would be nothing
 TIMES = ("seconds", "solve_seconds")  # what no two runs share
+LEFT = ("reynolds_residual", "load_error")  # of equations that are solved: any two processors leave something else
+SOLVED = 1e-4  # the solver's tolerance, which it has to be below
 SMALL = ("grid.cells=[64, 48]", "vibration.duration=0.2 s")
 ROLLING = ("grid.cells=[48, 32]", "surface.correlation_length=40 um")
 GROUND = """
@@ -152,7 +154,9 @@ def differences(then: Any, now: Any, tolerance: float, where: str = "") -> list[
     if isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
         each = [differences(*pair, tolerance, f"{where}[{n}]") for n, pair in enumerate(zip(then, now, strict=True))]
         return [line for lines in each for line in lines]
-    if type(then) is type(now) is float:
+    if where.endswith(LEFT) and type(now) is float:
+        same = abs(now) < SOLVED
+    elif type(then) is type(now) is float:
         same = then == now or abs(then - now) <= max(tolerance * max(abs(then), abs(now)), ROUNDING)
     elif isinstance(then, str) and isinstance(now, str) and tolerance > 0.0:
         same = True  # digits in a sentence follow the numbers beside it

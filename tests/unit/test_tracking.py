@@ -146,6 +146,23 @@ def test_time_is_the_place_where_all_recordings_know_theirs(tmp_path):
     assert judge([timed[0], readings[1]], TARGET).x_name == "recording"
 
 
+@pytest.mark.parametrize(
+    ("starts", "hours"),
+    [
+        (("02:30:00+02:00", "02:30:00+01:00"), 1.0),  # half past two in summer time, and again when clocks went back
+        (("02:45:00+02:00", "02:15:00+01:00"), 0.5),
+        (("02:15:00", "02:45:00"), 0.5),  # as they stand, whatever the night
+    ],
+)
+def test_times_with_a_zone_are_told_apart_when_clocks_go_back(tmp_path, starts, hours):
+    for number, start in enumerate(starts):
+        recording = record(tmp_path / f"{number}.npz", number)
+        Path(f"{recording}.toml").write_text(f'started = "2024-10-27T{start}"\n', "utf-8")
+    track = track_recordings(recordings_in([tmp_path]), case=CASE)
+    assert (track.x_name, [one.x for one in track.recordings]) == ("time_h", [0.0, hours])
+    assert Path(track.recordings[0].file).name == "0.npz"
+
+
 def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
     assert (track.method, track.resonance_count) == ("modes", 0)

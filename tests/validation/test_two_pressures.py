@@ -14,7 +14,7 @@ from asperity.ehl.dry import dry_contact
 from asperity.ehl.gridding import auto_grid
 from asperity.ehl.mixed import Pressures, evaluate
 from asperity.ehl.mixed_iterate import newton
-from asperity.ehl.mixed_linear import MixedLinear, foreseen
+from asperity.ehl.mixed_linear import FEWEST_NESTED, MixedLinear, firm, foreseen
 from asperity.ehl.mixed_solve import MixedSearch
 from asperity.ehl.posing import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
@@ -297,13 +297,16 @@ def test_the_oil_that_lubricated_cells_lose_is_counted():
     assert contact_state(solution).mass_flux_imbalance == pytest.approx(of_all / carried)
 
 
-def test_hard_steel_whose_films_are_nearly_closed_takes_no_more_steps_by_nested_blocks():
-    """On 192 x 144 cells: 232 steps where blocks are nested all the same, 176 where they are not."""
+def test_blocks_are_nested_where_bodies_touch_firmly_and_not_where_films_are_nearly_closed():
+    """Hard steel on 192 x 144 cells, nested and not: 192 and 176 steps, on another processor 261 and 234."""
+    case = load_case(PAPER).with_overrides({"grid.cells": "[128, 128]"})
+    soft = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     sample = next(islice(samples(6), 5, None))
     grid = auto_grid(sample.conditions, sample.oil, sample.texture)
     surface = gaussian_surface(
         grid, sq=sample.texture.sq, correlation_length=sample.texture.lengths, rng=np.random.default_rng(sample.seed)
     )
-    solution = solve_contact(sample.conditions, sample.oil, surface)
-    assert min(grid.cells) >= 128
-    assert len(solution.convergence.history) < 200
+    hard = solve_contact(sample.conditions, sample.oil, surface)
+    assert min(*soft.grid.cells, *grid.cells) >= FEWEST_NESTED
+    assert firm(balance_of(soft))
+    assert not firm(balance_of(hard))

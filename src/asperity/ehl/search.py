@@ -80,6 +80,10 @@ class Search:
                 step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
             else:
                 most = options.max_iterations if finest else min(options.max_iterations, MOST_COARSE_ITERATIONS)
+                if coarsest and problem.accurate:  # whose steps from afar are a matter of luck
+                    sturdy = replace(problem, accurate=False)
+                    step = self.run(sturdy, newton(sturdy, pressure, approach), FAR_OFF, MOST_COARSE_ITERATIONS)
+                    pressure, approach = step.balance.pressure, step.approach
                 step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
                 if coarsest and not finest and not self.settled(FAR_OFF):
                     # a capped contact answers its approach too unevenly for Newton
