@@ -236,7 +236,7 @@ def test_a_way_is_judged_by_its_own_steps(model, way):
 def test_a_heavy_smooth_ball_in_isoviscous_oil_is_solved_at_the_first_attempt(model):
     solution = isoviscous_ball(model)
     assert solution.convergence.attempt == ATTEMPTS[0]
-    assert len(solution.convergence.history) < 20  # 125 or 211, as the processor sums, without a sturdy step first
+    assert len(solution.convergence.history) < 30  # 125 or 211, as the processor sums, without sturdy steps
     assert contact_state(solution).reynolds_residual < 1e-5
 
 

@@ -33,6 +33,7 @@ OF_ENDS = 3.0  # of the same, of what is read off a roller's ends: their error f
 NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
 SCATTER = 0.03  # of a figure of the ends, below which differences say nothing of where they go
 NEXT_TO_NOTHING = 1e-2  # what is left of a start, below which steps have not strayed yet by many times that
+ASTRAY = 10.0  # times what a start leaves: steps of the accurate wedge that leave more began too far off
 FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 
 
@@ -80,11 +81,11 @@ class Search:
                 step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
             else:
                 most = options.max_iterations if finest else min(options.max_iterations, MOST_COARSE_ITERATIONS)
-                if coarsest and problem.accurate:  # whose steps from afar are a matter of luck
-                    sturdy = replace(problem, accurate=False)
-                    step = self.run(sturdy, newton(sturdy, pressure, approach), FAR_OFF, MOST_COARSE_ITERATIONS)
-                    pressure, approach = step.balance.pressure, step.approach
-                step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
+                steps = newton(problem, pressure, approach)
+                step = self.run(problem, steps, tolerance, most, stray=ASTRAY if problem.accurate else np.inf)
+                if problem.accurate and step.number < most and not (self.settled(tolerance) or self.lost):  # astray
+                    pressure, approach = self.nearer(problem, pressure, approach)
+                    step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
                 if coarsest and not finest and not self.settled(FAR_OFF):
                     # a capped contact answers its approach too unevenly for Newton
                     found = self.position(problem, pressure, approach, tolerance, from_outside=True)
@@ -93,6 +94,12 @@ class Search:
             if coarser_all_along(problem, levels[0]):
                 self.figures.append(self._figures(step))
         return step
+
+    def nearer(self, problem: Problem, pressure: Field, approach: float) -> tuple[Field, float]:
+        """A start for the accurate wedge by a step or two with the sturdy one; as it was, where these lead nowhere."""
+        sturdy = replace(problem, accurate=False)
+        step = self.run(sturdy, newton(sturdy, pressure, approach), FAR_OFF, MOST_COARSE_ITERATIONS)
+        return (step.balance.pressure, step.approach) if self.settled(FAR_OFF) else (pressure, approach)
 
     def run(
         self,
