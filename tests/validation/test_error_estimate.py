@@ -268,11 +268,11 @@ def isoviscous_ball(model):
 def counted(run):
     """`run`, bounded: steps that go nowhere do not count themselves."""
 
-    def bounded(self, problem, steps, tolerance, most, *, of_load=True):
+    def bounded(self, problem, steps, tolerance, most, **limits):
         def numbered():
             for number, step in enumerate(steps):
                 yield type(step)(number, step.balance, step.approach, step.change if np.isfinite(step.change) else 1.0)
 
-        return run(self, problem, numbered(), tolerance, most, of_load=of_load)
+        return run(self, problem, numbered(), tolerance, most, **limits)
 
     return bounded
