@@ -12,6 +12,7 @@ import numpy as np
 Vector = np.ndarray[Any, Any]
 Operator = Callable[[Any], Vector]
 
+FEW = 7  # vectors that there is room for at first: memory that is asked for in vain is given back and asked for anew
 CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more
 
 
@@ -22,8 +23,7 @@ def gmres(product: Operator, precondition: Operator, wanted: Vector, *, toleranc
     norm = _length(wanted)
     if norm == 0.0:
         return np.zeros_like(wanted)
-    basis = np.empty((most_steps + 1, wanted.size), dtype=wanted.dtype)
-    corrections = np.empty((most_steps, wanted.size), dtype=wanted.dtype)
+    basis, corrections = np.empty((2, min(FEW, most_steps) + 1, wanted.size), dtype=wanted.dtype)
     triangle = np.zeros((most_steps, most_steps), exact)
     turns = np.zeros(
         (most_steps, 2), exact
@@ -32,6 +32,8 @@ def gmres(product: Operator, precondition: Operator, wanted: Vector, *, toleranc
     target[0] = norm
     np.divide(wanted, norm, out=basis[0])
     for step in range(most_steps):
+        if step + 1 == len(basis):
+            basis, corrections = (np.concatenate([part, np.empty_like(part)]) for part in (basis, corrections))
         corrections[step] = precondition(basis[step])
         new = product(corrections[step])
         known = basis[: step + 1]

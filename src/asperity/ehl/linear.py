@@ -13,12 +13,13 @@ import scipy
 from asperity.arrays import Field
 from asperity.ehl.deflection import BETWEEN
 from asperity.ehl.problem import Balance, Past
-from asperity.kernels import relax, reynolds, stencils
+from asperity.kernels import nested, relax, reynolds, stencils
+from asperity.kernels.nested import Nest
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
 from asperity.kernels.stencils import Far, Stencil
 
 MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors, where it has one more
-MOST_FACTORED, FEWEST_PAIRED = 1500, 16  # cells of the last grid of several; along an axis that is halved
+FEWEST_PAIRED = 12  # cells along an axis that nested blocks still halve
 TURNS = 2  # of blocks and lines, on each of them
 LEAST_PIVOT = 0.02  # of a row's nearest entries, where it may vanish
 LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
@@ -123,10 +124,10 @@ def turn_back(stencil: Stencil, mirror: int) -> None:
 class LineRelaxation:
     """Zebra relaxation of a stencil of five points, or seven with `far` ones: its x lines are solved exactly.
 
-    Even, odd and even ones in turn. Lines of five, and `sums` over blocks, are not dominated by their centres.
+    Even, odd and even ones in turn. Lines of five are not dominated by their centres.
     """
 
-    def __init__(self, stencil: Stencil, far: Far | None = None, *, sums: bool = False) -> None:
+    def __init__(self, stencil: Stencil, far: Far | None = None) -> None:
         nx, ny = stencil.centre.shape
         nothing = np.empty((0, 0), stencil.centre.dtype)
         self.stencil, self.far = stencil, far or Far(nothing, nothing)
@@ -134,7 +135,7 @@ class LineRelaxation:
             near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
             beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
             lines = relax.Lines(*near, *beyond)
-            relax.factor_lines(stencil, self.far, parity, LEAST_PIVOT if far or sums else 0.0, lines)
+            relax.factor_lines(stencil, self.far, parity, LEAST_PIVOT if far else 0.0, lines)
             if parity:
                 self.odd = lines
             else:
@@ -142,21 +143,8 @@ class LineRelaxation:
 
     def __call__(self, residual: Field, change: Field) -> Field:
         """`change`, improved in place so that it better answers the residual, both (nx, ny)."""
-        rest_even, rest_odd, even, odd = (np.zeros_like(part.lower) for part in (self.even, self.odd) * 2)
-        relax.split_residual(self.stencil, self.far, residual, change, rest_even, rest_odd)
-        relax.relax_lines(self.even, 0, rest_even, odd[:, :0], even)
-        relax.relax_lines(self.odd, 1, rest_odd, even, odd)
-        relax.relax_lines(self.even, 0, rest_even, odd, even)
-        relax.add_lines(even, odd, change)
+        relax.relax_zebra(self.stencil, self.far, self.even, self.odd, residual, change)
         return change
-
-    def left(self, residual: Field, change: Field) -> Field:
-        """What the stencil leaves of a residual after a change, both (nx, ny)."""
-        even, odd = (np.empty_like(part.lower) for part in (self.even, self.odd))
-        relax.split_residual(self.stencil, self.far, residual, change, even, odd)
-        left = np.zeros_like(residual)
-        relax.add_lines(even, odd, left)
-        return left
 
 
 class SingularFactor(ArithmeticError):
@@ -164,64 +152,53 @@ class SingularFactor(ArithmeticError):
 
 
 class Blocks:
-    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU.
+    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
 
-    Or `nested`: summed over blocks of two by two again and again, relaxed in between, and factored at last.
-    """
-
-    def __init__(self, stencil: Stencil, weight: Field, *, nested: bool = False) -> None:
+    def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight, (nx, ny) = weight, weight.shape
-        self.block = (_pair(nx), _pair(ny)) if nested else (_block(nx), _block(ny))
+        self.block = _block(nx), _block(ny)
         self.cells = -(-nx // self.block[0]), -(-ny // self.block[1])
         coarse = Stencil(*np.empty((5, *self.cells)))
         relax.aggregate_stencil(stencil, weight, self.block, coarse)
-        relaxed = nested and coarse.centre.size > MOST_FACTORED
-        self.inverse = Relaxed(coarse, weight.dtype) if relaxed else Factored(coarse)
+        self.pattern = five_point_pattern(self.cells)
+        self.factors = self.pattern.factored(coarse)
 
     def __call__(self, residual: Field) -> Field:
         """The change, one number a block, that answers a residual; none in cells without weight."""
         coarse, change = np.empty(self.cells), np.zeros_like(self.weight)
         relax.restrict(residual, self.weight, self.block, coarse)
-        relax.prolong(self.inverse(coarse), self.weight, self.block, change)
+        relax.prolong(self.pattern.solve(self.factors, coarse), self.weight, self.block, change)
         return change
 
 
-class Factored:
-    """A five-point stencil and its LU factors."""
+class NestedBlocks:
+    """The same summed over blocks of two by two again and again, relaxed on each grid, and inverted on the last."""
 
-    def __init__(self, stencil: Stencil) -> None:
-        nx, ny = stencil.centre.shape
-        self.pattern = five_point_pattern((nx, ny))
-        self.factors = self.pattern.factored(stencil)
+    def __init__(self, stencil: Stencil, weight: Field) -> None:
+        self.weight = weight
+        self.nest = _nest(weight.shape, weight.dtype)
+        if not nested.nest_blocks(stencil, weight, LEAST_PIVOT, self.nest):
+            raise SingularFactor("the last of nested grids has no inverse")
 
-    def __call__(self, wanted: Field) -> Field:
-        """What the stencil turns into `wanted`, (nx, ny)."""
-        return self.pattern.solve(self.factors, wanted)
-
-
-class Relaxed:
-    """A five-point stencil's approximate inverse: its blocks' answer and its lines relaxed, in turns."""
-
-    def __init__(self, stencil: Stencil, dtype: Any) -> None:
-        self.scale = np.asarray(sum(np.abs(part) for part in stencil))
-        scaled = Stencil(*((part / self.scale).astype(dtype) for part in stencil))
-        empty = (stencil.centre == 1.0) & (self.scale == 1.0)  # a block without any cells
-        self.blocks = Blocks(scaled, np.where(empty, 0.0, self.scale).astype(dtype), nested=True)
-        self.lines = LineRelaxation(scaled, sums=True)
-
-    def __call__(self, wanted: Field) -> Field:
-        """About what the stencil turns into `wanted`, (nx, ny)."""
-        residual = (wanted / self.scale).astype(self.blocks.weight.dtype)
-        change = self.lines(residual, self.blocks(residual))
-        for _ in range(TURNS - 1):
-            change += self.blocks(self.lines.left(residual, change))
-            self.lines(residual, change)
+    def __call__(self, residual: Field) -> Field:
+        """The change, one number a block, that answers a residual; none in cells without weight."""
+        change = np.zeros_like(self.weight)
+        nested.answer_nested(self.nest, residual, self.weight, TURNS, change)
         return change
 
 
-def _pair(cells: int) -> int:
-    """How many cells along an axis the next coarser grid puts into one."""
-    return 1 if cells < FEWEST_PAIRED else 2
+def _nest(cells: tuple[int, int], dtype: Any) -> Nest:
+    """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
+    grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
+    while max(grids[-1]) >= FEWEST_PAIRED:
+        nx, ny = (-(-n // 2) if n >= FEWEST_PAIRED else n for n in grids[-1])
+        grids.append((nx, ny))
+    starts = np.cumsum([(0, 0, 0), *((nx * ny, nx * ((ny + 1) // 2), nx * (ny // 2)) for nx, ny in grids)], axis=0)
+    count, even, odd = starts[-1]
+    places = np.concatenate([grids, starts[:-1]], axis=1)
+    cells_of, last = (count,), grids[-1][0] * grids[-1][1]
+    shapes = [(5, count), cells_of, cells_of, (5, even), (5, odd), cells_of, cells_of, (last, last)]
+    return Nest._make([places, *(np.empty(shape, dtype) for shape in shapes)])
 
 
 def _block(cells: int) -> int:
@@ -233,8 +210,11 @@ def _block(cells: int) -> int:
 def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
     """In another precision; what would become denormal in it is none."""
     least = LEAST * float(max(faces.east.max(), faces.north.max()))
-    *parts, behind = faces
-    return Faces._make([*(np.where(part > least, part, 0.0).astype(dtype) for part in parts), behind])
+    *parts, inlet, wedge, behind = faces
+    single = np.empty((len(parts), *faces.east.shape), dtype)
+    for part, out in zip(parts, single, strict=True):
+        reynolds.in_precision_of(out, part, least)
+    return Faces._make([*single, np.where(inlet > least, inlet, 0.0).astype(dtype), wedge.astype(dtype), behind])
 
 
 class _Pattern(NamedTuple):

@@ -25,11 +25,12 @@ import numpy as np
 
 from asperity.arrays import Codes, Field, Mask
 from asperity.ehl.problem import CLOSED_WITHIN, FIRST_ORDER, THIRD_ORDER, Problem
+from asperity.kernels import sharing
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows, leaning_outflow
+from asperity.kernels.sharing import FREE, Borne, Bounds
 from asperity.lubricant import Lubricant
 
 OPEN_FROM = 0.5  # contact films of gap beyond the contact film
-FREE = LUBRICATED  # code of a cell in which the oil's pressure is the total one
 
 
 class Pressures(NamedTuple):
@@ -165,12 +166,11 @@ def _evaluate(
 ) -> MixedBalance:
     signed, pressure, approach = unknowns
     assert problem.lubricant is not None
-    contact_scale = 1.0 / problem.softness
-    touching = (gap - problem.contact_gap) * contact_scale
+    closed, scale = problem.contact_gap, 1.0 / problem.softness
+    bounds = Bounds(closed, scale, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap)
     oil = np.clip(signed, 0.0, problem.p_cap)
-    height = np.maximum(gap, problem.contact_gap) + _growth(problem, signed) if problem.conserve else gap
+    height = np.maximum(gap, closed) + _growth(problem, signed) if problem.conserve else gap
     film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
-    own_outflow = _own_outflow(problem, film, faces)
     lean = _lean(problem, film.content, gap) if second_order and may_lean(problem) else np.zeros_like(gap)
     surplus, surplus_by_oil = _surplus(problem, film, signed) if problem.conserve else (None, None)
     outflow += _beyond_first_order(problem, film.content, lean, second_order=second_order)
@@ -178,67 +178,41 @@ def _evaluate(
         outflow += transported(problem, surplus)
         upwind_at_outlet(problem, film.content, outflow)
 
-    borne = pressure - oil
-    free = borne < touching
-    yields = pressure - touching > problem.p_cap  # lifting it alone would take more than the cap
-    lifted = ~free & ~yields & (outflow + borne * own_outflow < 0.0) & (signed >= 0.0)
-    if may_lift and np.any(lifted & (borne > 0.0)):
-        freed = lifted if freed is None else freed | lifted
-        unknowns = Pressures(np.where(lifted & (borne > 0.0), pressure, signed), pressure, approach)
-        return _evaluate(problem, unknowns, gap, second_order, freed, may_lift=False)
-    free |= lifted & (borne <= 0.0)
-    if freed is not None:
-        free |= freed
-    solid, solid_residual = _borne_by(problem, pressure, borne, touching, free)
-
-    sunk = (solid == FREE) & (touching < 0.0) & ~yields
-    if np.any(sunk):
-        lacking = np.where(sunk, film.content_by_gap * (gap - problem.contact_gap), 0.0)
+    cells = Borne(signed, oil, pressure, gap, outflow, np.empty_like(gap))
+    sharing.own_outflows(film, faces, _carried(problem), *problem.spacing, cells.own_outflow)
+    freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
+    lifted, sunk, shut = np.empty((3, *gap.shape), dtype=bool)
+    if sharing.lift(cells, bounds, lifted) and may_lift:
+        unknowns = Pressures(np.where(lifted & (pressure > oil), pressure, signed), pressure, approach)
+        return _evaluate(problem, unknowns, gap, second_order, freed | lifted, may_lift=False)
+    solid, solid_residual = np.empty(gap.shape, dtype=np.int8), np.empty_like(gap)
+    if sharing.settle(cells, bounds, lifted, freed, solid, solid_residual, sunk):
+        lacking = np.where(sunk, film.content_by_gap * (gap - closed), 0.0)
         outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
-
-    closed = (solid != FREE) & (gap <= (1.0 + CLOSED_WITHIN) * problem.contact_gap)
-    shut = closed | ((touching <= 0.0) & ~sunk)
-    scale = np.where(closed, 1.0 / own_outflow, fluid_scale)
+    sharing.shut_in(cells, bounds, solid, sunk, fluid_scale, shut)
+    oil_residual, state = np.empty_like(gap), np.empty(gap.shape, dtype=np.int8)
     if surplus_by_oil is None:
-        oil_residual, state = _refilled(problem, outflow * scale, oil)
+        sharing.refilled(cells, bounds, fluid_scale, oil_residual, state)
+        sharing.hold_film(shut, film)
     else:
         # a cell closed to the contact film holds next to no oil: what it lacks counts as what would lift it
-        loose, lacks = surplus_by_oil > 0.0, np.maximum(surplus_by_oil, 1.0 / contact_scale) * _carried(problem)
-        scale = np.where(loose, 1.0 / lacks, scale)
-        oil_residual = outflow * scale
+        loose, lacks = surplus_by_oil > 0.0, np.maximum(surplus_by_oil, problem.softness) * _carried(problem)
+        fluid_scale = np.where(loose, 1.0 / lacks, fluid_scale)
+        oil_residual = outflow * fluid_scale
         state = np.where(signed < 0.0, RUPTURED, np.where(loose, CAPPED, LUBRICATED)).astype(np.int8)
-    pressed = problem.conserve & (signed > problem.p_cap)  # opened by the oil, not by the bodies' distance
-    film = film.held_where(shut & ~pressed)
-    if problem.conserve:
+        pressed = signed > problem.p_cap  # opened by the oil, not by the bodies' distance
+        sharing.hold_film(shut & ~pressed, film)
         stiff = pressed & (film.log_mobility_by_gap == 0.0)
         film = film._replace(log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap))
-    rim = problem.rim
-    state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
-    solid[:, rim], solid_residual[:, rim] = FREE, borne[:, rim]
+    if np.any(rim := problem.rim):
+        state[:, rim], oil_residual[:, rim] = RUPTURED, signed[:, rim]
+        solid[:, rim], solid_residual[:, rim] = FREE, (pressure - oil)[:, rim]
     if problem.held is not None:
         state[problem.held], solid[problem.held] = RUPTURED, FREE
         oil_residual[problem.held] = solid_residual[problem.held] = 0.0
-    rows, left = Rows(state, scale, contact_scale), (oil_residual, solid_residual)
+    rows, left = Rows(state, fluid_scale, scale), (oil_residual, solid_residual)
     balance = MixedBalance(problem, unknowns, gap, *left, rows, solid, film, faces, lean, outflow, shut)
     return replace(balance, surplus=surplus, surplus_by_oil=surplus_by_oil) if problem.conserve else balance
-
-
-def _borne_by(problem: Problem, pressure: Field, borne: Field, touching: Field, free: Mask) -> tuple[Codes, Field]:
-    """What decides each cell's total pressure, and what is left of its equation."""
-    residual = np.where(free, borne, touching)
-    solid = np.where(free, np.int8(FREE), np.int8(TOUCHING))
-    capped = pressure - problem.p_cap > residual
-    residual[capped], solid[capped] = pressure[capped] - problem.p_cap, CAPPED
-    return solid, residual
-
-
-def _refilled(problem: Problem, balanced: Field, oil: Field) -> tuple[Field, Codes]:
-    """What is left of the oil's equations, and which of them decides, where cavities are refilled."""
-    residual = np.minimum(balanced, oil)
-    state = np.where(balanced < oil, np.int8(LUBRICATED), np.int8(RUPTURED))
-    full = oil - problem.p_cap > residual
-    residual[full], state[full] = oil[full] - problem.p_cap, CAPPED
-    return residual, state
 
 
 def _surplus(problem: Problem, film: Film, signed: Field) -> tuple[Field, Field]:
@@ -284,29 +258,20 @@ def _lean(problem: Problem, content: Field, gap: Field) -> Field:
     Less beside cells that are nearly closed, and nothing beside closed ones: there the film is even, and its content
     the oil's density.
     """
-    upstream = _upstream(problem, content)
-    lean = upstream * content / (upstream**2 + content**2)
-    opened = _opened(problem, gap)
-    lean *= opened
-    lean[1:] *= opened[:-1]
-    lean[0] = 0.0
+    closed, lean = problem.contact_gap, np.empty_like(content)
+    sharing.lean(content, _upstream(problem, content), gap, closed, OPEN_FROM * closed, lean)
     return lean
 
 
-def _opened(problem: Problem, gap: Field) -> Field:
-    """How open each cell is, 0 to 1, (nx, ny)."""
-    closed = problem.contact_gap
-    return np.asarray(np.clip((gap - closed) / (OPEN_FROM * closed), 0.0, 1.0))
-
-
-def lean_slopes(balance: MixedBalance) -> tuple[Field, Field]:
+def lean_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     """How far the wedge leans for a change of each cell's content, and back for one of that upstream, both (nx, ny).
 
-    Of m₁ m₂/(m₁² + m₂²) (m₂ - m₁); how open the cells are is held, see `opening_slopes`.
+    How open the cells are is held, see `opening_slopes`.
     """
-    content, upstream = balance.film.content, _upstream(balance.problem, balance.film.content)
-    bend = (content - upstream) ** 2 * (content + upstream) / (content**2 + upstream**2)
-    return balance.lean * (1.0 - bend / content), balance.lean * (1.0 - bend / upstream)
+    content = balance.film.content
+    own, by_upstream = np.empty((2, *content.shape), dtype)
+    sharing.lean_slopes(balance.lean, content, _upstream(balance.problem, content), own, by_upstream)
+    return own, by_upstream
 
 
 def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]:
@@ -315,15 +280,15 @@ def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Any, Any, Field]
     Both as flat indices of cells, a cell once for its own face and once for the next one downstream.
     """
     problem, (_, ny) = balance.problem, balance.problem.cells
-    opened, content = _opened(problem, balance.gap).ravel(), balance.film.content.ravel()
-    cells = np.flatnonzero(moved.ravel() & (opened > 0.0) & (opened < 1.0))
+    gap, content, closed = balance.gap, balance.film.content.ravel(), problem.contact_gap
+    cells = np.flatnonzero(moved & (gap > closed) & (gap < (1.0 + OPEN_FROM) * closed))
     faces = np.concatenate([cells, cells + ny])
     inner = (faces >= ny) & (faces < content.size - ny)
     faces, cells = faces[inner], np.tile(cells, 2)[inner]
     here, upstream = content[faces], content[faces - ny]
-    other = np.where(faces == cells, opened[faces - ny], opened[faces])
+    other = np.clip((gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPEN_FROM, 0.0, 1.0)
     leaning = upstream * here / (upstream**2 + here**2) * (here - upstream)
-    return faces, cells, leaning * other / (OPEN_FROM * problem.contact_gap)
+    return faces, cells, leaning * other / (OPEN_FROM * closed)
 
 
 def _beyond_first_order(problem: Problem, content: Field, lean: Field, *, second_order: bool) -> Field:
@@ -367,16 +332,6 @@ def upwind_at_outlet(problem: Problem, content: Field, outflow: Field) -> None:
     if not _followed(problem):
         dx = problem.spacing[0]
         outflow[-1] -= (content[-1] - content[-2]) * content.dtype.type(0.5 / dx)
-
-
-def _own_outflow(problem: Problem, film: Film, faces: Faces) -> Field:
-    """Derivative of each cell's net outflow by its own pressure, its film held, (nx, ny)."""
-    dx, dy = problem.spacing
-    east, west = faces.east.copy(), np.empty_like(faces.east)
-    east[-1] *= 2.0
-    west[0], west[1:] = 2.0 * faces.inlet, faces.east[:-1]
-    across = faces.north + np.roll(faces.north, 1, axis=1)
-    return (east + west) / dx**2 + across / dy**2 + film.content_by_pressure * _carried(problem)
 
 
 def _carried(problem: Problem) -> float:

@@ -10,10 +10,11 @@ from asperity.arrays import Field, Mask
 from asperity.ehl.iterate import Step
 from asperity.ehl.limit import StepLimit
 from asperity.ehl.linear import SingularFactor
-from asperity.ehl.mixed import FREE, MixedBalance, Pressures, evaluate
+from asperity.ehl.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.mixed_linear import newton_step
 from asperity.ehl.problem import Problem
 from asperity.kernels.reynolds import CAPPED
+from asperity.kernels.sharing import FREE
 
 PATIENCE, PROGRESS = 8, 0.9  # steps without progress, after which halves are taken, or whole ones again
 LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step

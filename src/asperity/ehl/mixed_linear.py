@@ -18,9 +18,8 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.krylov import gmres
-from asperity.ehl.linear import Blocks, Kept, LineRelaxation, single_faces, turn_back
+from asperity.ehl.linear import Blocks, Kept, LineRelaxation, NestedBlocks, single_faces, turn_back
 from asperity.ehl.mixed import (
-    FREE,
     OPEN_FROM,
     MixedBalance,
     Pressures,
@@ -31,8 +30,9 @@ from asperity.ehl.mixed import (
     upwind_at_outlet,
 )
 from asperity.ehl.problem import CLOSED_WITHIN, Past
-from asperity.kernels import reynolds, stencils
+from asperity.kernels import reynolds, sharing, stencils
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
+from asperity.kernels.sharing import FREE
 from asperity.kernels.stencils import Far, Stencil
 
 LEFT = 0.1  # share to which the linearised equations are left ...
@@ -40,7 +40,7 @@ LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly strai
 LEFT_NEAR, NEAR = 1e-3, 1e-3  # ... from so little left on, of followed oil that may not be lost: met far closer
 OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
 MOST_KRYLOV_STEPS = 60
-FEWEST_NESTED = 128  # cells along both axes from which on blocks are nested, where bodies touch firmly
+FEWEST_NESTED = 64  # cells along both axes from which on blocks are nested, where bodies touch firmly
 NEARLY_CLOSED = 0.1  # of the flattened cells: fewer are nearly closed where bodies touch firmly
 LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
 
@@ -76,7 +76,7 @@ class MixedLinear:
             self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
         self.leans = bool(np.any(balance.lean))
         if self.leans:
-            self.lean_own, self.lean_upstream = (part.astype(self.real) for part in lean_slopes(balance))
+            self.lean_own, self.lean_upstream = lean_slopes(balance, dtype)
         state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
         self.rows = Rows(state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale)
         self.scale = np.where(self.lubricated, self.rows.fluid_scale, self.real(0.0))
@@ -93,14 +93,12 @@ class MixedLinear:
         self.closely = closely and self.leans
 
     @cached_property
-    def inverse(self) -> tuple[Blocks, LineRelaxation]:
+    def inverse(self) -> tuple[Blocks | NestedBlocks, LineRelaxation]:
         """Blocks and lines, made when they are first asked for."""
         stencil, far = self._stencil()
-        blocks = Blocks(
-            stencil,
-            np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0)),
-            nested=not self.follows_wedge and min(self.cells) >= FEWEST_NESTED and (self.closely or firm(self.balance)),
-        )
+        weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
+        alike = not self.follows_wedge and min(self.cells) >= FEWEST_NESTED and (self.closely or firm(self.balance))
+        blocks = (NestedBlocks if alike else Blocks)(stencil, weight)
         return blocks, LineRelaxation(*self._leaning(stencil)) if self.closely else LineRelaxation(stencil, far)
 
     def _stencil(self) -> tuple[Stencil, Far | None]:
@@ -114,9 +112,7 @@ class MixedLinear:
                 rows, film, self.faces, self.oil, (own, near[1] - near[3]), problem.spacing, stencil, far
             )
         else:
-            near = np.array([own, 0.0, 0.0, 0.0])
-            stencils.local_stencil(rows, film, self.faces, near, problem.spacing, 0.0, stencil)
-            stencils.add_mobility_slopes(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
+            stencils.own_stencil(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
         if self.kept is not None:
             by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
             stencil.centre[:] += np.where(self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0)
@@ -287,16 +283,11 @@ def foreseen(balance: MixedBalance) -> MixedBalance:
 
     A cell is ruptured until oil has come to it: oil that fills a streak of closed cells would go on by one a step.
     """
-    closed = flattened(balance)
-    fills = closed & (balance.rows.state == LUBRICATED) & (balance.oil_residual < 0.0)
-    for before, here, shut in zip(fills, fills[1:], closed[1:], strict=False):
-        here |= before & shut
-    reached = fills & (balance.rows.state == RUPTURED) & ~balance.problem.rim
-    return replace(
-        balance,
-        rows=balance.rows._replace(state=np.where(reached, np.int8(LUBRICATED), balance.rows.state)),
-        oil_residual=np.where(reached, balance.outflow * balance.rows.fluid_scale, balance.oil_residual),
-    )
+    problem, rows, residual = balance.problem, balance.rows, balance.oil_residual.copy()
+    state, highest = rows.state.copy(), (1.0 + CLOSED_WITHIN) * problem.contact_gap
+    balanced = balance.outflow, rows.fluid_scale
+    sharing.fill_streaks(balance.gap, highest, balance.solid, problem.rim, balanced, state, residual)
+    return replace(balance, rows=rows._replace(state=state), oil_residual=residual)
 
 
 def firm(balance: MixedBalance) -> bool:

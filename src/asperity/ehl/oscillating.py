@@ -15,10 +15,11 @@ import numpy as np
 from asperity.arrays import Field, Mask
 from asperity.ehl.krylov import gmres
 from asperity.ehl.linear import Linear
-from asperity.ehl.mixed import FREE, MixedBalance
+from asperity.ehl.mixed import MixedBalance
 from asperity.ehl.mixed_linear import MixedLinear
 from asperity.ehl.problem import Balance
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
+from asperity.kernels.sharing import FREE
 
 MOST_STEPS = 200  # of GMRES at a time ...
 AT_A_TIME = 3e-5  # ... which leave no less of what was left before: about what single precision can tell

@@ -17,7 +17,7 @@ from asperity.ehl.deflection import THROUGH, Deflection, deflection
 from asperity.ehl.shares import within_ellipse
 from asperity.ehl.transfer import averaged, interpolated, mirrored
 from asperity.kernels import reynolds
-from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Liquid, Rows
 from asperity.lubricant import Lubricant
 
 CLOSED_WITHIN = 0.01  # of the contact film
@@ -289,31 +289,22 @@ class Problem:
         pascals = pressure * self.p_scale
         gap = self.filmed(gap)
         height = np.maximum(gap, self.contact_gap)
-        density = oil.density(pascals) / oil.density.rho0
-        density_slope = oil.density.slope(pascals) * (self.p_scale / oil.density.rho0)
-        content = density * height
         viscosity = oil.viscosity(pascals)
         if self.viscosity_factor is not None:
             viscosity = viscosity * self.viscosity_factor
-        log_slope = oil.viscosity.log_slope(pascals) * self.p_scale
-        thinning, exponent = oil.rheology.thinning(viscosity * self.sliding / height)
-        mobility = content * height**2 * (oil.viscosity.eta0 / self.speed) / (viscosity * thinning)
+        liquid = Liquid(
+            oil.density(pascals) / oil.density.rho0,
+            oil.density.slope(pascals) * (self.p_scale / oil.density.rho0),
+            viscosity,
+            oil.viscosity.log_slope(pascals) * self.p_scale,
+            *oil.rheology.thinning(viscosity * self.sliding / height),
+        )
         ambient = height[[0, -1]] ** 3 / self.speed
         if self.viscosity_factor is not None:
             ambient /= self.viscosity_factor[[0, -1]]
-        film = Film(
-            content,
-            density,
-            density_slope * height,
-            mobility,
-            (3.0 + exponent) / height,
-            density_slope / density - (1.0 + exponent) * log_slope,
-            ambient,
-            3.0 * ambient / height[[0, -1]],
-        )
-        if least_mobility > 0.0:
-            closed = self.contact_gap / height
-            film = film.no_stiffer_than(least_mobility * closed * closed * closed)
+        film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
+        least = least_mobility * self.contact_gap**3
+        reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
         east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty((6, *self.cells))
         faces = Faces(
             east,
@@ -334,7 +325,7 @@ class Problem:
         entering = self.entering(gap)
         near = self.deflection.near
         if self.past is None:
-            reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
+            reynolds.net_outflow(pressure, film.content, faces, entering, dx, dy, outflow)
             reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
         else:
             self._move(self.past, pressure, film, faces, entering, outflow, diagonal)

@@ -144,6 +144,20 @@ def split_residual(stencil: Stencil, far: Far, residual: Field, correction: Fiel
 
 
 @njit(cache=True)
+def relax_zebra(stencil: Stencil, far: Far, even: Lines, odd: Lines, residual: Field, change: Field) -> None:
+    """Improve a change in place so that it better answers the residual: even, odd and even lines in turn."""
+    nx, kind = residual.shape[0], residual.dtype
+    of_even, of_odd = even.lower.shape[1], odd.lower.shape[1]
+    rest_even, rest_odd = np.empty((nx, of_even), kind), np.empty((nx, of_odd), kind)
+    by_even, by_odd = np.empty((nx, of_even), kind), np.empty((nx, of_odd), kind)
+    split_residual(stencil, far, residual, change, rest_even, rest_odd)
+    relax_lines(even, 0, rest_even, np.empty((nx, 0), kind), by_even)
+    relax_lines(odd, 1, rest_odd, by_even, by_odd)
+    relax_lines(even, 0, rest_even, by_odd, by_even)
+    add_lines(by_even, by_odd, change)
+
+
+@njit(cache=True)
 def add_lines(even: Field, odd: Field, out: Field) -> None:
     """Add even and odd x lines to the field they were split from."""
     nx, ny = out.shape

@@ -40,18 +40,6 @@ class Film(NamedTuple):
             ambient_by_gap=np.where(held[[0, -1]], 0.0, self.ambient_by_gap),
         )
 
-    def no_stiffer_than(self, mobility: Field) -> "Film":
-        """The same film, no cell of which moves its oil less easily than with this mobility, as if that were constant.
-
-        Newton's steps do not converge with its slope in H.
-        """
-        stiff = self.mobility < mobility
-        return self._replace(
-            mobility=np.where(stiff, mobility, self.mobility),
-            log_mobility_by_gap=np.where(stiff, 0.0, self.log_mobility_by_gap),
-            log_mobility_by_pressure=np.where(stiff, 0.0, self.log_mobility_by_pressure),
-        )
-
     @property
     def followed(self) -> "Film":
         """The same film without a wedge, for oil that is balanced along its way."""
@@ -86,6 +74,40 @@ class Rows(NamedTuple):
     contact_scale: float  # 1/compliance of the contact rows
 
 
+class Liquid(NamedTuple):
+    """Oil by its laws at each cell's pressure: density over the ambient one, viscosity, and what shear leaves of it.
+
+    With the slopes of density and of the viscosity's logarithm in P, and of the thinning's logarithm in that of shear.
+    """
+
+    density: Field
+    density_slope: Field
+    viscosity: Field
+    log_slope: Field
+    thinning: Field
+    exponent: Field
+
+
+@njit(cache=True, error_model="numpy")
+def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, film: Film) -> None:
+    """Fill the cells of `film` in; `conductance` is the mobility per content and squared height, times the viscosity.
+
+    No cell moves its oil less easily than `least` over its cubed height, as if that were constant: Newton's steps do
+    not converge with its slope in H.
+    """
+    nx, ny = height.shape
+    for i in range(nx):
+        for j in range(ny):
+            h, rho, rho_p, bent = height[i, j], liquid.density[i, j], liquid.density_slope[i, j], liquid.exponent[i, j]
+            content, cubed = rho * h, h * h * h
+            mobility = conductance * content * h * h / (liquid.viscosity[i, j] * liquid.thinning[i, j])
+            stiff = mobility * cubed < least
+            film.content[i, j], film.content_by_gap[i, j], film.content_by_pressure[i, j] = content, rho, rho_p * h
+            film.mobility[i, j] = least / cubed if stiff else mobility
+            film.log_mobility_by_gap[i, j] = 0.0 if stiff else (3.0 + bent) / h
+            film.log_mobility_by_pressure[i, j] = 0.0 if stiff else rho_p / rho - (1.0 + bent) * liquid.log_slope[i, j]
+
+
 @njit(cache=True)
 def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, float, float]:
     """Logarithmic mean of two positive numbers, and its slopes in their logarithms."""
@@ -96,7 +118,7 @@ def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, fl
     return mean, (own - mean) / log_ratio, (mean - following) / log_ratio
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces) -> None:
     """Fill `faces` in; `log_mobility` is the natural logarithm of the film's mobility.
 
@@ -108,48 +130,66 @@ def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, ends: Ma
     for j in range(ny):
         faces.inlet[j] = 0.5 * (eps[0, j] + film.ambient[0, j])
     for i in range(nx):
+        own, following = faces.east_by_own[i], faces.east_by_next[i]
+        if i == nx - 1:
+            for j in range(ny):
+                own[j], following[j] = 0.5 * eps[i, j], 0.0
+                faces.east[i, j] = own[j] + 0.5 * film.ambient[1, j]
+        elif logarithmic:
+            for j in range(ny):
+                ratio = log_mobility[i, j] - log_mobility[i + 1, j]
+                faces.east[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i + 1, j], ratio)
+        else:
+            for j in range(ny):
+                own[j], following[j] = 0.5 * eps[i, j], 0.5 * eps[i + 1, j]
+                faces.east[i, j] = own[j] + following[j]
+        own, following, last = faces.north_by_own[i], faces.north_by_next[i], ny - 1
+        if not logarithmic:
+            for j in range(last):
+                own[j], following[j] = 0.5 * eps[i, j], 0.5 * eps[i, j + 1]
+                faces.north[i, j] = own[j] + following[j]
+            own[last], following[last] = 0.5 * eps[i, last], 0.5 * eps[i, faces.behind]
+            faces.north[i, last] = own[last] + following[last]
         for j in range(ny):
-            if i < nx - 1:
-                ratio = log_mobility[i, j] - log_mobility[i + 1, j] if logarithmic else 0.0
-                mean, own, following = _log_mean(eps[i, j], eps[i + 1, j], ratio)
-            else:
-                mean, own, following = 0.5 * (eps[i, j] + film.ambient[1, j]), 0.5 * eps[i, j], 0.0
-            faces.east[i, j], faces.east_by_own[i, j], faces.east_by_next[i, j] = mean, own, following
-            jn = j + 1 if j < ny - 1 else faces.behind
-            ratio = log_mobility[i, j] - log_mobility[i, jn] if logarithmic else 0.0
-            if ends[j] and not logarithmic and eps[i, j] > 0.0 and eps[i, jn] > 0.0:
+            jn = j + 1 if j < last else faces.behind
+            if logarithmic:
+                ratio = log_mobility[i, j] - log_mobility[i, jn]
+                faces.north[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i, jn], ratio)
+            elif ends[j] and eps[i, j] > 0.0 and eps[i, jn] > 0.0:
                 ratio = np.log(eps[i, j]) - np.log(eps[i, jn])
-            mean, own, following = _log_mean(eps[i, j], eps[i, jn], ratio)
-            faces.north[i, j], faces.north_by_own[i, j], faces.north_by_next[i, j] = mean, own, following
+                faces.north[i, j], own[j], following[j] = _log_mean(eps[i, j], eps[i, jn], ratio)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def net_outflow(
     pressure: Field, content: Field, faces: Faces, inlet_content: Field, dx: float, dy: float, out: Field
 ) -> None:
     """Couette plus Poiseuille outflow minus inflow of each cell, per cell area."""
     nx, ny = pressure.shape
     a, b = faces.wedge
-    upstream = np.empty(ny)
+    over_dy2 = 1.0 / (dy * dy)
+    upstream, north = np.empty(ny), np.empty(ny)
     for j in range(ny):
         upstream[j] = inlet_content[j] - faces.inlet[j] * pressure[0, j] * 2.0 / dx
     for i in range(nx):
+        ahead, back = (a, b) if i > 0 else (0.0, 0.0)
         for j in range(ny):
-            flux = content[i, j]
             if i < nx - 1:
-                flux -= faces.east[i, j] * (pressure[i + 1, j] - pressure[i, j]) / dx
-                if i > 0:
-                    flux += a * (content[i + 1, j] - content[i, j]) + b * (content[i, j] - content[i - 1, j])
+                flux = content[i, j] - faces.east[i, j] * (pressure[i + 1, j] - pressure[i, j]) / dx
+                flux += ahead * (content[i + 1, j] - content[i, j])
+                flux += back * (content[i, j] - content[max(i - 1, 0), j])
             else:
-                flux += faces.east[i, j] * pressure[i, j] * 2.0 / dx + 0.5 * (content[i, j] - content[i - 1, j])
+                flux = content[i, j] + faces.east[i, j] * pressure[i, j] * 2.0 / dx
+                flux += 0.5 * (content[i, j] - content[i - 1, j])
             out[i, j] = (flux - upstream[j]) / dx
             upstream[j] = flux
-        for j in range(ny):
-            jn = j + 1 if j < ny - 1 else faces.behind
-            js = j - 1 if j > 0 else ny - 1
-            north = faces.north[i, j] * (pressure[i, j] - pressure[i, jn])
-            south = faces.north[i, js] * (pressure[i, js] - pressure[i, j])
-            out[i, j] += (north - south) / (dy * dy)
+        last = ny - 1
+        for j in range(last):
+            north[j] = over_dy2 * faces.north[i, j] * (pressure[i, j] - pressure[i, j + 1])
+        north[last] = over_dy2 * faces.north[i, last] * (pressure[i, last] - pressure[i, faces.behind])
+        out[i, 0] += north[0] - over_dy2 * faces.north[i, last] * (pressure[i, last] - pressure[i, 0])
+        for j in range(1, ny):
+            out[i, j] += north[j] - north[j - 1]
 
 
 @njit(cache=True)
@@ -252,7 +292,7 @@ def jacobian_product(
             before[j], here[j], d_log[j] = here[j], after[j], d_log_east[j]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fluid_diagonal(film: Film, faces: Faces, near: Field, dx: float, dy: float, out: Field) -> None:
     """Derivative of each cell's net outflow by its own pressure, kept positive; `near` holds the compliance along x.
 
@@ -270,3 +310,12 @@ def fluid_diagonal(film: Film, faces: Faces, near: Field, dx: float, dy: float, 
             wedge = max(wedge, near[0] - near[1])
             across = faces.north[i, j] + faces.north[i, js]
             out[i, j] = (east + west) / (dx * dx) + across / (dy * dy) + wedge / dx
+
+
+@njit(cache=True)
+def in_precision_of(out: Field, part: Field, least: float) -> None:
+    """Fill in a field in the precision of `out`; what is no more than `least` is nothing."""
+    nx, ny = part.shape
+    for i in range(nx):
+        for j in range(ny):
+            out[i, j] = part[i, j] if part[i, j] > least else 0.0

@@ -71,8 +71,8 @@ def local_stencil(
             out.south[i, j] = -across[j] * scale if wet else none
 
 
-@njit(cache=True)
-def add_mobility_slopes(
+@njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
+def own_stencil(
     rows: Rows,
     film: Film,
     faces: Faces,
@@ -81,41 +81,71 @@ def add_mobility_slopes(
     spacing: tuple[float, float],
     out: Stencil,
 ) -> None:
-    """Add to a local stencil what changed pressures do to the mobilities of the inner faces, in the precision of `out`.
+    """Fill an approximation of the scaled Jacobian in which a gap gives way to its own cell's pressure alone.
 
-    `compliance` is that of a cell's gap to its own pressure.
+    By its `compliance`; the wedge is of first order, and mobilities of the inner faces follow both. Rows that are not
+    the oil's are those of an identity. In the precision of `out`.
     """
     nx, ny = pressure.shape
     real = out.centre.dtype.type
-    dx, dy = spacing
-    over_dx2, over_dy2, own = real(1.0 / (dx * dx)), real(1.0 / (dy * dy)), real(compliance)
-    slope = np.empty_like(film.log_mobility_by_gap)
-    for i in range(nx):  # in loops, as what numba needs for sums of whole arrays takes long to load
-        for j in range(ny):
-            slope[i, j] = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
+    zero, one, two = real(0.0), real(1.0), real(2.0)
+    over_dx, over_dx2, over_dy2 = real(1.0 / spacing[0]), real(1.0 / spacing[0] ** 2), real(1.0 / spacing[1] ** 2)
+    own, last = real(compliance), ny - 1
+    m_h, m_p, log_h, log_p = (
+        film.content_by_gap,
+        film.content_by_pressure,
+        film.log_mobility_by_gap,
+        film.log_mobility_by_pressure,
+    )
+    slope, slope_next, carried = np.empty((3, ny), out.centre.dtype)
+    # of the flow through each face, east and north and before them west: its slopes in the cells on both sides
+    by_here, by_east, by_before, by_west, across, over = np.zeros((6, ny), out.centre.dtype)
+    for j in range(ny):
+        slope_next[j] = log_p[0, j] + own * log_h[0, j]
+        by_west[j] = -two * over_dx2 * faces.inlet[j]
     for i in range(nx):
         for j in range(ny):
-            here, scale = rows.state[i, j] == LUBRICATED, rows.fluid_scale[i, j]
-            if i < nx - 1:
+            slope[j] = slope_next[j]
+            carried[j] = over_dx * (own * m_h[i, j] + m_p[i, j])
+        if i < nx - 1:
+            for j in range(ny):
+                slope_next[j] = log_p[i + 1, j] + own * log_h[i + 1, j]
+                through = over_dx2 * faces.east[i, j]
                 falling = over_dx2 * (pressure[i, j] - pressure[i + 1, j])
-                by_own = falling * faces.east_by_own[i, j] * slope[i, j]
-                by_next = falling * faces.east_by_next[i, j] * slope[i + 1, j]
-                if here:
-                    out.centre[i, j] += scale * by_own
-                    out.east[i, j] += scale * by_next
-                if rows.state[i + 1, j] == LUBRICATED:
-                    out.centre[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_next
-                    out.west[i + 1, j] -= rows.fluid_scale[i + 1, j] * by_own
-            jn = j + 1 if j < ny - 1 else faces.behind
-            falling = over_dy2 * (pressure[i, j] - pressure[i, jn])
-            by_own = falling * faces.north_by_own[i, j] * slope[i, j]
-            by_next = falling * faces.north_by_next[i, j] * slope[i, jn]
-            if here:
-                out.centre[i, j] += scale * by_own
-                out.north[i, j] += scale * by_next
-            if rows.state[i, jn] == LUBRICATED and (jn == j + 1 or jn == 0):
-                out.centre[i, jn] -= rows.fluid_scale[i, jn] * by_next
-                out.south[i, jn] -= rows.fluid_scale[i, jn] * by_own
+                by_here[j] = through + falling * faces.east_by_own[i, j] * slope[j]
+                by_east[j] = falling * faces.east_by_next[i, j] * slope_next[j] - through
+        else:
+            for j in range(ny):
+                by_here[j], by_east[j] = two * over_dx2 * faces.east[i, j], zero
+        for j in range(ny):
+            jn = j + 1 if j < last else faces.behind
+            through, falling = over_dy2 * faces.north[i, j], over_dy2 * (pressure[i, j] - pressure[i, jn])
+            across[j] = through + falling * faces.north_by_own[i, j] * slope[j]
+            over[j] = falling * faces.north_by_next[i, j] * slope[jn] - through
+        for j in range(ny):
+            wet = rows.state[i, j] == LUBRICATED
+            scale = rows.fluid_scale[i, j] if wet else zero
+            out.centre[i, j] = scale * (by_here[j] - by_west[j] + across[j] + carried[j]) if wet else one
+            out.west[i, j] = -scale * by_before[j]
+            out.east[i, j] = scale * by_east[j]
+            out.north[i, j] = scale * over[j]
+        for j in range(1, ny):
+            scale = rows.fluid_scale[i, j] if rows.state[i, j] == LUBRICATED else zero
+            out.centre[i, j] -= scale * over[j - 1]
+            out.south[i, j] = -scale * across[j - 1]
+        scale = rows.fluid_scale[i, 0] if rows.state[i, 0] == LUBRICATED else zero
+        before, beyond = (over[last], across[last]) if faces.behind == 0 else _first_line(faces, i, over_dy2)
+        out.centre[i, 0] -= scale * before
+        out.south[i, 0] = -scale * beyond
+        for j in range(ny):
+            by_before[j], by_west[j] = by_here[j] + carried[j], by_east[j]
+
+
+@njit(cache=True)
+def _first_line(faces: Faces, i: int, over_dy2: float) -> tuple[float, float]:
+    """Slopes of the flow into the first line where lines do not go round: no equation of that line is the oil's."""
+    through = over_dy2 * faces.north[i, faces.north.shape[1] - 1]
+    return -through, through
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
