@@ -9,7 +9,7 @@ import pytest
 from benchmarks.chosen_grids import samples
 
 from asperity.case import load_case
-from asperity.ehl import Options, contact_state, mixed_iterate, solve_contact, starts
+from asperity.ehl import Options, contact_state, dry, mixed_iterate, solve_contact, starts
 from asperity.ehl.dry import dry_contact
 from asperity.ehl.gridding import auto_grid
 from asperity.ehl.mixed import Pressures, evaluate
@@ -101,6 +101,34 @@ def test_a_dry_start_follows_from_the_coarser_grids(sq, monkeypatch):
     followed = dry_start(fine, Pressures(np.zeros_like(total), total, approach + coarse.contact_gap))
     assert followed[1] == pytest.approx(alone[1], abs=0.01)
     assert np.sqrt(np.mean((followed[0] - alone[0]) ** 2)) < 0.02 * np.sqrt(np.mean(alone[0] ** 2))
+
+
+@pytest.mark.parametrize("sq", [1e-6, 4e-6])
+def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
+    """From Hertz's pressure and from the coarser grid; in single precision and on its own, without Newton's steps."""
+    levels = grid_levels(contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED))
+    monkeypatch.setattr(starts, "DRY", 1e-5)
+    with monkeypatch.context() as before:
+        before.setattr(starts, "roughly_dry", lambda _, *start: (*start[:2], False))
+        expected = [dry_start(level) for level in levels]
+    monkeypatch.setattr(starts, "newton", None)
+    monkeypatch.setattr(starts, "dry_contact", None)
+    coarser = None
+    for level, (pressure, approach) in reversed(list(zip(levels, expected, strict=True))):
+        total, distance = dry_start(level, coarser)
+        np.testing.assert_allclose(total, pressure, atol=0.01 * level.p_cap)
+        assert distance == pytest.approx(approach, abs=1e-3)
+        assert total.max() == level.p_cap
+        coarser = Pressures(np.zeros_like(total), total, distance + level.contact_gap)
+
+
+def test_a_dry_start_that_sets_of_cells_do_not_find_is_found_all_the_same(monkeypatch):
+    problem = contact_problem(contact(hardness=2e9), barus(), rough(grid((64, 64)), 1e-6), MIXED)
+    expected = dry_start(problem)
+    monkeypatch.setattr(dry, "MOST_SETS", 1)
+    found = dry_start(problem)
+    assert found[1] != expected[1]
+    assert found[1] == pytest.approx(expected[1], abs=0.01)
 
 
 def test_a_hard_dry_start_needs_no_steps_that_bear_the_cap(monkeypatch):

@@ -93,24 +93,29 @@ def _pressed(lines: _Lines, pressure: Field, tolerance: float, most_steps: int) 
         changing = np.count_nonzero(touching != before) > MANY * count
         share = LOOSE if changing else TIGHT if left > NEAR else EXACT
         share = max(share, 0.2 * tolerance / left)
-        change, taken = _levelled(lines.deflection, touching, gap, share, most_steps - steps)
+        change, _, taken = levelled(lines.deflection, touching, gap, share, most_steps - steps)
         pressure, before, steps = settled + change, touching, steps + taken
     pressure = np.maximum(pressure, 0.0)
     return pressure * (lines.load / pressure.sum()), steps
 
 
-def _levelled(deflection: Deflection, touching: Mask, gap: Field, share: float, most: int) -> tuple[Field, int]:
-    """A change of touching cells' pressures, in sum nothing, that levels their gaps but for a share; and its steps."""
-    count = np.float32(np.count_nonzero(touching))
-    left = np.where(touching, gap[touching].mean() - gap, 0.0).astype(np.float32)
+def levelled(deflection: Deflection, touching: Mask, gap: Field, share: float, most: int) -> tuple[Field, float, int]:
+    """A change of touching cells' pressures, in sum nothing, that levels their gaps but for a share.
+
+    With it the level, and the steps that were taken.
+    """
+    count, level = np.float32(np.count_nonzero(touching)), gap[touching].mean()
+    left = np.where(touching, level - gap, 0.0).astype(np.float32)
     change, direction, step = np.zeros_like(left), left.copy(), 0
     size = first = float(np.vdot(left, left))
     while size > share**2 * first and step < most:
         answer = deflection(direction)
         answer[~touching] = 0.0
-        answer -= np.where(touching, answer.sum() / count, np.float32(0.0))
+        mean = answer.sum() / count
+        answer -= np.where(touching, mean, np.float32(0.0))
         length = np.float32(size / float(np.vdot(answer, direction)))
         change += length * direction
+        level += length * mean
         left -= length * answer
         before, size = size, float(np.vdot(left, left))
         direction *= np.float32(size / before)
@@ -118,4 +123,4 @@ def _levelled(deflection: Deflection, touching: Mask, gap: Field, share: float, 
         step += 1
     exact = change.astype(float)
     exact[touching] -= exact[touching].mean()
-    return exact, step
+    return exact, float(level), step

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.arrays import Field
-from asperity.ehl.dry import dry_contact
+from asperity.ehl.dry import dry_contact, roughly_dry
 from asperity.ehl.elastic import elastic_contact
 from asperity.ehl.iterate import Step, newton
 from asperity.ehl.locally import smoothed
@@ -14,7 +14,8 @@ from asperity.ehl.mixed import Pressures
 from asperity.ehl.problem import Problem
 from asperity.ehl.search import COARSE_TOLERANCE
 
-DRY = 1e-2  # what the dry contact of bodies that yield is met to by Newton's steps: oil moves it far more
+DRY = 1e-2  # what the dry contact of bodies that yield is met to: oil moves it far more
+HIGH = 2.0  # asperities, over the root mean square of the roughness
 MOST_GRADIENTS, MOST_DRY = 60, 20  # steps by conjugate gradients, and then Newton's, for the dry contact
 
 
@@ -35,8 +36,9 @@ class Lubricated(NamedTuple):
 def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field, float]:
     """Pressure and approach without oil, from those on a `coarser` grid or from Hertz's pressure.
 
-    As elastic bodies, if these stay below the cap. Otherwise by Newton's steps from the coarser grid, and where that
-    leads nowhere by conjugate gradients, and by Newton's steps where the cap is too busy for these.
+    As elastic bodies, if these stay below the cap. Otherwise by sets of cells that yield. Where these go round in
+    circles by Newton's steps from the coarser grid, where that leads nowhere by conjugate gradients, and by Newton's
+    steps where the cap is too busy for these.
     """
     if problem.mirror:
         whole = None if coarser is None else coarser._replace(total=problem.whole(coarser.total))
@@ -49,8 +51,12 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
         pressure, approach, met = elastic_contact(dry, guess, COARSE_TOLERANCE)
         if met and np.all(pressure < problem.p_cap):
             return pressure, approach
+    near = _just_touching(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
+    pressure, approach, met = roughly_dry(dry, guess, near, DRY)
+    if met:
+        return pressure, approach
     if coarser is not None:
-        step, met = _settled(dry, guess, coarser.approach - problem.contact_gap)
+        step, met = _settled(dry, guess, near)
         if met:
             return step.balance.pressure, step.approach
         guess = problem.form.hertz(problem.x, problem.y)
@@ -59,6 +65,12 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
         step, _ = _settled(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
     return pressure, approach
+
+
+def _just_touching(dry: Problem, pressure: Field) -> float:
+    """The approach at which only high asperities touch, under the smooth bodies' pressure."""
+    smooth = dry.form.gap(dry.x, dry.y) + dry.deflection(pressure)
+    return HIGH * float(np.std(dry.roughness)) - float(smooth.min())
 
 
 def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
