@@ -137,7 +137,8 @@ def nest_blocks(stencil: Stencil, weight: Field, least_pivot: float, nest: Nest)
             factor_lines(scaled, Far(nothing, nothing), 0, least_pivot, even)
             factor_lines(scaled, Far(nothing, nothing), 1, least_pivot, odd)
         finer, rows = scaled, kept
-    return invert(finer, nest.inverse)
+    found: bool = invert(finer, nest.inverse)
+    return found
 
 
 @njit(cache=True)
