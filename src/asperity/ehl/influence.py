@@ -29,7 +29,7 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 ODD_IN_X = ((False, False, False, True, False, True), (True, True, True, False, True, False))
 ODD_IN_Y = (False, False, False, True, True, False)
 
-CACHED_CELLS = 2**17  # grids up to here keep their kernels: 3 MB a depth at 256 x 256, less where y repeats and it is deep
+CACHED_CELLS = 2**17  # grids up to here keep their kernels: at most 3 MB a depth at 256 x 256
 DEEP, SHALLOW = 3.5, 1.25  # in cells: below, no aliases are felt; above, too many
 QUIET = 1e-8  # what an image of the padded domain, or a wave at its depth, may still exert
 NEARBY = 1.25  # periods along x from a loaded cell, beyond which its images make it a strip
