@@ -107,6 +107,18 @@ def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
     assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
+def test_a_solve_begins_without_a_search_for_garbage():
+    probe = (
+        "import atexit, gc\nfound = []\n"
+        "gc.callbacks.append(lambda phase, told: found.append(told) if gc.get_threshold()[0] > 10_000 else None)\n"
+        "atexit.register(lambda: print('searched', len(found)))\n"
+        f"from asperity.cli import main\nmain(['solve', {str(PAPER)!r}, *{VIBRATED!r}, '--quiet'])"
+    )
+    for _ in range(2):  # the first one may have to compile
+        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1] == "searched 0", done.stderr
+
+
 def test_a_command_ends_without_a_search_for_garbage():
     probe = (
         "import atexit, gc\natexit.register(lambda: print('left', gc.get_freeze_count() > 1000))\n"

@@ -3,7 +3,7 @@ import pytest
 
 from asperity import BadInput, ContactConditions, ElasticPair, flat_surface, solve_contact, subsurface_stress
 from asperity.ehl import StressTensor, hertz_stress
-from asperity.ehl.influence import ODD_IN_X, ODD_IN_Y, Tractions, _rectangles
+from asperity.ehl.influence import ODD_IN_X, ODD_IN_Y, Tractions, _influence, _rectangles
 from asperity.ehl.stress import default_depths, stress_below
 from asperity.grid import Grid
 
@@ -63,6 +63,12 @@ def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells
     found = Tractions.of(grid, pressure, shear).stresses(depth * spacing[0], 0.3, keep=False)
     expected = images_summed(cells, spacing, depth * spacing[0], loaded)
     np.testing.assert_allclose(found, expected, atol=2e-4)  # of the load; images left out matter as much
+
+
+def test_deep_kernels_hold_only_the_waves_that_reach_so_far():
+    widths = [_influence((16, 64), (0.1, 0.1), True, depth, 0.3).shape[-1] for depth in (0.05, 1.0, 2.0, 50.0)]
+    reach = -np.log(1e-8) / (2.0 * np.pi / 6.4)  # over depth: the wavenumber of which 1e-8 is left
+    assert widths == [33, int(reach / 1.0) + 1, int(reach / 2.0) + 1, 1]
 
 
 @pytest.mark.parametrize("repeats", [True, False])

@@ -7,6 +7,8 @@ import pytest
 
 from asperity.case import load_case
 from asperity.errors import BadInput
+from asperity.results import solve_case
+from asperity.surface import parameters
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 COARSE = {"grid.cells": [64, 64]}
@@ -181,3 +183,13 @@ def test_two_drawn_bodies_move_each_at_its_speed(paper):
     case = paper.with_overrides({"surface": gaussian | {"second": gaussian | {"sq": "0.5 um"}}})
     moving = case.moving_surfaces()
     assert (moving.first.sq, moving.second.sq) == pytest.approx((1e-6, 0.5e-6), rel=1e-3)
+
+
+def test_a_solve_works_a_surfaces_correlation_lengths_out_once(monkeypatch):
+    asked = []
+    worked_out = parameters._autocorrelation
+    monkeypatch.setattr(parameters, "_autocorrelation", lambda *given: asked.append(1) or worked_out(*given))
+    case = load_case(PAPER).with_overrides({"grid.cells": [32, 24], "surface.correlation_length": "40 um"})
+    run = solve_case(case, surfaces=2)
+    assert run.determined in (True, False)
+    assert len(asked) == 2

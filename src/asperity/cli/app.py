@@ -18,7 +18,7 @@ from asperity.errors import AsperityError, BadInput
 from asperity.processes import end_quickly
 from asperity.quiet import printable
 
-GARBAGE_FROM = 100_000  # objects; libraries make that many while they load, and every hundredth search is of them all
+GARBAGE_FROM = 300_000  # objects; libraries make half as many while they load, and each search takes 0.03 s
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 LONGEST = 480  # characters of a complaint
 SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}

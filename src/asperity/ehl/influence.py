@@ -29,7 +29,7 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 ODD_IN_X = ((False, False, False, True, False, True), (True, True, True, False, True, False))
 ODD_IN_Y = (False, False, False, True, True, False)
 
-CACHED_CELLS = 2**17  # grids up to here keep their kernels: 3 MB a depth at 256 x 256
+CACHED_CELLS = 2**17  # grids up to here keep their kernels: at most 3 MB a depth at 256 x 256
 DEEP, SHALLOW = 3.5, 1.25  # in cells: below, no aliases are felt; above, too many
 QUIET = 1e-8  # what an image of the padded domain, or a wave at its depth, may still exert
 NEARBY = 1.25  # periods along x from a loaded cell, beyond which its images make it a strip
@@ -56,13 +56,14 @@ class Tractions:
         (nx, ny), (_, repeats) = self.grid.cells, self.grid.periodic
         influence = _kept_influence if keep and nx * ny <= CACHED_CELLS else _influence
         kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
+        felt = kernels.shape[-1]  # columns of wavenumbers along y; the transform back takes the others as zeros
         stresses = np.empty((6, nx, ny))
         for component, out in enumerate(stresses):
-            waves = np.zeros_like(self.pressure)
+            waves = np.zeros((2 * nx, felt), self.pressure.dtype)
             for traction, kernel, odd in zip((self.pressure, self.shear), kernels, ODD_IN_X, strict=True):
                 if traction is not None:
                     turn = np.complex64(1j ** (odd[component] + ODD_IN_Y[component]))
-                    _accumulate(waves, kernel[component], odd[component], turn * traction)
+                    _accumulate(waves, kernel[component], odd[component], turn * traction[:, :felt])
             along_x = scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx]
             out[:] = scipy.fft.irfft(along_x, n=ny if repeats else 2 * ny, axis=1)[:, :ny]
         return stresses
@@ -85,7 +86,7 @@ def _accumulate(waves: Waves, kernel: Field, odd: bool, traction: Waves) -> None
 def _influence(
     cells: tuple[int, int], spacing: tuple[float, float], periodic: bool, depth: float, poisson_ratio: float
 ) -> Field:
-    """Transformed kernels at one depth, shape (traction, component, nx + 1, wavenumbers along y).
+    """Transformed kernels at one depth, shape (traction, component, nx + 1, wavenumbers along y that reach it).
 
     Transforms are divided by i for each axis in which their kernel is odd, which leaves them real.
     """
@@ -99,7 +100,8 @@ def _influence(
     else:
         kernels = _waves(cells, spacing, depth, nu)
     kernels[..., 0] = _to_waves(_strips(cells[0], spacing[0], depth, nu)[..., None], axis=-2)[..., 0]
-    return np.asarray(kernels, np.float32)
+    felt = int(np.flatnonzero(kernels.any(axis=(0, 1, 2)))[-1]) + 1
+    return kernels[..., :felt].astype(np.float32)
 
 
 _kept_influence = lru_cache(maxsize=32)(_influence)

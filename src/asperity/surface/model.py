@@ -18,7 +18,7 @@ def require_roughness(sq: float) -> float:
     return sq
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Surface:
     """Composite roughness: heights [m], shape (nx, ny) on `grid`, x along rolling; positive = material.
 
@@ -53,7 +53,7 @@ class Surface:
         return float(np.std(self.heights))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSurface:
     """A measured map as its file gives it, apart from the unit.
 

@@ -1,6 +1,7 @@
 """ISO 25178-2 parameters of a rough surface, and the description of a measured file that the command line prints."""
 
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -209,6 +210,11 @@ def correlation_lengths(surface: Surface | MeasuredSurface, direction: float = 0
 
     NaN where it does not within half the map. Generators take these lengths; Sal is where it has fallen to 0.2.
     """
+    return _correlation_lengths(surface, direction)
+
+
+@lru_cache(maxsize=2)  # of a solve: a surface's notes, those of its solution and whether that is determined all ask
+def _correlation_lengths(surface: Surface | MeasuredSurface, direction: float) -> tuple[float, float]:
     correlation, middle = _autocorrelation(surface.heights - np.nanmean(surface.heights), surface.grid)
     angles = np.array([direction, direction + np.pi / 2.0])
     first, second = _decay(correlation, middle, surface.grid, angles, np.exp(-1.0))[0]
