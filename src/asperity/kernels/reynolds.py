@@ -166,7 +166,7 @@ def net_outflow(
 ) -> None:
     """Couette plus Poiseuille outflow minus inflow of each cell, per cell area."""
     nx, ny = pressure.shape
-    a, b = faces.wedge
+    a, b = faces.wedge[0], faces.wedge[1]
     over_dy2 = 1.0 / (dy * dy)
     upstream, north = np.empty(ny), np.empty(ny)
     for j in range(ny):
