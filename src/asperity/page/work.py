@@ -31,7 +31,7 @@ ReportWriter = Callable[[Sequence[Run], Path], Path]  # `asperity.report.write_r
 
 COARSE = 64 * 64  # cells, at most, of a coarse answer
 COARSER = 32 * 32  # cells, at most, where those are not solved in the steps that they are given
-COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS, COARSER_STEPS = 1e-2, 14, 30, 150
+COARSE_TOLERANCE, WARM_STEPS, COLD_STEPS, COARSER_STEPS = 1e-2, 14, 40, 150
 ALIKE = 0.9  # correlation with the roughness before, from which on its solution is the nearer start
 LONGEST_S = 60.0  # that a contact is worked on
 
