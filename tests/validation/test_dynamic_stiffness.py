@@ -159,11 +159,11 @@ def test_the_lines_follow_how_the_wedge_leans():
 
 
 def test_a_shaken_contact_whose_bodies_touch_takes_few_steps():
-    """With upright lines and blocks of their own it took 39, with stiff oil apart from what touches 30."""
-    ready = ShakenContact(papers(1.0, "mixed", cells=(128, 128)))
+    """With stiff oil apart from what touches it takes 30."""
+    ready = ShakenContact(papers(0.5, "mixed", cells=(128, 128)))
     answer = ready.oscillating.answer(ready.per_crossing(9e3), tolerance=3e-5)
     assert answer.left <= 3e-5
-    assert answer.steps <= 25
+    assert answer.steps <= 24
 
 
 @pytest.mark.parametrize(

@@ -108,10 +108,10 @@ class ShakenContact:
         """
         if not 0.0 <= frequency_hz < math.inf:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
-        return self._at(frequency_hz, tolerance)
+        return self._at(frequency_hz, tolerance, None)
 
-    def _at(self, frequency_hz: float, tolerance: float) -> DynamicStiffness:
-        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=tolerance)
+    def _at(self, frequency_hz: float, tolerance: float, start: Answer | None) -> DynamicStiffness:
+        answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=tolerance, start=start)
         if not answer.left < 2.0 * tolerance:
             raise AsperityError(
                 f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
@@ -176,10 +176,10 @@ class ShakenContact:
                 return self._response(sweep.sum)
 
     def _found(self, sweep: Shifted, frequency_hz: float) -> DynamicStiffness:
-        """Where a sweep has come to, unless it is short of what it says: then solved by rounds."""
+        """Where a sweep has come to, unless it is short of what it says: then solved on by rounds."""
         answer = self.oscillating.swept(sweep)
         if answer.left > max(SHORT * sweep.left, AT_RESONANCE) or sweep.left > STANDS_FROM:
-            return self._at(frequency_hz, AT_RESONANCE)
+            return self._at(frequency_hz, AT_RESONANCE, answer)
         return self._read(answer, frequency_hz)
 
     def _bodies(self) -> float:

@@ -37,13 +37,14 @@ Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 class Answer(NamedTuple):
     """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
 
-    `left` is the share of the equations that was left, `steps` those of GMRES.
+    `left` is the share of the equations that was left, `steps` those of GMRES, `unknowns` the equations' own.
     """
 
     oil: Waves
     total: Waves
     left: float
     steps: int
+    unknowns: Waves
 
 
 class _Equations(Protocol):
@@ -202,13 +203,19 @@ class Oscillating:
         self.rough = self.exact if one_line else _equations(balance, np.float32)
         self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
 
-    def answer(self, frequency: float, *, tolerance: float) -> Answer:
-        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`."""
+    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
+        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
+
+        `start` is an answer at the same frequency: of another one the oil's lag would stay.
+        """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
         wanted = rows + 1j * frequency * stored
         size = float(np.linalg.norm(wanted))
         vector, left, share = np.zeros(self.exact.size, complex), wanted, 1.0
+        if start is not None:
+            vector = start.unknowns
+            left, share = self._left(wanted, vector, frequency, size)
         for _ in range(MOST_ROUNDS):
             if share <= tolerance:
                 break
@@ -224,7 +231,7 @@ class Oscillating:
                 vector, share = vector + change, now
             else:
                 left, share = self._left(wanted, vector, frequency, size)
-        return Answer(*self.exact.pressures(vector), share, steps)
+        return Answer(*self.exact.pressures(vector), share, steps, vector)
 
     def sweep(self, frequency: float) -> Shifted:
         """The answer at Ω = `frequency` on its way, one round of GMRES whose Ω may move."""
@@ -245,7 +252,7 @@ class Oscillating:
         vector = sweep.answer().astype(complex)
         wanted = rows + 1j * sweep.frequency * stored
         _, share = self._left(wanted, vector, sweep.frequency, float(np.linalg.norm(wanted)))
-        return Answer(*self.exact.pressures(vector), share, sweep.count)
+        return Answer(*self.exact.pressures(vector), share, sweep.count, vector)
 
     @cached_property
     def bearing(self) -> Field:
