@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.krylov import gmres
+from asperity.ehl.krylov import Shifted, gmres
 
 
 @pytest.fixture
@@ -67,3 +67,63 @@ def test_complex_systems_too(system, dtype):
 
 def test_nothing_wanted_is_nothing_done(system):
     assert not gmres(system[0].__matmul__, same, np.zeros(60), tolerance=0.1, most_steps=9).any()
+
+
+def shifted(kind, spread=1.0):
+    """A sweep of 60 equations at Ω = 1.7, weights of the sum, and matrix and right-hand side at any Ω."""
+    rng = np.random.default_rng(5)
+    a = np.diag(np.linspace(1.0, 1.0 + spread, 60)) + 0.02 * rng.standard_normal((60, 60))
+    b = 0.03 * rng.standard_normal((60, 60))
+    wanted, bearing = rng.standard_normal((2, 60)), rng.standard_normal(60)
+    matrices = a.astype(kind), b.astype(kind)
+    sweep = Shifted(
+        lambda v: (matrices[0] @ v, matrices[1] @ v), same, tuple(wanted.astype(kind)), bearing, 1.7, 60
+    )  # fmt: skip
+    return sweep, bearing, lambda at: (a + 1j * at * b, wanted[0] + 1j * at * wanted[1])
+
+
+def test_a_sweep_solves_what_it_says_and_knows_the_sum_on_the_way():
+    sweep, bearing, equations = shifted(np.complex128)
+    while sweep.left > 1e-9:
+        assert sweep.step()
+    np.testing.assert_allclose(sweep.answer(), np.linalg.solve(*equations(1.7)), atol=1e-7)
+    assert sweep.sum == pytest.approx(bearing @ sweep.answer(), rel=1e-9)
+    assert sweep.count < 40
+
+
+def test_a_sweep_that_moves_keeps_what_it_knows():
+    """And says what it leaves of the equations at the new frequency, not at the old."""
+    sweep, _, equations = shifted(np.complex128)
+    for _ in range(8):
+        sweep.step()
+    before = sweep.left
+    sweep.move(1.8)
+    assert sweep.count == 8
+    assert before < sweep.left < 0.2
+    matrix, wanted = equations(1.8)
+    rest = wanted - matrix @ sweep.answer()
+    assert sweep.left == pytest.approx(np.linalg.norm(rest) / np.linalg.norm(wanted), rel=1e-9)
+    while sweep.left > 1e-9:
+        assert sweep.step()
+    np.testing.assert_allclose(sweep.answer(), np.linalg.solve(matrix, wanted), atol=1e-7)
+
+
+@pytest.mark.parametrize("spread", [1.0, 300.0])
+def test_a_sweep_in_single_precision_comes_as_far_as_that_tells(spread):
+    """On from what the last step made of it alone, the second stops at 5e-4."""
+    sweep, _, equations = shifted(np.complex64, spread)
+    while sweep.left > 3e-6:
+        assert not sweep.full
+        assert sweep.step()
+    np.testing.assert_allclose(sweep.answer(), np.linalg.solve(*equations(1.7)), atol=1e-4)
+
+
+def test_a_sweep_goes_on_where_nothing_falls_until_the_end():
+    """Each cell of a ring hands on to the next: no step but the last one meets anything."""
+    wanted = np.eye(8, dtype=complex)[0]
+    sweep = Shifted(lambda v: (np.roll(v, 1), 0.0 * v), same, (wanted, 0.0 * wanted), np.ones(8), 1.0, 8)
+    for _ in range(7):
+        assert sweep.step()
+    assert sweep.left == pytest.approx(1.0)
+    assert sweep.step()
+    np.testing.assert_allclose(sweep.answer(), np.roll(wanted, -1), atol=1e-12)

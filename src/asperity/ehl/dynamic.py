@@ -6,8 +6,10 @@ be negative where the film is carried through just late enough (the entraining m
 """
 
 import math
+from copy import copy
 from dataclasses import dataclass
 
+from asperity.ehl.krylov import Shifted
 from asperity.ehl.oscillating import Answer, Oscillating, elastic
 from asperity.ehl.outcome import CONSERVING
 from asperity.ehl.scales import Scales
@@ -18,11 +20,14 @@ from asperity.errors import AsperityError, BadInput, require_positive
 from asperity.hertz import line_stiffness
 
 TOLERANCE = 1e-5  # of the linear equations: stiffness to 1e-4, a damping ratio of 0.001 to 1 %
-AT_RESONANCE = 3e-5  # of those where a mass resonates: a damping ratio of 0.003 to 1 %
+AT_RESONANCE = 3e-5  # of those where a mass resonates, if they are solved by rounds: a damping ratio of 0.003 to 1 %
 ROUGHLY = 1e-2  # of those of a trial frequency: stiffness to 1 %
+STANDS_FROM, CLOSEST = 3e-4, 1e-6  # between which stiffness and damping are watched whether they stand ...
+FEWEST_WATCHED, WATCHED = 4, 0.2  # ... over the last steps, a share of all, as slow ones tell little one by one ...
+STILL, LEAST_LOSS = 0.005, 2e-6  # ... to this share; a loss factor of less is none
+SHORT = 2.0  # times what single precision says to be left, and a sweep has come short of it
 SAME_FREQUENCY = 0.005  # a resonance is found when its own stiffness moves it by less
 STANDING = 10.0  # tolerances that a solution may miss by
-NEAR = 0.05  # and looked for closely from here on
 MOST_TRIALS = 20
 
 
@@ -81,9 +86,15 @@ class ShakenContact:
                 f"a dynamic stiffness needs a contact that stands still, and {balance.residual_rms:.1e} of this one's "
                 "equations is left; solve it without motion, or to its end"
             )
+        self.scales, self.standing = Scales.of(conditions, solution.lubricant), balance
         self.balance = elastic(balance) if yielded == ELASTIC else balance
-        self.scales = Scales.of(conditions, solution.lubricant)
         self.oscillating = Oscillating(self.balance)
+
+    def yielding(self) -> "ShakenContact":
+        """The same contact, its cells at the pressure cap flowing."""
+        same = copy(self)
+        same.yielded, same.balance, same.oscillating = FLOWING, self.standing, Oscillating(self.standing)
+        return same
 
     def at(self, frequency_hz: float, *, tolerance: float = TOLERANCE) -> DynamicStiffness:
         """Stiffness and damping at a frequency [Hz]; 0 for a change so slow that the film follows.
@@ -97,18 +108,20 @@ class ShakenContact:
         """
         if not 0.0 <= frequency_hz < math.inf:
             raise BadInput(f"frequency must be 0 Hz or more, got {frequency_hz:g} Hz")
-        return self._at(frequency_hz, tolerance, None)[0]
+        return self._at(frequency_hz, tolerance, None)
 
-    def _at(self, frequency_hz: float, tolerance: float, start: Answer | None) -> tuple[DynamicStiffness, Answer]:
-        omega = 2.0 * math.pi * frequency_hz
+    def _at(self, frequency_hz: float, tolerance: float, start: Answer | None) -> DynamicStiffness:
         answer = self.oscillating.answer(self.per_crossing(frequency_hz), tolerance=tolerance, start=start)
         if not answer.left < 2.0 * tolerance:
             raise AsperityError(
                 f"dynamic stiffness not found at {frequency_hz:g} Hz: {answer.steps} steps left "
                 f"{answer.left:.1e} of the linear equations, wanted {tolerance:.0e}"
             )
-        response = self._from_reference(complex(answer.total.sum()) * self._newtons_per_metre())
-        found = DynamicStiffness(
+        return self._read(answer, frequency_hz)
+
+    def _read(self, answer: Answer, frequency_hz: float) -> DynamicStiffness:
+        response, omega = self._response(complex(answer.total.sum())), 2.0 * math.pi * frequency_hz
+        return DynamicStiffness(
             frequency_hz=frequency_hz,
             stiffness=response.real,
             damping=response.imag / omega if omega > 0.0 else math.nan,
@@ -116,7 +129,10 @@ class ShakenContact:
             reference_depth=self.depth,
             left=answer.left,
         )
-        return found, answer
+
+    def _response(self, pressed: complex) -> complex:
+        """Complex k + iωc [N/m] of the sum of the dimensionless pressures per approach."""
+        return self._from_reference(pressed * self._newtons_per_metre())
 
     def per_crossing(self, frequency_hz: float) -> float:
         """Angular frequency times the time that oil takes across a half-width."""
@@ -126,20 +142,45 @@ class ShakenContact:
     def resonance(self, mass: float) -> DynamicStiffness:
         """Where a mass [kg] resonates on this contact, k = m ω², to 0.5 % of its frequency; or AsperityError."""
         require_positive("mass", mass, "kg")
-        stiffness, tolerance = self._bodies(), ROUGHLY
-        roughly: Answer | None = None
-        for _ in range(MOST_TRIALS):
-            found, answer = self._at(math.sqrt(stiffness / mass) / (2.0 * math.pi), tolerance, roughly)
-            if found.stiffness <= 0.0:
+        hertz = _resonance_hz(self._bodies(), mass)
+        sweep = self.oscillating.sweep(self.per_crossing(hertz))
+        for trial in range(MOST_TRIALS):
+            stiffness = self._followed(sweep, roughly=trial == 0).real
+            if stiffness <= 0.0:
                 break
-            stiffness, frequency = found.stiffness, math.sqrt(found.stiffness / mass) / (2.0 * math.pi)
-            off = abs(frequency - found.frequency_hz) / frequency
-            if off <= SAME_FREQUENCY and tolerance == AT_RESONANCE:
-                return found
-            if off <= NEAR:
-                roughly = answer if tolerance == ROUGHLY else None
-                tolerance = AT_RESONANCE
+            moved = _resonance_hz(stiffness, mass)
+            if trial and abs(moved - hertz) <= SAME_FREQUENCY * moved:
+                return self._found(sweep, hertz)
+            hertz = moved
+            sweep.move(self.per_crossing(hertz))
         raise AsperityError(f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere")
+
+    def settled(self, frequency_hz: float) -> DynamicStiffness:
+        """Stiffness and damping at a frequency [Hz], so close that the damping ratio stands to 1 % (or 1e-6)."""
+        sweep = self.oscillating.sweep(self.per_crossing(frequency_hz))
+        self._followed(sweep, roughly=False)
+        return self._found(sweep, frequency_hz)
+
+    def _followed(self, sweep: Shifted, *, roughly: bool) -> complex:
+        """Complex k + iωc [N/m] once it does not move any more, or `roughly` once the equations are met to `ROUGHLY`.
+
+        What is left of the equations tells little of the damping: the smaller it is, the closer they have to be met.
+        """
+        said: list[complex] = []
+        while True:
+            if sweep.count:
+                said.append(self._response(sweep.sum))
+                if sweep.left <= (ROUGHLY if roughly else CLOSEST) or (not roughly and _stands(said, sweep)):
+                    return said[-1]
+            if sweep.full or not sweep.step():
+                return self._response(sweep.sum)
+
+    def _found(self, sweep: Shifted, frequency_hz: float) -> DynamicStiffness:
+        """Where a sweep has come to, unless it is short of what it says: then solved on by rounds."""
+        answer = self.oscillating.swept(sweep)
+        if answer.left > max(SHORT * sweep.left, AT_RESONANCE) or sweep.left > STANDS_FROM:
+            return self._at(frequency_hz, AT_RESONANCE, answer)
+        return self._read(answer, frequency_hz)
 
     def _bodies(self) -> float:
         """Stiffness of the smooth dry bodies under the whole load [N/m], near any contact's that has been loaded."""
@@ -187,10 +228,25 @@ class OwnResonance:
 
 def own_resonance(solution: ContactSolution, mass: float, *, reference_depth: float | None = None) -> OwnResonance:
     """Stiffness and damping that a mass [kg] meets on a solved contact; raises what `ShakenContact` does."""
-    shaken = ShakenContact(solution, reference_depth=reference_depth).resonance(mass)
-    yielding = ShakenContact(solution, yielded=FLOWING, reference_depth=reference_depth)
-    virgin = yielding.at(shaken.frequency_hz, tolerance=AT_RESONANCE)
-    return OwnResonance(elastic=shaken, virgin=virgin)
+    shaken = ShakenContact(solution, reference_depth=reference_depth)
+    found = shaken.resonance(mass)
+    return OwnResonance(elastic=found, virgin=shaken.yielding().settled(found.frequency_hz))
+
+
+def _resonance_hz(stiffness: float, mass: float) -> float:
+    """Of a mass [kg] on a spring [N/m]."""
+    return math.sqrt(stiffness / mass) / (2.0 * math.pi)
+
+
+def _stands(said: list[complex], sweep: Shifted) -> bool:
+    """Whether stiffness and damping have kept still over the last steps, and enough of the equations is met."""
+    watched = max(FEWEST_WATCHED, int(WATCHED * sweep.count))
+    if sweep.left > STANDS_FROM or len(said) < watched:
+        return False
+    *before, last = said[-watched:]
+    damping = max(abs(one.imag - last.imag) for one in before)
+    stiffness = max(abs(one.real - last.real) for one in before)
+    return damping <= max(STILL * abs(last.imag), LEAST_LOSS * abs(last)) and stiffness <= STILL * abs(last.real)
 
 
 def dynamic_stiffness(

@@ -1,5 +1,7 @@
 """GMRES, right-preconditioned, without restart, in the precision of what is wanted; real or complex.
 
+And the same of equations with a frequency in them, which may move between two steps.
+
 SciPy's preconditions from the left, so that it stops on a residual nobody asked for, and orthogonalises vector by
 vector; at 65 000 unknowns and a few dozen steps that costs as much as the physics.
 """
@@ -8,12 +10,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import scipy
 
 Vector = np.ndarray[Any, Any]
 Operator = Callable[[Any], Vector]
 
 FEW = 7  # vectors that there is room for at first: memory that is asked for in vain is given back and asked for anew
-CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more
+CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more ...
+NEARLY_CANCELLED = 0.1  # ... where all of it stays in this precision, and little is asked of the last digits
+FALLING = 0.9  # what a step leaves of what was left, below which that tells where to go on, and not the step
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what leaves this precision's range is found out below
@@ -70,3 +75,114 @@ def gmres(product: Operator, precondition: Operator, wanted: Vector, *, toleranc
 
 def _length(vector: Vector) -> float:
     return float(np.sqrt((vector.conj() @ vector).real))
+
+
+class Shifted:
+    """(A + iΩ B) x = a + iΩ b: corrections x one by one, their best combination at an Ω that may move on the way.
+
+    Adaptive simpler GMRES: a step answers what is left, or, where that hardly fell, what the last step made of it.
+    Either alone loses its digits, the one while nothing falls, the other once much has fallen.
+    Source: P. Jiránek and M. Rozložník, Numerical Algorithms 53 (2010) 93-112.
+
+    Parameters
+    ----------
+    product, precondition : A v and B v of a complex vector; about what A turns into one
+    wanted : a and b
+    bearing : weights of the unknowns in `sum`, which is known after every step
+    frequency : the Ω to begin with
+    most_steps : room for corrections
+    """
+
+    def __init__(
+        self,
+        product: Callable[[Any], tuple[Vector, Vector]],
+        precondition: Operator,
+        wanted: tuple[Vector, Vector],
+        bearing: Vector,
+        frequency: float,
+        most_steps: int,
+    ) -> None:
+        self.product, self.precondition, self.wanted, self.frequency = product, precondition, wanted, frequency
+        self.kind = wanted[0].dtype
+        self.bearing, self.count = bearing.astype(self.kind), 0
+        self.basis, self.corrections, self.stored = np.empty((3, most_steps, wanted[0].size), self.kind)
+        self.triangle = np.zeros((most_steps, most_steps), complex)
+        self.sums: list[complex] = []
+        self.falls: bool
+        self._begin()
+
+    @property
+    def left(self) -> float:
+        """Share of the equations that is left, as far as this precision tells."""
+        return _length(self.rest) / self.size
+
+    @property
+    def sum(self) -> complex:
+        """Weighted sum of the unknowns."""
+        return complex(self._combination() @ np.array(self.sums)) if self.count else 0.0j
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for further corrections."""
+        return self.count == len(self.basis)
+
+    def answer(self) -> Vector:
+        """The unknowns."""
+        return np.asarray(self._combination().astype(self.kind) @ self.corrections[: self.count])
+
+    def step(self) -> bool:
+        """One correction more; False where it told nothing new."""
+        before = _length(self.rest)
+        tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
+        correction = self.precondition(tried)
+        rows, stored = self.product(correction)
+        if not self._met(rows + self.kind.type(1j * self.frequency) * stored):
+            return False
+        self.corrections[self.count], self.stored[self.count] = correction, stored
+        self.sums.append(complex(correction @ self.bearing))
+        self.count, self.falls = self.count + 1, _length(self.rest) < FALLING * before
+        return True
+
+    def move(self, frequency: float) -> None:
+        """Combine what is known anew, for another Ω."""
+        count, further = self.count, self.kind.type(1j * (frequency - self.frequency))
+        rows = self.triangle[:count, :count].T.astype(self.kind) @ self.basis[:count]
+        rows += further * self.stored[:count]
+        self.frequency, self.count = frequency, 0
+        self._begin()
+        for row in rows:
+            if not self._met(row):
+                raise ArithmeticError(f"corrections that are no longer independent at frequency {frequency:g}")
+            self.count += 1
+
+    def _begin(self) -> None:
+        a, b = self.wanted
+        self.rest = a + self.kind.type(1j * self.frequency) * b
+        self.size = _length(self.rest)
+        self.falls = True
+        self.target: list[complex] = []
+
+    def _met(self, new: Vector) -> bool:
+        """What is left without what another correction makes of the equations; False where that is nothing new."""
+        count = self.count
+        known, before = self.basis[:count], _length(new)
+        column = np.zeros(count, complex)
+        for _ in range(2):
+            overlaps = (known @ new.conj()).conj()
+            new = new - overlaps @ known
+            column += overlaps
+            length = _length(new)
+            if length >= NEARLY_CANCELLED * before:
+                break
+        if not length > np.finfo(self.kind).eps * before:
+            return False
+        self.triangle[:count, count], self.triangle[count, count] = column, length
+        np.divide(new, length, out=self.basis[count])
+        share = complex(np.vdot(self.basis[count], self.rest))
+        self.rest = self.rest - self.kind.type(share) * self.basis[count]
+        self.target.append(share)
+        return True
+
+    def _combination(self) -> Vector:
+        triangle = self.triangle[: self.count, : self.count]
+        return np.asarray(scipy.linalg.solve_triangular(triangle, np.array(self.target)))

@@ -2,18 +2,21 @@
 
 With every cell held by what decides it, bodies that come closer by e^(iωt) ask for pressures x with
 (J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and distance, S and s the oil that
-lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned by Newton's own approximate inverse of J.
-Dimensionless; the roughness stands.
+lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned by Newton's own approximate inverse of J; but oil
+too stiff to flow carries its film along, so that its gap is as good as known, and it answers together with what
+touches. Dimensionless; the roughness stands.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from asperity.arrays import Field, Mask
-from asperity.ehl.krylov import gmres
+from asperity.ehl.deflection import Deflection
+from asperity.ehl.krylov import Shifted, gmres
 from asperity.ehl.linear import Linear
 from asperity.ehl.mixed import MixedBalance
 from asperity.ehl.mixed_linear import MixedLinear
@@ -26,6 +29,7 @@ AT_A_TIME = 3e-5  # ... which leave no less of what was left before: about what 
 MOST_ROUNDS = 12
 STUCK = 0.3  # share left by a round in single precision, above which the next is taken in double ...
 ASKED = 1.5  # ... times what it was asked to leave, where that is more
+STIFF = 1.0  # flow under a cell's own pressure over what the wedge carries on of its film, below which oil is stiff
 
 Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
@@ -58,6 +62,9 @@ class _Equations(Protocol):
     def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
         """Oil's and total pressure, (nx, ny)."""
 
+    def bearing(self) -> Field:
+        """Weight of each unknown in the sum of the total pressure."""
+
 
 class _OnePressure:
     """One pressure for oil and asperities."""
@@ -86,6 +93,9 @@ class _OnePressure:
         pressure = vector.reshape(self.cells)
         return pressure, pressure
 
+    def bearing(self) -> Field:
+        return np.ones(self.size, self.real)
+
 
 class _TwoPressures:
     """The oil's pressure in every cell and, after these, the total one of touching cells."""
@@ -99,6 +109,14 @@ class _TwoPressures:
         scale = np.where(linear.lubricated, balance.rows.fluid_scale, 0.0)
         self.by_gap = (scale * balance.film.content_by_gap).astype(real)
         self.by_pressure = (scale * balance.film.content_by_pressure).astype(real)
+        self.own, self.stiff = real(1.0 / linear.rows.contact_scale), self._stiff()
+        self.weights = self._weights()
+        self.lifted = 1.0 / self.weights
+
+    @cached_property
+    def patch(self) -> tuple[slice, Deflection] | None:
+        """Lines whose cells answer together, made when first asked for."""
+        return self._patch()
 
     def _split(self, vector: Any) -> tuple[Any, Any]:
         closed = np.zeros(self.count, vector.dtype)
@@ -115,17 +133,61 @@ class _TwoPressures:
         wet, gap_rows = self.linear.of_gap(d_oil, d_gap)
         stored = self.by_gap * d_gap + self.by_pressure * d_oil
         rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
-        return rows, self._joined(stored, np.zeros_like(closed))
+        rows *= self.weights
+        kept = np.zeros_like(rows)
+        np.multiply(stored.ravel(), self.weights[: self.count], out=kept[: self.count])
+        return rows, kept
 
     def answer(self, rows: Field) -> Field:
-        """As in Newton's step, but that touching cells answer together: here none of them changes sides."""
-        wet, gap_rows = self._split(rows)
-        oil = self.linear.answer(wet)
-        return self._joined(oil, self.deflection.undone(gap_rows * self.real(1.0 / self.linear.rows.contact_scale)))
+        """As in Newton's step, but that cells whose gap is known answer together: here none of them changes sides."""
+        wet, gap_rows = self._split(rows * self.lifted)
+        oil, closed = self.linear.answer(wet), gap_rows * self.own
+        if self.patch is not None:
+            lines, deflection = self.patch
+            stiff = self.stiff[lines]
+            together = deflection.undone(np.where(stiff, self.own * oil[lines], closed[lines]))
+            oil[lines] = np.where(stiff, together, oil[lines])
+            closed[lines] = together
+        return self._joined(oil, closed)
+
+    def _stiff(self) -> Mask:
+        """Free cells whose film is carried along, whatever their pressure: neither flow nor compressed oil undoes it.
+
+        Lines alone would take each of them to give way by itself.
+        """
+        film, problem = self.linear.balance.film, self.linear.balance.problem
+        dx, dy = problem.spacing
+        flow = film.mobility * (2.0 / dx**2 + 2.0 / dy**2) + film.content_by_pressure / dx
+        carried = film.content_by_gap / (dx * self.linear.rows.contact_scale)
+        return np.asarray(self.linear.free & self.linear.lubricated & (flow < STIFF * carried))
+
+    def _patch(self) -> tuple[slice, Deflection] | None:
+        """The lines with cells whose gap is known, and how these give way; None where there are none."""
+        (lines,) = np.nonzero((self.stiff | self.linear.touching).any(axis=1))
+        if not lines.size:
+            return None
+        if self.deflection.mirror:
+            return slice(None), self.deflection
+        span = slice(int(lines[0]), int(lines[-1]) + 1)
+        return span, self.deflection.among(span.stop - span.start)
+
+    def _weights(self) -> Field:
+        """Of the rows: a touching cell's oil counts by what flows on from it, as free cells' does, not by its pressure.
+
+        Nothing but the small compressibility and flow of its film tells that pressure, and nobody asks for it.
+        """
+        wide = self.linear.balance.problem.spacing[0] * self.linear.rows.contact_scale
+        scale = self.linear.balance.rows.fluid_scale
+        closed = self.linear.touching & self.linear.lubricated
+        wet = np.where(closed, np.minimum(1.0, wide / np.where(closed, scale, 1.0)), 1.0)
+        return self._joined(wet.astype(self.real), np.ones(self.cells, self.real))
 
     def pressures(self, vector: Waves) -> tuple[Any, Any]:
         oil, closed = self._split(vector)
         return oil, np.where(self.linear.free, oil, closed)
+
+    def bearing(self) -> Field:
+        return self._joined(self.linear.free.astype(self.real), np.ones(self.cells, self.real))
 
 
 class Oscillating:
@@ -144,8 +206,7 @@ class Oscillating:
     def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
         """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
 
-        `start` is a much rougher answer at a frequency near by. One as exact leaves so little that the oil's lag would
-        stay that of its own frequency.
+        `start` is an answer at the same frequency: of another one the oil's lag would stay.
         """
         steps, solver = 0, self.rough
         rows, stored = self.by_approach
@@ -171,6 +232,32 @@ class Oscillating:
             else:
                 left, share = self._left(wanted, vector, frequency, size)
         return Answer(*self.exact.pressures(vector), share, steps, vector)
+
+    def sweep(self, frequency: float) -> Shifted:
+        """The answer at Ω = `frequency` on its way, one round of GMRES whose Ω may move."""
+        equations = self.rough
+        kind = np.result_type(equations.real, np.complex64)
+        return Shifted(
+            lambda vector: _both(equations, vector),
+            lambda vector: np.asarray(_each_part(equations.answer, vector)),
+            (self.by_approach[0].astype(kind), self.by_approach[1].astype(kind)),
+            self.bearing,
+            frequency,
+            MOST_STEPS,
+        )
+
+    def swept(self, sweep: Shifted) -> Answer:
+        """Where a sweep has come to; what it leaves is measured in double."""
+        rows, stored = self.by_approach
+        vector = sweep.answer().astype(complex)
+        wanted = rows + 1j * sweep.frequency * stored
+        _, share = self._left(wanted, vector, sweep.frequency, float(np.linalg.norm(wanted)))
+        return Answer(*self.exact.pressures(vector), share, sweep.count, vector)
+
+    @cached_property
+    def bearing(self) -> Field:
+        """Weights of the unknowns in the sum of the total pressure."""
+        return self.rough.bearing()
 
     def _left(self, wanted: Waves, vector: Waves, frequency: float, size: float) -> tuple[Waves, float]:
         """What of the equations is left, and its share of all."""
@@ -201,13 +288,24 @@ def _solved(equations: _Equations, wanted: Waves, frequency: float, tolerance: f
 
 
 def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
-    rows, stored = _each_part(lambda part: np.stack(equations.product(part, 0.0)), vector)
+    rows, stored = _both(equations, vector)
     return np.asarray(rows + vector.dtype.type(1j * frequency) * stored)
 
 
 def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
     """A real linear operator on a complex vector."""
-    return operator(np.ascontiguousarray(vector.real)) + 1j * operator(np.ascontiguousarray(vector.imag))
+    real, imaginary = operator(np.ascontiguousarray(vector.real)), operator(np.ascontiguousarray(vector.imag))
+    both = np.empty(real.shape, vector.dtype)
+    both.real, both.imag = real, imaginary
+    return both
+
+
+def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
+    """Rows of J and of S for complex changes of the unknowns."""
+    parts = [equations.product(np.ascontiguousarray(part), 0.0) for part in (vector.real, vector.imag)]
+    rows, stored = np.empty(vector.size, vector.dtype), np.empty(vector.size, vector.dtype)
+    (rows.real, stored.real), (rows.imag, stored.imag) = parts
+    return rows, stored
 
 
 def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
