@@ -54,7 +54,6 @@ OF_JSON = {  # what golden numbers do not show of `--json`
     "null": "of JSON itself",
     "seconds": "no two runs share it",
     "hears": "of several sensors",
-    "sensors": "of several sensors",
     "alert": "a state that the golden series does not reach",
     "blind": "a state that the golden series does not reach",
     "reason": "of a file that is refused",
