@@ -59,6 +59,25 @@ def _grids(*, fast: bool) -> Iterator[str]:
         yield f"| {cells} x {cells} ({len(times)} solves) | {found} |"
 
 
+def _beside_papers_model() -> Iterator[str]:
+    """Rough contacts by the default model and by the paper's, in turns on the same surfaces."""
+    spent: dict[str, list[float]] = {"paper": [], "mixed": []}
+    for sq_um in (SQ_UM[0], 1.0, 2.5, SQ_UM[-1]):
+        for seed in SEEDS[:3]:
+            case = paper_case(sq_um, seed, 256)
+            surface = case.surface()
+            for model, times in spent.items():
+                deflection.cache_clear()
+                began = process_time()
+                solve_contact(case.conditions, case.lubricant, surface, options=replace(case.options, model=model))
+                times.append(process_time() - began)
+    paper, mixed = (median(times) for times in spent.values())
+    yield (
+        f"Rough, 256 x 256, median of {len(spent['mixed'])} surfaces in turns: {mixed:.2f} s by the default model, "
+        f"{paper:.2f} s by the paper's: {mixed / paper:.2f}."
+    )
+
+
 def peak_gib(cells: int) -> float:
     """Of a process that solves the paper's contact once."""
     code = (
@@ -223,5 +242,5 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield ""
     yield from _grids(fast=fast)
     yield ""
-    for part in (_smooth(), _dry(), _two_processors(), _error_bars(fast=fast)):
+    for part in (_beside_papers_model(), _smooth(), _dry(), _two_processors(), _error_bars(fast=fast)):
         yield from part

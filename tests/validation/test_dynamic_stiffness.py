@@ -18,6 +18,7 @@ from asperity.ehl import (
     solve_contact,
     tangent_stiffness,
 )
+from asperity.ehl.krylov import Shifted
 from asperity.ehl.mixed_linear import MixedLinear
 from asperity.ehl.oscillating import elastic
 from asperity.ehl.scales import Scales
@@ -133,6 +134,20 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
         expected = shaken_cells(balance, [crossing * frequency for frequency in hertz])
     found = [complex(ready.oscillating.answer(crossing * one, tolerance=1e-9).total.sum()) for one in hertz]
     assert found == pytest.approx(expected, rel=2e-4)
+
+
+def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
+    """Where corrections of one frequency tell nothing new at the next, the resonance is the same."""
+    solution = papers(1.0, "mixed")
+    expected = ShakenContact(solution).resonance(0.1)
+
+    def refused(sweep, frequency):
+        raise ArithmeticError(f"corrections that are no longer independent at frequency {frequency:g}")
+
+    monkeypatch.setattr(Shifted, "move", refused)
+    found = ShakenContact(solution).resonance(0.1)
+    assert found.frequency_hz == pytest.approx(expected.frequency_hz, rel=1e-3)
+    assert found.damping_ratio == pytest.approx(expected.damping_ratio, rel=2e-2)
 
 
 def stencil_times(lines, change):

@@ -152,7 +152,10 @@ class ShakenContact:
             if trial and abs(moved - hertz) <= SAME_FREQUENCY * moved:
                 return self._found(sweep, hertz)
             hertz = moved
-            sweep.move(self.per_crossing(hertz))
+            try:
+                sweep.move(self.per_crossing(hertz))
+            except ArithmeticError:  # what was gathered at the other frequency is not enough for this one
+                sweep = self.oscillating.sweep(self.per_crossing(hertz))
         raise AsperityError(f"a mass of {mass:g} kg has no resonance on this contact: k = m ω² is met nowhere")
 
     def settled(self, frequency_hz: float) -> DynamicStiffness:

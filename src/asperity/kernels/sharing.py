@@ -63,6 +63,13 @@ def lean(content: Field, upstream: Field, gap: Field, closed: float, opens: floa
 
 
 @njit(cache=True)
+def _pressing(cells: Borne, bounds: Bounds, i: int, j: int) -> tuple[float, float]:
+    """How far a cell is open, as a pressure, and what the asperities bear of its total one."""
+    touching = (cells.gap[i, j] - bounds.contact_gap) * bounds.contact_scale
+    return touching, cells.total[i, j] - cells.oil[i, j]
+
+
+@njit(cache=True)
 def lift(cells: Borne, bounds: Bounds, lifted: Mask) -> bool:
     """Mark closed cells that take in more oil than drives out again; whether the oil of one bears less than the total.
 
@@ -72,9 +79,7 @@ def lift(cells: Borne, bounds: Bounds, lifted: Mask) -> bool:
     found = False
     for i in range(nx):
         for j in range(ny):
-            total = cells.total[i, j]
-            touching = (cells.gap[i, j] - bounds.contact_gap) * bounds.contact_scale
-            borne = total - cells.oil[i, j]
+            total, (touching, borne) = cells.total[i, j], _pressing(cells, bounds, i, j)
             lifted[i, j] = (
                 borne >= touching
                 and total - touching <= bounds.p_cap
@@ -96,9 +101,7 @@ def settle(cells: Borne, bounds: Bounds, lifted: Mask, freed: Mask, solid: Codes
     found = False
     for i in range(nx):
         for j in range(ny):
-            total = cells.total[i, j]
-            touching = (cells.gap[i, j] - bounds.contact_gap) * bounds.contact_scale
-            borne = total - cells.oil[i, j]
+            total, (touching, borne) = cells.total[i, j], _pressing(cells, bounds, i, j)
             free = borne < touching or freed[i, j] or (lifted[i, j] and borne <= 0.0)
             left, beyond = borne if free else touching, total - bounds.p_cap
             capped = beyond > left
