@@ -141,7 +141,7 @@ def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
     solution = papers(1.0, "mixed")
     expected = ShakenContact(solution).resonance(0.1)
 
-    def refused(sweep, frequency):
+    def refused(_, frequency):
         raise ArithmeticError(f"corrections that are no longer independent at frequency {frequency:g}")
 
     monkeypatch.setattr(Shifted, "move", refused)
