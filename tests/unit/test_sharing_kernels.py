@@ -7,7 +7,7 @@ from asperity.kernels import limits, reynolds, sharing
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Liquid
 from asperity.kernels.sharing import FREE, Borne, Bounds
 
-CELLS, DX, DY = (9, 7), 0.13, 0.21
+CELLS, DX, DY = (30, 20), 0.13, 0.21
 BOUNDS = Bounds(contact_gap=0.1, contact_scale=3.0, closed_gap=0.101, p_cap=0.9)
 
 
@@ -31,7 +31,10 @@ def twin(cells, freed):
     touching = (cells.gap - BOUNDS.contact_gap) * BOUNDS.contact_scale
     borne = cells.total - cells.oil
     free, yields = borne < touching, cells.total - touching > BOUNDS.p_cap
-    lifted = ~free & ~yields & (cells.outflow + borne * cells.own_outflow < 0.0) & (cells.signed >= 0.0)
+    lifts = ~free, ~yields, cells.outflow + borne * cells.own_outflow < 0.0, cells.signed >= 0.0
+    for alone in range(len(lifts)):  # each of them decides somewhere
+        assert (~lifts[alone] & np.all([lifts[other] for other in range(len(lifts)) if other != alone], axis=0)).any()
+    lifted = np.all(lifts, axis=0)
     free = free | (lifted & (borne <= 0.0)) | freed
     residual = np.where(free, borne, touching)
     solid = np.where(free, FREE, TOUCHING)
