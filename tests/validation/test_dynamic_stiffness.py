@@ -136,6 +136,20 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
     assert found == pytest.approx(expected, rel=2e-4)
 
 
+@pytest.mark.parametrize("hardness", [None, "2 GPa"])
+def test_where_nothing_yields_both_limits_are_one(hardness):
+    """Solved for themselves they agree; where cells are at the cap they do not."""
+    case = load_case(PAPER).with_overrides({"grid.cells": [48, 24], "surface.sq": "1 um", "contact.load": "500 N"})
+    conditions = replace(case.conditions, hardness=hardness and case.conditions.hardness)
+    own = own_resonance(solve_contact(conditions, case.lubricant, case.surface(), options=case.options), 0.1)
+    assert own.virgin.yielded == "flowing"
+    shaken = ShakenContact(solve_contact(conditions, case.lubricant, case.surface(), options=case.options))
+    alone = shaken.yielding().settled(own.elastic.frequency_hz)
+    assert own.virgin.stiffness == pytest.approx(alone.stiffness, rel=2e-3)
+    assert own.virgin.damping_ratio == pytest.approx(alone.damping_ratio, rel=0.02)
+    assert (own.virgin.stiffness < 0.95 * own.elastic.stiffness) == (hardness is not None)
+
+
 def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
     """Where corrections of one frequency tell nothing new at the next, the resonance is the same."""
     solution = papers(1.0, "mixed")

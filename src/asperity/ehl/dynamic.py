@@ -7,10 +7,10 @@ be negative where the film is carried through just late enough (the entraining m
 
 import math
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from asperity.ehl.krylov import Shifted
-from asperity.ehl.oscillating import Answer, Oscillating, elastic
+from asperity.ehl.oscillating import Answer, Oscillating, at_cap, elastic
 from asperity.ehl.outcome import CONSERVING
 from asperity.ehl.scales import Scales
 from asperity.ehl.solution import ContactSolution
@@ -233,6 +233,8 @@ def own_resonance(solution: ContactSolution, mass: float, *, reference_depth: fl
     """Stiffness and damping that a mass [kg] meets on a solved contact; raises what `ShakenContact` does."""
     shaken = ShakenContact(solution, reference_depth=reference_depth)
     found = shaken.resonance(mass)
+    if not at_cap(shaken.standing):  # nothing yields, and both limits are one
+        return OwnResonance(elastic=found, virgin=replace(found, yielded=FLOWING))
     return OwnResonance(elastic=found, virgin=shaken.yielding().settled(found.frequency_hz))
 
 

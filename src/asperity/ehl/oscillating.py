@@ -308,6 +308,12 @@ def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
     return rows, stored
 
 
+def at_cap(balance: Balance | MixedBalance) -> bool:
+    """Whether the cap decides any cell, of the oil's or of the bodies' pressure."""
+    capped = balance.rows.state == CAPPED
+    return bool(np.any(capped | (balance.solid == CAPPED) if isinstance(balance, MixedBalance) else capped))
+
+
 def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
     """The balance with its capped cells elastic, as they are once they have yielded and are shaken below that load.
 
