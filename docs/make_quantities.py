@@ -19,6 +19,7 @@ TITLES = {  # of groups, where the group's own name does not do
     "heat": "Temperature",
     "resonance": "Contact resonance",
     "own": "Stiffness and damping of the contact itself",
+    "virgin": "The same while it still yields",
     "dynamic": "Stiffness and damping over frequency",
     "map": "Maps in a run's file",
     "vibration": "Vibration model",

@@ -11,6 +11,7 @@ import x3pio
 
 import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
+from asperity.ehl import OwnResonance, ShakenContact
 from asperity.errors import BadInput
 from asperity.surface import flat_surface
 
@@ -46,6 +47,18 @@ def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
     assert sorted(json.loads(out)) == sorted(KEYS)
     assert json.loads(out)["converged"] is True
     assert json.loads(out)["sq_m"] == pytest.approx(1e-6)
+
+
+def test_what_is_not_shown_is_not_worked_out(asp, monkeypatch):
+    """The virgin contact's stiffness stands in no short table, and costs as much as the other limit."""
+    expected = asp("solve", "case.toml")
+    monkeypatch.setattr(OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to")))
+    found = asp("solve", "case.toml")
+    assert [line for line in found[1].splitlines() if " s" not in line] == [
+        line for line in expected[1].splitlines() if " s" not in line
+    ]
+    monkeypatch.setattr(ShakenContact, "resonance", lambda *_: pytest.fail("shaken without being asked to"))
+    assert asp("solve", "case.toml", "--quiet")[:2] == (0, f"{expected[1].splitlines()[0]}\n")
 
 
 def test_the_verdict_comes_first_and_quiet_is_the_verdict(asp):

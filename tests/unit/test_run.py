@@ -10,9 +10,10 @@ import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
 from asperity.cli.contact import run_table
 from asperity.coupling import contact_vibration
-from asperity.ehl import own_resonance
+from asperity.ehl import OwnResonance, own_resonance
 from asperity.quantities import NO_VALUE, catalogue, quantity
 from asperity.report import write_report
+from asperity.results import SHORT_GROUPS
 
 MASS = {"mass": "0.5 kg", "damping_ratio": 0.02, "duration": "0.1 s"}
 SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
@@ -66,6 +67,33 @@ def test_the_deviation_of_damping_is_of_one_further_surface(run):
         2.91999 * np.sqrt(4.0 / 3.0) * np.std(found, ddof=1), rel=1e-5
     )
     assert solve_case(run.case.with_overrides({"vibration": MASS})).scalars()["contact_damping_error"] is None
+
+
+def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
+    """And what was not, on every surface, has no mean once a run is read back."""
+    case = run.case.with_overrides({"vibration": MASS})
+    whole = solve_case(case, surfaces=2)
+    with monkeypatch.context() as patched:
+        patched.setattr(OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to")))
+        short = solve_case(case, surfaces=2, groups=SHORT_GROUPS)
+        found = short.scalars()
+        solve_case(case, surfaces=2, groups=()).verdict()
+    virgin = {"contact_damping_ratio_virgin", "contact_stiffness_virgin_n_m"}
+    assert set(whole.scalars()) - set(found) == virgin
+    assert all(found[key] == value for key, value in whole.scalars().items() if key not in virgin | {"seconds"})
+    back = load_run(short.save(tmp_path / "short.nc"))
+    assert back.scalars() | dict.fromkeys(virgin) == back.scalars()
+    assert back.own_scalars["contact_damping_ratio_virgin"] == whole.own_scalars["contact_damping_ratio_virgin"]
+
+
+def test_where_the_virgin_contact_is_not_known_the_other_limit_stands(run, monkeypatch):
+    def lost(_):
+        raise AsperityError("dynamic stiffness not found at 3000 Hz")
+
+    monkeypatch.setattr(OwnResonance, "virgin", property(lost))
+    found = solve_case(run.case.with_overrides({"vibration": MASS})).scalars()
+    assert found["contact_damping_ratio_virgin"] is None
+    assert found["contact_damping_ratio"] > 0.0
 
 
 def test_each_surface_vibrates_once(run, monkeypatch):

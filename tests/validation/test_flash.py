@@ -83,6 +83,17 @@ def test_a_square_source_is_its_quadrature(peclet):
         assert rise[i, j] == pytest.approx(exact, rel=1e-4)
 
 
+@pytest.mark.parametrize("speed", [1e-3, 0.1, 1.9, -2.1, 50.0, 1e3])
+def test_few_panels_are_as_good_as_many(speed, monkeypatch):
+    """The kernel in panels of half a cell throughout, with nodes enough."""
+    place = (96, 16), (2e-6, 1e-6), speed, STEEL
+    found = moving_source(*place, length=0.01).spectrum[0]
+    monkeypatch.setattr("asperity.ehl.flash.SPREAD", 0.0)
+    monkeypatch.setattr("asperity.ehl.flash.NODES", 16)
+    expected = moving_source.__wrapped__(*place, length=0.01).spectrum[0]
+    assert np.abs(found - expected).max() < 5e-5 * np.abs(expected).max()
+
+
 def test_a_line_at_rest_is_as_long_as_it_is():
     """Without its length it would warm up for ever."""
     dx = 2.0 * B / 33

@@ -75,7 +75,9 @@ def solve(
         chosen = chosen.with_overrides({"solver.surfaces": surfaces})
     if dynamic and not chosen.contents.solver.dynamic:
         chosen = chosen.with_overrides({"solver.dynamic": results.FREQUENCIES})
-    run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None)
+    shown = () if quiet else results.SHORT_GROUPS
+    groups = shown if out is None and not as_json else results.RUN_GROUPS
+    run = _solve(chosen, label=path.name, quiet=quiet, surfaces=None, groups=groups)
     if out is not None:
         run.save(out)
     kept = [] if out is None else [f"Kept in {out}; asperity report {out} makes a page of it"]
@@ -85,7 +87,9 @@ def solve(
         raise AsperityError(f"not converged: {run.solution.convergence.explain()}{where}")
 
 
-def _solve(chosen: "Case", *, label: str, quiet: bool, surfaces: int | None = 1) -> "Run":
+def _solve(
+    chosen: "Case", *, label: str, quiet: bool, surfaces: int | None = 1, groups: tuple[str, ...] | None = None
+) -> "Run":
     """A run, marked where it did not converge."""
     chosen.surface()  # made or read here: it may take seconds, which are not the solver's
     with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
@@ -97,6 +101,7 @@ def _solve(chosen: "Case", *, label: str, quiet: bool, surfaces: int | None = 1)
             progress=steps.step,
             surface_progress=steps.surface,
             strict=False,
+            groups=results.RUN_GROUPS if groups is None else groups,
         )
 
 

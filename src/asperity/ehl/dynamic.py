@@ -6,8 +6,8 @@ be negative where the film is carried through just late enough (the entraining m
 """
 
 import math
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from asperity.ehl.krylov import Shifted
 from asperity.ehl.oscillating import Answer, Oscillating, at_cap, elastic
@@ -86,15 +86,9 @@ class ShakenContact:
                 f"a dynamic stiffness needs a contact that stands still, and {balance.residual_rms:.1e} of this one's "
                 "equations is left; solve it without motion, or to its end"
             )
-        self.scales, self.standing = Scales.of(conditions, solution.lubricant), balance
+        self.scales, self.yields = Scales.of(conditions, solution.lubricant), at_cap(balance)
         self.balance = elastic(balance) if yielded == ELASTIC else balance
         self.oscillating = Oscillating(self.balance)
-
-    def yielding(self) -> "ShakenContact":
-        """The same contact, its cells at the pressure cap flowing."""
-        same = copy(self)
-        same.yielded, same.balance, same.oscillating = FLOWING, self.standing, Oscillating(self.standing)
-        return same
 
     def at(self, frequency_hz: float, *, tolerance: float = TOLERANCE) -> DynamicStiffness:
         """Stiffness and damping at a frequency [Hz]; 0 for a change so slow that the film follows.
@@ -218,24 +212,36 @@ class ShakenContact:
         return 1.0 / (1.0 / response + 2.0 / (math.pi * modulus * conditions.length) * math.log(self.depth / a))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class OwnResonance:
     """Where a mass resonates on a solved contact: the contact once it has borne its load, and while it still yields.
 
-    `virgin` is at the frequency of `elastic`: one frequency, the two limits of what cells at the pressure cap do.
+    `yields` tells whether any cell of the `solution` is at the pressure cap.
     """
 
     elastic: DynamicStiffness
-    virgin: DynamicStiffness
+    yields: bool
+    solution: ContactSolution = field(repr=False)
+
+    @cached_property
+    def virgin(self) -> DynamicStiffness:
+        """Cells at the pressure cap flowing, at the frequency of `elastic`; worked out when first asked for.
+
+        Raises
+        ------
+        AsperityError
+            where the linear equations cannot be solved.
+        """
+        if not self.yields:  # and both limits are one
+            return replace(self.elastic, yielded=FLOWING)
+        shaken = ShakenContact(self.solution, yielded=FLOWING, reference_depth=self.elastic.reference_depth)
+        return shaken.settled(self.elastic.frequency_hz)
 
 
 def own_resonance(solution: ContactSolution, mass: float, *, reference_depth: float | None = None) -> OwnResonance:
     """Stiffness and damping that a mass [kg] meets on a solved contact; raises what `ShakenContact` does."""
     shaken = ShakenContact(solution, reference_depth=reference_depth)
-    found = shaken.resonance(mass)
-    if not at_cap(shaken.standing):  # nothing yields, and both limits are one
-        return OwnResonance(elastic=found, virgin=replace(found, yielded=FLOWING))
-    return OwnResonance(elastic=found, virgin=shaken.yielding().settled(found.frequency_hz))
+    return OwnResonance(elastic=shaken.resonance(mass), yields=shaken.yields, solution=solution)
 
 
 def _resonance_hz(stiffness: float, mass: float) -> float:

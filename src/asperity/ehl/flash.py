@@ -12,45 +12,53 @@ contact repeats in y and is as long as it is: at rest its temperature has a limi
 Source: H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7.
 """
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
 from asperity.arrays import Field, Mask
+from asperity.ehl.krylov import gmres
 from asperity.ehl.solution import ContactSolution
 from asperity.ehl.traction import Friction, friction
 from asperity.errors import AsperityError
 from asperity.lubricant import Solid, Thermal
 
-NODES = 4  # of Gauss's rule in a panel
+Waves = npt.NDArray[np.complexfloating[Any, Any]]
+
+NODES = 6  # of Gauss's rule in a panel
 RATIO = 1.25  # of the s at both ends of a panel, at most
+SPREAD = 1.0  # of s, by which the source drifts in a panel, at most
 EARLIEST, LATEST = 1.0 / 16.0, 1e4  # first s in cells; last s in lengths of the source
 HARMONICS = 6
 AT_ONCE = 256  # values of s: what they need stays in the processor's cache
-SHARING_TOLERANCE = 1e-6
+SHARING_TOLERANCE, SURELY = 1e-6, 0.5
+AT_A_TIME, MOST_STEPS, MOST_ROUNDS = 1e-3, 100, 8  # of GMRES in single precision; what it leaves is measured in double
 
 
 @dataclass(frozen=True, slots=True)
 class MovingSource:
     """Surface temperature of a body that moves past a heat input: an exact cell-to-cell convolution by FFT.
 
-    `own` is the rise of a cell by its own heat [K m^2/W].
+    `spectrum` is the transformed kernel, in double and in single precision, and `own` the rise of a cell by its own
+    heat [K m^2/W].
     """
 
     cells: tuple[int, int]
-    spectrum: npt.NDArray[np.complex128]
+    spectrum: tuple[Waves, Waves]
     own: float
     periodic: bool
 
     def __call__(self, heat: Field) -> Field:
-        """Temperature rise [K] of a heat input [W/m^2], both (nx, ny)."""
+        """Temperature rise [K] of a heat input [W/m^2], both (nx, ny) and of one precision."""
         nx, ny = self.cells
         length = ny if self.periodic else 2 * ny
         waves = scipy.fft.fft(scipy.fft.rfft(heat, n=length, axis=1), n=2 * nx, axis=0, overwrite_x=True)
-        waves *= self.spectrum
+        waves *= self.spectrum[heat.dtype == np.float32]
         return np.asarray(
             scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=length, axis=1)[:, :ny]
         )
@@ -82,20 +90,25 @@ def moving_source(
     kernel = np.roll(kernel, nx, axis=0)
     mirrored = np.concatenate([kernel, kernel[:, -2:0:-1]], axis=1) if length is None else kernel
     spectrum = scipy.fft.fft(scipy.fft.rfft(mirrored, axis=1), axis=0)
-    spectrum.flags.writeable = False
-    return MovingSource(cells, spectrum, float(kernel[0, 0]), length is not None)
+    both = spectrum, spectrum.astype(np.complex64)
+    for array in both:
+        array.flags.writeable = False
+    return MovingSource(cells, both, float(kernel[0, 0]), length is not None)
 
 
 def _times(nx: int, dx: float, dy: float, drift: float, reach: float) -> tuple[Field, Field]:
     """The values of s and their weights, Gauss's rule in panels.
 
     Panels grow by a ratio, and end where the source has drifted by half cells: however little the heat spreads, each
-    panel then lies on one side of a cell's edge.
+    panel then lies on one side of a cell's edge. Once it has spread beyond a cell, drifts may be as long as it.
     """
     first, last = EARLIEST * min(dx, dy), LATEST * reach
     ends = np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(RATIO))) + 1)
     if drift != 0.0:
-        ends = np.concatenate([ends, np.sqrt(0.5 * dx * np.arange(1, 2 * nx + 8) / abs(drift))])
+        drifted = [0.5 * dx]
+        while drifted[-1] < (nx + 3.0) * dx:
+            drifted.append(drifted[-1] + max(0.5 * dx, SPREAD * math.sqrt(drifted[-1] / abs(drift))))
+        ends = np.concatenate([ends, np.sqrt(np.array(drifted) / abs(drift))])
     ends = np.concatenate([[0.0], np.unique(ends)])
     node, share = np.polynomial.legendre.leggauss(NODES)
     half = np.diff(ends) / 2.0
@@ -207,18 +220,29 @@ def _passed_on(
     wanted = np.asarray(np.where(exchanging, warmer + two(half) - one(half), 0.0))
     if not np.any(wanted):
         return wanted
-    both = MovingSource(one.cells, one.spectrum + two.spectrum, one.own + two.own, one.periodic)
+    summed = one.spectrum[0] + two.spectrum[0], one.spectrum[1] + two.spectrum[1]
+    both = MovingSource(one.cells, summed, one.own + two.own, one.periodic)
     scale = 1.0 / (resistance + both.own)
+    parts: dict[Any, tuple[Field, Field]] = {
+        np.dtype(kind): (resistance.astype(kind), scale.astype(kind)) for kind in (np.float32, np.float64)
+    }
 
     def unbalanced(vector: Field) -> Field:
-        crossing = vector.reshape(heat.shape) * scale
-        answer = resistance * crossing + both(crossing)
-        return np.where(exchanging, answer, crossing / scale).ravel()
+        resisted, scaled = parts[vector.dtype]
+        crossing = vector.reshape(heat.shape) * scaled
+        answer = resisted * crossing + both(crossing)
+        return np.where(exchanging, answer, vector.reshape(heat.shape)).ravel()
 
-    operator = scipy.sparse.linalg.LinearOperator((heat.size, heat.size), matvec=unbalanced, dtype=np.float64)
-    solved, failed = scipy.sparse.linalg.gmres(
-        operator, wanted.ravel(), rtol=SHARING_TOLERANCE, atol=0.0, restart=80, maxiter=10
-    )
-    if failed:
-        raise AsperityError("the heat could not be shared between the bodies; is the film far thinner than a cell?")
-    return np.asarray(np.where(exchanging, solved.reshape(heat.shape) * scale, 0.0))
+    def itself(vector: Field) -> Field:
+        return vector
+
+    solved, left, size = np.zeros(heat.size), wanted.ravel(), float(np.linalg.norm(wanted))
+    for _ in range(MOST_ROUNDS):
+        rest = float(np.linalg.norm(left))
+        if rest <= SHARING_TOLERANCE * size:
+            return np.asarray(np.where(exchanging, solved.reshape(heat.shape) * scale, 0.0))
+        tolerance = max(AT_A_TIME, SURELY * SHARING_TOLERANCE * size / rest)
+        single = (left / rest).astype(np.float32)
+        solved += rest * gmres(unbalanced, itself, single, tolerance=tolerance, most_steps=MOST_STEPS)
+        left = wanted.ravel() - unbalanced(solved)
+    raise AsperityError("the heat could not be shared between the bodies; is the film far thinner than a cell?")

@@ -57,7 +57,7 @@ class Tractions:
         influence = _kept_influence if keep and nx * ny <= CACHED_CELLS else _influence
         kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
         felt = kernels.shape[-1]  # columns of wavenumbers along y; the transform back takes the others as zeros
-        stresses = np.empty((6, nx, ny))
+        stresses = np.empty((6, nx, ny), np.float32)
         for component, out in enumerate(stresses):
             waves = np.zeros((2 * nx, felt), self.pressure.dtype)
             for traction, kernel, odd in zip((self.pressure, self.shear), kernels, ODD_IN_X, strict=True):

@@ -18,6 +18,7 @@ Operator = Callable[[Any], Vector]
 FEW = 7  # vectors that there is room for at first: memory that is asked for in vain is given back and asked for anew
 CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more ...
 NEARLY_CANCELLED = 0.1  # ... where all of it stays in this precision, and little is asked of the last digits
+ADJOINT = 2  # what BLAS calls the conjugate transpose
 FALLING = 0.9  # what a step leaves of what was left, below which that tells where to go on, and not the step
 
 
@@ -74,7 +75,7 @@ def gmres(product: Operator, precondition: Operator, wanted: Vector, *, toleranc
 
 
 def _length(vector: Vector) -> float:
-    return float(np.sqrt((vector.conj() @ vector).real))
+    return float(np.sqrt(np.vdot(vector, vector).real))
 
 
 class Shifted:
@@ -107,6 +108,7 @@ class Shifted:
         self.bearing, self.count = bearing.astype(self.kind), 0
         self.basis, self.corrections, self.stored = np.empty((3, most_steps, wanted[0].size), self.kind)
         self.triangle = np.zeros((most_steps, most_steps), complex)
+        self.times, self.plus = scipy.linalg.get_blas_funcs(("gemv", "axpy"), (self.basis,))
         self.sums: list[complex] = []
         self.falls: bool
         self._begin()
@@ -136,7 +138,7 @@ class Shifted:
         tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
         correction = self.precondition(tried)
         rows, stored = self.product(correction)
-        if not self._met(rows + self.kind.type(1j * self.frequency) * stored):
+        if not self._met(self.plus(stored, rows, a=1j * self.frequency)):
             return False
         self.corrections[self.count], self.stored[self.count] = correction, stored
         self.sums.append(complex(correction @ self.bearing))
@@ -165,21 +167,23 @@ class Shifted:
     def _met(self, new: Vector) -> bool:
         """What is left without what another correction makes of the equations; False where that is nothing new."""
         count = self.count
-        known, before = self.basis[:count], _length(new)
+        known, before = self.basis[:count].T, _length(new)
         column = np.zeros(count, complex)
-        for _ in range(2):
-            overlaps = (known @ new.conj()).conj()
-            new = new - overlaps @ known
+        for _ in range(2 if count else 0):
+            overlaps = self.times(1.0, known, new, trans=ADJOINT)
+            new = self.times(-1.0, known, overlaps, beta=1.0, y=new, overwrite_y=True)
             column += overlaps
             length = _length(new)
             if length >= NEARLY_CANCELLED * before:
                 break
+        else:
+            length = _length(new)
         if not length > np.finfo(self.kind).eps * before:
             return False
         self.triangle[:count, count], self.triangle[count, count] = column, length
         np.divide(new, length, out=self.basis[count])
         share = complex(np.vdot(self.basis[count], self.rest))
-        self.rest = self.rest - self.kind.type(share) * self.basis[count]
+        self.rest = self.plus(self.basis[count], self.rest, a=-share)
         self.target.append(share)
         return True
 

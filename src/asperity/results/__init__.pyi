@@ -16,6 +16,7 @@ from .run import DOUBT as DOUBT
 from .run import ENDS as ENDS
 from .run import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .run import RUN_GROUPS as RUN_GROUPS
+from .run import SHORT_GROUPS as SHORT_GROUPS
 from .run import Run as Run
 from .solve import SurfaceProgress as SurfaceProgress
 from .solve import load_run as load_run

@@ -29,7 +29,11 @@ if TYPE_CHECKING:
 FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
-RUN_GROUPS = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "own", "solver")
+RUN_GROUPS = (
+    *("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "own", "virgin"),
+    "solver",
+)
+SHORT_GROUPS = tuple(group for group in RUN_GROUPS if group != "virgin")  # short tables show none of it
 DOUBT = "uncertainty"  # group of the catalogue: of all surfaces together
 ENDS = "ends"  # group of the catalogue: of rollers
 DAMPING = "contact_damping_ratio"
@@ -44,7 +48,8 @@ class Run:
     `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the numbers has to know.
     Friction, heat and stress are worked out when they are first asked for. `others` are the numbers of further surfaces
     of the same kind that were solved: fields, state, vibration and friction are those of the first surface, `scalars`
-    the means over all, and `error` says how far a single surface may be off them.
+    the means over all, and `error` says how far a single surface may be off them. `groups` of the catalogue are what
+    `scalars` has of every surface.
     """
 
     case: Case
@@ -53,6 +58,7 @@ class Run:
     vibration: Vibration | None
     notes: tuple[str, ...] = ()
     others: tuple[Row, ...] = ()
+    groups: tuple[str, ...] = RUN_GROUPS
 
     @cached_property
     def _rubbing(self) -> tuple[Friction, FlashTemperature] | str:
@@ -130,6 +136,14 @@ class Run:
         return self._shaken if isinstance(self._shaken, str) else None
 
     @cached_property
+    def virgin_resonance(self) -> ehl.DynamicStiffness | None:
+        """The same while cells at the pressure cap still yield; None where that is not known."""
+        try:
+            return None if self.own_resonance is None else self.own_resonance.virgin
+        except AsperityError:  # the other limit is as good without it
+            return None
+
+    @cached_property
     def _over_frequency(self) -> DynamicCurve | str:
         """K and c over frequency, or why there are none; empty where the case asks for none."""
         count = self.case.contents.solver.dynamic
@@ -174,7 +188,7 @@ class Run:
     @cached_property
     def own_scalars(self) -> dict[str, Scalar]:
         """Every number of the first surface by its key in the catalogue of quantities, SI; None where there is none."""
-        return self.numbers(RUN_GROUPS)
+        return self.numbers(self.groups)
 
     def numbers(self, groups: Sequence[str]) -> dict[str, Scalar]:
         """`own_scalars` of some groups of the catalogue; a roller's along its length go with them."""
@@ -321,10 +335,11 @@ def run_of(
     notes: Sequence[str],
     others: Sequence[Row] = (),
     vibration: Vibration | None = None,
+    groups: tuple[str, ...] = RUN_GROUPS,
 ) -> Run:
     """The run of a case that is solved, its vibration worked out, unless it is known.
 
-    `others` are the numbers of further surfaces.
+    `others` are the numbers of further surfaces, of these `groups` of the catalogue.
     """
     state = ehl.contact_state(solution)
     model = case.vibration
@@ -336,7 +351,15 @@ def run_of(
         notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
-    run = Run(case=case, solution=solution, state=state, vibration=vibration, notes=tuple(notes), others=tuple(others))
+    run = Run(
+        case=case,
+        solution=solution,
+        state=state,
+        vibration=vibration,
+        notes=tuple(notes),
+        others=tuple(others),
+        groups=groups,
+    )
     error = whole_error(state, (run.crucial, *others), case.conditions, model, vibration)
     return replace(run, state=replace(state, error=error))
 

@@ -16,7 +16,7 @@ from asperity.coupling import require_sampling
 from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.kept import version_notes
 from asperity.processes import cores, set_up_worker
-from asperity.results.run import Run, run_of
+from asperity.results.run import RUN_GROUPS, Run, run_of
 from asperity.results.spread import Row
 from asperity.surface import Surface
 
@@ -34,6 +34,7 @@ def solve_case(
     progress: Callable[[ehl.Iteration], None] | None = None,
     surface_progress: SurfaceProgress | None = None,
     strict: bool = True,
+    groups: tuple[str, ...] = RUN_GROUPS,
 ) -> Run:
     """Solve a case, and work out its vibration.
 
@@ -49,6 +50,7 @@ def solve_case(
     surface_progress : called with the surfaces that are done, and all of them
     strict : raise when the solver stops before its tolerance on the first surface; else the run says so. Others that
         fail are left out, and the run's notes say so
+    groups : of the catalogue of quantities, whose numbers are worked out on every surface
 
     Raises
     ------
@@ -66,7 +68,7 @@ def solve_case(
         case = replace(case, stored=surface)
         surfaces = 1
     count = case.surface_count(surfaces)
-    run = _first(case, progress, strict)
+    run = _first(case, progress, strict, groups)
     if count == 1 or not run.solution.convergence.converged:
         return run
     kind = [case.on_surface(number) for number in range(1, count)]
@@ -74,7 +76,8 @@ def solve_case(
     failures: dict[int, str] = {}
     seconds = run.solution.convergence.seconds
     spread_out = workers > 1 and seconds * len(kind) > WORTH_PROCESSES_S
-    for done, outcome in enumerate(_in_processes(kind, workers) if spread_out else _here(kind, progress), 1):
+    outcomes = _in_processes(kind, groups, workers) if spread_out else _here(kind, groups, progress)
+    for done, outcome in enumerate(outcomes, 1):
         if outcome.row is None:
             failures[outcome.number] = outcome.reason
         else:
@@ -88,10 +91,10 @@ def solve_case(
     ]
     notes = [*json.loads(run.solution.attributes["notes"]), *left_out]
     kept = {**run.solution.attributes, "notes": json.dumps(notes), "surfaces": json.dumps(others)}
-    return run_of(case, replace(run.solution, attributes=kept), notes, others, run.vibration)
+    return run_of(case, replace(run.solution, attributes=kept), notes, others, run.vibration, groups)
 
 
-def _first(case: Case, progress: Callable[[ehl.Iteration], None] | None, strict: bool) -> Run:
+def _first(case: Case, progress: Callable[[ehl.Iteration], None] | None, strict: bool, groups: tuple[str, ...]) -> Run:
     """A case on its own surface."""
     roughness = case.surface()
     if case.vibration is not None:
@@ -112,7 +115,7 @@ def _first(case: Case, progress: Callable[[ehl.Iteration], None] | None, strict:
         )
     except NotConverged as unfinished:
         raise NotConverged(replace(unfinished.solution, attributes=kept), str(unfinished)) from None
-    return run_of(case, replace(solution, attributes=kept), notes)
+    return run_of(case, replace(solution, attributes=kept), notes, groups=groups)
 
 
 class _Outcome(NamedTuple):
@@ -123,25 +126,30 @@ class _Outcome(NamedTuple):
     reason: str = ""
 
 
-def _outcome(number: int, case: Case, progress: Callable[[ehl.Iteration], None] | None = None) -> _Outcome:
+def _outcome(
+    number: int, case: Case, groups: tuple[str, ...], progress: Callable[[ehl.Iteration], None] | None = None
+) -> _Outcome:
     """One thread does the algebra: two would sum in another order, and processes are to change nothing."""
     try:
         with threadpool_limits(1):
-            run = _first(case, progress, strict=True)
-            return _Outcome(number, run.own_scalars)
+            run = _first(case, progress, strict=True, groups=groups)
+            return _Outcome(number, {**run.own_scalars, **run.crucial})
     except AsperityError as refusal:
         return _Outcome(number, None, str(refusal).rstrip("."))
 
 
-def _here(kind: list[Case], progress: Callable[[ehl.Iteration], None] | None) -> Iterator[_Outcome]:
+def _here(
+    kind: list[Case], groups: tuple[str, ...], progress: Callable[[ehl.Iteration], None] | None
+) -> Iterator[_Outcome]:
     for number, case in enumerate(kind, 1):
-        yield _outcome(number, case, progress)
+        yield _outcome(number, case, groups, progress)
 
 
-def _in_processes(kind: list[Case], workers: int) -> Iterator[_Outcome]:
+def _in_processes(kind: list[Case], groups: tuple[str, ...], workers: int) -> Iterator[_Outcome]:
     pool = ProcessPoolExecutor(min(workers, cores(), len(kind)), get_context("spawn"), set_up_worker)
     try:
-        for future in as_completed([pool.submit(_outcome, number, case) for number, case in enumerate(kind, 1)]):
+        submitted = [pool.submit(_outcome, number, case, groups) for number, case in enumerate(kind, 1)]
+        for future in as_completed(submitted):
             yield future.result()
     except BrokenExecutor:
         raise AsperityError(

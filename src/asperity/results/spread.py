@@ -33,16 +33,22 @@ AVERAGED = (
     "stress",
     "resonance",
     "own",
+    "virgin",
 )  # groups of the catalogue
 
 
 def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
-    """The mean over surfaces of every number that one surface has; over those that have it, as not all resonate."""
+    """The mean over surfaces of every number that one surface has; over those that have it, as not all resonate.
+
+    None for what was not worked out on every surface.
+    """
     first, *others = rows
     means: dict[str, Any] = dict(first)
     for key in (entry.key for entry in lines(*AVERAGED)):
         values = [float(value) for row in rows if (value := row.get(key)) is not None]
-        if others and values:
+        if key in means and any(key not in row for row in others):
+            means[key] = None
+        elif others and values:
             means[key] = float(np.mean(values))
     return means
 

@@ -16,15 +16,14 @@ from asperity.arrays import Field, finite_or_none
 from asperity.case import Case
 from asperity.coupling import Vibration, contact_vibration
 from asperity.errors import AsperityError
-from asperity.quantities import lines, read
-from asperity.results import DOUBT, RUN_GROUPS, Run, mean_row, solve_case, vibrate_case
+from asperity.results import RUN_GROUPS, Run, solve_case, vibrate_case
 
 CaseStatus = Literal["done", "not converged", "failed"]
 StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
 DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
-QUICK = tuple(group for group in RUN_GROUPS if group != "own")  # its own stiffness takes as long as the contact
+QUICK = tuple(group for group in RUN_GROUPS if group not in ("own", "virgin"))  # they take as long as the contact
 STILL = tuple(group for group in RUN_GROUPS if group not in ("heat", "stress", "resonance"))
 
 Row = dict[str, Any]
@@ -85,10 +84,8 @@ def _status(run: Run) -> Row:
 
 def _over_surfaces(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
     """Means over the surfaces that [solver] asks for, and intervals, as `asperity solve` gives them."""
-    run = solve_case(case, surfaces=None, strict=False)
-    first = run.numbers(QUICK)
-    others = [{key: other.get(key) for key in first} for other in run.others]
-    return {**_status(run), **mean_row((first, *others)), **read(run, lines(DOUBT))}, {}
+    run = solve_case(case, surfaces=None, strict=False, groups=QUICK)
+    return {**_status(run), **run.scalars()}, {}
 
 
 def _still(case: Case, _wanted: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
