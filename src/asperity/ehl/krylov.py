@@ -15,21 +15,53 @@ import scipy
 Vector = np.ndarray[Any, Any]
 Operator = Callable[[Any], Vector]
 
-FEW = 7  # vectors that there is room for at first: memory that is asked for in vain is given back and asked for anew
+FEW = 7  # vectors that there is room for at first
 CANCELLED = 0.5  # share of a vector left by orthogonalising it, below which that is done once more ...
 NEARLY_CANCELLED = 0.1  # ... where all of it stays in this precision, and little is asked of the last digits
 ADJOINT = 2  # what BLAS calls the conjugate transpose
 FALLING = 0.9  # what a step leaves of what was left, below which that tells where to go on, and not the step
 
 
+class Room:
+    """Memory for the vectors of one GMRES after the other: fresh memory takes as long as what is done with it."""
+
+    def __init__(self) -> None:
+        self.parts: tuple[Vector, Vector] = (np.empty(0), np.empty(0))
+
+    def rows(self, count: int, vector: Vector) -> tuple[Vector, Vector]:
+        """Two arrays of at least `count` rows like `vector`; rows of the same length are what they were before."""
+        size = vector.size
+        if self.parts[0].dtype != vector.dtype or self.parts[0].size < count * size:
+            before = self.parts
+            self.parts = np.empty(count * size, vector.dtype), np.empty(count * size, vector.dtype)
+            for old, new in zip(before, self.parts, strict=True):
+                if old.dtype == new.dtype:
+                    new[: old.size] = old
+        whole = self.parts[0].size // size
+        first, second = (part[: whole * size].reshape(whole, size) for part in self.parts)
+        return first, second
+
+
 @np.errstate(over="ignore", invalid="ignore")  # what leaves this precision's range is found out below
-def gmres(product: Operator, precondition: Operator, wanted: Vector, *, tolerance: float, most_steps: int) -> Vector:
-    """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x."""
+def gmres(
+    product: Operator,
+    precondition: Operator,
+    wanted: Vector,
+    *,
+    tolerance: float,
+    most_steps: int,
+    room: Room | None = None,
+) -> Vector:
+    """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x.
+
+    Where many are solved one after the other, all of them may have one `room`.
+    """
     exact = np.result_type(wanted.dtype, float)
     norm = _length(wanted)
     if norm == 0.0:
         return np.zeros_like(wanted)
-    basis, corrections = np.empty((2, min(FEW, most_steps) + 1, wanted.size), dtype=wanted.dtype)
+    room = room or Room()
+    basis, corrections = room.rows(min(FEW, most_steps) + 1, wanted)
     triangle = np.zeros((most_steps, most_steps), exact)
     turns = np.zeros(
         (most_steps, 2), exact
@@ -39,7 +71,7 @@ def gmres(product: Operator, precondition: Operator, wanted: Vector, *, toleranc
     np.divide(wanted, norm, out=basis[0])
     for step in range(most_steps):
         if step + 1 == len(basis):
-            basis, corrections = (np.concatenate([part, np.empty_like(part)]) for part in (basis, corrections))
+            basis, corrections = room.rows(2 * len(basis), wanted)
         corrections[step] = precondition(basis[step])
         new = product(corrections[step])
         known = basis[: step + 1]

@@ -8,6 +8,7 @@ import numpy as np
 
 from asperity.arrays import Field, Mask
 from asperity.ehl.iterate import Step
+from asperity.ehl.krylov import Room
 from asperity.ehl.limit import StepLimit
 from asperity.ehl.linear import SingularFactor
 from asperity.ehl.mixed import MixedBalance, Pressures, evaluate
@@ -57,13 +58,13 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
     furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
     approach_before, change = 0.0, np.inf
-    lowest, idle, share, astray = np.inf, 0, 1.0, False
+    lowest, idle, share, astray, room = np.inf, 0, 1.0, False, Room()
     balance, settled = evaluate(problem, unknowns, second_order=second_order), np.zeros(problem.cells, dtype=bool)
     for number in count():
         unknowns = balance.unknowns
         yield Step(number, balance, unknowns.approach, change)
         try:
-            step = newton_step(balance, None if astray else settled)
+            step = newton_step(balance, None if astray else settled, room)
         except SingularFactor:  # strayed so far that no step leads on
             yield Step(number + 1, balance, unknowns.approach, np.inf)
             return

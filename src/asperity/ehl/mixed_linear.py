@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from asperity.arrays import Field, Mask
-from asperity.ehl.krylov import gmres
+from asperity.ehl.krylov import Room, gmres
 from asperity.ehl.linear import Blocks, Kept, LineRelaxation, NestedBlocks, single_faces, turn_back
 from asperity.ehl.mixed import (
     OPEN_FROM,
@@ -301,11 +301,11 @@ def firm(balance: MixedBalance) -> bool:
     return bool(nearly.sum() < NEARLY_CLOSED * flattened(balance).sum())
 
 
-def newton_step(balance: MixedBalance, settled: Mask | None = None) -> Pressures:
+def newton_step(balance: MixedBalance, settled: Mask | None = None, room: Room | None = None) -> Pressures:
     """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
 
     How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly, and oil is foreseen
-    in flattened streaks; neither without `settled`.
+    in flattened streaks; neither without `settled`. Steps of one grid may share GMRES's `room`.
     """
     problem = balance.problem
     stands = settled is not None and not problem.conserve and problem.past is None and problem.held is None
@@ -330,7 +330,9 @@ def newton_step(balance: MixedBalance, settled: Mask | None = None) -> Pressures
     left = LEFT_SMOOTH if linear.follows_wedge else LEFT
     if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
         left = LEFT_NEAR
-    solved = gmres(step.product, step.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS)
+    solved = gmres(
+        step.product, step.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS, room=room
+    )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
     d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
     d_total.ravel()[step.touching] = solved[step.count : -1]
