@@ -1,7 +1,6 @@
 """The application: its commands are in the modules beside this one; what asperity refuses becomes an exit code here."""
 
 import codecs
-import gc
 import os
 import sys
 import unicodedata
@@ -15,10 +14,9 @@ import asperity
 from asperity import quantities
 from asperity.cli.options import with_flags
 from asperity.errors import AsperityError, BadInput
-from asperity.processes import end_quickly
+from asperity.processes import save_time
 from asperity.quiet import printable
 
-GARBAGE_FROM = 300_000  # objects; libraries make half as many while they load, and each search takes 0.03 s
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 LONGEST = 480  # characters of a complaint
 SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}
@@ -36,8 +34,7 @@ app = typer.Typer(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; what asperity refuses is one line on stderr."""
-    gc.set_threshold(GARBAGE_FROM)
-    end_quickly()
+    save_time()
     codecs.register_error("plain", _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):

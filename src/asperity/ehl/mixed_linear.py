@@ -330,9 +330,7 @@ def newton_step(balance: MixedBalance, settled: Mask | None = None, room: Room |
     left = LEFT_SMOOTH if linear.follows_wedge else LEFT
     if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
         left = LEFT_NEAR
-    solved = gmres(
-        step.product, step.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS, room=room
-    )
+    solved = gmres(step.product, step.precondition, wanted, tolerance=left, most_steps=MOST_KRYLOV_STEPS, room=room)
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
     d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
     d_total.ravel()[step.touching] = solved[step.count : -1]
