@@ -217,3 +217,13 @@ def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_rat
     assert first.peak.value == pytest.approx(0.565 * bodies.hertz.p_max, rel=0.01)
     with pytest.raises(BadInput, match="body must be 1 or 2"):
         subsurface_stress(solution, body=0)
+
+
+def test_the_largest_shear_of_single_precision_keeps_its_digits():
+    """Below the middle of a ball two principal stresses are equal: on Hertz's axis, K. L. Johnson (1985), eq. 3.45."""
+    depth, nu = np.linspace(0.05, 2.0, 200), 0.3
+    inside = 1.0 - depth * np.arctan(1.0 / depth)
+    across, down = -(1.0 + nu) * inside + 0.5 / (1.0 + depth**2), -1.0 / (1.0 + depth**2)
+    nothing = np.zeros_like(depth)
+    single = StressTensor(*(part.astype(np.float32) for part in (across, across, down, nothing, nothing, nothing)))
+    np.testing.assert_allclose(single.max_shear, 0.5 * np.abs(across - down), rtol=2e-6)

@@ -221,7 +221,7 @@ class OwnResonance:
 
     elastic: DynamicStiffness
     yields: bool
-    solution: ContactSolution = field(repr=False)
+    solution: ContactSolution = field(repr=False, compare=False)
 
     @cached_property
     def virgin(self) -> DynamicStiffness:

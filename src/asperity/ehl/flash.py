@@ -237,12 +237,13 @@ def _passed_on(
         return vector
 
     solved, left, size = np.zeros(heat.size), wanted.ravel(), float(np.linalg.norm(wanted))
-    for _ in range(MOST_ROUNDS):
+    for number in range(MOST_ROUNDS + 1):
         rest = float(np.linalg.norm(left))
         if rest <= SHARING_TOLERANCE * size:
             return np.asarray(np.where(exchanging, solved.reshape(heat.shape) * scale, 0.0))
-        tolerance = max(AT_A_TIME, SURELY * SHARING_TOLERANCE * size / rest)
-        single = (left / rest).astype(np.float32)
-        solved += rest * gmres(unbalanced, itself, single, tolerance=tolerance, most_steps=MOST_STEPS)
-        left = wanted.ravel() - unbalanced(solved)
+        if number < MOST_ROUNDS:
+            tolerance = max(AT_A_TIME, SURELY * SHARING_TOLERANCE * size / rest)
+            single = (left / rest).astype(np.float32)
+            solved += rest * gmres(unbalanced, itself, single, tolerance=tolerance, most_steps=MOST_STEPS)
+            left = wanted.ravel() - unbalanced(solved)
     raise AsperityError("the heat could not be shared between the bodies; is the film far thinner than a cell?")

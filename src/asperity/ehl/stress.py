@@ -43,11 +43,15 @@ class StressTensor:
 
     @property
     def max_shear(self) -> Field:
-        """Half the difference of the largest and the smallest principal stress [Pa], Tresca's measure."""
-        mean = (self.xx + self.yy + self.zz) / 3.0
-        x, y, z = self.xx - mean, self.yy - mean, self.zz - mean
-        third = x * y * z + 2.0 * self.xy * self.yz * self.xz - x * self.yz**2 - y * self.xz**2 - z * self.xy**2
-        second = self._second_invariant
+        """Half the difference of the largest and the smallest principal stress [Pa], Tresca's measure.
+
+        In double precision: where two principal stresses are equal, Lode's angle has half of the digits.
+        """
+        xx, yy, zz, xy, yz, xz = (np.asarray(getattr(self, name), dtype=float) for name in COMPONENTS)
+        mean = (xx + yy + zz) / 3.0
+        x, y, z = xx - mean, yy - mean, zz - mean
+        third = x * y * z + 2.0 * xy * yz * xz - x * yz**2 - y * xz**2 - z * xy**2
+        second = StressTensor(xx, yy, zz, xy, yz, xz)._second_invariant
         with np.errstate(divide="ignore", invalid="ignore"):
             cosine = np.where(second > 0.0, 1.5 * np.sqrt(3.0) * third / second**1.5, 1.0)
         angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0  # Lode's

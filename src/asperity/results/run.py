@@ -3,7 +3,7 @@
 Does no physics of its own, solves and prints nothing.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -136,12 +136,24 @@ class Run:
         return self._shaken if isinstance(self._shaken, str) else None
 
     @cached_property
-    def virgin_resonance(self) -> ehl.DynamicStiffness | None:
-        """The same while cells at the pressure cap still yield; None where that is not known."""
+    def _yielding(self) -> ehl.DynamicStiffness | str:
+        """The same while cells at the pressure cap still yield, or why that is not known."""
+        if isinstance(self._shaken, str):
+            return self._shaken
         try:
-            return None if self.own_resonance is None else self.own_resonance.virgin
-        except AsperityError:  # the other limit is as good without it
-            return None
+            return self._shaken.virgin
+        except AsperityError as error:  # the other limit is as good without it
+            return str(error)
+
+    @property
+    def virgin_resonance(self) -> ehl.DynamicStiffness | None:
+        """Stiffness and damping of virgin roughness; None where `virgin_resonance_failure` says why."""
+        return None if isinstance(self._yielding, str) else self._yielding
+
+    @property
+    def virgin_resonance_failure(self) -> str | None:
+        """Why there is no `virgin_resonance`; None where there is one."""
+        return self._yielding if isinstance(self._yielding, str) else None
 
     @cached_property
     def _over_frequency(self) -> DynamicCurve | str:
@@ -232,8 +244,13 @@ class Run:
             "regime_card": self.card.to_dict(),
             **oil,
             **({} if self.dynamic_curve is None else {"dynamic_curve": self.dynamic_curve.scalars()}),
-            "notes": list(self.remarks),
+            "notes": [*self.remarks, *self._without_virgin()],
         }
+
+    def _without_virgin(self) -> Iterator[str]:
+        """A sentence where one limit of the contact's stiffness is known and the other is not, though asked for."""
+        if "virgin" in self.groups and self.own_resonance is not None and self.virgin_resonance_failure is not None:
+            yield f"There is no stiffness of virgin roughness: {self.virgin_resonance_failure}."
 
     def verdict(self) -> str:
         """One sentence on the state of the contact, of its surfaces' means and with 90 % intervals.

@@ -45,8 +45,10 @@ def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
     first, *others = rows
     means: dict[str, Any] = dict(first)
     for key in (entry.key for entry in lines(*AVERAGED)):
+        if key not in first:
+            continue
         values = [float(value) for row in rows if (value := row.get(key)) is not None]
-        if key in means and any(key not in row for row in others):
+        if any(key not in row for row in others):
             means[key] = None
         elif others and values:
             means[key] = float(np.mean(values))
