@@ -21,11 +21,9 @@ def cores() -> int:
 
 
 def save_time() -> None:
-    """Spare a process that is asperity's own what costs it time beside its work.
+    """Search for garbage seldom, and not at the end, where that takes 0.2 s; keep memory that is freed.
 
-    It searches for garbage seldom, and not at its end, where that takes 0.2 s. And it keeps what it has freed: a solve
-    frees and asks for the same fields again and again, and the system clears memory that it hands out. That is said to
-    glibc; elsewhere memory is handled as ever.
+    A solve frees and asks for the same fields again and again, and the system clears what it hands out. glibc only.
     """
     gc.set_threshold(GARBAGE_FROM)
     atexit.register(gc.freeze)

@@ -20,7 +20,7 @@ from asperity.errors import AsperityError, BadInput
 from asperity.quantities import lines, quantity, read
 from asperity.results.doubt import basis, in_words
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
-from asperity.results.spread import Row, Scalar, half_interval, mean_row, whole_error
+from asperity.results.spread import AVERAGED, Row, Scalar, half_interval, mean_row, whole_error
 from asperity.wear import Resonance
 
 if TYPE_CHECKING:
@@ -29,10 +29,7 @@ if TYPE_CHECKING:
 FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
-RUN_GROUPS = (
-    *("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "own", "virgin"),
-    "solver",
-)
+RUN_GROUPS = (*AVERAGED, "solver")
 SHORT_GROUPS = tuple(group for group in RUN_GROUPS if group != "virgin")  # short tables show none of it
 DOUBT = "uncertainty"  # group of the catalogue: of all surfaces together
 ENDS = "ends"  # group of the catalogue: of rollers
@@ -147,13 +144,8 @@ class Run:
 
     @property
     def virgin_resonance(self) -> ehl.DynamicStiffness | None:
-        """Stiffness and damping of virgin roughness; None where `virgin_resonance_failure` says why."""
+        """Stiffness and damping of virgin roughness; None where it is not known."""
         return None if isinstance(self._yielding, str) else self._yielding
-
-    @property
-    def virgin_resonance_failure(self) -> str | None:
-        """Why there is no `virgin_resonance`; None where there is one."""
-        return self._yielding if isinstance(self._yielding, str) else None
 
     @cached_property
     def _over_frequency(self) -> DynamicCurve | str:
@@ -249,8 +241,8 @@ class Run:
 
     def _without_virgin(self) -> Iterator[str]:
         """A sentence where one limit of the contact's stiffness is known and the other is not, though asked for."""
-        if "virgin" in self.groups and self.own_resonance is not None and self.virgin_resonance_failure is not None:
-            yield f"There is no stiffness of virgin roughness: {self.virgin_resonance_failure}."
+        if "virgin" in self.groups and self.own_resonance is not None and isinstance(self._yielding, str):
+            yield f"There is no stiffness of virgin roughness: {self._yielding}."
 
     def verdict(self) -> str:
         """One sentence on the state of the contact, of its surfaces' means and with 90 % intervals.
@@ -368,15 +360,8 @@ def run_of(
         notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
-    run = Run(
-        case=case,
-        solution=solution,
-        state=state,
-        vibration=vibration,
-        notes=tuple(notes),
-        others=tuple(others),
-        groups=groups,
-    )
+    rows = tuple(others)
+    run = Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes, others=rows, groups=groups)
     error = whole_error(state, (run.crucial, *others), case.conditions, model, vibration)
     return replace(run, state=replace(state, error=error))
 

@@ -23,18 +23,8 @@ Row = Mapping[str, Scalar]
 LEVEL = 0.95  # of the t distribution on either side: 90 % between them
 NORMAL = 1.6448536269514722  # standard deviations on either side of 90 % of a normal distribution
 FLOOR = 0.01  # load share below which the film is full: the logarithm of the odds tells no smaller ones apart
-AVERAGED = (
-    "load",
-    "sharing",
-    "film",
-    "pressure",
-    "friction",
-    "heat",
-    "stress",
-    "resonance",
-    "own",
-    "virgin",
-)  # groups of the catalogue
+# groups of the catalogue
+AVERAGED = ("load", "sharing", "film", "pressure", "friction", "heat", "stress", "resonance", "own", "virgin")
 
 
 def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
