@@ -9,6 +9,7 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator
+from importlib.metadata import files as files_of
 from pathlib import Path
 
 import draw_benchmark
@@ -27,6 +28,7 @@ BESIDE = {
 }
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
 ERRORS = STAGE / "images" / "benchmark-error.png"  # drawn from the csv that the last `make bench` wrote
+MATHJAX = ("sphinx-mathjax-offline", "tex-svg.js")  # who has it, and what of it draws the equations
 REST = "<!-- the rest -->"  # where pages go that no other list of pages names
 
 
@@ -59,6 +61,12 @@ def relinked(path: Path) -> str:
     return "".join(part if part.startswith("```") else LINK.sub(leading, part) for part in parts)
 
 
+def mathjax() -> Path:
+    """MathJax in one file, as the library that brings it for Sphinx has it."""
+    library, name = MATHJAX
+    return Path(next(file for file in files_of(library) or () if file.name == name).locate())
+
+
 def listed(texts: dict[Path, str]) -> set[str]:
     """Pages of the stage's root that some list of pages names."""
     blocks = (block for text in texts.values() for block in re.findall(r"```\{toctree\}.*?```", text, re.DOTALL))
@@ -75,6 +83,7 @@ def stage() -> None:
     names = "\n".join(f"../{name}" for name in rest if name not in listed(texts))
     wanted = {path: text.replace(REST, names).encode() for path, text in texts.items()}
     wanted |= {staged(path): path.read_bytes() for path in sources() if path.suffix != ".md"}
+    wanted[STAGE / "_static" / "mathjax" / MATHJAX[1]] = mathjax().read_bytes()
     made = [STAGE / name for name in ("gallery", "reference/names")]
     for path in STAGE.rglob("*"):
         if path.is_file() and path not in (*wanted, ERRORS) and not any(path.is_relative_to(folder) for folder in made):

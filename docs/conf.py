@@ -38,7 +38,7 @@ autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "inherited-members": False}
 napoleon_google_docstring = False
 
-mathjax_path = "mathjax/tex-svg.js"
+mathjax_path = "mathjax/tex-svg.js"  # staged: equations are drawn without a network
 mathjax3_config = {"options": {"enableMenu": False}}  # the menu is what would ask other machines for speech rules
 copybutton_prompt_text = "$ "
 

@@ -233,9 +233,6 @@ def _passed_on(
         answer = resisted * crossing + both(crossing)
         return np.where(exchanging, answer, vector.reshape(heat.shape)).ravel()
 
-    def itself(vector: Field) -> Field:
-        return vector
-
     solved, left, size = np.zeros(heat.size), wanted.ravel(), float(np.linalg.norm(wanted))
     for number in range(MOST_ROUNDS + 1):
         rest = float(np.linalg.norm(left))
@@ -244,6 +241,6 @@ def _passed_on(
         if number < MOST_ROUNDS:
             tolerance = max(AT_A_TIME, SURELY * SHARING_TOLERANCE * size / rest)
             single = (left / rest).astype(np.float32)
-            solved += rest * gmres(unbalanced, itself, single, tolerance=tolerance, most_steps=MOST_STEPS)
+            solved += rest * gmres(unbalanced, np.asarray, single, tolerance=tolerance, most_steps=MOST_STEPS)
             left = wanted.ravel() - unbalanced(solved)
     raise AsperityError("the heat could not be shared between the bodies; is the film far thinner than a cell?")
