@@ -38,7 +38,18 @@ def main(wanted: Collection[str]) -> None:
         (HERE / "cases" / f"{name}.toml").write_text(text, "utf-8")
     with (HERE / "certified.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["case", "quantity", "unit", "value", "uncertainty", "first way", "second way", "found by it"])
+        writer.writerow(
+            [
+                "case",
+                "quantity",
+                "unit",
+                "value",
+                "uncertainty",
+                "first way",
+                "second way",
+                "found by it",
+            ]
+        )
         for path in sorted((HERE / "cases").glob("*.toml")):
             for entry in tomllib.loads(path.read_text("utf-8"))["certified"]:
                 first, second = entry["ways"]
@@ -57,14 +68,25 @@ def main(wanted: Collection[str]) -> None:
 
 
 def _certified(
-    name: str, key: str, unit: str, first: tuple[str, float], second: tuple[str, float], least: float
+    name: str,
+    key: str,
+    unit: str,
+    first: tuple[str, float],
+    second: tuple[str, float],
+    least: float,
 ) -> dict[str, Any] | None:
     doubt = max(abs(first[1] - second[1]), least * abs(first[1]))
     kept = doubt <= MOST * abs(first[1])
     sentence = "" if kept else "NOT CERTIFIED"
-    print(f"{name:18s} {key:16s} {first[1]:.6e} {second[1]:.6e} {100 * doubt / abs(first[1]):.4f} % {sentence}")
+    print(
+        f"{name:18s} {key:16s} {first[1]:.6e} {second[1]:.6e} {100 * doubt / abs(first[1]):.4f} % {sentence}"
+    )
     both = [{"by": by, "value": value} for by, value in (first, second)]
-    return {"quantity": key, "unit": unit, "value": first[1], "uncertainty": doubt, "ways": both} if kept else None
+    return (
+        {"quantity": key, "unit": unit, "value": first[1], "uncertainty": doubt, "ways": both}
+        if kept
+        else None
+    )
 
 
 if __name__ == "__main__":

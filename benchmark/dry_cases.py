@@ -33,15 +33,30 @@ def smooth() -> Iterator[Stated]:
     common = {"kind": "dry", "definition": DRY}
     for number, (load, radius) in enumerate(((50e3, 5.4e-3), (400e3, 20e-3))):
         given = {**common, "geometry": "line", "radius_m": radius, "line_load_n_m": load, **STEEL}
-        both = ("Hertz, closed form", ways.hertz_line, "dense active set, 1601 nodes", ways.dense_line)
+        both = (
+            "Hertz, closed form",
+            ways.hertz_line,
+            "dense active set, 1601 nodes",
+            ways.dense_line,
+        )
         yield f"dry-line-{number + 1}", given, partial(_closed, given, *both)
     for number, (load, radius) in enumerate(((20.0, 10e-3), (500.0, 25e-3))):
         given = {**common, "geometry": "point", "radius_m": radius, "load_n": load, **STEEL}
-        both = ("Hertz, closed form", ways.hertz_point, "Sneddon's integrals by quadrature", ways.sneddon)
+        both = (
+            "Hertz, closed form",
+            ways.hertz_point,
+            "Sneddon's integrals by quadrature",
+            ways.sneddon,
+        )
         yield f"dry-ball-{number + 1}", given, partial(_closed, given, *both)
     for number, radii in enumerate(([5e-3, 10e-3], [12e-3, 4e-3], [8e-3, 80e-3])):
         given = {**common, "geometry": "elliptic", "radius_m": radii, "load_n": 50.0, **STEEL}
-        both = ("Hertz, elliptic integrals", ways.hertz_ellipse, "chords by quadrature", ways.ellipse_by_chords)
+        both = (
+            "Hertz, elliptic integrals",
+            ways.hertz_ellipse,
+            "chords by quadrature",
+            ways.ellipse_by_chords,
+        )
         yield f"dry-ellipse-{number + 1}", given, partial(_closed, given, *both)
 
 
@@ -49,7 +64,12 @@ def waves() -> Iterator[Stated]:
     for number, share in enumerate((0.25, 0.5, 0.75)):
         given = {"kind": "wave", "definition": WAVE, "wavelength_m": 1e-4, "amplitude_m": 2e-7}
         given |= {"pressure_over_full": share, **STEEL}
-        both = ("Westergaard, closed form", ways.westergaard, "dense active set, 800 nodes", ways.dense_wave)
+        both = (
+            "Westergaard, closed form",
+            ways.westergaard,
+            "dense active set, 800 nodes",
+            ways.dense_wave,
+        )
         yield f"dry-wave-{number + 1}", given, partial(_closed, given, *both)
 
 
@@ -59,7 +79,12 @@ def _closed(given: dict[str, Any], first: str, closed: Any, second: str, twin: A
 
 def wavy_lines() -> Iterator[Stated]:
     for number, (height, length) in enumerate(((2e-7, 40e-6), (5e-8, 15e-6))):
-        given = {"kind": "dry", "definition": DRY + LINE_WAVES, "geometry": "line", "radius_m": 5.4e-3}
+        given = {
+            "kind": "dry",
+            "definition": DRY + LINE_WAVES,
+            "geometry": "line",
+            "radius_m": 5.4e-3,
+        }
         given |= {"line_load_n_m": 50e3, **STEEL, "waves": [[height, 1.0 / length, 0, 0.0]]}
         yield f"dry-wavy-line-{number + 1}", given, partial(_wavy_line, given)
 
@@ -68,12 +93,24 @@ def _wavy_line(given: dict[str, Any]) -> list[Value]:
     grids = [only(ways.dense_line(given, nodes), "p_weighted_pa") for nodes in (801, 1601, 3201)]
     first = oiled.limit(grids, [4.0, 2.0, 1.0])
     other = ways.refined("asperity", given, (512, 1024, 2048))
-    return stepped("dense active set, up to 3201 nodes", first, "asperity, 512 to 2048 cells", other, "p_weighted_pa")
+    return stepped(
+        "dense active set, up to 3201 nodes",
+        first,
+        "asperity, 512 to 2048 cells",
+        other,
+        "p_weighted_pa",
+    )
 
 
 def ringed_balls() -> Iterator[Stated]:
     for number, (height, length) in enumerate(((3e-8, 60e-6), (1e-8, 40e-6))):
-        given = {"kind": "dry", "definition": DRY + RINGS, "geometry": "point", "radius_m": 10e-3, "load_n": 20.0}
+        given = {
+            "kind": "dry",
+            "definition": DRY + RINGS,
+            "geometry": "point",
+            "radius_m": 10e-3,
+            "load_n": 20.0,
+        }
         given |= {**STEEL, "rings": [height, length]}
         yield f"dry-ringed-ball-{number + 1}", given, partial(_ringed_ball, given)
 
@@ -81,13 +118,25 @@ def ringed_balls() -> Iterator[Stated]:
 def _ringed_ball(given: dict[str, Any]) -> list[Value]:
     exact = ways.sneddon(given)
     other = ways.refined("tamaas", given, (128, 256, 512))
-    both = ("Sneddon's integrals by quadrature", (exact, dict.fromkeys(exact, 0.0)), "tamaas, 128 to 512 cells", other)
+    both = (
+        "Sneddon's integrals by quadrature",
+        (exact, dict.fromkeys(exact, 0.0)),
+        "tamaas, 128 to 512 cells",
+        other,
+    )
     return stepped(*both, "p_weighted_pa")
 
 
 def rough_balls() -> Iterator[Stated]:
     for number, (sq, seed) in enumerate(((1e-7, 1), (3e-7, 2), (1e-6, 3))):
-        given = {"kind": "dry", "definition": ROUGH, "geometry": "point", "radius_m": 10e-3, "load_n": 20.0, **STEEL}
+        given = {
+            "kind": "dry",
+            "definition": ROUGH,
+            "geometry": "point",
+            "radius_m": 10e-3,
+            "load_n": 20.0,
+            **STEEL,
+        }
         given["side_m"] = 3.2 * ways.hertz_point(given)["half_width_m"]
         given["waves"] = ways.random_waves(sq, given["side_m"], seed)
         yield f"dry-rough-{number + 1}", given, partial(_rough_ball, given)
@@ -98,7 +147,13 @@ def _rough_ball(given: dict[str, Any]) -> list[Value]:
     first = ways.refined("tamaas", given, (128, 256, 512))
     value, step = ways.refined("contactmechanics", given, (96, 192, 384))
     other = (value, {key: 3.0 * first[1][key] for key in step})
-    return stepped("tamaas, 128 to 512 cells", first, "contactmechanics, 96 to 384 cells", other, "p_weighted_pa")
+    return stepped(
+        "tamaas, 128 to 512 cells",
+        first,
+        "contactmechanics, 96 to 384 cells",
+        other,
+        "p_weighted_pa",
+    )
 
 
 FAMILIES = (smooth, waves, wavy_lines, ringed_balls, rough_balls)

@@ -11,12 +11,16 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from asperity import hertz
 from asperity.benchmark import load_benchmark
+from asperity.contact import hertz
 from benchmark import oiled, ways
 
 HERE = Path(__file__).parent / "fields"
-GRIDS = {"point": [(46, 21), (64, 29)], "strip": [(101, 12), (151, 18)], "line": [(301, 1), (601, 1)]}
+GRIDS = {
+    "point": [(46, 21), (64, 29)],
+    "strip": [(101, 12), (151, 18)],
+    "line": [(301, 1), (601, 1)],
+}
 
 
 def field_of(given: oiled.Given) -> xr.Dataset | None:
@@ -42,7 +46,9 @@ def _twin(given: oiled.Given) -> xr.Dataset:
         fields["fill"] = 1.0 + np.minimum(state.oil, 0.0)
     shaped = {name: field.reshape(mesh.shape) for name, field in fields.items()}
     if kind == "line":
-        return _dataset({"x": mesh.x * stated.a}, {name: field[:, 0] for name, field in shaped.items()})
+        return _dataset(
+            {"x": mesh.x * stated.a}, {name: field[:, 0] for name, field in shaped.items()}
+        )
     return _dataset({"x": mesh.x * stated.a, "y": mesh.y * stated.a}, shaped)
 
 
@@ -51,7 +57,9 @@ def _hertz(given: oiled.Given) -> xr.Dataset:
     if given["geometry"] == "line":
         found = hertz.line_contact(given["line_load_n_m"], 1.0, given["radius_m"], modulus)
         x = share * found.half_widths[0]
-        return _dataset({"x": x}, {"pressure": found.p_max * np.sqrt(np.maximum(1.0 - share**2, 0.0))})
+        return _dataset(
+            {"x": x}, {"pressure": found.p_max * np.sqrt(np.maximum(1.0 - share**2, 0.0))}
+        )
     if given["geometry"] == "point":
         found = hertz.point_contact(given["load_n"], given["radius_m"], modulus)
     else:
@@ -67,7 +75,9 @@ def _wave(given: oiled.Given) -> xr.Dataset:
     mean = s * np.pi * ways.modulus(given) * given["amplitude_m"] / length
     x = (np.arange(400) + 0.5) / 400 * length - length / 2.0
     under = np.maximum(s - np.sin(np.pi * x / length) ** 2, 0.0)
-    return _dataset({"x": x}, {"pressure": 2.0 * mean / s * np.cos(np.pi * x / length) * np.sqrt(under)})
+    return _dataset(
+        {"x": x}, {"pressure": 2.0 * mean / s * np.cos(np.pi * x / length) * np.sqrt(under)}
+    )
 
 
 UNITS = {"pressure": "Pa", "oil_pressure": "Pa", "film": "m", "fill": "1"}
@@ -85,8 +95,14 @@ def main(wanted: Collection[str]) -> None:
             continue
         found = field_of(dict(case.given))
         if found is not None:
-            found.attrs = {"title": case.name, "source": f"benchmark/cases/{case.name}.toml", "Conventions": "CF-1.11"}
-            packed = {name: {"dtype": "float32", "zlib": True, "complevel": 9} for name in found.data_vars}
+            found.attrs = {
+                "title": case.name,
+                "source": f"benchmark/cases/{case.name}.toml",
+                "Conventions": "CF-1.11",
+            }
+            packed = {
+                name: {"dtype": "float32", "zlib": True, "complevel": 9} for name in found.data_vars
+            }
             found.to_netcdf(HERE / f"{case.name}.nc", engine="h5netcdf", encoding=packed)
             print(case.name, *found.sizes.items())
 

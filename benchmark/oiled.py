@@ -43,7 +43,14 @@ class Stated:
         x, y = mesh.x[:, None], mesh.y[None, :]
         gap = x**2 / 2.0 + (y**2 / 2.0 if mesh.kind == "ball" else 0.0 * y)
         for amplitude, along, across, phase in self.given.get("waves", []):
-            turn = 2.0 * np.pi * (along * self.a * (x - shifted) + across * y * self.a / self.given.get("width_m", 1.0))
+            turn = (
+                2.0
+                * np.pi
+                * (
+                    along * self.a * (x - shifted)
+                    + across * y * self.a / self.given.get("width_m", 1.0)
+                )
+            )
             gap = gap - amplitude / self.height * np.cos(turn + phase)
         return gap.ravel()
 
@@ -61,7 +68,12 @@ class Stated:
             12.0 * oil["eta0_pa_s"] * self.speed * self.radius**2 / (self.a**3 * self.p_h),
             (lambda p: (alpha * p, np.full_like(p, alpha)))
             if oil["viscosity"] == "barus"
-            else (lambda p: (scale * ((1.0 + q * p) ** z - 1.0), scale * z * q * (1.0 + q * p) ** (z - 1.0))),
+            else (
+                lambda p: (
+                    scale * ((1.0 + q * p) ** z - 1.0),
+                    scale * z * q * (1.0 + q * p) ** (z - 1.0),
+                )
+            ),
             lambda p: (1.0 + c1 * p / (1.0 + c2 * p), c1 / (1.0 + c2 * p) ** 2),
             self.given.get("touching_film_m", 0.0) / self.height,
             self.given["kind"] == "conserving",
@@ -117,13 +129,19 @@ def quantities(stated: Stated, solver: twin.Twin, state: twin.State) -> Found:
     found["h_central_m"] = float(np.interp(0.0, mesh.x, middle)) * stated.height
     found["h_min_m"] = least(film) * stated.height
     inside = np.linspace(-1.0, 1.0, 4001)
-    found["h_mean_m"] = float(np.trapezoid(np.interp(inside, mesh.x, film.mean(axis=1)), inside)) / 2.0 * stated.height
+    found["h_mean_m"] = (
+        float(np.trapezoid(np.interp(inside, mesh.x, film.mean(axis=1)), inside))
+        / 2.0
+        * stated.height
+    )
     if problem.touch > 0.0:
         touching = (film <= problem.touch * (1.0 + 1e-9)).ravel()
         found["load_share"] = float((weights @ (pressure * touching)) / (weights @ pressure))
     if problem.keeps_oil:
         content = solver.content(state).reshape(mesh.shape)
-        found["flux_m2_s"] = float(content[-2].mean()) * stated.height * stated.speed  # nothing drives it there but u
+        found["flux_m2_s"] = (
+            float(content[-2].mean()) * stated.height * stated.speed
+        )  # nothing drives it there but u
     return {key: float(value) for key, value in found.items()}
 
 
@@ -161,8 +179,13 @@ def moving(given: Given, nodes: int) -> Found:
     before = state
     for number in range(1, last + 1):
         now = twin.Twin.__new__(twin.Twin)
-        now.__dict__ = {**solver.__dict__, "problem": replace(problem, shape=stated.shape(mesh, number * step * rough))}
-        guess = twin.State(np.maximum(2.0 * state.oil - before.oil, 0.0), state.borne, state.approach)
+        now.__dict__ = {
+            **solver.__dict__,
+            "problem": replace(problem, shape=stated.shape(mesh, number * step * rough)),
+        }
+        guess = twin.State(
+            np.maximum(2.0 * state.oil - before.oil, 0.0), state.borne, state.approach
+        )
         past = twin.Past(step, once, twice)
         try:
             following = now.settled(guess, past, most=15, tolerance=1e-5)
@@ -173,7 +196,10 @@ def moving(given: Given, nodes: int) -> Found:
         films.append(float(now.gap(state)[centre]))
     heard = np.array(films[-period:]) * stated.height
     turns = np.exp(2j * np.pi * np.arange(period) / period)
-    return {"amplitude_ratio": float(2.0 * abs(turns @ heard) / period / amplitude), "h_mean_m": float(heard.mean())}
+    return {
+        "amplitude_ratio": float(2.0 * abs(turns @ heard) / period / amplitude),
+        "h_mean_m": float(heard.mean()),
+    }
 
 
 def limit(found: list[Found], sizes: list[float]) -> tuple[Found, Found]:

@@ -23,8 +23,13 @@ CAVITY = (
     "Rigid walls, d/dx(h^3/(12 eta) dp/dx) = u d(theta h)/dx, u the mean of the walls' speeds, p >= 0, 0 <= theta <= 1, p (1 "
     "- theta) = 0 (Jakobsson, Floberg, Olsson), pressures_pa at both ends. flux_m2_s: the flow u theta h - h^3/(12 eta) dp/dx. "
 )
-SLIDER = CAVITY + "h = least_m (1 + (2 x/length_m - 1)^2) from 0 to length_m. load_n_m: integral of p."
-JOURNAL = CAVITY + "h = clearance_m (1 + eccentricity cos(x/radius_m)) from 0 to 2 pi radius_m, full of oil at x = 0."
+SLIDER = (
+    CAVITY + "h = least_m (1 + (2 x/length_m - 1)^2) from 0 to length_m. load_n_m: integral of p."
+)
+JOURNAL = (
+    CAVITY
+    + "h = clearance_m (1 + eccentricity cos(x/radius_m)) from 0 to 2 pi radius_m, full of oil at x = 0."
+)
 COMMON = (
     "Elastic half-spaces, E* = 1/sum((1 - nu^2)/E). Newtonian, isothermal. roelands: eta = eta0 exp((ln(eta0/(Pa s)) + "
     "9.67)((1 + p/p0)^z - 1)), z = alpha p0/(ln eta0 + 9.67). dowson-higginson: rho = rho0 (1 + c1 p/(1 + c2 p)). um is "
@@ -73,20 +78,39 @@ MOVING = (
 
 
 def _twinned(
-    given: dict[str, Any], grids: list[tuple[int, int]], cells: tuple[int, ...], keys: tuple[str, ...]
+    given: dict[str, Any],
+    grids: list[tuple[int, int]],
+    cells: tuple[int, ...],
+    keys: tuple[str, ...],
 ) -> list[Value]:
     """Values of what stands still: by dense Newton on these grids, and by asperity on its own."""
     found = oiled.limit(oiled.steady(given, grids), [1.0 / (along - 1) for along, _ in grids])
     along, across = grids[-1]
     nodes = f"{along} nodes" if across == 1 else f"{along} x {across} nodes"
     other = ways.refined("asperity", given, cells)
-    return stepped(f"dense Newton on up to {nodes}", found, f"asperity, {cells[0]} to {cells[-1]} cells", other, *keys)
+    return stepped(
+        f"dense Newton on up to {nodes}",
+        found,
+        f"asperity, {cells[0]} to {cells[-1]} cells",
+        other,
+        *keys,
+    )
 
 
 def balls() -> Iterator[Stated]:
     for number, (load, speed) in enumerate(((0.7, 0.036), (1.5, 0.08), (5.0, 0.3))):
-        given = {"kind": "ehl", "definition": BALL, "geometry": "point", "radius_m": 12.5e-3, "load_n": load}
-        given |= {"surface_speeds_m_s": [speed, speed], "inlet_half_widths": -3.0, "outlet_half_widths": 1.5}
+        given = {
+            "kind": "ehl",
+            "definition": BALL,
+            "geometry": "point",
+            "radius_m": 12.5e-3,
+            "load_n": load,
+        }
+        given |= {
+            "surface_speeds_m_s": [speed, speed],
+            "inlet_half_widths": -3.0,
+            "outlet_half_widths": 1.5,
+        }
         given |= {"side_half_widths": 2.0, **STEEL, "oil": {**OIL, "eta0_pa_s": 0.04}}
         grids = [(64, 29), (91, 41), (127, 57)]
         yield (
@@ -99,8 +123,19 @@ def balls() -> Iterator[Stated]:
 def with_waves(
     kind: str, definition: str, waves: list[list[float]], speeds: list[float], film: float | None
 ) -> dict[str, Any]:
-    given = {"kind": kind, "definition": definition, "geometry": "line", "radius_m": 5.4e-3, "line_load_n_m": 50e3}
-    given |= {"surface_speeds_m_s": speeds, "inlet_half_widths": -3.0, "outlet_half_widths": 2.0, **STEEL}
+    given = {
+        "kind": kind,
+        "definition": definition,
+        "geometry": "line",
+        "radius_m": 5.4e-3,
+        "line_load_n_m": 50e3,
+    }
+    given |= {
+        "surface_speeds_m_s": speeds,
+        "inlet_half_widths": -3.0,
+        "outlet_half_widths": 2.0,
+        **STEEL,
+    }
     given |= {"waves": waves, "oil": OIL}
     return given | ({} if film is None else {"touching_film_m": film})
 
@@ -121,7 +156,11 @@ def mixed() -> Iterator[Stated]:
 def strips() -> Iterator[Stated]:
     waves = [[0.25e-6, 1.0 / 60e-6, 0.0, 0.0], [0.25e-6, 0.0, 1.0, 0.0]]
     given = with_waves("mixed", MIXED, waves, [0.1, 0.1], 80e-9) | {"width_m": 60e-6}
-    yield "mixed-strip-1", given, partial(_twinned, given, [(101, 12), (151, 18), (201, 24)], (128, 256, 512), SHARED)
+    yield (
+        "mixed-strip-1",
+        given,
+        partial(_twinned, given, [(101, 12), (151, 18), (201, 24)], (128, 256, 512), SHARED),
+    )
 
 
 def conserving() -> Iterator[Stated]:
@@ -129,14 +168,22 @@ def conserving() -> Iterator[Stated]:
     for number, (length, height, speed) in enumerate(
         ((40e-6, 0.2e-6, 1.0), (60e-6, 0.4e-6, 0.5), (40e-6, 0.5e-6, 0.5))
     ):
-        given = with_waves("conserving", CONSERVING, [[height, 1.0 / length, 0.0, 0.0]], [speed, speed], 20e-9)
-        yield f"conserving-line-{number + 1}", given, partial(_twinned, given, NODES, (384, 768, 1536), keys)
+        given = with_waves(
+            "conserving", CONSERVING, [[height, 1.0 / length, 0.0, 0.0]], [speed, speed], 20e-9
+        )
+        yield (
+            f"conserving-line-{number + 1}",
+            given,
+            partial(_twinned, given, NODES, (384, 768, 1536), keys),
+        )
 
 
 def running() -> Iterator[Stated]:
     common = with_waves("moving", MOVING, [], [0.2, 0.2], None) | {"line_load_n_m": 200e3}
     common |= {"inlet_half_widths": -2.5, "outlet_half_widths": 1.5}
-    for number, (share, speeds) in enumerate(((1.0, [0.2, 0.2]), (2.0, [0.2, 0.2]), (1.0, [0.1, 0.3]))):
+    for number, (share, speeds) in enumerate(
+        ((1.0, [0.2, 0.2]), (2.0, [0.2, 0.2]), (1.0, [0.1, 0.3]))
+    ):
         wave = [2e-8, float(f"{1.0 / (share * oiled.Stated(common).a):.10g}"), 0.0, 0.0]
         given = common | {"surface_speeds_m_s": speeds, "waves": [wave]}
         given["settles_half_widths"] = 2.5 * 0.2 / min(speeds)
@@ -152,10 +199,22 @@ def _run(given: dict[str, Any]) -> list[Value]:
 
 def smooth_lines() -> Iterator[Stated]:
     for number, (law, alpha, speed, inlet, outlet) in enumerate(LINES):
-        oil = {"eta0_pa_s": 0.096, "alpha_1_pa": alpha * 1e-9, "viscosity": law, "rho0_kg_m3": 880.0, **LAWS}
+        oil = {
+            "eta0_pa_s": 0.096,
+            "alpha_1_pa": alpha * 1e-9,
+            "viscosity": law,
+            "rho0_kg_m3": 880.0,
+            **LAWS,
+        }
         if law == "roelands":
             oil["roelands_p0_pa"] = 1.96e8
-        given = {"kind": "ehl", "definition": OILED, "geometry": "line", "radius_m": 5.4e-3, "line_load_n_m": 50e3}
+        given = {
+            "kind": "ehl",
+            "definition": OILED,
+            "geometry": "line",
+            "radius_m": 5.4e-3,
+            "line_load_n_m": 50e3,
+        }
         given |= {"surface_speeds_m_s": [speed, speed], "oil": oil}
         given |= {"inlet_half_widths": inlet, "outlet_half_widths": outlet, **STEEL}
         yield f"ehl-line-{number + 1}", given, partial(_smooth_line, given)
@@ -165,7 +224,9 @@ def _smooth_line(given: dict[str, Any]) -> list[Value]:
     first = ways.newton_on_nodes(given)
     second, step = ways.refined("asperity", given, (128, 256, 512))
     least = max(step[key] / first[key] for key in first) / 3.0
-    return paired("dense Newton on 401 and 801 nodes", first, "asperity, 128 to 512 cells", second, least)
+    return paired(
+        "dense Newton on 401 and 801 nodes", first, "asperity, 128 to 512 cells", second, least
+    )
 
 
 LINES = [
@@ -180,10 +241,22 @@ LINES = [
 
 
 def cavities() -> Iterator[Stated]:
-    slider = {"kind": "slider", "definition": SLIDER, "viscosity_pa_s": 0.039, "speed_m_s": 2.285, "length_m": 76.2e-3}
+    slider = {
+        "kind": "slider",
+        "definition": SLIDER,
+        "viscosity_pa_s": 0.039,
+        "speed_m_s": 2.285,
+        "length_m": 76.2e-3,
+    }
     wall = {**slider, "shape": "parabola", "least_m": 25.4e-6, "pressures_pa": [3364.14, 0.0]}
     yield "cavity-parabola", wall, partial(_parabola, wall)
-    journal = {"kind": "slider", "definition": JOURNAL, "shape": "journal", "viscosity_pa_s": 0.02, "speed_m_s": 3.0}
+    journal = {
+        "kind": "slider",
+        "definition": JOURNAL,
+        "shape": "journal",
+        "viscosity_pa_s": 0.02,
+        "speed_m_s": 3.0,
+    }
     journal |= {"radius_m": 25e-3, "clearance_m": 30e-6, "pressures_pa": [0.0, 0.0]}
     for eccentricity in (0.3, 0.6, 0.8):
         given = {**journal, "eccentricity": eccentricity}
@@ -194,7 +267,9 @@ def _parabola(wall: dict[str, Any]) -> list[Value]:
     first = ways.parabola(wall)
     second, step = ways.refined("asperity", wall, (400, 800, 1600))
     least = max(step[key] / first[key] for key in first) / 3.0
-    return paired("shooting on the flow, quadrature", first, "asperity, 400 to 1600 cells", second, least)
+    return paired(
+        "shooting on the flow, quadrature", first, "asperity, 400 to 1600 cells", second, least
+    )
 
 
 def _journal(given: dict[str, Any]) -> list[Value]:

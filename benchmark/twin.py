@@ -53,7 +53,9 @@ def line(lower: float, upper: float, nodes: int) -> Mesh:
 
 
 def strip(lower: float, upper: float, width: float, nodes: tuple[int, int]) -> Mesh:
-    return Mesh(np.linspace(lower, upper, nodes[0]), np.arange(nodes[1]) * width / nodes[1], "strip")
+    return Mesh(
+        np.linspace(lower, upper, nodes[0]), np.arange(nodes[1]) * width / nodes[1], "strip"
+    )
 
 
 def half_ball(lower: float, upper: float, side: float, nodes: tuple[int, int]) -> Mesh:
@@ -71,7 +73,9 @@ def compliance(mesh: Mesh) -> Field:
     hats = np.empty((ny, 2 * nx - 1))
     twice = away**2 * (np.where(away == 0.0, 0.0, np.log(far)) / 2.0 - 0.75) / -np.pi
     hats[0] = np.diff(twice, 2) / dx
-    for number in range(1, ny):  # e^(iky) along y: 2 K0(k |x|) in place of 1/r, integrated twice along x
+    for number in range(
+        1, ny
+    ):  # e^(iky) along y: 2 K0(k |x|) in place of 1/r, integrated twice along x
         k = 2.0 * np.pi * min(number, ny - number) / (ny * (mesh.y[1] - mesh.y[0]))
         once = iti0k0(k * far)[1] / k
         twice = far * once - (1.0 - k * far * k1(k * far)) / k**2
@@ -152,7 +156,9 @@ class Twin:
         ahead, behind = sparse.eye(nx - 1, nx, 1), sparse.eye(nx - 1, nx)
         self.mean_x = sparse.kron((ahead + behind) / 2.0, each).tocsr()
         self.slope_x = sparse.kron((ahead - behind) / dx, each).tocsr()
-        self.out_x = sparse.kron(sparse.eye(nx, nx - 1) - sparse.eye(nx, nx - 1, -1), each).tocsr() / dx
+        self.out_x = (
+            sparse.kron(sparse.eye(nx, nx - 1) - sparse.eye(nx, nx - 1, -1), each).tocsr() / dx
+        )
         self.upwind = sparse.kron(behind, each).tocsr()
         back = sparse.eye(nx - 1, nx) - sparse.eye(nx - 1, nx, -1)
         first = sparse.diags(np.r_[0.0, np.ones(nx - 2)])
@@ -193,7 +199,10 @@ class Twin:
         content, content_by_gap = density * film * share, density * opens * share
         content_by_oil = wet * by_p * film + (1.0 - wet) * density * film * p.keeps_oil
         mobility = density * film**3 * np.exp(-thick)
-        mobility_by_gap, mobility_by_oil = 3.0 * mobility / film * opens, mobility * (by_p / density - thicker)
+        mobility_by_gap, mobility_by_oil = (
+            3.0 * mobility / film * opens,
+            mobility * (by_p / density - thicker),
+        )
         least = p.touch**6 / film**3
         low = mobility < least
         mobility_by_gap = np.where(low, -3.0 * least / film * opens, mobility_by_gap) / p.number
@@ -203,7 +212,9 @@ class Twin:
         at_faces, face = self._carried(content)
         drop = self.slope_x @ oil
         outflow = self.out_x @ (at_faces - (self.mean_x @ mobility) * drop)
-        by_gap = face @ sparse.diags(content_by_gap) - sparse.diags(drop) @ self.mean_x @ sparse.diags(mobility_by_gap)
+        by_gap = face @ sparse.diags(content_by_gap) - sparse.diags(
+            drop
+        ) @ self.mean_x @ sparse.diags(mobility_by_gap)
         by_oil = sparse.diags(drop) @ self.mean_x @ sparse.diags(mobility_by_oil * wet)
         by_oil = face @ sparse.diags(content_by_oil) - by_oil
         by_oil -= sparse.diags(self.mean_x @ mobility) @ self.slope_x @ sparse.diags(wet)
@@ -214,7 +225,9 @@ class Twin:
             around = self.out_y @ sparse.diags(drop) @ self.mean_y
             slope_gap -= around @ sparse.diags(mobility_by_gap)
             slope_oil -= around @ sparse.diags(mobility_by_oil * wet)
-            slope_oil -= self.out_y @ sparse.diags(self.mean_y @ mobility) @ self.slope_y @ sparse.diags(wet)
+            slope_oil -= (
+                self.out_y @ sparse.diags(self.mean_y @ mobility) @ self.slope_y @ sparse.diags(wet)
+            )
         if past is not None:
             lead = 1.0 if past.twice is None else 1.5
             before = past.once if past.twice is None else 2.0 * past.once - 0.5 * past.twice
@@ -235,7 +248,9 @@ class Twin:
         slopes = self.upwind + sparse.diags(by_rise) @ self.back + sparse.diags(by_both) @ self.both
         return self.upwind @ content + rise * (1.0 - steep) / 2.0, slopes
 
-    def settled(self, state: State, past: Past | None = None, most: int = 60, tolerance: float = 1e-9) -> State:
+    def settled(
+        self, state: State, past: Past | None = None, most: int = 60, tolerance: float = 1e-9
+    ) -> State:
         """By Newton's steps, each on the sets that the last one left.
 
         Raises
@@ -280,7 +295,9 @@ class Twin:
             (gap + sunk - p.touch)[t],
             weights @ (oil + state.borne + drop_oil * (state.oil > 0.0) + drop_borne) - p.load,
         ]
-        step = -lu_solve(lu_factor(rows, overwrite_a=True, check_finite=False), asked, check_finite=False)
+        step = -lu_solve(
+            lu_factor(rows, overwrite_a=True, check_finite=False), asked, check_finite=False
+        )
         step = np.clip(step, -0.3, 0.3)
         new_oil, new_borne = state.oil + drop_oil, state.borne + drop_borne
         new_oil[w] += step[: w.size]
@@ -292,7 +309,9 @@ class Twin:
             border = np.where(new_oil < 0.0, -1e-12, 0.0)
             new_oil = np.where(crossed, border, np.maximum(new_oil, -0.999))
         new_borne = np.maximum(new_borne, 0.0)
-        change = max(np.abs(new_oil - state.oil).max(), np.abs(new_borne - state.borne).max(), abs(step[-1]))
+        change = max(
+            np.abs(new_oil - state.oil).max(), np.abs(new_borne - state.borne).max(), abs(step[-1])
+        )
         return State(new_oil, new_borne, state.approach + step[-1]), float(change)
 
     def steady(self, state: State) -> State:
@@ -303,7 +322,9 @@ class Twin:
             if steps > 120:
                 raise NotFound("steps of time stay short")
             try:
-                state = self.settled(state, Past(length, self.content(state)), most=14, tolerance=1e-5)
+                state = self.settled(
+                    state, Past(length, self.content(state)), most=14, tolerance=1e-5
+                )
                 length *= 3.0
             except NotFound:
                 length /= 4.0

@@ -3,7 +3,9 @@
 UNITS = {"_pa": "Pa", "_m2_s": "m^2/s", "_n_m": "N/m", "_m2": "m^2", "_m": "m", "_n": "N"}
 
 Found = dict[str, float]
-Value = tuple[str, str, tuple[str, float], tuple[str, float], float]  # quantity, unit, two ways, least uncertainty
+Value = tuple[
+    str, str, tuple[str, float], tuple[str, float], float
+]  # quantity, unit, two ways, least uncertainty
 
 
 def unit_of(key: str) -> str:
@@ -14,7 +16,9 @@ def only(found: Found, *keys: str) -> Found:
     return {key: found[key] for key in keys}
 
 
-def paired(first_by: str, first: Found, second_by: str, second: Found, least: float = 1e-9) -> list[Value]:
+def paired(
+    first_by: str, first: Found, second_by: str, second: Found, least: float = 1e-9
+) -> list[Value]:
     """Both ways of every quantity that both have."""
     return [
         (key, unit_of(key), (first_by, float(first[key])), (second_by, float(second[key])), least)
@@ -24,7 +28,11 @@ def paired(first_by: str, first: Found, second_by: str, second: Found, least: fl
 
 
 def stepped(
-    first_by: str, first: tuple[Found, Found], second_by: str, second: tuple[Found, Found], *keys: str
+    first_by: str,
+    first: tuple[Found, Found],
+    second_by: str,
+    second: tuple[Found, Found],
+    *keys: str,
 ) -> list[Value]:
     """Values of both ways on ever more cells, each with what its grids leave open; a third of the second's last step."""
     (value, doubt), (other, step) = first, second

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq, fsolve
 
-from asperity import hertz
 from asperity.benchmark import solver_named
-from asperity.conditions import ElasticPair
+from asperity.contact import hertz
+from asperity.contact.conditions import ElasticPair
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support.line import Oil, compliance, line_contact
@@ -20,7 +20,9 @@ Found = dict[str, float]
 
 
 def modulus(given: Given) -> float:
-    return ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])).reduced_modulus
+    return ElasticPair(
+        tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])
+    ).reduced_modulus
 
 
 def of(contact: hertz.HertzContact) -> Found:
@@ -30,7 +32,11 @@ def of(contact: hertz.HertzContact) -> Found:
 def hertz_line(given: Given) -> Found:
     found = hertz.line_contact(given["line_load_n_m"], 1.0, given["radius_m"], modulus(given))
     weighted = 8.0 / (3.0 * np.pi) * found.p_max
-    return {"p_max_pa": found.p_max, "p_weighted_pa": weighted, "half_width_m": found.half_widths[0]}
+    return {
+        "p_max_pa": found.p_max,
+        "p_weighted_pa": weighted,
+        "half_width_m": found.half_widths[0],
+    }
 
 
 def dense_line(given: Given, nodes: int = 1601) -> Found:
@@ -41,12 +47,17 @@ def dense_line(given: Given, nodes: int = 1601) -> Found:
     matrix = 2.0 * compliance(x)  # -(2/(pi E*)) ln|x|, pressures in E* scale/R
     shape = x**2 / 2.0
     for amplitude, along, _, phase in given.get("waves", []):
-        shape = shape - amplitude * radius / scale**2 * np.cos(2.0 * np.pi * along * scale * x + phase)
+        shape = shape - amplitude * radius / scale**2 * np.cos(
+            2.0 * np.pi * along * scale * x + phase
+        )
     pressure, active = np.zeros(nodes), np.abs(x) < 1.0
     for _ in range(200):
         inside = np.flatnonzero(active)
         rows = np.block(
-            [[matrix[np.ix_(inside, inside)], np.ones((inside.size, 1))], [np.ones((1, inside.size)), np.zeros((1, 1))]]
+            [
+                [matrix[np.ix_(inside, inside)], np.ones((inside.size, 1))],
+                [np.ones((1, inside.size)), np.zeros((1, 1))],
+            ]
         )
         solved = np.linalg.solve(rows, np.append(-shape[inside], 1.0 / (x[1] - x[0])))
         pressure[:] = 0.0
@@ -101,7 +112,11 @@ def sneddon(given: Given) -> Found:
     nodes, weights = np.polynomial.legendre.leggauss(80 if height else 24)
     r = a * np.sqrt((nodes + 1.0) / 2.0)  # even in area
     p = np.array([pressure(one) for one in r])
-    return {"p_max_pa": pressure(0.0), "p_weighted_pa": weights @ p**2 / (weights @ p), "contact_area_m2": np.pi * a**2}
+    return {
+        "p_max_pa": pressure(0.0),
+        "p_weighted_pa": weights @ p**2 / (weights @ p),
+        "contact_area_m2": np.pi * a**2,
+    }
 
 
 def hertz_ellipse(given: Given) -> Found:
@@ -121,7 +136,13 @@ def ellipse_by_chords(given: Given) -> Found:
                 gamma = (np.cos(turn) / a) ** 2 + (np.sin(turn) / b) ** 2
                 return 1.0 / (axis**2 * gamma**0.5) - part(turn) ** 2 / (axis**4 * gamma**1.5)
 
-            return quad(chord, 0.0, np.pi, epsabs=0.0, epsrel=1e-11)[0] * 1.5 * load / (np.pi * a * b) / (2.0 * e)
+            return (
+                quad(chord, 0.0, np.pi, epsabs=0.0, epsrel=1e-11)[0]
+                * 1.5
+                * load
+                / (np.pi * a * b)
+                / (2.0 * e)
+            )
 
         return 2.0 * over(a, np.cos), 2.0 * over(b, np.sin)
 
@@ -140,7 +161,10 @@ def westergaard(given: Given) -> Found:
     """Westergaard (1939), Johnson (1985) eqs 13.8 to 13.10, at s = p/p*."""
     s, amplitude = given["pressure_over_full"], given["amplitude_m"]
     mean = s * np.pi * modulus(given) * amplitude / given["wavelength_m"]
-    return {"p_max_pa": 2.0 * mean / np.sqrt(s), "mean_gap_m": amplitude * (1.0 - s + s * np.log(s))}
+    return {
+        "p_max_pa": 2.0 * mean / np.sqrt(s),
+        "mean_gap_m": amplitude * (1.0 - s + s * np.log(s)),
+    }
 
 
 def dense_wave(given: Given, nodes: int = 800) -> Found:
@@ -179,10 +203,16 @@ def random_waves(sq: float, side: float, seed: int) -> list[list[float]]:
     """Twelve waves of two to seven periods over the side that add up to Sq."""
     assert side > 0.0
     rng = np.random.default_rng(seed)
-    waves = [(int(rng.integers(2, 7)), int(rng.integers(-6, 7)), rng.uniform(0.0, 2.0 * np.pi)) for _ in range(12)]
+    waves = [
+        (int(rng.integers(2, 7)), int(rng.integers(-6, 7)), rng.uniform(0.0, 2.0 * np.pi))
+        for _ in range(12)
+    ]
     sizes = np.array([1.0 / (kx**2 + ky**2) ** 0.5 for kx, ky, _ in waves])
     sizes *= sq / np.sqrt((sizes**2).sum() / 2.0)
-    return [[float(f"{size:.6g}"), kx, ky, round(phase, 6)] for size, (kx, ky, phase) in zip(sizes, waves, strict=True)]
+    return [
+        [float(f"{size:.6g}"), kx, ky, round(phase, 6)]
+        for size, (kx, ky, phase) in zip(sizes, waves, strict=True)
+    ]
 
 
 def refined(solver: str, given: Given, cells: tuple[int, ...]) -> tuple[Found, Found]:
@@ -192,14 +222,20 @@ def refined(solver: str, given: Given, cells: tuple[int, ...]) -> tuple[Found, F
     for key in grids[-1]:
         first, second, third = (grid[key] for grid in grids[-3:])
         ratio = (second - first) / (third - second) if third != second else 4.0
-        gain = 1.0 / (ratio - 1.0) if ratio > 1.5 else 1.0  # else it does not settle, and all of the step is doubt
+        gain = (
+            1.0 / (ratio - 1.0) if ratio > 1.5 else 1.0
+        )  # else it does not settle, and all of the step is doubt
         value[key], step[key] = third + min(gain, 1.0) * (third - second), abs(third - second)
     return value, step
 
 
 def newton_on_nodes(given: Given, grids: tuple[int, int] = (401, 801)) -> Found:
     """The tests' dense Newton, extrapolated at second order."""
-    oil, radius, speed = given["oil"], given["radius_m"], float(np.mean(given["surface_speeds_m_s"]))
+    oil, radius, speed = (
+        given["oil"],
+        given["radius_m"],
+        float(np.mean(given["surface_speeds_m_s"])),
+    )
     found = hertz.line_contact(given["line_load_n_m"], 1.0, radius, modulus(given))
     a, p_h = found.half_widths[0], found.p_max
     eta0, alpha = oil["eta0_pa_s"], oil["alpha_1_pa"]
@@ -213,10 +249,13 @@ def newton_on_nodes(given: Given, grids: tuple[int, int] = (401, 801)) -> Found:
             lambda p: scale * ((1.0 + q * p) ** z - 1.0),
             lambda p: scale * z * q * (1.0 + q * p) ** (z - 1.0),
         )
-    laws = Oil(*thickening, lambda p: 1.0 + c1 * p / (1.0 + c2 * p), lambda p: c1 / (1.0 + c2 * p) ** 2)
+    laws = Oil(
+        *thickening, lambda p: 1.0 + c1 * p / (1.0 + c2 * p), lambda p: c1 / (1.0 + c2 * p) ** 2
+    )
     number = 12.0 * eta0 * speed * radius**2 / (a**3 * p_h)
     films = [
-        line_contact(given["inlet_half_widths"], given["outlet_half_widths"], nodes, number, laws) for nodes in grids
+        line_contact(given["inlet_half_widths"], given["outlet_half_widths"], nodes, number, laws)
+        for nodes in grids
     ]
     unit = a**2 / radius
     return {
@@ -225,7 +264,9 @@ def newton_on_nodes(given: Given, grids: tuple[int, int] = (401, 801)) -> Found:
     }
 
 
-def shooting(gap: Any, given: Given, start: float, widest_end: float, first: float, narrowest: float) -> Found:
+def shooting(
+    gap: Any, given: Given, start: float, widest_end: float, first: float, narrowest: float
+) -> Found:
     """Flow at which pressure and its slope end together, by quadrature of 12 eta (u h - q)/h^3."""
     eta, u = given["viscosity_pa_s"], given["speed_m_s"]
     points, weights = np.polynomial.legendre.leggauss(400)
@@ -247,7 +288,11 @@ def shooting(gap: Any, given: Given, start: float, widest_end: float, first: flo
     top = brentq(lambda x: u * gap(x) - flux, start, narrowest, xtol=1e-15)
     x = np.linspace(start, rupture(flux), 4001)
     p = first + np.array([gained(flux, one) for one in x])
-    return {"p_max_pa": first + gained(flux, top), "flux_m2_s": flux, "load_n_m": float(np.trapezoid(p, x))}
+    return {
+        "p_max_pa": first + gained(flux, top),
+        "flux_m2_s": flux,
+        "load_n_m": float(np.trapezoid(p, x)),
+    }
 
 
 def parabola(given: Given) -> Found:
@@ -264,7 +309,9 @@ def parabola(given: Given) -> Found:
 
 def journal(given: Given) -> Found:
     c, e, r = given["clearance_m"], given["eccentricity"], given["radius_m"]
-    found = shooting(lambda x: c * (1.0 + e * np.cos(x / r)), given, 0.0, 2.0 * np.pi * r, 0.0, np.pi * r)
+    found = shooting(
+        lambda x: c * (1.0 + e * np.cos(x / r)), given, 0.0, 2.0 * np.pi * r, 0.0, np.pi * r
+    )
     return {key: found[key] for key in ("p_max_pa", "flux_m2_s")}
 
 
@@ -277,11 +324,15 @@ def sommerfeld(given: Given) -> Found:
         return (g - e * np.sin(g)) / (1.0 - e**2) ** 1.5
 
     def third(g: float) -> float:
-        return (g * (1.0 + e**2 / 2.0) - 2.0 * e * np.sin(g) + e**2 * np.sin(2.0 * g) / 4.0) / (1.0 - e**2) ** 2.5
+        return (g * (1.0 + e**2 / 2.0) - 2.0 * e * np.sin(g) + e**2 * np.sin(2.0 * g) / 4.0) / (
+            1.0 - e**2
+        ) ** 2.5
 
     def film(g: float) -> float:
         return (1.0 - e**2) / (1.0 - e * np.cos(g))
 
-    end = brentq(lambda g: second(g) - film(g) * third(g), np.pi + 1e-6, 2.0 * np.pi - 1e-6, xtol=1e-15)
+    end = brentq(
+        lambda g: second(g) - film(g) * third(g), np.pi + 1e-6, 2.0 * np.pi - 1e-6, xtol=1e-15
+    )
     largest = 12.0 * (second(2.0 * np.pi - end) - film(end) * third(2.0 * np.pi - end))
     return {"p_max_pa": largest * eta * u * r / c**2, "flux_m2_s": u * c * film(end)}

@@ -61,8 +61,23 @@ ABREAST = (  # what is counted, on each processor one of these, each one part or
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
 # short enough as they are, whatever is asked
-WHOLE = ("certified", "chosen_films", "first_call", "stress", "surfaces", "rollers", "gallery", "soonest")
-ON_ALL = ("recordings", "study", "first_call", "prompt", "page")  # as their users have them, on all processors
+WHOLE = (
+    "certified",
+    "chosen_films",
+    "first_call",
+    "stress",
+    "surfaces",
+    "rollers",
+    "gallery",
+    "soonest",
+)
+ON_ALL = (
+    "recordings",
+    "study",
+    "first_call",
+    "prompt",
+    "page",
+)  # as their users have them, on all processors
 TIMES = "times"  # the part that says how long the others took
 
 
@@ -78,11 +93,21 @@ class Asked(NamedTuple):
 def main() -> None:
     """Run the parts, keep what they say as csv, write the page and say what changed."""
     arguments = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    arguments.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all unless named")
-    arguments.add_argument("--whole", action="store_true", help="the long parts at full size, too: hours")
-    arguments.add_argument("--minutes", type=float, help="of all parts together; 40 unless given, no end if whole")
-    arguments.add_argument("--most", type=float, help="minutes of one part; 8 unless given, no end if whole")
-    arguments.add_argument("--afresh", action="store_true", help="all parts, also those of a run that was cut off")
+    arguments.add_argument(
+        "parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all unless named"
+    )
+    arguments.add_argument(
+        "--whole", action="store_true", help="the long parts at full size, too: hours"
+    )
+    arguments.add_argument(
+        "--minutes", type=float, help="of all parts together; 40 unless given, no end if whole"
+    )
+    arguments.add_argument(
+        "--most", type=float, help="minutes of one part; 8 unless given, no end if whole"
+    )
+    arguments.add_argument(
+        "--afresh", action="store_true", help="all parts, also those of a run that was cut off"
+    )
     arguments.add_argument("--alone", type=float, metavar="SECONDS", help=argparse.SUPPRESS)
     wanted = arguments.parse_args()
     if unknown := [part for part in wanted.parts if part not in PARTS]:
@@ -92,14 +117,21 @@ def main() -> None:
             print(line, flush=True)
         return
     minutes, most = (
-        given or (float("inf") if wanted.whole else usual) for given, usual in ((wanted.minutes, 40), (wanted.most, 8))
+        given or (float("inf") if wanted.whole else usual)
+        for given, usual in ((wanted.minutes, 40), (wanted.most, 8))
     )
     asked = Asked(tuple(wanted.parts or PARTS), wanted.whole, 60.0 * minutes, 60.0 * most)
     run = Unfinished.of(
-        asked.parts, whole=wanted.whole, afresh=wanted.afresh, file=None if wanted.parts else unfinished.FILE
+        asked.parts,
+        whole=wanted.whole,
+        afresh=wanted.afresh,
+        file=None if wanted.parts else unfinished.FILE,
     )
     if run.done:
-        print(f"Going on with the run of {run.began}, after {', '.join(run.done)}; --afresh starts anew.\n", flush=True)
+        print(
+            f"Going on with the run of {run.began}, after {', '.join(run.done)}; --afresh starts anew.\n",
+            flush=True,
+        )
     _measure(asked, run)
     _conclude(run, alone=bool(wanted.parts))
     sys.exit(any(trouble for _, trouble, _ in run.done.values()) or bool(run.left))
@@ -116,7 +148,9 @@ def _measure(asked: Asked, run: Unfinished) -> None:
             return
         printed, trouble = _run(part, whole=asked.whole, seconds=seconds)
         with saying:
-            if seconds < asked.most and trouble.startswith("stopped"):  # by the end of all: the next run has it first
+            if seconds < asked.most and trouble.startswith(
+                "stopped"
+            ):  # by the end of all: the next run has it first
                 return
             changed = [] if trouble else kept.keep(part, printed.splitlines())
             run.end(part, perf_counter() - began, trouble, changed)
@@ -136,7 +170,8 @@ def _measure(asked: Asked, run: Unfinished) -> None:
 def _conclude(run: Unfinished, *, alone: bool) -> None:
     """Write the page, and say what the parts took and what changed."""
     times = [
-        f"| {part} | {seconds:.0f} | {trouble or 'measured'} |" for part, (seconds, trouble, _) in run.done.items()
+        f"| {part} | {seconds:.0f} | {trouble or 'measured'} |"
+        for part, (seconds, trouble, _) in run.done.items()
     ]
     times = ["## What the parts took", "", "| part | time [s] | outcome |", "|---|---|---|", *times]
     changed = [line for _, _, lines in run.done.values() for line in lines]
@@ -144,7 +179,16 @@ def _conclude(run: Unfinished, *, alone: bool) -> None:
         kept.keep(TIMES, times)
         run.forget()
     kept.PAGE.write_text(kept.page(parts=(*PARTS, TIMES)), "utf-8")
-    print("\n".join([*times, "", f"## What changed by more than {100 * kept.CHANGED:.0f} % against the last", ""]))
+    print(
+        "\n".join(
+            [
+                *times,
+                "",
+                f"## What changed by more than {100 * kept.CHANGED:.0f} % against the last",
+                "",
+            ]
+        )
+    )
     print("\n".join(changed) or "Nothing.")
     if run.left:
         print(f"\nOut of time before {', '.join(run.left)}: the same command goes on there.")
@@ -168,12 +212,24 @@ def _said(part: str, *, whole: bool, seconds: float) -> Iterator[str]:
 
 def _run(part: str, *, whole: bool, seconds: float) -> tuple[str, str]:
     """What a part prints, and what kept it from doing so to the end."""
-    command = [sys.executable, "-m", "benchmarks", part, f"--alone={seconds}", *(["--whole"] if whole else [])]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks",
+        part,
+        f"--alone={seconds}",
+        *(["--whole"] if whole else []),
+    ]
     limited = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"} if part not in ON_ALL else {}
     most = None if seconds == float("inf") else seconds
     try:
         done = subprocess.run(
-            command, stdout=subprocess.PIPE, text=True, timeout=most, check=False, env={**os.environ, **limited}
+            command,
+            stdout=subprocess.PIPE,
+            text=True,
+            timeout=most,
+            check=False,
+            env={**os.environ, **limited},
         )
     except subprocess.TimeoutExpired:
         return "", f"stopped after {seconds:.0f} s"

@@ -16,15 +16,26 @@ from typing import NamedTuple
 import numpy as np
 
 import asperity
-from asperity.tracking.alarming import CRF_LEAST, LEVEL_LEAST, RMS, Warming
-from asperity.tracking.operating import ANY_CONTACT, LEVEL, Operating, conditions_of
-from asperity.wear import FALSE_ALARMS, Alarm, Sight, Watched, knee_weight, sequential_alarm, split_stages
+from asperity.monitoring.alarm import CRF_LEAST, LEVEL_LEAST, RMS, Warming
+from asperity.monitoring.operating_point import ANY_CONTACT, LEVEL, Operating, conditions_of
+from asperity.trend import (
+    FALSE_ALARMS,
+    Alarm,
+    Sight,
+    Watched,
+    knee_weight,
+    sequential_alarm,
+    split_stages,
+)
 
 KEPT = Path("build/alarms.json")
 CODE = Path(asperity.__file__).parent
 SOURCES = [
     Path(__file__),
-    *(CODE / "wear" / f"{name}.py" for name in ("alarm", "sequential", "regressors", "warming", "stages", "bends")),
+    *(
+        CODE / "wear" / f"{name}.py"
+        for name in ("alarm", "sequential", "regressors", "warming", "stages", "bends")
+    ),
     *(CODE / "tracking" / f"{name}.py" for name in ("alarming", "operating")),
 ]
 SERIES, RECORDINGS = 300, 40
@@ -94,7 +105,9 @@ def daily(rng: np.random.Generator, size: float) -> Drawn:
 
 def load_step(rng: np.random.Generator) -> Drawn:
     there = after(rng)
-    return drawn(rng, 1.0 + rng.uniform(0.02, 0.12) * there, rng.uniform(0.0, 0.7) * there, 0.0, 0.5 * there)
+    return drawn(
+        rng, 1.0 + rng.uniform(0.02, 0.12) * there, rng.uniform(0.0, 0.7) * there, 0.0, 0.5 * there
+    )
 
 
 def warm_up(rng: np.random.Generator) -> Drawn:
@@ -105,12 +118,18 @@ def warm_up(rng: np.random.Generator) -> Drawn:
 def moved_sensor(rng: np.random.Generator) -> Drawn:
     there = after(rng)
     return drawn(
-        rng, 1.0 + rng.uniform(-0.02, 0.02) * there, rng.uniform(-1.5, 1.5) * there, 0.0, rng.uniform(-1.5, 1.5) * there
+        rng,
+        1.0 + rng.uniform(-0.02, 0.02) * there,
+        rng.uniform(-1.5, 1.5) * there,
+        0.0,
+        rng.uniform(-1.5, 1.5) * there,
     )
 
 
 def drift_of_modes(rng: np.random.Generator) -> Drawn:
-    return drawn(rng, 1.0 + rng.uniform(-0.02, 0.02) * NUMBER / RECORDINGS, 0.3 * NUMBER / RECORDINGS)
+    return drawn(
+        rng, 1.0 + rng.uniform(-0.02, 0.02) * NUMBER / RECORDINGS, 0.3 * NUMBER / RECORDINGS
+    )
 
 
 def saturating(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
@@ -138,7 +157,9 @@ def under_load(rng: np.random.Generator, load: np.ndarray, memory: float = 0.0) 
 
 
 def given_step(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
-    return under_load(rng, 500.0 * rng.uniform(1.1, 2.0) ** (rng.choice([-1.0, 1.0]) * after(rng)), memory)
+    return under_load(
+        rng, 500.0 * rng.uniform(1.1, 2.0) ** (rng.choice([-1.0, 1.0]) * after(rng)), memory
+    )
 
 
 def in_turns(rng: np.random.Generator) -> Drawn:
@@ -149,7 +170,9 @@ def warmth(rng: np.random.Generator, temperature: np.ndarray, memory: float = 0.
     """CRF and level as powers of an oil's viscosity: Vogel's, of 30 to 300 mPa s at 40 degC; measured to 0.5 K."""
     thin = 1000.0 * (1.0 / (temperature + 95.0) - 1.0 / 135.0)
     size = rng.uniform(0.02, 0.12) / np.ptp(thin)
-    one = drawn(rng, np.exp(-size * (thin - thin[-1])), -rng.uniform(0.0, 0.3) * (thin - thin[-1]), memory)
+    one = drawn(
+        rng, np.exp(-size * (thin - thin[-1])), -rng.uniform(0.0, 0.3) * (thin - thin[-1]), memory
+    )
     return one._replace(temperature=temperature + 0.5 * rng.standard_normal(RECORDINGS))
 
 
@@ -159,7 +182,9 @@ def given_warm_up(rng: np.random.Generator, memory: float = 0.0) -> Drawn:
 
 
 def given_days(rng: np.random.Generator) -> Drawn:
-    return warmth(rng, 60.0 + rng.uniform(5.0, 15.0) * np.sin(2.0 * np.pi * (NUMBER / rng.choice(CYCLES))))
+    return warmth(
+        rng, 60.0 + rng.uniform(5.0, 15.0) * np.sin(2.0 * np.pi * (NUMBER / rng.choice(CYCLES)))
+    )
 
 
 def given_season(rng: np.random.Generator) -> Drawn:
@@ -196,11 +221,15 @@ WITHOUT_WEAR: dict[str, Callable[[np.random.Generator], Drawn]] = {
 }
 
 
-def knee(rng: np.random.Generator, scatter_hz: float, memory: float = 0.0, *, between: bool = False) -> Drawn:
+def knee(
+    rng: np.random.Generator, scatter_hz: float, memory: float = 0.0, *, between: bool = False
+) -> Drawn:
     """The rig's course of CRF over recordings, its knee drawn among the 12th to the 24th, or anywhere between them."""
     begins = float(rng.uniform(12.0, 24.0) if between else rng.integers(12, 25))
     pace = RISE_HZ / begins
-    course = CRF_HZ + np.where(begins > NUMBER, pace * NUMBER, RISE_HZ + AFTER * pace * (NUMBER - begins))
+    course = CRF_HZ + np.where(
+        begins > NUMBER, pace * NUMBER, RISE_HZ + AFTER * pace * (NUMBER - begins)
+    )
     crf = (course + scatter_hz * remembered(rng, memory)) / CRF_HZ
     return drawn(rng)._replace(crf=crf, begins=begins)
 
@@ -214,7 +243,10 @@ def knee_under_load(rng: np.random.Generator, scatter_hz: float) -> Drawn:
 
 def knee_in_season(rng: np.random.Generator, scatter_hz: float) -> Drawn:
     """The rig's knee while the oil grows warmer all the time."""
-    one, warm = knee(rng, scatter_hz), warmth(rng, 35.0 + rng.uniform(5.0, 30.0) * NUMBER / RECORDINGS)
+    one, warm = (
+        knee(rng, scatter_hz),
+        warmth(rng, 35.0 + rng.uniform(5.0, 30.0) * NUMBER / RECORDINGS),
+    )
     return one._replace(crf=one.crf * warm.crf, temperature=warm.temperature)
 
 
@@ -257,7 +289,9 @@ def judged(one: Drawn) -> Alarm:
         Operating(load_n=load, temperature_degc=warm)
         for load, warm in zip(_stated(one.load), _stated(one.temperature), strict=True)
     ]
-    of_crf, of_level = (conditions_of(met, follows, ANY_CONTACT.oil) for follows in (ANY_CONTACT.crf, LEVEL))
+    of_crf, of_level = (
+        conditions_of(met, follows, ANY_CONTACT.oil) for follows in (ANY_CONTACT.crf, LEVEL)
+    )
     choices = {"least": CRF_LEAST, "contact": True, "in_words": str, "relative": True}
     crf = Watched(name="CRF", values=one.crf, conditions=of_crf, **choices)
     choices = {"least": LEVEL_LEAST, "contact": False, "in_words": str, "conditions": of_level}
@@ -274,7 +308,9 @@ def judged(one: Drawn) -> Alarm:
     sight = Sight() if np.isfinite(one.crf).any() else Sight("cannot-tell", "no contact resonance")
     watched = [crf, *levels] if np.isfinite(one.crf).any() else levels
     excuses = Warming(NUMBER, watched[:1], levels, "").excuses
-    return sequential_alarm(NUMBER, watched, [sight] * RECORDINGS, confirmed=severe, excused=excuses)
+    return sequential_alarm(
+        NUMBER, watched, [sight] * RECORDINGS, confirmed=severe, excused=excuses
+    )
 
 
 def _stated(values: np.ndarray | None) -> list[float | None]:
@@ -285,7 +321,10 @@ class Rows:
     """Rows that are done, kept in a file as long as the code behind them is the same; a run goes on behind them."""
 
     def __init__(self, file: Path = KEPT) -> None:
-        self.file, self.code = file, sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest()
+        self.file, self.code = (
+            file,
+            sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest(),
+        )
         self.done: dict[str, str] = {}
         if file.is_file():
             told = json.loads(file.read_text("utf-8"))
@@ -318,8 +357,13 @@ def lines(*, fast: bool = False) -> Iterator[str]:
 
 def quiet_row(draw: Callable[[np.random.Generator], Drawn], series: int) -> str:
     """Shares of series without wear that are ever said to be anything but healthy."""
-    states = [judged(draw(np.random.default_rng([11, number]))).states[8:] for number in range(series)]
-    shares = [100.0 * np.mean([kind in one for one in states]) for kind in ("alarm", "alert", "cannot-tell")]
+    states = [
+        judged(draw(np.random.default_rng([11, number]))).states[8:] for number in range(series)
+    ]
+    shares = [
+        100.0 * np.mean([kind in one for one in states])
+        for kind in ("alarm", "alert", "cannot-tell")
+    ]
     return " | ".join(f"{share:.1f} %" for share in shares)
 
 
@@ -350,8 +394,12 @@ def reliability_lines(series: int) -> Iterator[str]:
             recordings = int(rng.integers(14, RECORDINGS + 1))
             said.append(probabilities(one, recordings))
             true.append(NUMBER[:recordings] > one.begins)
-    yield from _bins("last recording", *(np.array([one[-1] for one in both]) for both in (said, true)))
-    yield from _bins("earlier recordings", *(np.concatenate([one[:-1] for one in both]) for both in (said, true)))
+    yield from _bins(
+        "last recording", *(np.array([one[-1] for one in both]) for both in (said, true))
+    )
+    yield from _bins(
+        "earlier recordings", *(np.concatenate([one[:-1] for one in both]) for both in (said, true))
+    )
     yield from held_lines(series)
 
 

@@ -45,17 +45,29 @@ def print_anchors(cells: int | None = None) -> None:
     found = curves(cells)
     print("\n| anchor | printed | " + " | ".join(found) + " |")
     print("|---|---|" + "---|" * len(found))
-    tables = {name: compare_with_anchors(curve).set_index("anchor") for name, curve in found.items()}
+    tables = {
+        name: compare_with_anchors(curve).set_index("anchor") for name, curve in found.items()
+    }
     for anchor in PAPER_ANCHORS:
         sign = {"about": "", "at least": "≥ ", "at most": "≤ "}[anchor.sense]
         cells_shown = []
         for table in tables.values():
             row = table.loc[anchor.name]
             span = f"{shown(anchor.quantity, row['low'])} to {shown(anchor.quantity, row['high'])}"
-            text = "none" if row["ours"] != row["ours"] else f"{shown(anchor.quantity, row['ours'])} ({span})"
+            text = (
+                "none"
+                if row["ours"] != row["ours"]
+                else f"{shown(anchor.quantity, row['ours'])} ({span})"
+            )
             cells_shown.append(f"**{text}**" if row["met"] else text)
-        print(f"| {anchor.name} | {sign}{shown(anchor.quantity, anchor.value)} | {' | '.join(cells_shown)} |")
-    for name, what in (("ends", "two printed ends"), ("knee", "12 rings, bent"), ("smooth", "12 rings, saturating")):
+        print(
+            f"| {anchor.name} | {sign}{shown(anchor.quantity, anchor.value)} | {' | '.join(cells_shown)} |"
+        )
+    for name, what in (
+        ("ends", "two printed ends"),
+        ("knee", "12 rings, bent"),
+        ("smooth", "12 rings, saturating"),
+    ):
         off = [f"{rig_deviation(curve)[name]:.0f} Hz" for curve in found.values()]
         print(f"| rms deviation of CRF from the rig, {what} | - | {' | '.join(off)} |")
     for preset in ("sound", "paper"):

@@ -13,15 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import auto_grid, contact_state, solve_contact
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.contact.rollers import RollerShape
+from asperity.ehl import auto_grid, solve_contact
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.rollers import RollerShape
+from asperity.solution import contact_state
 from asperity.surface import Surface, gaussian_surface
 
 STEEL = ElasticPair((206e9, 206e9), (0.3, 0.3))
-OIL = Lubricant(viscosity=Roelands(0.08, 20e-9), density=DowsonHigginson(870.0), rheology=Newtonian())
+OIL = Lubricant(
+    viscosity=Roelands(0.08, 20e-9), density=DowsonHigginson(870.0), rheology=Newtonian()
+)
 CAPS = (1e9, 2e9, 4e9, None)
 INLETS = (-4.5, -1.9)
 ELLIPSE_CELLS, ROLLER_CELLS = (128, 128), (128, 256)
@@ -61,7 +64,9 @@ def ellipses(count: int = 200) -> Iterator[tuple[int, ContactConditions, Surface
         a, b = conditions.hertz.half_widths
         inlet = INLETS[int(row[6] * len(INLETS))]
         side = 0.7 * -inlet
-        grid = Grid(ELLIPSE_CELLS, (inlet * a, -side * b), (1.9 * a, side * b), periodic=(False, False))
+        grid = Grid(
+            ELLIPSE_CELLS, (inlet * a, -side * b), (1.9 * a, side * b), periodic=(False, False)
+        )
         yield number, conditions, _rough(row, number, grid)
 
 
@@ -74,7 +79,9 @@ def rollers(count: int = 100) -> Iterator[tuple[int, ContactConditions, Surface]
             _between(0.01, 20.0, row[7]),
         )
         load = length * _between(2e4, 4e5, row[4])
-        logarithm = RollerShape.johns_gohar(load * _between(0.5, 3.0, row[9]), length, radius, STEEL.reduced_modulus)
+        logarithm = RollerShape.johns_gohar(
+            load * _between(0.5, 3.0, row[9]), length, radius, STEEL.reduced_modulus
+        )
         crown = RollerShape(crown_radius=length**2 / 8.0 / _between(1e-6, 50e-6, row[9]))
         shape = (RollerShape(), logarithm, logarithm, crown)[int(row[8] * 4)]
         tilt = 0.0 if row[10] < 0.5 else MOST_TILTED * (4.0 * row[10] - 3.0)
@@ -94,7 +101,9 @@ def rollers(count: int = 100) -> Iterator[tuple[int, ContactConditions, Surface]
         yield number, conditions, _rough(row, number, grid)
 
 
-def outcomes(contacts: Iterator[tuple[int, ContactConditions, Surface]]) -> Iterator[dict[str, object]]:
+def outcomes(
+    contacts: Iterator[tuple[int, ContactConditions, Surface]],
+) -> Iterator[dict[str, object]]:
     """Each contact solved, a row each."""
     for number, conditions, surface in contacts:
         began = time.process_time()
@@ -135,7 +144,9 @@ def lines(*, fast: bool, artefact: Path = Path("build/bounded.csv")) -> Iterator
                 file.flush()
                 rows.append(row)
             solved = [row for row in rows if row["status"] == "converged"]
-            times, steps = ([float(str(row[key])) for row in solved] for key in ("processor_s", "steps"))
+            times, steps = (
+                [float(str(row[key])) for row in solved] for key in ("processor_s", "steps")
+            )
             yield (
                 f"{name}: {len(solved)} of {len(rows)} solved, the rest said so; median {np.median(times):.1f} s of "
                 f"processor time and {np.median(steps):.0f} steps, at most {max(times):.0f} s."

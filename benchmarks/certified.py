@@ -10,7 +10,9 @@ CELLS = (64, 128, 256)
 
 
 def lines(*, fast: bool) -> Iterator[str]:
-    results = [run_benchmark(solver_named(name), cells=CELLS[:2] if fast else CELLS) for name in SOLVERS]
+    results = [
+        run_benchmark(solver_named(name), cells=CELLS[:2] if fast else CELLS) for name in SOLVERS
+    ]
     yield "## The benchmark's certified values"
     yield ""
     yield "Relative to the certified value; processor time of a case, all that is loaded and compiled once apart."
@@ -26,7 +28,11 @@ def lines(*, fast: bool) -> Iterator[str]:
 def _rows(result: BenchmarkResult) -> Iterator[str]:
     for family in dict.fromkeys(row.case.partition("-")[0] for row in result.rows):
         for cells in dict.fromkeys(row.cells for row in result.rows):
-            rows = [row for row in result.rows if row.case.startswith(f"{family}-") and row.cells == cells]
+            rows = [
+                row
+                for row in result.rows
+                if row.case.startswith(f"{family}-") and row.cells == cells
+            ]
             if not rows:
                 continue
             worst = max(rows, key=lambda row: abs(row.error))

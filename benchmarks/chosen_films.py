@@ -11,10 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from asperity.case import load_case
-from asperity.conditions import ContactConditions
-from asperity.ehl import ContactSolution, auto_grid, regime_card, solve_contact
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.grid import Grid
+from asperity.ehl import ContactSolution, auto_grid, solve_contact
 from asperity.lubricant import Lubricant
+from asperity.solution import regime_card
 from asperity.surface import flat_surface
 from benchmarks.films import line_case
 
@@ -54,7 +55,9 @@ def timed(conditions: ContactConditions, oil: Lubricant) -> tuple[ContactSolutio
     seconds = []
     for _ in range(TRIES):
         began = time.process_time()
-        solution = solve_contact(conditions, oil, flat_surface(auto_grid(conditions, oil)), strict=False)
+        solution = solve_contact(
+            conditions, oil, flat_surface(auto_grid(conditions, oil)), strict=False
+        )
         seconds.append(time.process_time() - began)
     return solution, min(seconds)
 
@@ -74,7 +77,9 @@ def heavy() -> Iterator[str]:
         solution, seconds = timed(conditions, oil)
         error, cells, held = solution.convergence.error, [], True
         assert error is not None
-        for film, bar, true in zip(films(solution), (error.h_central, error.h_min), (central, least), strict=True):
+        for film, bar, true in zip(
+            films(solution), (error.h_central, error.h_min), (central, least), strict=True
+        ):
             off, own = film / unit / true - 1.0, bar / film
             held = held and abs(off) <= max(WITHIN, own)
             cells.append(f"{film / unit:.3f} | {100.0 * off:+.2f} | {100.0 * own:.2f}")
@@ -91,9 +96,16 @@ def light() -> Iterator[str]:
     for load_number, oil_number in LIGHT:
         conditions, oil, _ = line_case(load_number, oil_number, "Roelands")
         a = conditions.hertz.half_widths[0]
-        far = films(solve_contact(conditions, oil, flat_surface(Grid((1024, 8), (-30.0 * a, -a), (8.0 * a, a)))))
+        far = films(
+            solve_contact(
+                conditions, oil, flat_surface(Grid((1024, 8), (-30.0 * a, -a), (8.0 * a, a)))
+            )
+        )
         solution, seconds = timed(conditions, oil)
-        off = [f"{100.0 * (near / there - 1.0):+.2f}" for near, there in zip(films(solution), far, strict=True)]
+        off = [
+            f"{100.0 * (near / there - 1.0):+.2f}"
+            for near, there in zip(films(solution), far, strict=True)
+        ]
         shown = " x ".join(map(str, solution.grid.cells))
         yield f"| {load_number}, {oil_number} | {shown} | {seconds:.2f} | {' | '.join(off)} |"
 
@@ -102,7 +114,9 @@ def soft() -> str:
     case = load_case(SOFT, name="soft")
     assert case.lubricant is not None
     solution, seconds = timed(case.conditions, case.lubricant)
-    fits = [fit for fit in regime_card(solution).fits if fit.source == "Hamrock and Dowson, soft (1978)"]
+    fits = [
+        fit for fit in regime_card(solution).fits if fit.source == "Hamrock and Dowson, soft (1978)"
+    ]
     off = ", ".join(f"{fit.place} film {100.0 * fit.deviation:+.1f} %" for fit in fits)
     shown = " x ".join(map(str, solution.grid.cells))
     touching = int(solution.in_contact.sum())

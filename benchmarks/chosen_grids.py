@@ -13,19 +13,11 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import (
-    ContactModel,
-    Options,
-    Texture,
-    auto_grid,
-    contact_state,
-    least_film,
-    solve_contact,
-    undetermined,
-)
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.ehl import ContactModel, Options, Texture, auto_grid, least_film, solve_contact
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.solution import contact_state, undetermined
 from asperity.surface import gaussian_surface
 from benchmarks.unfinished import stamp
 
@@ -63,8 +55,14 @@ class Outcome:
     @property
     def told(self) -> str:
         """CLR and its interval in words."""
-        ends = "no interval" if self.interval is None else f"{self.interval[0]:.3f} to {self.interval[1]:.3f}"
-        doubts = ("" if self.determined else ", not determined") + ("" if self.converged else ", not converged")
+        ends = (
+            "no interval"
+            if self.interval is None
+            else f"{self.interval[0]:.3f} to {self.interval[1]:.3f}"
+        )
+        doubts = ("" if self.determined else ", not determined") + (
+            "" if self.converged else ", not converged"
+        )
         return f"{self.clr:.3f} ({ends}{doubts})"
 
 
@@ -128,16 +126,24 @@ def solved(sample: Sample, model: ContactModel, most: int, finer: float = 1.0) -
     state = contact_state(solution)
     interval = None if state.error is None else state.error.clr.interval
     determined = state.error is not None and undetermined(solution, state.error.clr) is None
-    return Outcome(grid.cells, solution.convergence.converged, seconds, state.clr, interval, determined)
+    return Outcome(
+        grid.cells, solution.convergence.converged, seconds, state.clr, interval, determined
+    )
 
 
 def summary(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     """Solved, seconds, and how many of those solved on both grids hold the finer one's CLR in their bar."""
-    chosen, both = [one for one, _ in pairs], [(one, two) for one, two in pairs if one.converged and two.converged]
+    chosen, both = (
+        [one for one, _ in pairs],
+        [(one, two) for one, two in pairs if one.converged and two.converged],
+    )
     seconds = [one.seconds for one in chosen]
     off = [abs(one.clr - two.clr) for one, two in both]
     told = [(one, two) for one, two in both if one.determined and one.interval is not None]
-    held = sum(one.interval is not None and one.interval[0] <= two.clr <= one.interval[1] for one, two in told)
+    held = sum(
+        one.interval is not None and one.interval[0] <= two.clr <= one.interval[1]
+        for one, two in told
+    )
     return (
         f"{sum(one.converged for one in chosen)} of {len(chosen)} solved on the chosen grid, median "
         f"{np.median(seconds):.1f} s, longest {max(seconds):.1f} s; of {len(both)} solved on both, {len(told)} are "
@@ -171,10 +177,15 @@ def kept_pairs(wanted: dict[int, Sample], end: float) -> dict[int, tuple[Outcome
     kept = json.loads(path.read_text("utf-8")) if path.is_file() else {}
     for number, sample in wanted.items():
         if str(number) not in kept and time.perf_counter() < end:
-            kept[str(number)] = [asdict(solved(sample, "mixed", MOST, finer)) for finer in (1.0, FINER)]
+            kept[str(number)] = [
+                asdict(solved(sample, "mixed", MOST, finer)) for finer in (1.0, FINER)
+            ]
             KEPT.mkdir(parents=True, exist_ok=True)
             path.write_text(json.dumps(kept), "utf-8")
-    return {int(number): (Outcome(**one), Outcome(**two)) for number, (one, two) in sorted(kept.items(), key=_number)}
+    return {
+        int(number): (Outcome(**one), Outcome(**two))
+        for number, (one, two) in sorted(kept.items(), key=_number)
+    }
 
 
 def _number(entry: tuple[str, object]) -> int:

@@ -16,18 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.case import Case
-from asperity.ehl import (
-    ContactSolution,
-    LoadSharing,
-    Snapshot,
-    moving_contact,
-    sharing_by_film,
-    solve_contact,
-    solve_film,
-)
+from asperity.ehl import ContactSolution, solve_contact, solve_film
 from asperity.ehl.outcome import CONSERVING, MIXED, PAPER
-from asperity.ehl.state import balance_of
+from asperity.solution import LoadSharing, sharing_by_film
+from asperity.solution.state import balance_of
 from asperity.surface import MovingSurfaces
+from asperity.transient import Snapshot, moving_contact
 from benchmarks.roughness_levels import paper_case
 
 SQ_UM, LENGTHS_UM, CAPS_GPA, SEEDS = (0.5, 1.0, 2.5, 4.0), (40, 80), (0.7, 2.0), (7, 8, 9)
@@ -98,7 +92,9 @@ class Contact(NamedTuple):
 
 def contacts(seeds: tuple[int, ...]) -> Iterator[Contact]:
     """All levels of all surfaces."""
-    yield from (Contact(*level, seed) for seed in seeds for level in product(SQ_UM, LENGTHS_UM, CAPS_GPA))
+    yield from (
+        Contact(*level, seed) for seed in seeds for level in product(SQ_UM, LENGTHS_UM, CAPS_GPA)
+    )
 
 
 def lost(solution: ContactSolution) -> float:
@@ -120,7 +116,11 @@ def standing(seeds: tuple[int, ...]) -> Iterator[str]:
         for model in (PAPER, MIXED, CONSERVING):
             began = process_time()
             solution = solve_contact(
-                case.conditions, case.lubricant, surface, options=replace(options, model=model), strict=False
+                case.conditions,
+                case.lubricant,
+                surface,
+                options=replace(options, model=model),
+                strict=False,
             )
             spent[model] = process_time() - began
             if solution.convergence.converged:
@@ -148,7 +148,9 @@ def _shares(shares: dict[tuple[str, float], list[LoadSharing]]) -> Iterator[str]
         def spread(values: list[float], scale: float = 1.0) -> str:
             return f"{scale * mean(values):.2f} ± {scale * float(np.std(values)):.2f}"
 
-        below = " | ".join(spread([one.below[index] for one in found]) for index in range(len(FILMS_NM)))
+        below = " | ".join(
+            spread([one.below[index] for one in found]) for index in range(len(FILMS_NM))
+        )
         yield (
             f"| {sq:g} | {model} | {spread([one.clr_solid for one in found])} | "
             f"{spread([one.car_solid for one in found])} | {below} | {spread([one.cavitated for one in found])} | "

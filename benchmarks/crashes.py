@@ -17,7 +17,11 @@ import pandas
 import pyarrow.parquet
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
-SETTINGS = ["grid.cells=[64, 64]", 'study.sq={from="0.5 um", to="4 um", step="0.7 um"}', "study.seeds=3"]
+SETTINGS = [
+    "grid.cells=[64, 64]",
+    'study.sq={from="0.5 um", to="4 um", step="0.7 um"}',
+    "study.seeds=3",
+]
 TIMES = "seconds"  # the one column that cannot be the same twice
 
 
@@ -40,13 +44,17 @@ def command(out: Path) -> list[str]:
 
 def children(pid: int) -> list[int]:
     """Worker processes of a study: its children but for multiprocessing's resource tracker."""
-    found = subprocess.run(["pgrep", "-P", str(pid), "-f", "spawn_main"], capture_output=True, text=True, check=False)
+    found = subprocess.run(
+        ["pgrep", "-P", str(pid), "-f", "spawn_main"], capture_output=True, text=True, check=False
+    )
     return [int(line) for line in found.stdout.split()]
 
 
 def killed(out: Path, after: float, target: str) -> str:
     """Start or resume the study and kill the target after so many seconds; what became of the process."""
-    running = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    running = subprocess.Popen(
+        command(out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
     time.sleep(after)
     if running.poll() is None:
         workers = children(running.pid)
@@ -83,7 +91,9 @@ def main(moments: int) -> None:
         whole = pandas.read_parquet(folder / "whole" / "table.parquet").drop(columns=TIMES)
         rng = random.Random(1)
         same = twice = behind = 0
-        print(f"{len(whole)} cases take {length:.0f} s; then killed at {moments} moments and resumed")
+        print(
+            f"{len(whole)} cases take {length:.0f} s; then killed at {moments} moments and resumed"
+        )
         for number in range(moments):
             out = folder / f"killed-{number}"
             target = ("worker", "parent")[number % 2]
@@ -95,9 +105,13 @@ def main(moments: int) -> None:
             twice += computed_twice(out)
             left = len(list(out.rglob("*.part")))
             behind += left
-            print(f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left over: {left}")
+            print(
+                f"  after {after:5.1f} s: {fate}; same to the last bit: {again.equals(whole)}; left over: {left}"
+            )
             shutil.rmtree(out)
-        print(f"{same} of {moments} the same to the last bit; {twice} cases computed twice, {behind} files left over")
+        print(
+            f"{same} of {moments} the same to the last bit; {twice} cases computed twice, {behind} files left over"
+        )
         sys.exit(same < moments or twice > 0 or behind > 0)
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -14,13 +14,20 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field
-from asperity.ehl import ShakenContact, contact_state, solve_contact
-from asperity.errors import AsperityError
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError
+from asperity.ehl import solve_contact
 from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, Disturbance
-from asperity.paper.rig_recording import GRID_HZ, ContactLine, RigRecording, RigTest, draw_background
+from asperity.paper.rig_recording import (
+    GRID_HZ,
+    ContactLine,
+    RigRecording,
+    RigTest,
+    draw_background,
+)
+from asperity.resonance import contact_resonance, remove_lines, series_resonances
+from asperity.solution import ShakenContact, contact_state
 from asperity.vibration import ContactOscillator, FilteredNoise
-from asperity.wear import contact_resonance, remove_lines, series_resonances
 from benchmarks.roughness_levels import paper_case
 
 KEPT = Path(__file__).parents[1] / "build" / "damping.csv"
@@ -29,7 +36,10 @@ SEEDS = tuple(range(12))
 LIGHT, HEAVY = 0.1, 1.0  # kg on the contact: resonances near 9 and 2.9 kHz
 RATE_HZ, DURATION_S, SEGMENT = 20e3, 60.0, 40_000
 BAND_HZ = (2.0e3, 4.1e3)
-REST, REST_SCATTER = 0.01, 0.1  # damping ratio of all but the contact, and how it varies from mounting to mounting
+REST, REST_SCATTER = (
+    0.01,
+    0.1,
+)  # damping ratio of all but the contact, and how it varies from mounting to mounting
 MOUNTING = 0.005  # relative deviation of a frequency from mounting to mounting
 TESTS, TRAINING, SERIES = 3, 20, 60
 SEVERE_UM = 1.8  # between the paper's stages
@@ -57,7 +67,10 @@ def points(seeds: Sequence[int]) -> list[Point]:
         with KEPT.open() as file:
             for row in csv.DictReader(file):
                 point = Point(
-                    **{entry.name: (int if entry.name == "seed" else float)(row[entry.name]) for entry in fields(Point)}
+                    **{
+                        entry.name: (int if entry.name == "seed" else float)(row[entry.name])
+                        for entry in fields(Point)
+                    }
                 )
                 kept[point.sq_um, point.seed] = point
     for seed in seeds:
@@ -148,13 +161,18 @@ def series_lines(library: Sequence[Point]) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|"
     for law in ("the paper's (CLR F)^(1/6)", "the contact itself"):
         for modes in (0, 4):
-            made = [readings(series(library, number, law, modes), modes) for number in range(TRAINING + SERIES)]
+            made = [
+                readings(series(library, number, law, modes), modes)
+                for number in range(TRAINING + SERIES)
+            ]
             training, judged = made[:TRAINING], made[TRAINING:]
             total = SERIES * len(SAMPLES_SQ_UM)
             found = sum(len(rings) for rings in judged)
             other = "noise" if modes == 0 else f"{modes} modes"
             for name in ("frequency", "damping", "both"):
-                yield f"| {law} | {other} | {100 * found / total:.0f} % | {name} | " + told(training, judged, name)
+                yield f"| {law} | {other} | {100 * found / total:.0f} % | {name} | " + told(
+                    training, judged, name
+                )
 
 
 def series(library: Sequence[Point], number: int, law: str, modes: int) -> list[Ring]:
@@ -166,14 +184,20 @@ def series(library: Sequence[Point], number: int, law: str, modes: int) -> list[
     rings = []
     for sample, (nominal, std) in enumerate(zip(SAMPLES_SQ_UM, SAMPLES_STD_UM, strict=True)):
         sq_um = float(np.clip(nominal + std * rng.standard_normal(), SQ_UM[0], SQ_UM[-1]))
-        clr, stiffness, damping = between(library, sq_um, int(rng.choice(sorted({point.seed for point in library}))))
-        if law != "the contact itself":  # the printed curve: full load at 3834 Hz, a line for 0.1 kg
+        clr, stiffness, damping = between(
+            library, sq_um, int(rng.choice(sorted({point.seed for point in library})))
+        )
+        if (
+            law != "the contact itself"
+        ):  # the printed curve: full load at 3834 Hz, a line for 0.1 kg
             stiffness = HEAVY * (2.0 * np.pi * 3834.0 * max(clr, 0.02) ** (1.0 / 6.0)) ** 2
         recordings = []
         for test in range(TESTS):
             mounted = stiffness * (1.0 + MOUNTING * rng.standard_normal()) ** 2
             rest = REST * np.exp(REST_SCATTER * rng.standard_normal())
-            spring = ContactOscillator(mass=HEAVY, stiffness=mounted, damping_ratio=rest + damping, load=500.0)
+            spring = ContactOscillator(
+                mass=HEAVY, stiffness=mounted, damping_ratio=rest + damping, load=500.0
+            )
             about = RigTest(sample + 1, test + 1, nominal * 1e-6, std * 1e-6, RATE_HZ, DURATION_S)
             line = line_of(spring, sq_um, clr, frequency)
             recordings.append(background.recorded(about, line, disturbance, rng))
@@ -186,7 +210,8 @@ def between(library: Sequence[Point], sq_um: float, seed: int) -> tuple[float, f
     own = [point for point in library if point.seed == seed]
     at = [point.sq_um for point in own]
     clr, stiffness, damping = (
-        float(np.interp(sq_um, at, [getattr(point, name) for point in own])) for name in ("clr", "stiffness", "heavy")
+        float(np.interp(sq_um, at, [getattr(point, name) for point in own]))
+        for name in ("clr", "stiffness", "heavy")
     )
     return clr, stiffness, damping
 
@@ -196,14 +221,27 @@ def line_of(spring: ContactOscillator, sq_um: float, clr: float, frequency: Fiel
     density = np.zeros(frequency.size)
     density[1:] = spring.gain(frequency[1:]) * noise.density(frequency[1:], RATE_HZ)
     f0 = spring.natural_frequency_hz
-    return ContactLine(sq_um * 1e-6, clr, f0, float(np.interp(f0, frequency, density)), spring.damping_ratio, density)
+    return ContactLine(
+        sq_um * 1e-6,
+        clr,
+        f0,
+        float(np.interp(f0, frequency, density)),
+        spring.damping_ratio,
+        density,
+    )
 
 
 def readings(rings: Sequence[Ring], modes: int) -> list[Reading]:
     """Fitted line by line where nothing else resonates, jointly where something does."""
-    clean = [remove_lines(one.spectrum(SEGMENT), shaft_hz=(60.0,)) for ring in rings for one in ring.recordings]
+    clean = [
+        remove_lines(one.spectrum(SEGMENT), shaft_hz=(60.0,))
+        for ring in rings
+        for one in ring.recordings
+    ]
     if modes:
-        found = series_resonances([one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean])
+        found = series_resonances(
+            [one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean]
+        )
     else:
         found = tuple(contact_resonance(one.spectrum, band_hz=BAND_HZ) for one in clean)
     read = []
@@ -211,35 +249,47 @@ def readings(rings: Sequence[Ring], modes: int) -> list[Reading]:
         seen = [one for one in found[number * TESTS : (number + 1) * TESTS] if one.found]
         if seen:
             logs = [
-                float(np.mean(np.log([getattr(one, name) for one in seen]))) for name in ("crf_hz", "damping_ratio")
+                float(np.mean(np.log([getattr(one, name) for one in seen])))
+                for name in ("crf_hz", "damping_ratio")
             ]
             read.append(Reading(ring.sq_um, ring.clr, *logs))
     return read
 
 
-def told(training: Sequence[Sequence[Reading]], judged: Sequence[Sequence[Reading]], name: str) -> str:
+def told(
+    training: Sequence[Sequence[Reading]], judged: Sequence[Sequence[Reading]], name: str
+) -> str:
     """Regressions of the odds of CLR, and of the stage, on quadratics of what is read; learnt on other series."""
     learnt = [reading for rings in training for reading in rings]
     centre, width = (
-        moment(np.array([(one.frequency, one.damping) for one in learnt]), axis=0) for moment in (np.mean, np.std)
+        moment(np.array([(one.frequency, one.damping) for one in learnt]), axis=0)
+        for moment in (np.mean, np.std)
     )
 
     def columns(rings: Sequence[Reading]) -> Field:
         scaled = (np.array([(one.frequency, one.damping) for one in rings]) - centre) / width
         parts = scaled if name == "both" else scaled[:, [0 if name == "frequency" else 1]]
-        squares = [parts[:, i] * parts[:, j] for i in range(parts.shape[1]) for j in range(i, parts.shape[1])]
+        squares = [
+            parts[:, i] * parts[:, j]
+            for i in range(parts.shape[1])
+            for j in range(i, parts.shape[1])
+        ]
         return np.column_stack([np.ones(len(rings)), parts, *squares])
 
     odds = np.array([np.log((one.clr + 0.01) / (1.01 - one.clr)) for one in learnt])
     side = np.array([1.0 if one.sq_um > SEVERE_UM else -1.0 for one in learnt])
-    of_clr, of_stage = (np.linalg.lstsq(columns(learnt), wanted, rcond=None)[0] for wanted in (odds, side))
+    of_clr, of_stage = (
+        np.linalg.lstsq(columns(learnt), wanted, rcond=None)[0] for wanted in (odds, side)
+    )
     off, right, whole = [], [], 0
     for rings in judged:
         if not rings:
             continue
         guessed = columns(rings) @ of_clr
         off += list(1.02 / (1.0 + np.exp(-guessed)) - 0.01 - np.array([one.clr for one in rings]))
-        same = (columns(rings) @ of_stage > 0.0) == np.array([one.sq_um > SEVERE_UM for one in rings])
+        same = (columns(rings) @ of_stage > 0.0) == np.array(
+            [one.sq_um > SEVERE_UM for one in rings]
+        )
         right += list(same)
         whole += int(np.count_nonzero(same) >= len(SAMPLES_SQ_UM) - 1)
     return f"{100 * np.sqrt(np.mean(np.square(off))):.0f} | {100 * np.mean(right):.0f} % | {whole} of {len(judged)} |"

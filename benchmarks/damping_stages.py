@@ -13,11 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, draw_background
+from asperity.resonance import damping_objection, remove_lines, series_resonances
+from asperity.trend import StageSource, split_stages
 from asperity.vibration import ContactOscillator
-from asperity.wear import StageSource, damping_objection, remove_lines, series_resonances, split_stages
 from benchmarks.damping import (
     BAND_HZ,
     DURATION_S,
@@ -103,7 +104,9 @@ def lines(*, fast: bool = False) -> Iterator[str]:
         yield from rows(truth.name, truth.knee, drawn)
     library = points(SEEDS)
     for law in ("by the contact's own stiffness", "by (CLR F)^(1/6)"):
-        drawn = [solved(library, law, np.random.default_rng([8, number])) for number in range(trials)]
+        drawn = [
+            solved(library, law, np.random.default_rng([8, number])) for number in range(trials)
+        ]
         yield from rows(f"the solved contact, CRF {law}", None, drawn)
     yield from width_lines(fast=fast)
 
@@ -136,14 +139,21 @@ def rows(name: str, knee: float | None, drawn: Sequence[tuple[Field, Field]]) ->
     for source in SOURCES:
         found = [
             split_stages(
-                sq, crf, crf_std_hz=CRF_STD, damping_ratio=damping, damping_std=DAMPING_STD * damping, source=source
+                sq,
+                crf,
+                crf_std_hz=CRF_STD,
+                damping_ratio=damping,
+                damping_std=DAMPING_STD * damping,
+                source=source,
             )
             for crf, damping in drawn
         ]
         share = [100.0 * np.mean([one.kind == kind for one in found]) for kind in KINDS]
         broken = [one for one in found if one.found]
         splits = np.array([one.split for one in broken])
-        place = f"{splits.mean():.2f} ± {splits.std():.2f}" if len(broken) > 0.1 * len(found) else "-"
+        place = (
+            f"{splits.mean():.2f} ± {splits.std():.2f}" if len(broken) > 0.1 * len(found) else "-"
+        )
         covers = "-"
         if knee is not None and place != "-":
             covers = f"{100.0 * np.mean([one.interval[0] <= knee <= one.interval[1] for one in broken]):.0f} %"
@@ -175,7 +185,10 @@ def width_lines(*, fast: bool = False) -> Iterator[str]:
             seen = [one for one in told if one is not None]
             off, stated, stands = (np.array(part) for part in zip(*seen, strict=True))
             covered = np.mean(np.abs(off) < 1.645 * stated)
-            cells = [f"{100 * part:.1f} %" for part in (np.mean(off), np.sqrt(np.mean(off**2)), np.median(stated))]
+            cells = [
+                f"{100 * part:.1f} %"
+                for part in (np.mean(off), np.sqrt(np.mean(off**2)), np.median(stated))
+            ]
             found = f"{100 * len(seen) / len(told):.0f} %"
             yield (
                 f"| {name} | {100 * scatter:g} % | {found} | {100 * np.mean(stands):.0f} % | {cells[0]}, {cells[1]} | "
@@ -194,22 +207,34 @@ def judged(law: Course, scatter: float, number: int) -> Iterator[tuple[float, fl
         for test in range(REPEATS):
             ratio = float(law(np.array([sq]))[0]) * float(np.exp(0.03 * rng.standard_normal()))
             stiffness = STIFFNESS * (1.0 + scatter * rng.standard_normal()) ** 2
-            spring = ContactOscillator(mass=HEAVY, stiffness=stiffness, damping_ratio=ratio, load=500.0)
+            spring = ContactOscillator(
+                mass=HEAVY, stiffness=stiffness, damping_ratio=ratio, load=500.0
+            )
             about = RigTest(sample + 1, test + 1, sq * 1e-6, std * 1e-6, RATE_HZ, DURATION_S)
-            recording = background.recorded(about, line_of(spring, sq, 0.5, frequency), disturbance, rng)
+            recording = background.recorded(
+                about, line_of(spring, sq, 0.5, frequency), disturbance, rng
+            )
             truth.append(ratio)
             clean.append(remove_lines(recording.spectrum(SEGMENT), shaft_hz=(60.0,)))
-    found = series_resonances([one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean])
+    found = series_resonances(
+        [one.spectrum for one in clean], band_hz=BAND_HZ, kept=[one.kept for one in clean]
+    )
     for ratio, resonance, one in zip(truth, found, clean, strict=True):
         known = damping_objection(resonance, one.spectrum.resolution_hz) is None
         own = resonance.damping_ratio
         stands = "keeps its place" in resonance.reason
-        yield (float(np.log(own / ratio)), resonance.damping_ratio_std / own, stands) if known else None
+        yield (
+            (float(np.log(own / ratio)), resonance.damping_ratio_std / own, stands)
+            if known
+            else None
+        )
 
 
 def main() -> None:
     """Print the tables as Markdown."""
-    arguments = argparse.ArgumentParser(prog="python -m benchmarks.damping_stages", description=__doc__)
+    arguments = argparse.ArgumentParser(
+        prog="python -m benchmarks.damping_stages", description=__doc__
+    )
     arguments.add_argument("--fast", action="store_true", help="a fifth of the trials")
     with threadpool_limits(1):
         for line in lines(fast=arguments.parse_args().fast):

@@ -13,15 +13,22 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from asperity.tracking import Track, track_recordings
+from asperity.monitoring import Track, track_recordings
 
-MACHINES, FEW, SNAPSHOTS = 40, 8, 40  # a fault and length; where a spectrum is worked out; of each machine
+MACHINES, FEW, SNAPSHOTS = (
+    40,
+    8,
+    40,
+)  # a fault and length; where a spectrum is worked out; of each machine
 LENGTHS = ((0.1, 20_000.0), (0.1, 25_600.0), (1.0, 20_000.0))  # of a snapshot [s], sampled at [Hz]
 PER_TURN = {"outer race": 3.585, "inner race": 5.415, "ball": 4.713}  # of a 6205
 CAGE_PER_TURN = 0.398
 SHAFT_HZ = 30.0
 GROWTH = (15.0, 25.0)
-GAIN, MEMORY = 0.05, 0.7  # scatter of ln rms from snapshot to snapshot, and what each keeps of the one before
+GAIN, MEMORY = (
+    0.05,
+    0.7,
+)  # scatter of ln rms from snapshot to snapshot, and what each keeps of the one before
 SLIP = 0.01  # of the time between two impulses
 HALL = 0.3  # share of white noise in what a healthy machine says
 
@@ -47,10 +54,16 @@ def machine(fault: str, seed: int, *, seconds: float = 0.1, rate_hz: float = 20_
     for louder in rms:
         gain = MEMORY * gain + np.sqrt(1.0 - MEMORY**2) * GAIN * rng.standard_normal()
         samples = round(seconds * rate_hz)
-        healthy = _unit(_rung(rng.standard_normal(samples), modes, rate_hz)) + HALL * rng.standard_normal(samples)
-        turning = 0.2 * np.sin(2.0 * np.pi * SHAFT_HZ * np.arange(samples) / rate_hz + rng.uniform(0.0, 2.0 * np.pi))
+        healthy = _unit(
+            _rung(rng.standard_normal(samples), modes, rate_hz)
+        ) + HALL * rng.standard_normal(samples)
+        turning = 0.2 * np.sin(
+            2.0 * np.pi * SHAFT_HZ * np.arange(samples) / rate_hz + rng.uniform(0.0, 2.0 * np.pi)
+        )
         fault_alone = _unit(_rung(_impulses(fault, samples, rate_hz, rng), modes, rate_hz))
-        rough = _unit(_rung(rng.standard_normal(samples), modes, rate_hz))  # debris and wear make all of it louder, too
+        rough = _unit(
+            _rung(rng.standard_normal(samples), modes, rate_hz)
+        )  # debris and wear make all of it louder, too
         more = np.sqrt(louder**2 - 1.0)
         whole = _unit(healthy + turning) + more * (0.8 * fault_alone + 0.6 * rough)
         snapshots.append(0.5 * np.exp(gain) * whole)
@@ -64,7 +77,11 @@ def _impulses(fault: str, samples: int, rate_hz: float, rng: np.random.Generator
     at = rng.uniform(0.0, period)
     while at < samples:
         turns = {"outer race": 0.0, "inner race": 1.0, "ball": CAGE_PER_TURN}[fault]
-        zone = 1.0 if not turns else 0.5 * (1.1 + np.cos(2.0 * np.pi * turns * SHAFT_HZ * at / rate_hz))
+        zone = (
+            1.0
+            if not turns
+            else 0.5 * (1.1 + np.cos(2.0 * np.pi * turns * SHAFT_HZ * at / rate_hz))
+        )
         train[int(at)] += zone * np.exp(0.3 * rng.standard_normal())
         at += period * (1.0 + SLIP * rng.standard_normal())
     return train
@@ -75,7 +92,9 @@ def _rung(force: np.ndarray, modes: np.ndarray, rate_hz: float) -> np.ndarray:
     heard = np.zeros(force.size)
     for f0, damping, weight in modes:
         pole = np.exp((-damping + 1j * np.sqrt(1.0 - damping**2)) * 2.0 * np.pi * f0 / rate_hz)
-        heard += weight * scipy.signal.lfilter([1.0, -1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], force)
+        heard += weight * scipy.signal.lfilter(
+            [1.0, -1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], force
+        )
     return heard
 
 

@@ -12,17 +12,26 @@ from time import process_time
 import numpy as np
 import scipy
 
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
-from asperity.ehl.posing import smooth_film
-from asperity.grid import Grid
-from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
+from asperity.ehl.problem_setup import smooth_film
+from asperity.lubricant import (
+    Barus,
+    DowsonHigginson,
+    Incompressible,
+    Lubricant,
+    Newtonian,
+    Roelands,
+)
 from asperity.surface import flat_surface
 
 PAIR = ElasticPair((200e9, 200e9), (0.3, 0.3))
 RADIUS, ETA0, ALPHA = 12.5e-3, 0.04, 22e-9
 NO_FLOOR = 1e-13  # [m]: low speeds make films of less than the usual contact film
-ROELANDS = Lubricant(viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian())
+ROELANDS = Lubricant(
+    viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian()
+)
 BARUS = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=Newtonian())
 REFERENCE = {  # M, L, oil: central and least film, Richardson from 257 and 513 points, X -4.5..1.5, Y -3..3
     (20, 10, "Barus"): (4.803, 2.961),
@@ -32,7 +41,9 @@ REFERENCE = {  # M, L, oil: central and least film, Richardson from 257 and 513 
 }
 
 
-def ball(load_number: float, oil_number: float, ratio: float = 1.0) -> tuple[ContactConditions, float]:
+def ball(
+    load_number: float, oil_number: float, ratio: float = 1.0
+) -> tuple[ContactConditions, float]:
     """A ball or barrel (`ratio` = Rx/Ry) on a flat with these Moes numbers, and the film [m] that H = 1 stands for."""
     modulus = PAIR.effective_modulus
     twice_u = (oil_number / (ALPHA * modulus)) ** 4
@@ -63,7 +74,13 @@ class Films:
 
 
 def ball_films(
-    load_number: float, oil_number: float, oil: Lubricant, cells: int, *, ratio: float = 1.0, reach: float = 4.5
+    load_number: float,
+    oil_number: float,
+    oil: Lubricant,
+    cells: int,
+    *,
+    ratio: float = 1.0,
+    reach: float = 4.5,
 ) -> Films:
     """Solved on X -reach..1.5, Y -3..3 half-widths, wider for a longer reach."""
     conditions, unit = ball(load_number, oil_number, ratio)
@@ -71,12 +88,23 @@ def ball_films(
     wide = max(3.0, reach / 1.5)
     found = []
     for n in (cells // 2, cells):
-        grid = Grid((n, n), (-reach * a, -wide * b), (reach / 3.0 * a, wide * b), periodic=(False, False))
+        grid = Grid(
+            (n, n), (-reach * a, -wide * b), (reach / 3.0 * a, wide * b), periodic=(False, False)
+        )
         solution = solve_contact(
-            conditions, oil, flat_surface(grid), options=Options(tolerance=1e-5, contact_film=NO_FLOOR)
+            conditions,
+            oil,
+            flat_surface(grid),
+            options=Options(tolerance=1e-5, contact_film=NO_FLOOR),
         )
         middle = solution.gap[:, n // 2 - 1 : n // 2 + 1].mean(axis=1)
-        found.append((np.interp(0.0, grid.x, middle) / unit, solution.gap.min() / unit, solution.convergence.seconds))
+        found.append(
+            (
+                np.interp(0.0, grid.x, middle) / unit,
+                solution.gap.min() / unit,
+                solution.convergence.seconds,
+            )
+        )
     (coarse_c, coarse_m, _), (fine_c, fine_m, seconds) = found
     third = 1.0 / 3.0  # second order
     return Films(
@@ -91,11 +119,17 @@ def ball_films(
 def nijenbanning(load_number: float, oil_number: float, ratio: float = 1.0) -> float:
     """Central film H of Nijenbanning, Venner and Moes (1994)."""
     shape = 1.0 + 0.006 * np.log(ratio) + 0.63 * ratio ** (4.0 / 7.0)
-    rigid = 145.0 * (1.0 + 0.796 * ratio ** (14.0 / 15.0)) ** (-15.0 / 7.0) / ratio * load_number**-2.0
+    rigid = (
+        145.0 * (1.0 + 0.796 * ratio ** (14.0 / 15.0)) ** (-15.0 / 7.0) / ratio * load_number**-2.0
+    )
     elastic = 3.18 * shape ** (-14.0 / 25.0) * ratio ** (-1.0 / 15.0) * load_number ** (-2.0 / 15.0)
     rigid_thick = 1.29 * (1.0 + 0.691 * ratio) ** (-2.0 / 3.0) * oil_number ** (2.0 / 3.0)
     elastic_thick = (
-        1.48 * shape ** (-7.0 / 20.0) * ratio ** (-1.0 / 24.0) * load_number ** (-1.0 / 12.0) * oil_number**0.75
+        1.48
+        * shape ** (-7.0 / 20.0)
+        * ratio ** (-1.0 / 24.0)
+        * load_number ** (-1.0 / 12.0)
+        * oil_number**0.75
     )
     s = 1.5 * (1.0 + np.exp(-1.2 * elastic / elastic_thick))
     thin = rigid**1.5 + (elastic**-4.0 + (1.8 / ratio) ** -4.0) ** (-3.0 / 8.0)
@@ -103,7 +137,9 @@ def nijenbanning(load_number: float, oil_number: float, ratio: float = 1.0) -> f
     return float((thin ** (2.0 * s / 3.0) + thick) ** (1.0 / s))
 
 
-def line_case(load_number: float, oil_number: float, law: str) -> tuple[ContactConditions, Lubricant, float]:
+def line_case(
+    load_number: float, oil_number: float, law: str
+) -> tuple[ContactConditions, Lubricant, float]:
     """A line contact with these Moes numbers, its oil, and the film [m] that H = 1 stands for."""
     modulus, radius = PAIR.effective_modulus, 5.4e-3
     twice_u = (oil_number / (ALPHA * modulus)) ** 4
@@ -125,12 +161,16 @@ def line_films(load_number: float, oil_number: float, law: str, cells: int) -> t
     """Film at x = 0 and least film, in units of H; the inlet is longer for light loads."""
     conditions, oil, unit = line_case(load_number, oil_number, law)
     a = conditions.hertz.half_widths[0]
-    reach = 10.0 if load_number <= 10.0 else 4.5 if load_number <= 20.0 else 2.5  # thin films need a short inlet only
+    reach = (
+        10.0 if load_number <= 10.0 else 4.5 if load_number <= 20.0 else 2.5
+    )  # thin films need a short inlet only
     grid = Grid((cells, 8), (-reach * a, -a), (max(1.4, 0.3 * reach) * a, a))
     solution = solve_contact(
         conditions, oil, flat_surface(grid), options=Options(tolerance=1e-7, contact_film=NO_FLOOR)
     )
-    return float(np.interp(0.0, grid.x, solution.gap[:, 0]) / unit), float(solution.gap.min() / unit)
+    return float(np.interp(0.0, grid.x, solution.gap[:, 0]) / unit), float(
+        solution.gap.min() / unit
+    )
 
 
 def fft_pair() -> Callable[[], object]:
@@ -153,19 +193,29 @@ def _timed(load_number: float, oil_number: float, oil: Lubricant) -> str:
     """What a ball costs, the FFT pair measured in between."""
     conditions, unit = ball(load_number, oil_number)
     a, n, pair = conditions.hertz.half_widths[0], 257, fft_pair()
-    surface = flat_surface(Grid((n, n), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False)))
+    surface = flat_surface(
+        Grid((n, n), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
+    )
     options = Options(contact_film=NO_FLOOR)
     seconds, beside = [], []
     for _ in range(TRIES):
         beside.append(spent(pair, TRIES))
         seconds.append(spent(lambda: solve_contact(conditions, oil, surface, options=options), 1))
     solution = solve_contact(conditions, oil, surface, options=options)
-    steps = [sum(step.cells[0] == cells for step in solution.convergence.history) for cells in (65, 129, 257)]
+    steps = [
+        sum(step.cells[0] == cells for step in solution.convergence.history)
+        for cells in (65, 129, 257)
+    ]
     law = type(oil.viscosity).__name__
-    found = np.interp(0.0, surface.grid.x, solution.gap[:, n // 2]) / unit, solution.gap.min() / unit
+    found = (
+        np.interp(0.0, surface.grid.x, solution.gap[:, n // 2]) / unit,
+        solution.gap.min() / unit,
+    )
     off = ["-", "-"]
     if (known := REFERENCE.get((load_number, oil_number, law))) is not None:
-        off = [f"{100.0 * (film / true - 1.0):+.2f}" for film, true in zip(found, known, strict=True)]
+        off = [
+            f"{100.0 * (film / true - 1.0):+.2f}" for film, true in zip(found, known, strict=True)
+        ]
     return (
         f"| {load_number}, {oil_number}, {law} | {', '.join(map(str, steps))} | {min(seconds):.2f} | "
         f"{min(seconds) / min(beside):.0f} | {' | '.join(off)} |"
@@ -185,11 +235,15 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|---|"
     for load_number, oil_number in LINE_CASES[:: 3 if fast else 1]:
         for law in ("Barus", "Roelands"):
-            coarse, here, true = (line_films(load_number, oil_number, law, n) for n in (128, 256, 4096))
+            coarse, here, true = (
+                line_films(load_number, oil_number, law, n) for n in (128, 256, 4096)
+            )
             cells = []
             for before, value, reference in zip(coarse, here, true, strict=True):
                 order = np.log2(abs((before - reference) / (value - reference)))
-                cells.append(f"{value:.3f} | {100.0 * (value / reference - 1.0):+.2f} | {order:.1f}")
+                cells.append(
+                    f"{value:.3f} | {100.0 * (value / reference - 1.0):+.2f} | {order:.1f}"
+                )
             yield f"| {load_number}, {oil_number} | {law} | {' | '.join(cells)} |"
     yield ""
     yield "Balls against extrapolated references:"
@@ -227,9 +281,16 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield ""
     yield "| M, L, Rx/Ry | H_c | Nijenbanning et al. | off by [%] | H_min | Hamrock and Dowson | off by [%] |"
     yield "|---|---|---|---|---|---|---|"
-    balls = [(load_number, oil_number, 1.0) for load_number in (5, 20, 100, 500) for oil_number in (2, 5, 10, 15)]
+    balls = [
+        (load_number, oil_number, 1.0)
+        for load_number in (5, 20, 100, 500)
+        for oil_number in (2, 5, 10, 15)
+    ]
     barrels = [(100, 10, ratio) for ratio in (0.5, 0.2, 0.1, 2.0)]
-    for load_number, oil_number, ratio in [*balls[:: 5 if fast else 1], *barrels[:: 3 if fast else 1]]:
+    for load_number, oil_number, ratio in [
+        *balls[:: 5 if fast else 1],
+        *barrels[:: 3 if fast else 1],
+    ]:
         films = ball_films(
             load_number,
             oil_number,
@@ -239,7 +300,10 @@ def lines(*, fast: bool) -> Iterator[str]:
             reach=9.0 if load_number <= 20 else 4.5,
         )
         conditions, unit = ball(load_number, oil_number, ratio)
-        fit, least = nijenbanning(load_number, oil_number, ratio), smooth_film(conditions, ROELANDS) / unit
+        fit, least = (
+            nijenbanning(load_number, oil_number, ratio),
+            smooth_film(conditions, ROELANDS) / unit,
+        )
         yield (
             f"| {load_number}, {oil_number}, {ratio:g} | {films.central_extrapolated:.3f} | {fit:.3f} | "
             f"{100.0 * (films.central_extrapolated / fit - 1.0):+.1f} | {films.least_extrapolated:.3f} | {least:.3f} | "

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field
 from asperity.case import load_case
-from asperity.errors import AsperityError
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError
 from asperity.inference import (
     Emulator,
     Forward,
@@ -30,7 +30,7 @@ from asperity.inference import (
     forecast_observations,
     setting_of,
 )
-from asperity.inference.course import KNOTS, along_range, between_knots
+from asperity.inference.drifting_contact import KNOTS, along_range, between_knots
 from asperity.inference.outputs import CLR, OUTPUTS
 from benchmarks.inference import CASE, KEPT, LEFT_S, share
 from benchmarks.rows import FOLDER, Rows
@@ -41,15 +41,38 @@ CRF_STD, DAMPING_STD, HEIGHT_STD = 2e-3, 0.05, 0.08
 ROWS = FOLDER / "forecast-courses.csv"
 SHAPES = ("straight", "steepening", "slackening", "wandering")
 OTHERS = ("jumping", "run in, then roughening", "straight, scatter remembers")
-CLASSES = {"wearing": SHAPES, "otherwise": OTHERS, "steady": ("steady",), "slow": ("steady, scatter remembers",)}
-REMEMBERED, SCATTER = 0.7, 2.0  # of scatter that remembers: from visit to visit, and over the deviation stated
+CLASSES = {
+    "wearing": SHAPES,
+    "otherwise": OTHERS,
+    "steady": ("steady",),
+    "slow": ("steady, scatter remembers",),
+}
+REMEMBERED, SCATTER = (
+    0.7,
+    2.0,
+)  # of scatter that remembers: from visit to visit, and over the deviation stated
 RATE = 0.3  # of a range over the series, standard deviation
 AHEAD = 2.0  # series' lengths after the last recording
 PLACE = (500.0, 1.91)
 COLUMNS = (
-    "kind", "number", "shape", "crossing", "low", "median", "high", "rises", "rising", "within", "already", "log_odds",
-    "alarm", "clr_true", "clr_low", "clr_high", "seconds",
-)  # fmt: skip
+    "kind",
+    "number",
+    "shape",
+    "crossing",
+    "low",
+    "median",
+    "high",
+    "rises",
+    "rising",
+    "within",
+    "already",
+    "log_odds",
+    "alarm",
+    "clr_true",
+    "clr_low",
+    "clr_high",
+    "seconds",
+)
 
 
 def main() -> None:
@@ -108,19 +131,39 @@ def judged(setting: Setting, emulator: Emulator, kind: str, number: int) -> dict
             break
     began = process_time()
     try:
-        found = forecast_observations(setting, emulator, _heard(sounds, rng, shape), limit=(CLR, LIMIT), seed=number)
+        found = forecast_observations(
+            setting, emulator, _heard(sounds, rng, shape), limit=(CLR, LIMIT), seed=number
+        )
     except AsperityError:  # counts as not held
         return dict.fromkeys(COLUMNS, np.nan) | {
-            "kind": kind, "number": number, "shape": shape, "crossing": crossing, "alarm": 0, "rises": 0, "rising": -1,
+            "kind": kind,
+            "number": number,
+            "shape": shape,
+            "crossing": crossing,
+            "alarm": 0,
+            "rises": 0,
+            "rising": -1,
             "seconds": round(process_time() - began, 1),
-        }  # fmt: skip
+        }
     return {
-        "kind": kind, "number": number, "shape": shape, "crossing": crossing, "low": found.time.low,
-        "median": found.time.median, "high": found.time.high, "rises": int(clr[-1] > clr[0]),
-        "rising": int(found.rising), "within": found.within, "already": found.already, "log_odds": found.log_odds,
-        "alarm": int(found.alarm), "clr_true": clr[_at(1.0)], "clr_low": found.clr.low, "clr_high": found.clr.high,
+        "kind": kind,
+        "number": number,
+        "shape": shape,
+        "crossing": crossing,
+        "low": found.time.low,
+        "median": found.time.median,
+        "high": found.time.high,
+        "rises": int(clr[-1] > clr[0]),
+        "rising": int(found.rising),
+        "within": found.within,
+        "already": found.already,
+        "log_odds": found.log_odds,
+        "alarm": int(found.alarm),
+        "clr_true": clr[_at(1.0)],
+        "clr_low": found.clr.low,
+        "clr_high": found.clr.high,
         "seconds": round(process_time() - began, 1),
-    }  # fmt: skip
+    }
 
 
 TIME = np.linspace(0.0, 1.0 + AHEAD, 601)
@@ -142,7 +185,11 @@ def _course(shape: str, begin: float, rng: np.random.Generator) -> Field:
     if shape == "jumping":
         return begin + rate * TIME + 0.5 * RATE * rng.standard_normal() * (rng.random() < TIME)
     if shape == "run in, then roughening":
-        return begin - 0.5 * RATE * rng.random() * (1.0 - np.exp(-TIME / 0.15)) + 0.5 * abs(rate) * TIME**2
+        return (
+            begin
+            - 0.5 * RATE * rng.random() * (1.0 - np.exp(-TIME / 0.15))
+            + 0.5 * abs(rate) * TIME**2
+        )
     wander = np.zeros(TIME.size)
     if shape == "wandering":
         speed = 0.3 * abs(rate) * np.sqrt(TIME[1]) * rng.standard_normal(TIME.size)
@@ -150,7 +197,9 @@ def _course(shape: str, begin: float, rng: np.random.Generator) -> Field:
     return begin + rate * TIME + wander
 
 
-def _shown(forward: Forward, z: Field, course: Field, rng: np.random.Generator) -> tuple[dict[str, Field], Field]:
+def _shown(
+    forward: Forward, z: Field, course: Field, rng: np.random.Generator
+) -> tuple[dict[str, Field], Field]:
     """Logarithms that the true contact shows, and its load share: the emulator's, off by a draw of its deviation."""
     unknown, grid = forward.setting.unknowns[0], np.linspace(0.0, 1.0, 4 * KNOTS)
     along = along_range(z, 0, unknown.at_share(grid))
@@ -159,7 +208,10 @@ def _shown(forward: Forward, z: Field, course: Field, rng: np.random.Generator) 
     _, std = forward.emulated(z, [CLR])[CLR]
     scale = between_knots(mean.T, course[None])[0][0] + std[0, 0] * rng.standard_normal()
     clr = OUTPUTS[CLR].back(scale)
-    tables = {key: between_knots(getattr(shown, key).T, course[None])[0][0] for key in ("crf", "damping", "crfa")}
+    tables = {
+        key: between_knots(getattr(shown, key).T, course[None])[0][0]
+        for key in ("crf", "damping", "crfa")
+    }
     before = OUTPUTS[CLR].back(between_knots(mean.T, course[None])[0][0])
     tables["crf"] = tables["crf"] + np.log(np.maximum(clr, 1e-4) / np.maximum(before, 1e-4)) / 6.0
     return tables, clr
@@ -179,11 +231,17 @@ def _heard(sounds: dict[str, Field], rng: np.random.Generator, shape: str) -> li
             crf = float(np.exp(sounds["crf"][place] + SCATTER * CRF_STD * slow))
         heard.append(
             Observation(
-                load_n=PLACE[0], entrainment_m_s=PLACE[1], crf_hz=crf, crf_std_hz=CRF_STD * crf,
-                damping_ratio=damping, damping_std=DAMPING_STD * damping, crfa=crfa, crfa_std=HEIGHT_STD * crfa,
+                load_n=PLACE[0],
+                entrainment_m_s=PLACE[1],
+                crf_hz=crf,
+                crf_std_hz=CRF_STD * crf,
+                damping_ratio=damping,
+                damping_std=DAMPING_STD * damping,
+                crfa=crfa,
+                crfa_std=HEIGHT_STD * crfa,
                 x=100.0 * at,
             )
-        )  # fmt: skip
+        )
     return heard
 
 
@@ -205,10 +263,18 @@ def tables() -> Iterator[str]:
         for shape in (*CLASSES[kind], whole):
             if some := [row for row in own if shape in (row["shape"], whole)]:
                 yield _line(shape, some)
-    for kind, what in (("steady", "that stay as they are"), ("slow", "that do, and scatter that remembers")):
+    for kind, what in (
+        ("steady", "that stay as they are"),
+        ("slow", "that do, and scatter that remembers"),
+    ):
         if own := [row for row in rows if row["kind"] == kind]:
-            alarms, told = (int(sum(flags)) for flags in ([row["alarm"] == "1" for row in own],
-                            [float(row["log_odds"]) >= np.log(100.0) for row in own]))  # fmt: skip
+            alarms, told = (
+                int(sum(flags))
+                for flags in (
+                    [row["alarm"] == "1" for row in own],
+                    [float(row["log_odds"]) >= np.log(100.0) for row in own],
+                )
+            )
             yield f"Of {len(own)} machines {what}, {told} are told to change and {alarms} are alarmed of."
     took = np.median([float(row["seconds"]) for row in rows])
     yield f"A forecast took {took:.1f} s of a processor (median). Rows by the code that found them: {kept.codes()}."
@@ -216,7 +282,9 @@ def tables() -> Iterator[str]:
 
 def _line(shape: str, rows: list[dict[str, str]]) -> str:
     width = np.nanmedian([float(row["high"]) / max(float(row["low"]), 1e-9) for row in rows])
-    now = [float(row["clr_low"]) <= float(row["clr_true"]) <= float(row["clr_high"]) for row in rows]
+    now = [
+        float(row["clr_low"]) <= float(row["clr_true"]) <= float(row["clr_high"]) for row in rows
+    ]
     told = [float(row["log_odds"]) >= np.log(100.0) for row in rows]
     held = share([_held(row) for row in rows])
     return f"| {shape} | {len(rows)} | {held} | {width:.1f} | {share(now)} | {share(told)} |"

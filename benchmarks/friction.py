@@ -13,23 +13,26 @@ from scipy.special import iv, k0e, modstruve
 
 from asperity import load_case, solve_contact, subsurface_stress
 from asperity.case import Case
-from asperity.ehl import (
-    ContactSolution,
-    Convergence,
-    Iteration,
-    Options,
-    SolveStatus,
+from asperity.contact.grid import Grid
+from asperity.contact.hertz import line_pressure
+from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus
+from asperity.lubricant import (
+    EyringShear,
+    FrictionLaw,
+    LinearBairWiner,
+    NewtonianShear,
+    Solid,
+    Thermal,
+)
+from asperity.results import stribeck_curve
+from asperity.solution import (
     contact_state,
     flash_temperature,
     friction,
     friction_and_heat,
     solve_thermal_contact,
 )
-from asperity.ehl.flash import moving_source
-from asperity.grid import Grid
-from asperity.hertz import line_pressure
-from asperity.lubricant import EyringShear, FrictionLaw, LinearBairWiner, NewtonianShear, Solid, Thermal
-from asperity.results import stribeck_curve
+from asperity.solution.flash import moving_source
 from asperity.surface import flat_surface
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
@@ -58,7 +61,11 @@ def lines(*, fast: bool) -> Iterator[str]:
 def limit_lines() -> Iterator[str]:
     case = load_case(CASE)
     conditions, gap, alpha, eta0 = case.conditions, 0.7e-6, 18.2e-9, 0.096
-    a, p_h, rate = conditions.hertz.half_widths[0], conditions.hertz.p_max, conditions.sliding_speed / 0.7e-6
+    a, p_h, rate = (
+        conditions.hertz.half_widths[0],
+        conditions.hertz.p_max,
+        conditions.sliding_speed / 0.7e-6,
+    )
     beta, tau0 = alpha * p_h, 2e3
 
     def limited(x: float) -> float:
@@ -107,7 +114,9 @@ def _hertz_film(case: Case, law: FrictionLaw, cells: int, gap: float) -> Contact
         gap=np.where(inside, gap, 1.0)[:, None] * ones,
         in_contact=np.zeros(grid.cells, bool),
         rigid_approach=0.0,
-        convergence=Convergence(SolveStatus.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0),
+        convergence=Convergence(
+            SolveStatus.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0
+        ),
     )
 
 
@@ -131,19 +140,37 @@ def source_lines() -> Iterator[str]:
         def source(at: float, where: float = where, v: float = v) -> float:
             return float(np.exp(v * (where - at) - v * abs(where - at)) * k0e(v * abs(where - at)))
 
-        reach = sorted({-HALF, HALF, where, *(where - s / v for s in (0.01, 1.0, 30.0) if where - s / v > -HALF)})
+        reach = sorted(
+            {
+                -HALF,
+                HALF,
+                where,
+                *(where - s / v for s in (0.01, 1.0, 30.0) if where - s / v > -HALF),
+            }
+        )
         exact = sum(quad(source, a, b, epsrel=1e-9)[0] for a, b in pairwise(reach)) / (np.pi * k)
-        yield _compared("band, Jaeger's integral at the same point", peclet, float(rise.max()), exact)
+        yield _compared(
+            "band, Jaeger's integral at the same point", peclet, float(rise.max()), exact
+        )
         if peclet >= 100.0:
             blok = 2.0 / k * np.sqrt(kappa * 2.0 * HALF / (np.pi * speed_at(peclet)))
-            yield _compared("band, Blok's 1.128 at the trailing edge", peclet, float(rise.max()), blok)
+            yield _compared(
+                "band, Blok's 1.128 at the trailing edge", peclet, float(rise.max()), blok
+            )
     square = moving_source((65, 65), (2.0 * HALF / 65, 2.0 * HALF / 65), 0.0, STEEL, length=None)
     at_rest = float(square(np.ones((65, 65))).max())
-    yield _compared("square at rest, 4 ln(1 + √2)/π", 0.0, at_rest, 4.0 * np.log(1.0 + np.sqrt(2.0)) / np.pi * HALF / k)
+    yield _compared(
+        "square at rest, 4 ln(1 + √2)/π",
+        0.0,
+        at_rest,
+        4.0 * np.log(1.0 + np.sqrt(2.0)) / np.pi * HALF / k,
+    )
     for peclet in (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0):
         body = moving_source((64, 64), (dx, dx), speed_at(peclet), STEEL, length=None)
         fitted = 2.0 * HALF / (k * np.sqrt(np.pi * (1.011 + peclet)))
-        yield _compared("square, Tian and Kennedy's fit", peclet, float(body(np.ones((64, 64))).max()), fitted)
+        yield _compared(
+            "square, Tian and Kennedy's fit", peclet, float(body(np.ones((64, 64))).max()), fitted
+        )
 
 
 def _compared(name: str, peclet: float, found: float, exact: float) -> str:
@@ -159,7 +186,9 @@ def balance_lines() -> Iterator[str]:
         chosen = case.with_overrides({"surface.sq": f"{sq} um"})
         solution = solve_contact(chosen.conditions, chosen.lubricant, chosen.surface())
         for speeds in ((2.101, 1.719), (1.719, 2.101), (3.82, 0.0), (5.0, -1.18), (1.91, 1.91)):
-            moved = replace(solution, conditions=replace(solution.conditions, surface_speeds=speeds))
+            moved = replace(
+                solution, conditions=replace(solution.conditions, surface_speeds=speeds)
+            )
             rubbing = friction(moved)
             heat = flash_temperature(moved, rubbing)
             off = (heat.heat_1_w + heat.heat_2_w) / rubbing.power - 1.0 if rubbing.power else 0.0
@@ -172,7 +201,10 @@ def balance_lines() -> Iterator[str]:
 def cost_lines() -> Iterator[str]:
     case = load_case(CASE)
     solution = solve_contact(case.conditions, case.lubricant, case.surface())
-    seconds = [solve_contact(case.conditions, case.lubricant, case.surface()).convergence.seconds for _ in range(3)]
+    seconds = [
+        solve_contact(case.conditions, case.lubricant, case.surface()).convergence.seconds
+        for _ in range(3)
+    ]
     solve = statistics.median(seconds)
     moving_source.cache_clear()
     began = perf_counter()
@@ -248,11 +280,16 @@ def stribeck_lines() -> Iterator[str]:
                 {"grid.cells": [128, 128], "surface.sq": sq, "thermal.feedback": feedback}
             )
             curves.append(stribeck_curve(case))
-    names = [f"Sq {1e6 * curve.sq:g} um{', fed back' if curve.feedback else ''}" for curve in curves]
+    names = [
+        f"Sq {1e6 * curve.sq:g} um{', fed back' if curve.feedback else ''}" for curve in curves
+    ]
     yield f"| u [m/s] | {' | '.join(names)} |"
     yield "|---|" + "---|" * len(curves)
     for points in zip(*(curve.points for curve in curves), strict=True):
-        found = [f"{p.friction_coefficient:.4f}{'' if p.converged else ' (not converged)'}" for p in points]
+        found = [
+            f"{p.friction_coefficient:.4f}{'' if p.converged else ' (not converged)'}"
+            for p in points
+        ]
         yield f"| {points[0].entrainment_speed_m_s:.3g} | {' | '.join(found)} |"
 
 

@@ -31,7 +31,11 @@ def _taken(script: Path) -> float:
     with tempfile.TemporaryDirectory() as folder:
         limited = {"MPLBACKEND": "agg", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         subprocess.run(
-            [sys.executable, str(script)], cwd=folder, env=os.environ | limited, check=True, stdout=subprocess.DEVNULL
+            [sys.executable, str(script)],
+            cwd=folder,
+            env=os.environ | limited,
+            check=True,
+            stdout=subprocess.DEVNULL,
         )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime

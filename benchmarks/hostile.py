@@ -22,12 +22,22 @@ from time import monotonic, sleep, time
 
 import numpy as np
 
-from asperity.tracking.files import may_be_recording
+from asperity.monitoring.files import may_be_recording
 
 RATE, SECONDS = 20e3, 0.1
 AHEAD_S = 30 * 86_400.0
 PARTS_S = 3.0  # between the two halves of a file that is still being written
-KINDS = ("plain",) * 6 + ("late", "in parts", "twice", "ahead", "cut", "foreign", "half copied", "empty", "again")
+KINDS = ("plain",) * 6 + (
+    "late",
+    "in parts",
+    "twice",
+    "ahead",
+    "cut",
+    "foreign",
+    "half copied",
+    "empty",
+    "again",
+)
 
 
 def recorded(number: int, sensor: int) -> np.ndarray:
@@ -79,9 +89,22 @@ def arrive(folder: Path, number: int, kind: str, sensors: int) -> None:
         write(path, number + 5000, sensors)
 
 
-def watch(folder: Path, out: Path, *words: str, sensors: int, every: float, settle: float) -> list[str]:
+def watch(
+    folder: Path, out: Path, *words: str, sensors: int, every: float, settle: float
+) -> list[str]:
     words += ("--channel", ",".join(channels(sensors)))
-    own = ("--out", str(out), "--quiet", "--machine", "Fan 1", "--point", "DE", "--band", "2000", "4000")
+    own = (
+        "--out",
+        str(out),
+        "--quiet",
+        "--machine",
+        "Fan 1",
+        "--point",
+        "DE",
+        "--band",
+        "2000",
+        "4000",
+    )
     pace = ("--every", f"{every:g}", "--settle", f"{settle:g}")
     return [sys.executable, "-m", "asperity", "watch", str(folder), *own, *pace, *words]
 
@@ -108,7 +131,9 @@ def accounted(folder: Path, store: Path, sensors: int) -> tuple[Counter[str], li
     for path in folder.iterdir():
         rows = held.get(path.name, [])
         if len(rows) == sensors:
-            counts["refused with a reason" if any(row[1] for row in rows) else "heard and judged"] += 1
+            counts[
+                "refused with a reason" if any(row[1] for row in rows) else "heard and judged"
+            ] += 1
         elif not path.name.isprintable() or b"\xff" in os.fsencode(path.name):
             counts["left out, its name said"] += 1
         elif not may_be_recording(path):
@@ -159,11 +184,15 @@ def run(
                 process.kill()
                 process.wait()
         for out in outs.values():
-            subprocess.run(watch(folder, out, "--once", sensors=sensors, **pace), check=False, **quiet)
+            subprocess.run(
+                watch(folder, out, "--once", sensors=sensors, **pace), check=False, **quiet
+            )
         stores = [out / "asperity.db" for out in outs.values()]
         counts, silent = accounted(folder, stores[1], sensors)
         first, second = (latest(store) for store in stores)
-        differ = sorted(file for file in first.keys() | second.keys() if first.get(file) != second.get(file))
+        differ = sorted(
+            file for file in first.keys() | second.keys() if first.get(file) != second.get(file)
+        )
         yield f"Sample: {minutes:.0f} minutes."
         yield "| a folder as loggers leave it | |"
         yield "|---|---|"
@@ -187,6 +216,9 @@ if __name__ == "__main__":
     arguments.add_argument("--sensors", type=int, default=1)
     given = arguments.parse_args()
     for line in run(
-        given.minutes, given.kills, given.sensors, say=lambda text: print(text, file=sys.stderr, flush=True)
+        given.minutes,
+        given.kills,
+        given.sensors,
+        say=lambda text: print(text, file=sys.stderr, flush=True),
     ):
         print(line, flush=True)

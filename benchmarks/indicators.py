@@ -11,9 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from asperity.core.signals import Spectrum
 from asperity.paper import SAMPLES_SQ_UM, SAMPLES_STD_UM, TRENDS, Disturbance, Rig, simulate_rig
-from asperity.signals import Spectrum
-from asperity.wear import CleanSpectrum, Resonance, contact_resonance, remove_lines, series_resonances, split_stages
+from asperity.resonance import (
+    CleanSpectrum,
+    Resonance,
+    contact_resonance,
+    remove_lines,
+    series_resonances,
+)
+from asperity.trend import split_stages
 
 SNRS = (20.0, 10.0, 6.0, 3.0, 0.0)
 SERIES = 60
@@ -25,7 +32,10 @@ TRIALS = 400
 FEW, FEWER = 12, 3  # series, where fewer will do
 CRF_STD = 15.0
 KNEE, RANGE = 1.8, (1.68, 1.92)
-HEARD_THROUGH = (0.3, 1.0)  # height of the highest mode of a structure's transfer over the direct way
+HEARD_THROUGH = (
+    0.3,
+    1.0,
+)  # height of the highest mode of a structure's transfer over the direct way
 
 Reading = Callable[["Heard"], Sequence[Resonance]]
 
@@ -76,7 +86,9 @@ def transferred(rig: Rig, size: float, seed: int) -> Rig:
     for _ in range(int(rng.integers(2, 7))):
         f0, damping = rng.uniform(*rig.band_hz), np.exp(rng.uniform(np.log(0.004), np.log(0.03)))
         height = size * rng.uniform(0.3, 1.0) * rng.choice([-1.0, 1.0])
-        passed += height * 2j * damping / (1.0 - (frequency / f0) ** 2 + 2j * damping * frequency / f0)
+        passed += (
+            height * 2j * damping / (1.0 - (frequency / f0) ** 2 + 2j * damping * frequency / f0)
+        )
     power = np.abs(passed) ** 2
     heard = [
         replace(
@@ -103,8 +115,11 @@ def through_lines(series: int) -> Iterator[str]:
         "CRFA rms error | CRFA median error | 90 % intervals cover CRF and CRFA | s a series |"
     )
     yield "|---|---|---|---|---|---|---|---|---|---|---|"
-    for duration_s, name, way in ((10.0, "10 s", transferred), (DURATION, f"{DURATION:g} s", transferred),
-                                  (10.0, "10 s, sensor moved halfway", moved)):  # fmt: skip
+    for duration_s, name, way in (
+        (10.0, "10 s", transferred),
+        (DURATION, f"{DURATION:g} s", transferred),
+        (10.0, "10 s, sensor moved halfway", moved),
+    ):
         for size in HEARD_THROUGH:
             tally = Tally()
             for number in range(series):
@@ -126,7 +141,9 @@ def heard(rig: Rig) -> Heard:
 
 def papers(heard: Heard) -> Sequence[Resonance]:
     """Five-point cubic smoothing three times, highest point of the band."""
-    return [contact_resonance(one, band_hz=heard.rig.band_hz, method="peak") for one in heard.spectra]
+    return [
+        contact_resonance(one, band_hz=heard.rig.band_hz, method="peak") for one in heard.spectra
+    ]
 
 
 def alone(heard: Heard) -> Sequence[Resonance]:
@@ -136,13 +153,18 @@ def alone(heard: Heard) -> Sequence[Resonance]:
 
 def modes(heard: Heard) -> Sequence[Resonance]:
     """As many lines as each spectrum needs, the strongest; tones taken out."""
-    return [contact_resonance(one.spectrum, band_hz=heard.rig.band_hz, method="modes") for one in heard.clean]
+    return [
+        contact_resonance(one.spectrum, band_hz=heard.rig.band_hz, method="modes")
+        for one in heard.clean
+    ]
 
 
 def joint(heard: Heard) -> Sequence[Resonance]:
     """What stays told from what moves, tones taken out."""
     return series_resonances(
-        [one.spectrum for one in heard.clean], band_hz=heard.rig.band_hz, kept=[one.kept for one in heard.clean]
+        [one.spectrum for one in heard.clean],
+        band_hz=heard.rig.band_hz,
+        kept=[one.kept for one in heard.clean],
     )
 
 
@@ -173,7 +195,10 @@ class Tally:
             if np.isfinite(one.crf_std):
                 self.crf_std.append(one.crf_std)
                 self.covered.append(
-                    (abs(error) < NINETY * one.crf_std, abs(one.crfa - true.crfa) < NINETY * one.crfa_std)
+                    (
+                        abs(error) < NINETY * one.crf_std,
+                        abs(one.crfa - true.crfa) < NINETY * one.crfa_std,
+                    )
                 )
 
     def row(self) -> str:
@@ -199,7 +224,10 @@ BY_ITSELF: dict[str, Reading] = {"one line": alone, "modes": modes}
 
 
 def table_lines(
-    series: int, snrs: Sequence[float] = SNRS, methods: Mapping[str, Reading] = METHODS, **choices: float
+    series: int,
+    snrs: Sequence[float] = SNRS,
+    methods: Mapping[str, Reading] = METHODS,
+    **choices: float,
 ) -> Iterator[str]:
     yield (
         "| SNR [dB] | method | failures | > 100 Hz off | not found | CRF rms error [Hz] | stated [Hz] | "
@@ -256,12 +284,16 @@ def saturating_share(sq: np.ndarray) -> np.ndarray:
     return np.asarray(3879.0 * share.clip(0.02) ** (1.0 / 6.0))
 
 
-def stage_row(truth: Callable[[np.ndarray], np.ndarray], errors: float, tests: int, trials: int) -> str:
+def stage_row(
+    truth: Callable[[np.ndarray], np.ndarray], errors: float, tests: int, trials: int
+) -> str:
     rng = np.random.default_rng(7)
     kinds: dict[str, int] = {}
     splits, covered = [], 0
     for _ in range(trials):
-        true_sq = np.array(SAMPLES_SQ_UM) + errors * np.array(SAMPLES_STD_UM) * rng.standard_normal(12)
+        true_sq = np.array(SAMPLES_SQ_UM) + errors * np.array(SAMPLES_STD_UM) * rng.standard_normal(
+            12
+        )
         crf = truth(np.repeat(true_sq, tests) * 1e-6) + CRF_STD * rng.standard_normal(12 * tests)
         x_std = np.repeat(SAMPLES_STD_UM, tests) * errors if errors else None
         found = split_stages(np.repeat(SAMPLES_SQ_UM, tests), crf, crf_std_hz=CRF_STD, x_std=x_std)
@@ -274,13 +306,13 @@ def stage_row(truth: Callable[[np.ndarray], np.ndarray], errors: float, tests: i
     if truth is not TRENDS["knee"]:
         return f"{said} | - | - | -"
     inside = sum(RANGE[0] <= split <= RANGE[1] for split in splits)
-    return (
-        f"{said} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % | {np.std(splits):.3f}"
-    )
+    return f"{said} | {100 * inside / trials:.1f} % | {100 * covered / max(len(splits), 1):.0f} % | {np.std(splits):.3f}"
 
 
 if __name__ == "__main__":
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.indicators", description=__doc__)
-    arguments.add_argument("--fast", action="store_true", help="a twentieth of the series and trials")
+    arguments.add_argument(
+        "--fast", action="store_true", help="a twentieth of the series and trials"
+    )
     for line in lines(fast=arguments.parse_args().fast):
         print(line, flush=True)

@@ -22,8 +22,8 @@ import numpy as np
 from scipy.stats import binomtest
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field
 from asperity.case import load_case
+from asperity.core.arrays import Field
 from asperity.coupling import VibrationModel, dry_full_load
 from asperity.inference import (
     Emulator,
@@ -35,11 +35,11 @@ from asperity.inference import (
     setting_of,
 )
 from asperity.inference.inference import STAGES, stages
-from asperity.inference.listening import band_of
+from asperity.inference.recording_input import band_of
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
+from asperity.resonance import remove_lines, series_resonances
 from asperity.study import overrides_at, plan_points, run_study
-from asperity.wear import remove_lines, series_resonances
 from benchmarks.rows import FOLDER, Rows
 
 CASE = Path(__file__).parents[1] / "examples" / "infer.toml"
@@ -63,13 +63,17 @@ def main() -> None:
     """Solve, listen, infer, and say how often intervals hold."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--machines", type=int, default=MACHINES)
-    arguments.add_argument("--finer", type=int, default=0, help="machines whose truth is on twice the cells")
+    arguments.add_argument(
+        "--finer", type=int, default=0, help="machines whose truth is on twice the cells"
+    )
     arguments.add_argument("--fast", action="store_true", help=f"{FEW} machines")
     arguments.add_argument("--kept", type=Path, default=KEPT, help="folder that keeps everything")
     arguments.add_argument("--known", action="store_true", help="only machines whose truth is kept")
     wanted = arguments.parse_args()
     with threadpool_limits(1):
-        judge_all(FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept, known=wanted.known)
+        judge_all(
+            FEW if wanted.fast else wanted.machines, wanted.finer, wanted.kept, known=wanted.known
+        )
     print("\n".join(tables()))
 
 
@@ -80,7 +84,9 @@ def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:
     yield from tables()
 
 
-def judge_all(machines: int, finer: int, kept: Path, *, known: bool = False, end: float = float("inf")) -> None:
+def judge_all(
+    machines: int, finer: int, kept: Path, *, known: bool = False, end: float = float("inf")
+) -> None:
     """Every machine, in turn; its rows as it is done."""
     setting = setting_of(load_case(CASE))
     emulator = build_emulator(setting, folder=kept / "emulator", workers=1)
@@ -88,7 +94,11 @@ def judge_all(machines: int, finer: int, kept: Path, *, known: bool = False, end
     on_its_grid = replace(emulator, grid={})
     rows, truths = Rows(ROWS, ("machine", "law")), Truths(setting, kept)
     for number, z in zip(range(machines), machines_of(setting), strict=False):
-        for law in (INSIDE, *([FINER] if number < finer else []), *(OUTSIDE if number < ALSO_OUTSIDE else [])):
+        for law in (
+            INSIDE,
+            *([FINER] if number < finer else []),
+            *(OUTSIDE if number < ALSO_OUTSIDE else []),
+        ):
             if perf_counter() > end:
                 return
             grid = GRIDS[law == FINER]
@@ -154,16 +164,22 @@ class Truths:
         case = self.setting.case
         if grid != GRIDS[0]:
             case = case.with_overrides({"grid.cells": [2 * count for count in case.grid.cells]})
-        shares = [float(unknown.share(z[place])) for place, unknown in enumerate(self.setting.contact)]
+        shares = [
+            float(unknown.share(z[place])) for place, unknown in enumerate(self.setting.contact)
+        ]
         base = overrides_at(case, [unknown.range for unknown in self.setting.contact], shares)
         points = [
             {**base, "contact.load": f"{load:g} N", "contact.entrainment_speed": f"{speed:g} m/s"}
             for load, speed in PLACES
         ]
-        unheard = case.with_overrides({"vibration": "none"})  # no stiffness of its own, which takes as long again
+        unheard = case.with_overrides(
+            {"vibration": "none"}
+        )  # no stiffness of its own, which takes as long again
         plan = plan_points(unheard, points, seeds=SURFACES, kind="solve")
         there = self.kept / ("truth" if grid == GRIDS[0] else "truth-finer") / f"{number:03d}"
-        with ThreadPoolExecutor(1) as executor:  # a process for each machine would take as long to start
+        with ThreadPoolExecutor(
+            1
+        ) as executor:  # a process for each machine would take as long to start
             table = run_study(plan, out=there, executor=executor).table
         means = table[table["status"] == "done"].groupby("point")[list(KEYS)].agg(["mean", "count"])
         if len(means) < len(PLACES) or (means[KEYS[0], "count"] < SURFACES).any():
@@ -174,11 +190,16 @@ class Truths:
 def recordings(setting: Setting, machine: Machine) -> list[Observation]:
     """What the rig hears of a machine, by the joint separation of all its recordings."""
     assert machine.states is not None
-    values = {unknown.key: float(unknown.value(machine.z[i : i + 1])[0]) for i, unknown in enumerate(setting.unknowns)}
+    values = {
+        unknown.key: float(unknown.value(machine.z[i : i + 1])[0])
+        for i, unknown in enumerate(setting.unknowns)
+    }
     stated = setting.case.vibration
     assert stated is not None
     model = stated.with_choices(
-        mass=values["mass_kg"], damping_ratio=values["damping_ratio"], cutoff_exponent=values["cutoff_exponent"]
+        mass=values["mass_kg"],
+        damping_ratio=values["damping_ratio"],
+        cutoff_exponent=values["cutoff_exponent"],
     )
     rng = np.random.default_rng([SEED, machine.number])
     frequency = np.arange(0.0, RATE_HZ / 2.0 + GRID_HZ, GRID_HZ)
@@ -191,7 +212,9 @@ def recordings(setting: Setting, machine: Machine) -> list[Observation]:
             continue  # nothing resonates
         conditions = setting.case.with_overrides({"contact.load": f"{load:g} N"}).conditions
         state = replace(dry_full_load(conditions, values["sq_m"]), clr=clr, car=car)
-        line = contact_line(state, conditions, wrongly(model, machine.law, clr, load), frequency, RATE_HZ)
+        line = contact_line(
+            state, conditions, wrongly(model, machine.law, clr, load), frequency, RATE_HZ
+        )
         for test in range(TESTS):
             ring = RigTest(machine.number + 1, test + 1, values["sq_m"], 1e-8, RATE_HZ, DURATION_S)
             spectra.append(background.recorded(ring, line, Disturbance(), rng).spectrum(SEGMENT))
@@ -200,18 +223,26 @@ def recordings(setting: Setting, machine: Machine) -> list[Observation]:
         return []
     cleaned = [remove_lines(spectrum) for spectrum in spectra]
     found = series_resonances(
-        [clean.spectrum for clean in cleaned], band_hz=band, method="joint", kept=[clean.kept for clean in cleaned]
+        [clean.spectrum for clean in cleaned],
+        band_hz=band,
+        method="joint",
+        kept=[clean.kept for clean in cleaned],
     )
     return [
         Observation(
-            load_n=load, entrainment_m_s=speed, crf_hz=one.crf_hz, crf_std_hz=one.crf_std,
+            load_n=load,
+            entrainment_m_s=speed,
+            crf_hz=one.crf_hz,
+            crf_std_hz=one.crf_std,
             crf_shared_std_hz=one.crf_shared_std,
-            crfa=one.crfa if one.crfa_std > 0.0 else np.nan, crfa_std=one.crfa_std if one.crfa_std > 0.0 else np.nan,
-            damping_ratio=one.damping_ratio, damping_std=one.damping_ratio_std,
+            crfa=one.crfa if one.crfa_std > 0.0 else np.nan,
+            crfa_std=one.crfa_std if one.crfa_std > 0.0 else np.nan,
+            damping_ratio=one.damping_ratio,
+            damping_std=one.damping_ratio_std,
         )
         for (load, speed), one in zip(places, found, strict=True)
         if one.found
-    ]  # fmt: skip
+    ]
 
 
 def wrongly(model: VibrationModel, law: str, clr: float, load: float) -> VibrationModel:
@@ -227,11 +258,28 @@ def wrongly(model: VibrationModel, law: str, clr: float, load: float) -> Vibrati
 
 # Judged --------------------------------------------------------------------------------------------------------------
 
-ENDS = tuple(f"{key}_{name}{end}" for key in ("clr", "sq") for name in ("", "exact_") for end in ("low", "high"))
+ENDS = tuple(
+    f"{key}_{name}{end}"
+    for key in ("clr", "sq")
+    for name in ("", "exact_")
+    for end in ("low", "high")
+)
 HELD = (
-    "clr_true", "sq_true", *ENDS, "clr_bits", "sq_bits", "stage_true", "stage_held", "stage_probability",
-    "likeliest", "likeliest_probability", "law_error", "exact_probability", "own_probability", "identifiable",
-)  # fmt: skip
+    "clr_true",
+    "sq_true",
+    *ENDS,
+    "clr_bits",
+    "sq_bits",
+    "stage_true",
+    "stage_held",
+    "stage_probability",
+    "likeliest",
+    "likeliest_probability",
+    "law_error",
+    "exact_probability",
+    "own_probability",
+    "identifiable",
+)
 
 
 def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[dict[str, Any]]:
@@ -239,7 +287,12 @@ def judged(setting: Setting, emulator: Emulator, machine: Machine) -> Iterator[d
     heard = [] if machine.states is None else recordings(setting, machine)
     at_one = [one for one in heard if one.place[:2] == ONE]
     for points, observations in ((1, at_one), (len(PLACES), heard)):
-        row = {"machine": machine.number, "law": machine.law, "points": points, "heard": len(observations)}
+        row = {
+            "machine": machine.number,
+            "law": machine.law,
+            "points": points,
+            "heard": len(observations),
+        }
         if not observations:
             yield row | dict.fromkeys(HELD, "")
             continue
@@ -251,13 +304,17 @@ def held(found: Inference, at: tuple[float, float], machine: Machine) -> dict[st
     """Truth and intervals of Sq, and of CLR and stage at one operating point that was heard."""
     assert machine.states is not None
     place = next(
-        number for number, point in enumerate(found.forward.points)
+        number
+        for number, point in enumerate(found.forward.points)
         if number and (point.load_n, point.entrainment_m_s) == at
-    )  # fmt: skip
+    )
     clr = float(machine.states["clr"][PLACES.index(at)])
     ends = {}
     for name, draws in (("", found.draws), ("exact_", found.exact)):
-        for key, values in (("sq", found.values(draws)["sq_m"]), ("clr", found.values(draws, place)["clr"])):
+        for key, values in (
+            ("sq", found.values(draws)["sq_m"]),
+            ("clr", found.values(draws, place)["clr"]),
+        ):
             low, high = np.quantile(values, (0.05, 0.95))
             ends |= {f"{key}_{name}low": float(low), f"{key}_{name}high": float(high)}
     own = found.at_points()[place - 1]
@@ -302,11 +359,22 @@ def tables() -> Iterator[str]:
     told = {key: [row for row in rows if row["clr_true"]] for key, rows in sorted(groups.items())}
     told = {key: rows for key, rows in told.items() if rows}
     for (law, points), rows in told.items():
-        inside = [share([within(row, key, name) for row in rows]) for key in ("clr", "sq") for name in ("", "exact_")]
+        inside = [
+            share([within(row, key, name) for row in rows])
+            for key in ("clr", "sq")
+            for name in ("", "exact_")
+        ]
         right = np.mean([row["likeliest"] == row["stage_true"] for row in rows])
         said = np.mean([float(row["likeliest_probability"]) for row in rows])
         stage = share([row["stage_held"] == "1" for row in rows])
-        cells = (law, points, len(rows), *inside, stage, f"{100 * right:.0f} % ({100 * said:.0f} %)")
+        cells = (
+            law,
+            points,
+            len(rows),
+            *inside,
+            stage,
+            f"{100 * right:.0f} % ({100 * said:.0f} %)",
+        )
         yield f"| {' | '.join(map(str, cells))} |"
     yield "## What such an interval is wide, and what was learned (medians)"
     yield (
@@ -315,16 +383,28 @@ def tables() -> Iterator[str]:
     )
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for (law, points), rows in told.items():
-        clr = [f"{100 * median(rows, f'clr_{name}high', f'clr_{name}low', np.subtract):.0f}" for name in ("", "exact_")]
-        sq = [f"{median(rows, f'sq_{name}high', f'sq_{name}low', np.divide):.2f}" for name in ("", "exact_")]
-        bits = [f"{np.median([float(row[f'{key}_bits']) for row in rows]):.1f}" for key in ("clr", "sq")]
+        clr = [
+            f"{100 * median(rows, f'clr_{name}high', f'clr_{name}low', np.subtract):.0f}"
+            for name in ("", "exact_")
+        ]
+        sq = [
+            f"{median(rows, f'sq_{name}high', f'sq_{name}low', np.divide):.2f}"
+            for name in ("", "exact_")
+        ]
+        bits = [
+            f"{np.median([float(row[f'{key}_bits']) for row in rows]):.1f}" for key in ("clr", "sq")
+        ]
         error = f"{100 * np.median([float(row['law_error']) for row in rows]):.1f}"
         exact = np.clip([float(row["exact_probability"]) for row in rows], 1e-300, 1.0 - 1e-9)
         odds = f"{np.median(np.log(1.0 / exact - 1.0)):.1f}"
         yield f"| {' | '.join((law, points, *clr, *sq, *bits, error, odds))} |"
     machines = {row["machine"] for row in every}
     yield f"Sample: {len(machines)} machines."
-    silent = {row["machine"] for row in every if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"}
+    silent = {
+        row["machine"]
+        for row in every
+        if row["law"] == INSIDE and row["points"] != "1" and row["heard"] == "0"
+    }
     yield (
         f"{len(machines)} machines with {SURFACES} surfaces at each operating point; of {len(silent)} too few "
         f"recordings show a line, and nothing is said. Rows by the code that found them: {kept.codes()}."
@@ -339,7 +419,9 @@ def within(row: Mapping[str, str], key: str, name: str) -> bool:
 
 def median(rows: Sequence[Mapping[str, str]], high: str, low: str, how: np.ufunc) -> float:
     """Of what `how` makes of two columns."""
-    return float(np.median(how([float(row[high]) for row in rows], [float(row[low]) for row in rows])))
+    return float(
+        np.median(how([float(row[high]) for row in rows], [float(row[low]) for row in rows]))
+    )
 
 
 def share(inside: Sequence[bool]) -> str:

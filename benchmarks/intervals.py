@@ -1,7 +1,7 @@
 """Do the intervals hold what they say? Load shares on 128 and 256 cells against 512, a hundred of the wide sample.
 
 A contact counts where it converged on both grids and the interval is determined. The calibration of
-`asperity.ehl.search.grid_error`: its factors were chosen on forty of these contacts.
+`asperity.ehl.strategies.grid_continuation.grid_error`: its factors were chosen on forty of these contacts.
 """
 
 import csv
@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.ehl import ContactModel, Options, contact_state, solve_contact
+from asperity.ehl import ContactModel, Options, solve_contact
+from asperity.solution import contact_state
 from benchmarks.robustness import OIL, contacts, prepared
 
 MODELS: tuple[ContactModel, ...] = ("mixed",)
@@ -43,7 +44,9 @@ class Held:
         return 0.5 * (self.high - self.low) / abs(self.true - self.clr)
 
 
-def solved(number: int, model: ContactModel, cells: int) -> tuple[float, float | None, float | None] | None:
+def solved(
+    number: int, model: ContactModel, cells: int
+) -> tuple[float, float | None, float | None] | None:
     """Load share and interval of one contact on one grid; None where it did not converge."""
     conditions, surface = prepared(contacts()[number], cells, shown=COARSE[0])
     solution = solve_contact(conditions, OIL, surface, options=Options(model=model), strict=False)

@@ -12,7 +12,10 @@ from pathlib import Path
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER, PAGE = DOCS / "benchmarks", DOCS / "benchmarks.md"
 CHANGED = 0.1  # relative, from which a number is told: less is a shared machine's mood
-IN_FULL, IN_SHORT = "Measured in full.", "Measured in short; `python -m benchmarks --whole` takes all of it."
+IN_FULL, IN_SHORT = (
+    "Measured in full.",
+    "Measured in short; `python -m benchmarks --whole` takes all of it.",
+)
 SAMPLE = re.compile(r"Sample: (\d+) ")  # what a part says that goes on as long as it has time
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
@@ -34,7 +37,10 @@ def taken_apart(lines: Iterable[str]) -> tuple[list[str], list[Table]]:
             tables.append([cells(line)])
             said.append(f"{{{len(tables)}}}")
             within = True
-    return said, [[row for row in table if not all(set(cell) <= set("-: ") for cell in row)] for table in tables]
+    return said, [
+        [row for row in table if not all(set(cell) <= set("-: ") for cell in row)]
+        for table in tables
+    ]
 
 
 def cells(line: str) -> list[str]:
@@ -47,11 +53,19 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
     said, tables = taken_apart(lines)
     before = {path.name: read(path) for path in _files(part, folder)}
     now = {_name(part, number): table for number, table in enumerate(tables, 1)}
-    have, had = sample(said), sample([text for row in before.get(f"{part}-said.csv", []) for text in row])
+    have, had = (
+        sample(said),
+        sample([text for row in before.get(f"{part}-said.csv", []) for text in row]),
+    )
     if have < had:
         return [
             f"{part}: stays as it was; {_in_words(have)} is compared with {_in_words(had)}",
-            *(line for name in now if name in before for line in changes(name, before[name], now[name])),
+            *(
+                line
+                for name in now
+                if name in before
+                for line in changes(name, before[name], now[name])
+            ),
         ]
     now[f"{part}-said.csv"] = [["said"], *([text] for text in said)]
     folder.mkdir(parents=True, exist_ok=True)
@@ -65,13 +79,25 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
 
 def sample(said: Iterable[str]) -> float:
     """How much a part took into account, by its own words; 0 where it took little or does not say."""
-    sizes = [float("inf") if text == IN_FULL else float(found[1]) if (found := SAMPLE.match(text)) else 0.0
-             for text in said]  # fmt: skip
+    sizes = [
+        float("inf")
+        if text == IN_FULL
+        else float(found[1])
+        if (found := SAMPLE.match(text))
+        else 0.0
+        for text in said
+    ]
     return max(sizes, default=0.0)
 
 
 def _in_words(size: float) -> str:
-    return "all of it" if size == float("inf") else f"a sample of {size:.0f}" if size else "a short run"
+    return (
+        "all of it"
+        if size == float("inf")
+        else f"a sample of {size:.0f}"
+        if size
+        else "a short run"
+    )
 
 
 def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
@@ -85,7 +111,10 @@ def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
     pairs = list(zip(before, now, strict=False))
     if len(before) != len(now) and len(now[0]) > 1:
         old_rows, rows = _by_name(before[1:], now[1:])
-        pairs = [(before[0], now[0]), *((old_rows[key], rows[key]) for key in rows if key in old_rows)]
+        pairs = [
+            (before[0], now[0]),
+            *((old_rows[key], rows[key]) for key in rows if key in old_rows),
+        ]
         yield f"{name}: {len(before) - 1} rows are now {len(now) - 1}, {len(pairs) - 1} of them as before"
     elif len(before) != len(now):
         yield f"{name}: has another shape"
@@ -96,7 +125,11 @@ def changes(name: str, before: Table | None, now: Table) -> Iterator[str]:
     for old_row, row in pairs[1:]:
         for head, old, new in zip(now[0], old_row, row, strict=True):
             numbers = zip(NUMBER.findall(old), NUMBER.findall(new), strict=False)
-            moved = [f"{a} is now {b}" for a, b in numbers if _moved(*(float(n.replace("−", "-")) for n in (a, b)))]
+            moved = [
+                f"{a} is now {b}"
+                for a, b in numbers
+                if _moved(*(float(n.replace("−", "-")) for n in (a, b)))
+            ]
             if moved or NUMBER.sub("", old) != NUMBER.sub("", new):
                 yield f"{name}: {row[0][:60]}, {head}: {'; '.join(moved) or f'{old[:60]!r} is now {new[:60]!r}'}"
 
@@ -151,4 +184,8 @@ def _name(part: str, number: int) -> str:
 
 
 def _files(part: str, folder: Path) -> list[Path]:
-    return [path for path in sorted(folder.glob("*.csv")) if re.fullmatch(rf"{part}(-said|-\d+)?\.csv", path.name)]
+    return [
+        path
+        for path in sorted(folder.glob("*.csv"))
+        if re.fullmatch(rf"{part}(-said|-\d+)?\.csv", path.name)
+    ]

@@ -18,13 +18,13 @@ from time import process_time
 import numpy as np
 import scipy
 
+from asperity.monitoring import watch as watching
+from asperity.monitoring.reading import read_channels
+from asperity.monitoring.sensors import opened
+from asperity.monitoring.store import STORE
+from asperity.monitoring.target import search_target
+from asperity.monitoring.watch import Update, version_of, watch_folder
 from asperity.recording import ReadOptions
-from asperity.tracking import watch as watching
-from asperity.tracking.reading import read_channels
-from asperity.tracking.sensors import opened
-from asperity.tracking.store import STORE
-from asperity.tracking.target import search_target
-from asperity.tracking.watch import Update, version_of, watch_folder
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)
 SPACING, MORE = 5.0, 12
@@ -38,9 +38,15 @@ def heard(rng: np.random.Generator, sensors: int) -> dict[str, np.ndarray]:
     channels = {}
     for sensor in range(sensors):
         values = 0.3 * rng.standard_normal(SAMPLES)
-        modes = [(frequency * (1.0 + ELSEWHERE * sensor), damping, level) for frequency, damping, level in LINES]
+        modes = [
+            (frequency * (1.0 + ELSEWHERE * sensor), damping, level)
+            for frequency, damping, level in LINES
+        ]
         for frequency, damping, level in ((line_hz, 0.02, 1.0), *modes):
-            turn, decay = 2.0 * np.pi * frequency / RATE, np.exp(-damping * 2.0 * np.pi * frequency / RATE)
+            turn, decay = (
+                2.0 * np.pi * frequency / RATE,
+                np.exp(-damping * 2.0 * np.pi * frequency / RATE),
+            )
             fresh = rng.standard_normal(SAMPLES)
             line = scipy.signal.lfilter([1.0], [1.0, -2.0 * decay * np.cos(turn), decay**2], fresh)
             values += level * line / line.std()
@@ -59,7 +65,11 @@ def channel(sensors: int) -> str:
 
 def filled(folder: Path, store: Path, many: int, sensors: int) -> None:
     """A folder and a store of `many` recordings, of which 200 differ."""
-    rng, target, options = np.random.default_rng(1), search_target(None, BAND), ReadOptions(channel=channel(sensors))
+    rng, target, options = (
+        np.random.default_rng(1),
+        search_target(None, BAND),
+        ReadOptions(channel=channel(sensors)),
+    )
     keeping = opened(store, folder.resolve(), (None, None, None), target, options)
     keeping.settle_spacing(SPACING)
     one = folder.parent / "one.npz"
@@ -90,7 +100,9 @@ def one_more(folder: Path, out: Path, many: int, sensors: int) -> tuple[list[flo
         return track
 
     watching._Memory.judged = timed  # type: ignore[assignment,method-assign]
-    looks = watch_folder(folder, out, band_hz=BAND, channel=channel(sensors), every_s=0.05, settle_s=0.0)
+    looks = watch_folder(
+        folder, out, band_hz=BAND, channel=channel(sensors), every_s=0.05, settle_s=0.0
+    )
     _require_known(next(looks))
     judged.clear()
     whole = []
@@ -107,12 +119,24 @@ def _require_known(update: Update) -> None:
     """That the watch goes on with what was filled in, and that it was heard: nothing else is worth a time."""
     track = update.track
     if update.new or track is None or not all(one.resonance.found for one in track.recordings):
-        raise RuntimeError(f"the watch reads {len(update.new)} recordings that its store should know, or hears no line")
+        raise RuntimeError(
+            f"the watch reads {len(update.new)} recordings that its store should know, or hears no line"
+        )
 
 
 def known(folder: Path, out: Path) -> float:
     """Processor time [s] of `asperity watch --once` where nothing is new, its imports too."""
-    command = [sys.executable, "-m", "asperity", "watch", str(folder), "--out", str(out), "--once", "--quiet"]
+    command = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "watch",
+        str(folder),
+        "--out",
+        str(out),
+        "--once",
+        "--quiet",
+    ]
     command += ["--channel", channel(1), "--settle", "0", "--band", *(f"{end:g}" for end in BAND)]
     subprocess.run(command, check=False, capture_output=True)
     took = []

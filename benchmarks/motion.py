@@ -9,21 +9,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import Options, moving_contact, solve_contact
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.ehl import Options, solve_contact
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.surface import MovingSurfaces, Surface, flat_surface
+from asperity.transient import moving_contact
 from benchmarks.roughness_levels import paper_case
 
 # deformed over undeformed amplitude by wavelength over half-width, pure rolling, M 100, L 11, amplitude 0.1 H_c:
 # Venner, Couhier, Lubrecht and Greenwood, Tribology Series 32 (1997) 103, transcribed second-hand
 VENNER = {4.0: 0.030, 2.0: 0.073, 1.0: 0.183, 0.5: 0.394, 0.25: 0.660, 0.125: 0.839}
 M, L = 100.0, 11.0
-ALPHA, ETA0, EFFECTIVE, RADIUS = 2.2e-8, 0.04, 2.26e11, 12.5e-3  # Moes' numbers decide; these only have to meet them
-OIL = Lubricant(viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian())
+ALPHA, ETA0, EFFECTIVE, RADIUS = (
+    2.2e-8,
+    0.04,
+    2.26e11,
+    12.5e-3,
+)  # Moes' numbers decide; these only have to meet them
+OIL = Lubricant(
+    viscosity=Roelands(ETA0, ALPHA), density=DowsonHigginson(870.0), rheology=Newtonian()
+)
 DOMAIN = (-2.5, 1.5)  # half-widths
-CROSSING = 1.4  # half-widths that the waves travel before the amplitude is taken, over one wavelength more
+CROSSING = (
+    1.4  # half-widths that the waves travel before the amplitude is taken, over one wavelength more
+)
 
 
 def master_curve(wavelength: float) -> float:
@@ -90,7 +100,12 @@ def waves(wavelength: float, cells_per_b: int, time_step: float = 1.0, share: fl
     travelled = np.arange(last - in_period + 1, last + 1) * time_step / cells_per_b
     turns = np.exp(2j * np.pi * travelled / wavelength)
     own = -height * np.exp(2j * np.pi * grid.x / (wavelength * b)) / 2.0  # a crest is a thin film
-    return Waves(grid.x / b, (turns @ np.array(films[-in_period:])) / in_period / own, perf_counter() - began, last)
+    return Waves(
+        grid.x / b,
+        (turns @ np.array(films[-in_period:])) / in_period / own,
+        perf_counter() - began,
+        last,
+    )
 
 
 def _amplitudes(*, fast: bool) -> Iterator[str]:
@@ -99,9 +114,13 @@ def _amplitudes(*, fast: bool) -> Iterator[str]:
     yield "|---|" + "---|" * (len(grids) + 4)
     for wavelength, printed in VENNER.items():
         found = [waves(wavelength, cells).central for cells in grids]
-        limit = found[-1] + (found[-1] - found[-2]) / 3.0 if len(found) > 1 else None  # one grid has none
+        limit = (
+            found[-1] + (found[-1] - found[-2]) / 3.0 if len(found) > 1 else None
+        )  # one grid has none
         off = 100.0 * ((found[-1] if limit is None else limit) / printed - 1.0)
-        row = " | ".join("not determined" if value is None else f"{value:.4f}" for value in (*found, limit))
+        row = " | ".join(
+            "not determined" if value is None else f"{value:.4f}" for value in (*found, limit)
+        )
         yield f"| {wavelength:g} | {row} | {printed:.3f} | {off:+.1f} % | {master_curve(wavelength):.3f} |"
 
 
@@ -113,7 +132,10 @@ def _orders(*, fast: bool) -> Iterator[str]:
     long, half, quarter = (waves(0.5, 64, time_step).at(0.0) for time_step in (0.5, 0.25, 0.125))
     order = np.log2(abs(half - long) / abs(quarter - half))
     yield f"Order in Δt alone (steps of 1/2, 1/4, 1/8 cell, time and wedge apart): {order:.2f}."
-    for label, time_step in (("followed along its way, steps of 1 cell", 1.0), ("apart, steps of 1/4 cell", 0.25)):
+    for label, time_step in (
+        ("followed along its way, steps of 1 cell", 1.0),
+        ("apart, steps of 1/4 cell", 0.25),
+    ):
         amplitude = abs(waves(0.125, 64, time_step).at(0.0))
         yield f"A wave of b/8 on 8 cells, {label}: {amplitude:.3f} of its height at x = 0."
 
@@ -128,8 +150,14 @@ def _costs(*, fast: bool) -> Iterator[str]:
             surfaces = MovingSurfaces.one_rough(case.surface(), case.conditions.surface_speeds)
             taken = moving_contact(case.conditions, case.lubricant, surfaces, options=case.options)
             start, *rest = [one.solution.convergence for one in islice(taken, steps + 1)]
-            bad, held = sum(not one.converged for one in rest), sum("held" in one.attempt for one in rest)
-            newton, seconds = median(one.iterations for one in rest), median(one.seconds for one in rest)
+            bad, held = (
+                sum(not one.converged for one in rest),
+                sum("held" in one.attempt for one in rest),
+            )
+            newton, seconds = (
+                median(one.iterations for one in rest),
+                median(one.seconds for one in rest),
+            )
             ratio = seconds / start.seconds
             yield f"| {sq} | {cells} | {steps} | {bad} | {held} | {newton:g} | {seconds:.3f} | {ratio:.2f} |"
 

@@ -20,19 +20,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
-from asperity.ehl import (
-    FILMS,
-    Snapshot,
-    clr_below,
-    moving_contact,
-    roller_depth,
-    sharing_by_film,
-    step_seconds,
-    tangent_stiffness,
-)
-from asperity.ehl.stiffness import approach_of
-from asperity.errors import NotConverged
-from asperity.hertz import point_stiffness
+from asperity.contact.hertz import point_stiffness
+from asperity.core.errors import NotConverged
+from asperity.solution import FILMS, clr_below, roller_depth, sharing_by_film, tangent_stiffness
+from asperity.solution.stiffness import approach_of
+from asperity.transient import Snapshot, moving_contact, step_seconds
 from benchmarks.roughness_levels import paper_case
 
 KEPT = Path(__file__).parents[1] / "build" / "motion_table.csv"
@@ -40,7 +32,13 @@ SQ_UM = (0.5, 1.0, 2.5, 4.0)
 SEEDS = (0, 1, 2)
 SNAPSHOT, MIXED, CONSERVING = "mixed snapshot", "mixed moving", "conserving moving"
 MODELS = {MIXED: "mixed", CONSERVING: "conserving"}
-KINDS: dict[str, type] = {"model": str, "cells": int, "seed": int, "steps": int, "bad": int}  # numbers else
+KINDS: dict[str, type] = {
+    "model": str,
+    "cells": int,
+    "seed": int,
+    "steps": int,
+    "bad": int,
+}  # numbers else
 LOAD_STEP = 0.02
 MOMENTS = 2  # of a passage, at which the tangent stiffness is taken
 
@@ -74,7 +72,9 @@ class Outcome:
 def table_case(sq_um: float, seed: int, cells: int) -> Case:
     """The paper's contact under the table's cap and correlation length."""
     case = paper_case(sq_um, seed, cells)
-    return case.with_overrides({"material.hardness": "0.7 GPa", "surface.correlation_length": "40 um"})
+    return case.with_overrides(
+        {"material.hardness": "0.7 GPa", "surface.correlation_length": "40 um"}
+    )
 
 
 def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcome]:
@@ -87,10 +87,14 @@ def outcomes(model: str, sq_um: float, seed: int, cells: int) -> Iterator[Outcom
     began = perf_counter()
     settled: list[Snapshot] = []
     bad = 0
-    for snapshot in islice(moving_contact(case.conditions, case.lubricant, surfaces, options=case.options), last + 1):
+    for snapshot in islice(
+        moving_contact(case.conditions, case.lubricant, surfaces, options=case.options), last + 1
+    ):
         bad += not snapshot.solution.convergence.converged
         if snapshot.number == 0 and model == MIXED:
-            yield _outcome(SNAPSHOT, case, sq_um, seed, [snapshot], [snapshot], 0, perf_counter() - began)
+            yield _outcome(
+                SNAPSHOT, case, sq_um, seed, [snapshot], [snapshot], 0, perf_counter() - began
+            )
         if snapshot.number > cells:
             settled.append(snapshot)
     moments = settled[:: len(settled) // MOMENTS][:MOMENTS]
@@ -113,7 +117,9 @@ def _outcome(
     conditions, mass = case.conditions, case.vibration.mass if case.vibration else math.nan
     sharing = [sharing_by_film(one.solution) for one in rows]
     clr = mean(one.clr_solid for one in sharing)
-    spring = point_stiffness(clr * conditions.load, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
+    spring = point_stiffness(
+        clr * conditions.load, conditions.radius_along_rolling, conditions.pair.reduced_modulus
+    )
     below = [mean(clr_below(one.solution, film) for one in rows) for film in FILMS]
     stiffness = [found for one in moments if (found := _tangent(one)) is not None]
     return Outcome(
@@ -147,7 +153,9 @@ def _tangent(snapshot: Snapshot) -> float | None:
         return None
 
 
-def tangent_in_motion(sq_um: float, seed: int, cells: int, model: str = MIXED) -> tuple[float, float]:
+def tangent_in_motion(
+    sq_um: float, seed: int, cells: int, model: str = MIXED
+) -> tuple[float, float]:
     """Resonance [Hz] by the tangent stiffness of the moving contact, and that by the standing one's at MOMENTS times.
 
     In motion: the same passage under a load 2 % less and 2 % more, difference of loads over that of mean approaches.
@@ -160,11 +168,19 @@ def tangent_in_motion(sq_um: float, seed: int, cells: int, model: str = MIXED) -
     approaches = []
     for load in ((1.0 - LOAD_STEP) * conditions.load, (1.0 + LOAD_STEP) * conditions.load):
         pressed = replace(conditions, load=load)
-        taken = islice(moving_contact(pressed, case.lubricant, surfaces, options=case.options), last + 1)
-        approaches.append(float(np.mean([approach_of(one.solution, depth) for one in taken if one.number > cells])))
+        taken = islice(
+            moving_contact(pressed, case.lubricant, surfaces, options=case.options), last + 1
+        )
+        approaches.append(
+            float(
+                np.mean([approach_of(one.solution, depth) for one in taken if one.number > cells])
+            )
+        )
     stiffness = 2.0 * LOAD_STEP * conditions.load / (approaches[1] - approaches[0])
     compute(cells, [seed], [model], [sq_um])
-    return math.sqrt(stiffness / mass) / (2.0 * math.pi), kept()[model, cells, sq_um, seed].tangent_hz
+    return math.sqrt(stiffness / mass) / (2.0 * math.pi), kept()[
+        model, cells, sq_um, seed
+    ].tangent_hz
 
 
 def kept() -> dict[tuple[str, int, float, int], Outcome]:
@@ -175,12 +191,16 @@ def kept() -> dict[tuple[str, int, float, int], Outcome]:
         rows = list(csv.DictReader(file))
     found = []
     for row in rows:
-        values: dict[str, Any] = {one.name: KINDS.get(one.name, float)(row[one.name]) for one in fields(Outcome)}
+        values: dict[str, Any] = {
+            one.name: KINDS.get(one.name, float)(row[one.name]) for one in fields(Outcome)
+        }
         found.append(Outcome(**values))
     return {(one.model, one.cells, one.sq_um, one.seed): one for one in found}
 
 
-def compute(cells: int, seeds: Iterable[int], models: Iterable[str], sq_um: Iterable[float] = SQ_UM) -> None:
+def compute(
+    cells: int, seeds: Iterable[int], models: Iterable[str], sq_um: Iterable[float] = SQ_UM
+) -> None:
     """Whatever is not kept yet, kept as soon as it is there."""
     models, sq_um = list(models), list(sq_um)
     for seed in seeds:
@@ -232,17 +252,29 @@ def table() -> Iterator[str]:
     for sq in SQ_UM:
         for model in (SNAPSHOT, *MODELS):
             for cells in sorted({one.cells for one in found.values()}):
-                rows = [one for one in found.values() if (one.model, one.cells, one.sq_um) == (model, cells, sq)]
+                rows = [
+                    one
+                    for one in found.values()
+                    if (one.model, one.cells, one.sq_um) == (model, cells, sq)
+                ]
                 if not rows:
                     continue
-                same = [found[model, coarsest, sq, one.seed] for one in rows] if cells > coarsest else []
-                shown = " | ".join(_shown(rows, same, name, scale, digits) for _, name, scale, digits in COLUMNS)
+                same = (
+                    [found[model, coarsest, sq, one.seed] for one in rows]
+                    if cells > coarsest
+                    else []
+                )
+                shown = " | ".join(
+                    _shown(rows, same, name, scale, digits) for _, name, scale, digits in COLUMNS
+                )
                 bad = f"{sum(one.bad for one in rows)} of {sum(one.steps + cells for one in rows)}"
                 yield f"| {sq:g} | {model} | {cells} | {len(rows)} | {shown} | {'-' if model == SNAPSHOT else bad} |"
 
 
 def _shown(rows: list[Outcome], same: list[Outcome], name: str, scale: float, digits: int) -> str:
-    values, coarse = (np.array([getattr(one, name) for one in some]) * scale for some in (rows, same))
+    values, coarse = (
+        np.array([getattr(one, name) for one in some]) * scale for some in (rows, same)
+    )
     values, coarse = values[np.isfinite(values)], coarse[np.isfinite(coarse)]
     if values.size == 0:
         return "-"
@@ -254,7 +286,9 @@ def _shown(rows: list[Outcome], same: list[Outcome], name: str, scale: float, di
 
 def main() -> None:
     """Compute a part of the table, and print what there is of it."""
-    arguments = argparse.ArgumentParser(prog="python -m benchmarks.motion_table", description=__doc__)
+    arguments = argparse.ArgumentParser(
+        prog="python -m benchmarks.motion_table", description=__doc__
+    )
     arguments.add_argument("--cells", type=int, default=64)
     arguments.add_argument("--seeds", type=int, nargs="*", default=SEEDS)
     arguments.add_argument("--sq", type=float, nargs="*", default=SQ_UM)

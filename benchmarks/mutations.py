@@ -13,7 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-SMOOTH, MIXED = "tests/validation/test_smooth_line_contact.py", "tests/validation/test_mixed_contact.py"
+SMOOTH, MIXED = (
+    "tests/validation/test_smooth_line_contact.py",
+    "tests/validation/test_mixed_contact.py",
+)
 HERTZ, KERNELS = "tests/validation/test_hertz.py", "tests/unit/test_kernels.py"
 DRY = "tests/validation/test_dry_contact.py"
 
@@ -39,7 +42,11 @@ MUTATIONS = (
         SMOOTH,
     ),
     Mutation(
-        "density: held at its ambient value", "ehl/problem.py", "content = density * height", "content = height", SMOOTH
+        "density: held at its ambient value",
+        "ehl/problem.py",
+        "content = density * height",
+        "content = height",
+        SMOOTH,
     ),
     Mutation(
         "viscosity: 2 % too steep",
@@ -89,17 +96,39 @@ MUTATIONS = (
 def caught(mutation: Mutation) -> str | None:
     """Name of the first test that fails on the broken sources; None when all of them pass."""
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(ROOT / "src", folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / "src", folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__")
+        )
         path = Path(folder) / "asperity" / mutation.file
         text = path.read_text("utf-8")
         if text.count(mutation.true) != 1:
-            raise RuntimeError(f"{mutation.file} holds {mutation.true!r} {text.count(mutation.true)} times, not once")
+            raise RuntimeError(
+                f"{mutation.file} holds {mutation.true!r} {text.count(mutation.true)} times, not once"
+            )
         path.write_text(text.replace(mutation.true, mutation.broken), "utf-8")
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", mutation.tests]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            mutation.tests,
+        ]
         ran = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": folder}, check=False
+            command,
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONPATH": folder},
+            check=False,
         )
-        failed = [line.split("::")[1].split(" ")[0] for line in ran.stdout.splitlines() if line.startswith("FAILED")]
+        failed = [
+            line.split("::")[1].split(" ")[0]
+            for line in ran.stdout.splitlines()
+            if line.startswith("FAILED")
+        ]
         return failed[0] if failed else None
 
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field
 from asperity.case import load_case
+from asperity.core.arrays import Field
 from asperity.inference import (
     Emulator,
     Forward,
@@ -81,25 +81,41 @@ def judged(setting: Setting, emulator: Emulator, number: int) -> dict[str, Any]:
         emulator,
         [
             Observation(
-                load_n=FIRST[0], entrainment_m_s=FIRST[1], crf_hz=crf, crf_std_hz=usual[0] * crf,
-                damping_ratio=damping, damping_std=usual[1] * damping,
+                load_n=FIRST[0],
+                entrainment_m_s=FIRST[1],
+                crf_hz=crf,
+                crf_std_hz=usual[0] * crf,
+                damping_ratio=damping,
+                damping_std=usual[1] * damping,
             )
         ],
         seed=number,
-    )  # fmt: skip
-    loads, speeds = (next(e for e in setting.operating if e.key.endswith(key)) for key in ("load", "speed"))
+    )
+    loads, speeds = (
+        next(e for e in setting.operating if e.key.endswith(key)) for key in ("load", "speed")
+    )
     places = [(found.next_point.load_n, found.next_point.entrainment_m_s)]
     places += [(loads.value(rng.random()), speeds.value(rng.random())) for _ in range(RANDOM)]
     points = tuple(Point(*place) for place in places)
-    shown, every = would_show(found.forward, found.draws, points), Forward(setting, emulator, (Point(*FIRST), *points))
+    shown, every = (
+        would_show(found.forward, found.draws, points),
+        Forward(setting, emulator, (Point(*FIRST), *points)),
+    )
     bits = np.array([taught(shown, _heard(every, z, own, rng)[:, 1:]) for _ in range(TIMES)])
     shows = every.states(z, ["clr"])["clr"][0, 1:] > LEAST_SHARE
     once, mean = bits[0], bits.mean(axis=0)
     return {
-        "machine": number, "advised_shows": int(shows[0]), "once": once[0], "once_random": once[1:].mean(),
-        "mean": mean[0], "mean_random": mean[1:].mean(), "best_random": mean[1:].max(),
-        "expected": found.next_point.information_bits, "load_n": places[0][0], "entrainment_m_s": places[0][1],
-    }  # fmt: skip
+        "machine": number,
+        "advised_shows": int(shows[0]),
+        "once": once[0],
+        "once_random": once[1:].mean(),
+        "mean": mean[0],
+        "mean_random": mean[1:].mean(),
+        "best_random": mean[1:].max(),
+        "expected": found.next_point.information_bits,
+        "load_n": places[0][0],
+        "entrainment_m_s": places[0][1],
+    }
 
 
 def _heard(forward: Forward, z: Field, own: Field, rng: np.random.Generator) -> Field:
@@ -116,10 +132,12 @@ def _heard(forward: Forward, z: Field, own: Field, rng: np.random.Generator) -> 
 
 def taught(shown: WouldShow, heard: Field) -> Field:
     """Bits by which the entropy of what is possible falls at each point: by the weights that what is heard gives."""
-    logs = np.asarray(sum(
-        shown.channels[key].log_density(value, USUAL[key])
-        for key, value in zip(("crf", "damping"), heard, strict=True)
-    ))  # fmt: skip
+    logs = np.asarray(
+        sum(
+            shown.channels[key].log_density(value, USUAL[key])
+            for key, value in zip(("crf", "damping"), heard, strict=True)
+        )
+    )
     weights = np.exp(logs - logs.max(axis=0))
     weights /= weights.sum(axis=0)
     return np.asarray(np.sum(weights * np.log2(np.maximum(weights * len(weights), 1e-300)), axis=0))

@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from asperity.case import load_case
-from asperity.conditions import ContactConditions
-from asperity.ehl import contact_state, solve_contact
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.grid import Grid
+from asperity.ehl import solve_contact
 from asperity.lubricant import Lubricant
 from asperity.results import stribeck_curve
+from asperity.solution import contact_state
 from asperity.surface import Surface, gaussian_surface
 from benchmarks.roughness_levels import paper_case
 
@@ -80,7 +81,9 @@ def limits(*, fast: bool) -> Iterator[str]:
     heads = "contact | cells | speed [m/s] | solved | CLR, least | largest | within 0.02 of 1 | median [s] | longest"
     yield f"| {heads} |"
     yield "|---|---|---|---|---|---|---|---|---|"
-    solve_contact(*posed("line", SQ_UM[0], CAPS_GPA[0], SPEEDS[0], 64), strict=False)  # loads the compiled kernels
+    solve_contact(
+        *posed("line", SQ_UM[0], CAPS_GPA[0], SPEEDS[0], 64), strict=False
+    )  # loads the compiled kernels
     for body in ("line", "ball"):
         for cells in CELLS[:1] if fast else CELLS:
             for speed in SPEEDS:

@@ -44,7 +44,10 @@ TURN = """([key, text]) => new Promise(done => {
 def _server(folder: Path) -> Iterator[tuple[str, int]]:
     """The address of a page's server and the number of its process."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "asperity", "page", "--port", "0"], stdout=subprocess.PIPE, text=True, cwd=folder
+        [sys.executable, "-m", "asperity", "page", "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=folder,
     )
     try:
         assert process.stdout is not None
@@ -174,10 +177,15 @@ def lines(*, fast: bool) -> Iterator[str]:
                 _solved(page)
                 before = _spent(process)
                 first, whole = _steps(page, steps, cells)
-                parts[cells] = {name: (spent - before[name]) / steps for name, spent in _spent(process).items()}
+                parts[cells] = {
+                    name: (spent - before[name]) / steps for name, spent in _spent(process).items()
+                }
                 yield _row(f"a knob to new maps, {cells} x {cells}, coarse", first)
                 yield _row(f"a knob to the full answer, {cells} x {cells}", whole)
-            yield _row(f"a knob to the full answer, 128 x 128, {USERS} users at once", _crowd(browser, url, steps // 4))
+            yield _row(
+                f"a knob to the full answer, 128 x 128, {USERS} users at once",
+                _crowd(browser, url, steps // 4),
+            )
             size = RECORDING // (10 if fast else 1)
             name = f"a recording of {size * 8 / 1e6:.0f} MB dropped, to its verdict"
             yield _row(name, [_drop(browser, url, Path(folder), size)])

@@ -11,7 +11,9 @@ from functools import cache
 from pathlib import Path
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
-PROCESSOR = 0  # the one that all run on: further surfaces are then solved in the command's own process
+PROCESSOR = (
+    0  # the one that all run on: further surfaces are then solved in the command's own process
+)
 INSIDE = """
 import io, json, sys
 from contextlib import redirect_stdout
@@ -70,7 +72,9 @@ def _run(*arguments: str) -> tuple[float, str]:
         preexec_fn=_on_one_processor,
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return sum(getattr(after, kind) - getattr(before, kind) for kind in ("ru_utime", "ru_stime")), done.stdout
+    return sum(
+        getattr(after, kind) - getattr(before, kind) for kind in ("ru_utime", "ru_stime")
+    ), done.stdout
 
 
 def seconds(*arguments: str, tries: int) -> float:
@@ -90,7 +94,10 @@ def rows(*, fast: bool) -> Iterator[tuple[str, float]]:
         yield "asperity check of a file that is none", seconds("check", str(CASE), tries=tries)
         yield "asperity solve examples/paper.toml", seconds("solve", str(CASE), tries=tries)
         inside = [json.loads(_run("-c", INSIDE, str(CASE))[1]) for _ in range(tries)]
-        for name, title in (("first", "in a process that looks inside"), ("again", "once more in that process")):
+        for name, title in (
+            ("first", "in a process that looks inside"),
+            ("again", "once more in that process"),
+        ):
             parts = min((one[name] for one in inside), key=lambda one: one["whole"])
             whole = parts.pop("whole")
             yield title, whole

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.monitoring import search_target, track_recordings
+from asperity.monitoring.reading import FINEST_HZ, read_spectrum
 from asperity.paper import simulate_rig, write_rig
 from asperity.recording import ReadOptions, check_recording, open_channels, read_recording
-from asperity.tracking import search_target, track_recordings
-from asperity.tracking.reading import FINEST_HZ, read_spectrum
-from asperity.wear import contact_resonance, remove_lines
+from asperity.resonance import contact_resonance, remove_lines
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 MEASURED = Path(__file__).parents[2] / "shared" / "data" / "vibration"
@@ -36,7 +36,12 @@ def lines(*, fast: bool) -> Iterator[str]:
         where = Path(folder, "rig")
         write_rig(simulate_rig(duration_s=duration, seed=7), where)
         table = ["--table", str(where / "table.csv"), "--case", str(where / "rig.toml")]
-        page = ["--report", str(where.parent / "report.html"), "--out", str(where.parent / "track.nc")]
+        page = [
+            "--report",
+            str(where.parent / "report.html"),
+            "--out",
+            str(where.parent / "track.nc"),
+        ]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds, peak, said = measured([*ASPERITY, "track", str(where), *table, *page, "--quiet"])
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -85,7 +90,9 @@ def _megabytes(pid: int) -> float:
         rollup = Path(f"/proc/{pid}/smaps_rollup").read_text()
     except OSError:
         return 0.0
-    return sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:")) / 1024
+    return (
+        sum(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:")) / 1024
+    )
 
 
 def one_file(path: Path) -> str:
@@ -121,7 +128,16 @@ def large_file(folder: Path) -> str:
             file.write(text)
     for name in ("large.npy", "large.csv"):
         size = (folder / name).stat().st_size / 1e9
-        command = [*ASPERITY, "check", str(folder / name), "--rate", "20000", "--unit", "m/s^2", "--quiet"]
+        command = [
+            *ASPERITY,
+            "check",
+            str(folder / name),
+            "--rate",
+            "20000",
+            "--unit",
+            "m/s^2",
+            "--quiet",
+        ]
         seconds, peak, _ = measured(command)
         told.append(f"{name.split('.')[1]} of {size:.1f} GB in {seconds:.0f} s and {peak:.0f} MB")
         (folder / name).unlink()
@@ -153,7 +169,9 @@ def damaged_files(count: int) -> Iterator[str]:
                     check_recording(one)
                 outcomes["read"] += 1
             except BadInput as refusal:
-                outcomes["refused" if "\n" not in str(refusal) else "TRACEBACK IN THE SENTENCE"] += 1
+                outcomes[
+                    "refused" if "\n" not in str(refusal) else "TRACEBACK IN THE SENTENCE"
+                ] += 1
             except Exception as error:  # noqa: BLE001 - what must not happen is counted
                 outcomes[f"TRACEBACK {type(error).__name__}"] += 1
             slowest = max(slowest, (time.perf_counter() - began, name))
@@ -175,7 +193,9 @@ def false_finds() -> Iterator[str]:
     running = []
     for path in [*sorted((MEASURED / "mfpt").iterdir()), *sorted((MEASURED / "ims").iterdir())]:
         given = {"rate_hz": 20e3} if path.parent.name == "ims" else {"unit": "g"}
-        running += [(path, given | {"channel": one.channel.name}) for one in open_channels(path, **given)]
+        running += [
+            (path, given | {"channel": one.channel.name}) for one in open_channels(path, **given)
+        ]
     for name, method in alone.items():
         tracks = [track_recordings([path], method=method, **given) for path, given in running]
         usable = [track for track in tracks if track.recordings[0].reading.usable]

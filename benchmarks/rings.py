@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.arrays import Field
 from asperity.case import load_case
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.inference import Observation, Unknown, build_emulator, infer_observations, setting_of
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
-from asperity.quantities import quantity
 from benchmarks.inference import CASE, KEPT
 
 CRF_STD_HZ = 15.0  # the width that the paper's figure gives a point
@@ -40,16 +40,27 @@ def lines(*, fast: bool, kept: Path = KEPT) -> Iterator[str]:  # noqa: ARG001 - 
         known = Unknown("sq_m", setting.contact[0].range, sq, std)
         ring = replace(setting, contact=(known, *setting.contact[1:]))
         printed = {0: CRF_ENDS_HZ[0], len(SAMPLES_SQ_UM) - 1: CRF_ENDS_HZ[1]}.get(number)
-        heard = [] if printed is None else [
-            Observation(load_n=LOAD_N, entrainment_m_s=SPEED_M_S, crf_hz=printed, crf_std_hz=CRF_STD_HZ)
-        ]  # fmt: skip
+        heard = (
+            []
+            if printed is None
+            else [
+                Observation(
+                    load_n=LOAD_N, entrainment_m_s=SPEED_M_S, crf_hz=printed, crf_std_hz=CRF_STD_HZ
+                )
+            ]
+        )
         found = infer_observations(ring, emulator, heard)
         before = _interval(found.values(found.prior)["clr"])
         cells = [f"{sq:.2f} ± {std:.2f}", clr.interval(*before), "", "", "", "", ""]
         if printed is not None:
             told, mass = found.posterior()["clr"], found.posterior()["mass_kg"]
-            cells[2:] = [f"{printed:.0f}", clr.interval(told.low, told.high), f"{told.information_bits:.1f}",
-                         kg.interval(mass.low, mass.high), f"{found.law_probability('own'):.2f}"]  # fmt: skip
+            cells[2:] = [
+                f"{printed:.0f}",
+                clr.interval(told.low, told.high),
+                f"{told.information_bits:.1f}",
+                kg.interval(mass.low, mass.high),
+                f"{found.law_probability('own'):.2f}",
+            ]
         yield f"| {' | '.join(cells)} |"
     yield "Ten of the twelve CRF are drawn and not printed; of those rings Sq alone says something."
 

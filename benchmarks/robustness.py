@@ -12,17 +12,20 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import ContactSolution, Options, Scales, contact_state, solve_contact
-from asperity.ehl.posing import contact_problem
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.ehl import ContactSolution, Options, Scales, solve_contact
+from asperity.ehl.problem_setup import contact_problem
 from asperity.kernels.reynolds import CAPPED
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
+from asperity.solution import contact_state
 from asperity.surface import Surface, gaussian_surface, self_affine_surface
 
 CAPS_GPA = (0.65, 1.0, 2.0, None)
 INLETS = (-4.5, -1.9)
-OIL = Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian())
+OIL = Lubricant(
+    viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()
+)
 STEEL = ElasticPair((200e9, 200e9), (0.3, 0.3))
 
 
@@ -82,7 +85,9 @@ def contacts(count: int = 600) -> list[Contact]:
     ]
 
 
-def prepared(contact: Contact, cells: int, *, shown: int | None = None) -> tuple[ContactConditions, Surface]:
+def prepared(
+    contact: Contact, cells: int, *, shown: int | None = None
+) -> tuple[ContactConditions, Surface]:
     """Conditions and roughness; a length that the domain cannot hold is cut to 0.45 of its shorter side.
 
     The roughness has no waves that a grid of `shown` cells cannot show, so that it is the same one on finer grids.
@@ -115,14 +120,22 @@ def overlap(solution: ContactSolution) -> float:
     decides are flattened plastically and do not count.
     """
     scales = Scales.of(solution.conditions, solution.lubricant)
-    problem = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
-    balance = problem.evaluate(solution.pressure / scales.pressure, solution.rigid_approach / scales.gap)
+    problem = contact_problem(
+        solution.conditions, solution.lubricant, solution.surface, solution.options
+    )
+    balance = problem.evaluate(
+        solution.pressure / scales.pressure, solution.rigid_approach / scales.gap
+    )
     elastic = balance.rows.state != CAPPED
     return float(np.max(problem.contact_gap - balance.gap[elastic], initial=0.0)) * scales.gap
 
 
 def outcomes(
-    *, count: int = 600, cells: int = 128, checked: int = 30, told: Callable[[Outcome], None] = lambda _: None
+    *,
+    count: int = 600,
+    cells: int = 128,
+    checked: int = 30,
+    told: Callable[[Outcome], None] = lambda _: None,
 ) -> Iterator[Outcome]:
     """Solve every contact, and every (count/checked)-th again 100 times tighter."""
     for contact in contacts(count):
@@ -131,8 +144,14 @@ def outcomes(
         state = contact_state(solution)
         error = None
         if contact.number % (count // checked) == 0 and solution.convergence.converged:
-            tight = solve_contact(conditions, OIL, surface, options=Options(tolerance=1e-6), strict=False)
-            error = abs(contact_state(tight).clr - state.clr) if tight.convergence.converged else float("nan")
+            tight = solve_contact(
+                conditions, OIL, surface, options=Options(tolerance=1e-6), strict=False
+            )
+            error = (
+                abs(contact_state(tight).clr - state.clr)
+                if tight.convergence.converged
+                else float("nan")
+            )
         outcome = Outcome(
             contact,
             str(solution.convergence.status),

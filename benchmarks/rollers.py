@@ -7,16 +7,19 @@ Steel on steel, R 3.629 mm, 10 mm long, 2000 N: the most loaded roller of an NU 
 import time
 from collections.abc import Iterator
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import along_roller, contact_state, solve_contact
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.contact.rollers import RollerShape
+from asperity.ehl import solve_contact
 from asperity.lubricant import DowsonHigginson, Lubricant, Newtonian, Roelands
-from asperity.rollers import RollerShape
+from asperity.solution import along_roller, contact_state
 from asperity.surface import flat_surface
 
 STEEL = ElasticPair((206e9, 206e9), (0.3, 0.3))
 RADIUS, LENGTH, LOAD = 3.629e-3, 10e-3, 2000.0
-OIL = Lubricant(viscosity=Roelands(0.04, 20e-9), density=DowsonHigginson(870.0), rheology=Newtonian())
+OIL = Lubricant(
+    viscosity=Roelands(0.04, 20e-9), density=DowsonHigginson(870.0), rheology=Newtonian()
+)
 DROPS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # design load over load
 TILTS = (0.0, 0.25e-3, 0.5e-3, 1e-3)
 TIMED = (128, 256), (256, 512)

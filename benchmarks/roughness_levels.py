@@ -14,8 +14,9 @@ from time import process_time
 import numpy as np
 
 from asperity.case import Case, load_case
-from asperity.ehl import ContactSolution, Options, contact_state, solve_contact
+from asperity.ehl import ContactSolution, Options, solve_contact
 from asperity.ehl.deflection import deflection
+from asperity.solution import contact_state
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 SQ_UM = (0.5, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
@@ -52,11 +53,17 @@ def solve(sq_um: float, seed: int, tolerance: float, cells: int) -> ContactSolut
     case = paper_case(sq_um, seed, cells)
     deflection.cache_clear()
     return solve_contact(
-        case.conditions, case.lubricant, case.surface(), options=Options(tolerance=tolerance), strict=False
+        case.conditions,
+        case.lubricant,
+        case.surface(),
+        options=Options(tolerance=tolerance),
+        strict=False,
     )
 
 
-def outcomes(*, tight: bool, cells: int = 256, told: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
+def outcomes(
+    *, tight: bool, cells: int = 256, told: Callable[[Outcome], None] = lambda _: None
+) -> list[Outcome]:
     """All levels and surfaces."""
     solve(SQ_UM[0], 0, 1e-2, 64)  # loads the compiled kernels
     results = []
@@ -114,7 +121,9 @@ def table(results: list[Outcome]) -> list[str]:
             return f"{statistics.mean(values):.1f} ± {statistics.stdev(values):.1f}"
 
         worst = max((one.clr_error for one in level if one.clr_error is not None), default=None)
-        tight = "" if worst is None else f" ({sum(bool(one.tight_converged) for one in level)} tight)"
+        tight = (
+            "" if worst is None else f" ({sum(bool(one.tight_converged) for one in level)} tight)"
+        )
         rows.append(
             f"| {sq_um} | {spread('car')} | {spread('car_domain')} | {spread('clr')} | {spread('capped_oil')} | "
             f"{spread('imbalance')} | {sum(one.converged for one in level)} of {len(level)}{tight} | "
@@ -128,7 +137,10 @@ def lines(*, fast: bool) -> Iterator[str]:
     """The table as Markdown, and what a solve takes in transforms."""
 
     def told(one: Outcome) -> None:
-        print(f"  Sq {one.sq_um} um, seed {one.seed}: {one.seconds:.2f} s, CLR {one.clr:.4f}", file=sys.stderr)
+        print(
+            f"  Sq {one.sq_um} um, seed {one.seed}: {one.seconds:.2f} s, CLR {one.clr:.4f}",
+            file=sys.stderr,
+        )
 
     yield "## Roughness levels of the paper's contact, 256 x 256\n"
     before = fft_pair_seconds()

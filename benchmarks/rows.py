@@ -21,7 +21,9 @@ def code() -> str:
 
 
 def _git(*asked: str) -> str:
-    return subprocess.run(["git", *asked], cwd=HERE.parent, capture_output=True, text=True, check=True).stdout.strip()
+    return subprocess.run(
+        ["git", *asked], cwd=HERE.parent, capture_output=True, text=True, check=True
+    ).stdout.strip()
 
 
 class Rows:
@@ -46,7 +48,9 @@ class Rows:
             if file.tell() == 0:
                 writer.writeheader()
             for row in rows:
-                writer.writerow({"code": self.code, **{key: _short(value) for key, value in row.items()}})
+                writer.writerow(
+                    {"code": self.code, **{key: _short(value) for key, value in row.items()}}
+                )
         self.done |= {tuple(str(row[key]) for key in self.keys) for row in rows}
 
     def codes(self) -> str:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.signals import Spectrum
-from asperity.wear import DISAGREE, line_shape, resonances_of_sensors
+from asperity.core.arrays import Field
+from asperity.core.signals import Spectrum
+from asperity.resonance import DISAGREE, line_shape, resonances_of_sensors
 
 SERIES = 40
 BAND = (1800.0, 4000.0)
@@ -55,10 +55,14 @@ def row(choices: dict[str, Any], series: int) -> str:
     for seed in range(series):
         told = resonances_of_sensors(two_sensors(seed, **choices), band_hz=BAND)
         apart += sum(one.reason.startswith(DISAGREE) for one in told.resonances)
-        by_best += max(sum(one is not None and one.found for one in every) for every in told.alone.values())
+        by_best += max(
+            sum(one is not None and one.found for one in every) for every in told.alone.values()
+        )
         for number, (one, true) in enumerate(zip(told.resonances, TRUTH, strict=True)):
             claimed += one.found
-            far = one.found and (choices.get("heights") == (0.0, 0.0) or abs(one.crf_hz - true) > FAR)
+            far = one.found and (
+                choices.get("heights") == (0.0, 0.0) or abs(one.crf_hz - true) > FAR
+            )
             wrong += far
             heard = [every[number] for every in told.alone.values()]
             best = [other for other in heard if other is not None and other.found]
@@ -74,7 +78,9 @@ def row(choices: dict[str, Any], series: int) -> str:
     both = [np.array(part).T for part in (together, alone) if part]
     errors = [f"{np.sqrt(np.mean(off**2)):.2f}" for off, _ in both]
     held = [f"{100.0 * np.mean(np.abs(off) < NINETY * std):.0f} %" for off, std in both]
-    return f"{' | '.join(shares)} | {' | '.join([*errors, '-'][:2])} | {' | '.join([*held, '-'][:2])}"
+    return (
+        f"{' | '.join(shares)} | {' | '.join([*errors, '-'][:2])} | {' | '.join([*held, '-'][:2])}"
+    )
 
 
 def two_sensors(
@@ -93,7 +99,9 @@ def two_sensors(
     """
     rng = np.random.default_rng([3, seed])
     rests, ways = [machine(rng), machine(rng)], [passed_on(rng, size), passed_on(rng, size)]
-    moved = rng.uniform(1900.0, 2400.0) + rng.uniform(100.0, 400.0) * np.linspace(0.0, 1.0, TRUTH.size)
+    moved = rng.uniform(1900.0, 2400.0) + rng.uniform(100.0, 400.0) * np.linspace(
+        0.0, 1.0, TRUTH.size
+    )
     found: dict[str, list[Spectrum]] = {"a": [], "b": []}
     for number, f0 in enumerate(TRUTH):
         line, both = _waves(rng, averages), _waves(rng, averages)
@@ -124,7 +132,9 @@ def passed_on(rng: np.random.Generator, size: float) -> Field:
     for _ in range(2):
         f0, damping = rng.uniform(*BAND), rng.uniform(0.008, 0.03)
         height = size * rng.uniform(0.3, 1.0) * rng.choice([-1.0, 1.0])
-        factor += height * 2j * damping / (1.0 - (FREQUENCY / f0) ** 2 + 2j * damping * FREQUENCY / f0)
+        factor += (
+            height * 2j * damping / (1.0 - (FREQUENCY / f0) ** 2 + 2j * damping * FREQUENCY / f0)
+        )
     return np.asarray(np.abs(factor) ** 2)
 
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from asperity.wear import FALSE_ALARMS
-from asperity.wear.alarm import CONTACT_SHARE
-from asperity.wear.sequential import LONGEST_CYCLE, SHORTEST_CYCLE
+from asperity.trend import FALSE_ALARMS
+from asperity.trend.alarm import CONTACT_SHARE
+from asperity.trend.sequential import LONGEST_CYCLE, SHORTEST_CYCLE
 from benchmarks.alarms import AFTER, RECORDINGS, RISE_HZ
 
 BEGINS = range(12, 25)  # of the knees of `alarms`
@@ -88,7 +88,9 @@ def power(distances: np.ndarray, behind: np.ndarray, chance: float | None) -> np
 
     `chance` of ever speaking without a cause; None: at most the alarm's rate for CRF in each recording since the knee.
     """
-    wrong = CONTACT_SHARE * FALSE_ALARMS * behind if chance is None else np.full(behind.shape, chance)
+    wrong = (
+        CONTACT_SHARE * FALSE_ALARMS * behind if chance is None else np.full(behind.shape, chance)
+    )
     return np.asarray(norm.cdf(distances - norm.isf(wrong)))
 
 
@@ -127,7 +129,9 @@ def power_unknown(near: Nearest, memory: float, chance: float) -> float:
     def ratios(rows: np.ndarray) -> np.ndarray:
         """Of series about the nearest course, made independent by its memory."""
         knees = np.linalg.solve(across.T, (rows - near.left).T)
-        return np.asarray(0.5 * (np.sum((rows / near.size) ** 2, axis=1) - np.sum(knees**2, axis=0)))
+        return np.asarray(
+            0.5 * (np.sum((rows / near.size) ** 2, axis=1) - np.sum(knees**2, axis=0))
+        )
 
     limit = np.quantile(ratios(near.size * fresh), 1.0 - chance)
     return float(np.mean(ratios(near.left + fresh @ across) > limit))
@@ -138,8 +142,13 @@ def row(scatter_hz: float, memory: float, others: Courses) -> str:
     left = np.array([RECORDINGS - 1 - begins for begins in BEGINS])
     known = (scatter_hz, memory, others)
     after = np.array([[distance(begins, many, *known) for many in BEHIND] for begins in BEGINS])
-    ends = np.array([distance(begins, many, *known) for begins, many in zip(BEGINS, left, strict=True)])
-    cells = [_told(power(after, np.array(BEHIND), chance), power(ends, left, chance)) for chance in (None, EVER)]
+    ends = np.array(
+        [distance(begins, many, *known) for begins, many in zip(BEGINS, left, strict=True)]
+    )
+    cells = [
+        _told(power(after, np.array(BEHIND), chance), power(ends, left, chance))
+        for chance in (None, EVER)
+    ]
     rate = CONTACT_SHARE * FALSE_ALARMS
 
     def unknown(begins: int, many: int) -> float:

@@ -12,11 +12,12 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from asperity.conditions import ContactConditions
-from asperity.ehl import ContactSolution, Options, contact_state, solve_contact
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.grid import Grid
+from asperity.ehl import ContactSolution, Options, solve_contact
 from asperity.ehl.deflection import deflection
-from asperity.grid import Grid
 from asperity.lubricant import Lubricant
+from asperity.solution import contact_state
 from asperity.surface import Surface, flat_surface
 from benchmarks.films import BARUS, REFERENCE, ball
 from benchmarks.roughness_levels import SEEDS, SQ_UM, paper_case
@@ -25,10 +26,14 @@ TRIES = 3
 TURNS = 5  # of two codes beside each other
 
 
-def cold(conditions: ContactConditions, oil: Lubricant | None, surface: Surface, tolerance: float) -> ContactSolution:
+def cold(
+    conditions: ContactConditions, oil: Lubricant | None, surface: Surface, tolerance: float
+) -> ContactSolution:
     """From the Hertz pressure, the elastic kernel built anew."""
     deflection.cache_clear()
-    return solve_contact(conditions, oil, surface, options=Options(tolerance=tolerance), strict=False)
+    return solve_contact(
+        conditions, oil, surface, options=Options(tolerance=tolerance), strict=False
+    )
 
 
 def best_of(work: Callable[[], object], tries: int = TRIES) -> float:
@@ -69,7 +74,12 @@ def _beside_papers_model() -> Iterator[str]:
             for model, times in spent.items():
                 deflection.cache_clear()
                 began = process_time()
-                solve_contact(case.conditions, case.lubricant, surface, options=replace(case.options, model=model))
+                solve_contact(
+                    case.conditions,
+                    case.lubricant,
+                    surface,
+                    options=replace(case.options, model=model),
+                )
                 times.append(process_time() - began)
     paper, mixed = (median(times) for times in spent.values())
     yield (
@@ -101,7 +111,8 @@ def _smooth() -> Iterator[str]:
         seconds = best_of(lambda c=conditions, g=grid: cold(c, BARUS, flat_surface(g), 1e-4))  # type: ignore[misc]
         middle = float(np.interp(0.0, grid.x, solution.gap[:, 128])) / unit
         off = [
-            100.0 * (film / wanted - 1.0) for film, wanted in ((middle, central), (solution.gap.min() / unit, least))
+            100.0 * (film / wanted - 1.0)
+            for film, wanted in ((middle, central), (solution.gap.min() / unit, least))
         ]
         yield (
             f"Smooth ball, M {load_number}, L {oil_number}, {name}, 257 x 257: {seconds:.2f} s; "
@@ -152,7 +163,11 @@ def _beside_tamaas(sq_um: float, seed: int, cells: int) -> str:
             work()
             spent[name].append(process_time() - began)
     least = {name: min(times[1:]) for name, times in spent.items()}
-    twin = f"{least['tamaas']:.3f} | {least['cold'] / least['tamaas']:.2f}" if "tamaas" in least else "not here | -"
+    twin = (
+        f"{least['tamaas']:.3f} | {least['cold'] / least['tamaas']:.2f}"
+        if "tamaas" in least
+        else "not here | -"
+    )
     return f"{least['cold']:.3f} | {least['kept']:.3f} | {twin}"
 
 
@@ -182,12 +197,16 @@ def _contact_mechanics_seconds(surface: Surface, conditions: ContactConditions) 
     grid = surface.grid
     form = -(grid.x[:, None] ** 2) / (2.0 * conditions.radius_along_rolling) * np.ones(grid.cells)
     topography = Topography(surface.heights + form, grid.extent, periodic=True)
-    substrate = PeriodicFFTElasticHalfSpace(grid.cells, conditions.pair.reduced_modulus, grid.extent)
+    substrate = PeriodicFFTElasticHalfSpace(
+        grid.cells, conditions.pair.reduced_modulus, grid.extent
+    )
     load = conditions.line_load * grid.extent[1]
 
     def solve() -> None:
         system = make_system(substrate=substrate, surface=topography)
-        result = system.minimize_proxy(external_force=load, pentol=1e-8 * load / np.prod(grid.cells))
+        result = system.minimize_proxy(
+            external_force=load, pentol=1e-8 * load / np.prod(grid.cells)
+        )
         if not result.success:
             raise RuntimeError("ContactMechanics did not converge")
 
@@ -220,7 +239,9 @@ def _error_bars(*, fast: bool) -> Iterator[str]:
     for sq in SQ_UM[:: 4 if fast else 1]:
         for seed in (0, 1) if fast else SEEDS:
             coarse, fine = (paper_case(sq, seed, cells) for cells in (256, 512))
-            here, finer = (cold(one.conditions, one.lubricant, one.surface(), 1e-4) for one in (coarse, fine))
+            here, finer = (
+                cold(one.conditions, one.lubricant, one.surface(), 1e-4) for one in (coarse, fine)
+            )
             error, state, truth = here.convergence.error, contact_state(here), contact_state(finer)
             assert error is not None
             cases += 1
@@ -242,5 +263,11 @@ def lines(*, fast: bool) -> Iterator[str]:
     yield ""
     yield from _grids(fast=fast)
     yield ""
-    for part in (_beside_papers_model(), _smooth(), _dry(), _two_processors(), _error_bars(fast=fast)):
+    for part in (
+        _beside_papers_model(),
+        _smooth(),
+        _dry(),
+        _two_processors(),
+        _error_bars(fast=fast),
+    ):
         yield from part

@@ -7,12 +7,12 @@ from time import process_time
 import numpy as np
 
 from asperity.case import load_case
-from asperity.ehl import SubsurfaceStress, friction_and_heat, subsurface_stress
-from asperity.ehl.flash import moving_source
-from asperity.ehl.influence import clear_kernels
-from asperity.ehl.stress import stress_below
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
 from asperity.results import solve_case
+from asperity.solution import SubsurfaceStress, friction_and_heat, subsurface_stress
+from asperity.solution.flash import moving_source
+from asperity.solution.stress import stress_below
+from asperity.solution.stress_influence import clear_kernels
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.4)
@@ -33,14 +33,21 @@ def lines(*, fast: bool) -> Iterator[str]:
             yield f"| {name} | {friction:g} | {shown} |"
     yield "\nLargest shear stress without friction: " + ", ".join(
         f"{name} {peak.value:.4f} p_h at {peak.depth:.3f} a"
-        for name, peak in (("line", _line(0.0, 256).shear_peak), ("point", _point(0.0, 256).shear_peak))
+        for name, peak in (
+            ("line", _line(0.0, 256).shear_peak),
+            ("point", _point(0.0, 256).shear_peak),
+        )
     )
     yield "\nSeconds of one processor, with kernels made anew and with kernels kept:\n"
     yield "| case | cells | solve | friction and heat, anew | stress, anew | friction and heat, kept | stress, kept |"
     yield "|---|---|---|---|---|---|---|"
     for file, count in (("paper.toml", 256), ("ball-on-disc.toml", 256)):
-        case = load_case(EXAMPLES / file).with_overrides({"grid.cells": [count, count], "vibration": "none"})
-        solution = solve_case(case, strict=False).solution  # whatever has to be compiled is, after this
+        case = load_case(EXAMPLES / file).with_overrides(
+            {"grid.cells": [count, count], "vibration": "none"}
+        )
+        solution = solve_case(
+            case, strict=False
+        ).solution  # whatever has to be compiled is, after this
         friction_and_heat(solution)
         started = process_time()
         solution = solve_case(case, strict=False).solution
@@ -53,7 +60,11 @@ def lines(*, fast: bool) -> Iterator[str]:
             heated = process_time()
             subsurface_stress(solution, shear=rubbing.shear)
             times += [heated - started, process_time() - heated]
-        yield f"| {file} | {count} x {count} | " + " | ".join(f"{value:.2f}" for value in times) + " |"
+        yield (
+            f"| {file} | {count} x {count} | "
+            + " | ".join(f"{value:.2f}" for value in times)
+            + " |"
+        )
 
 
 def _depths(spacing: float) -> np.ndarray:

@@ -38,7 +38,9 @@ def papers_study(levels: str = "0.1 um") -> Iterator[str]:
             words = ["--out", folder, "--workers", str(workers), "--quiet", "--set", sweep]
             begun = time.perf_counter()
             subprocess.run(
-                [sys.executable, "-m", "asperity", "study", str(CASE), *words], check=True, stdout=subprocess.DEVNULL
+                [sys.executable, "-m", "asperity", "study", str(CASE), *words],
+                check=True,
+                stdout=subprocess.DEVNULL,
             )
             taken[workers] = time.perf_counter() - begun
         yield f"- {workers} worker{'s' if workers > 1 else ''}: {taken[workers]:.1f} s from the prompt"
@@ -63,7 +65,9 @@ def overhead(cases: int = 10_000) -> Iterator[str]:
     held: dict[int, float] = {}
     folder = Path(tempfile.mkdtemp())
     begun, own, theirs = time.perf_counter(), time.process_time(), _children_s()
-    result = run_study(plan, out=folder, workers=2, progress=lambda how: held.update({how.done: _resident_mib()}))
+    result = run_study(
+        plan, out=folder, workers=2, progress=lambda how: held.update({how.done: _resident_mib()})
+    )
     wall = time.perf_counter() - begun
     parent, workers = (time.process_time() - own) / cases, (_children_s() - theirs) / cases
     early, late = (min(held, key=lambda done: abs(done - share * cases)) for share in (0.1, 0.9))

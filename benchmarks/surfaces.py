@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from asperity.case import load_case
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
 from asperity.results import solve_case
 from asperity.surface import (
     Surface,
@@ -49,8 +49,12 @@ KINDS: dict[str, Maker] = {
     "non-gaussian, Ssk -2, Sku 9": lambda g, r: non_gaussian_surface(
         g, sq=1e-6, skewness=-2.0, kurtosis=9.0, correlation_length=ASKED, rng=r
     ),
-    "self-affine, H 0.8": lambda g, r: self_affine_surface(g, sq=1e-6, hurst=0.8, cutoffs=(8e-6, 200e-6), rng=r),
-    "run-in, plateau 0.4": lambda g, r: run_in_surface(g, sq=1e-6, correlation_length=ASKED, plateau_share=0.4, rng=r),
+    "self-affine, H 0.8": lambda g, r: self_affine_surface(
+        g, sq=1e-6, hurst=0.8, cutoffs=(8e-6, 200e-6), rng=r
+    ),
+    "run-in, plateau 0.4": lambda g, r: run_in_surface(
+        g, sq=1e-6, correlation_length=ASKED, plateau_share=0.4, rng=r
+    ),
     "ground, lay at 30°": lambda g, r: ground_surface(
         g, sq=1e-6, groove_width=12e-6, groove_length=150e-6, direction=np.pi / 6.0, rng=r
     ),
@@ -101,7 +105,9 @@ def _slope(hurst: float) -> float:
     grid = Grid((256, 256), (0.0, 0.0), (SIDE, SIDE), (True, True))
     spectra = [
         surface_spectrum(
-            self_affine_surface(grid, sq=1e-6, hurst=hurst, cutoffs=(8e-6, 200e-6), rng=np.random.default_rng(seed))
+            self_affine_surface(
+                grid, sq=1e-6, hurst=hurst, cutoffs=(8e-6, 200e-6), rng=np.random.default_rng(seed)
+            )
         )
         for seed in SEEDS
     ]
@@ -133,7 +139,22 @@ def _second_opinion() -> Iterator[str]:
         "smr1",
         "smr2",
     )
-    linear = ("ra", "rq", "rsk", "rku", "rp", "rv", "rz", "rt", "rdq", "rk", "rpk", "rvk", "rmr1", "rmr2")
+    linear = (
+        "ra",
+        "rq",
+        "rsk",
+        "rku",
+        "rp",
+        "rv",
+        "rz",
+        "rt",
+        "rdq",
+        "rk",
+        "rpk",
+        "rvk",
+        "rmr1",
+        "rmr2",
+    )
     scales = dict.fromkeys(("ssk", "sku", "sdq", "str_", "rsk", "rku", "rdq"), 1.0)
     scales |= dict.fromkeys(("sdr", "smr1", "smr2", "rmr1", "rmr2"), 1e-2)
 
@@ -171,7 +192,9 @@ def _lay() -> Iterator[str]:
                 surface = {"file": str(MEASURED / name), "turn": turn} | ({"sq": sq} if sq else {})
                 run = solve_case(case.with_overrides({"surface": surface}), strict=False)
                 state = run.state
-                percent = [100.0 * share for share in (state.car, state.clr, state.capped_oil_load_ratio)]
+                percent = [
+                    100.0 * share for share in (state.car, state.clr, state.capped_oil_load_ratio)
+                ]
                 yield (
                     f"| {name} | {1e6 * state.sq:.3f}{'' if sq else ' as measured'} | {lay} | {percent[0]:.2f} | "
                     f"{percent[1]:.2f} | {percent[2]:.1f} | {100 * state.mass_flux_imbalance:.0f} | "

@@ -10,7 +10,9 @@ from pathlib import Path
 FILE = Path("build/benchmarks.json")
 PACKAGE = Path(__file__).parents[1] / "src" / "asperity"
 
-Ended = tuple[float, str, list[str]]  # seconds, what kept the part from its end, what changed against the last
+Ended = tuple[
+    float, str, list[str]
+]  # seconds, what kept the part from its end, what changed against the last
 
 
 @dataclass
@@ -24,7 +26,9 @@ class Unfinished:
     done: dict[str, Ended] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, parts: Sequence[str], *, whole: bool, afresh: bool, file: Path | None) -> "Unfinished":
+    def of(
+        cls, parts: Sequence[str], *, whole: bool, afresh: bool, file: Path | None
+    ) -> "Unfinished":
         """The run that was cut off, of these parts in this size; or a new one."""
         new = cls(tuple(parts), whole, f"{datetime.now():%Y-%m-%d %H:%M}", file)
         if afresh or file is None or not file.is_file():
@@ -32,7 +36,13 @@ class Unfinished:
         last = json.loads(file.read_text("utf-8"))
         if (tuple(last["parts"]), last["whole"]) != (new.parts, whole):
             return new
-        return cls(new.parts, whole, last["began"], file, {part: tuple(how) for part, how in last["done"].items()})
+        return cls(
+            new.parts,
+            whole,
+            last["began"],
+            file,
+            {part: tuple(how) for part, how in last["done"].items()},
+        )
 
     @property
     def left(self) -> list[str]:

@@ -14,13 +14,20 @@ from scipy.integrate import solve_ivp
 from scipy.ndimage import uniform_filter1d
 
 from asperity.case import load_case
+from asperity.contact.grid import Grid
+from asperity.core.signals import Signal, power_spectrum
 from asperity.coupling import VibrationModel, oscillator
-from asperity.ehl import contact_state, solve_contact, tangent_stiffness
-from asperity.grid import Grid
+from asperity.ehl import solve_contact
 from asperity.paper import continuous_crfa, expected_crfa, reproduce_table1
-from asperity.signals import Signal, power_spectrum
+from asperity.solution import contact_state, tangent_stiffness
 from asperity.surface import gaussian_surface
-from asperity.vibration import ContactOscillator, FilteredNoise, SurfaceTrack, acceleration, mass_motion
+from asperity.vibration import (
+    ContactOscillator,
+    FilteredNoise,
+    SurfaceTrack,
+    acceleration,
+    mass_motion,
+)
 
 CASE = Path(__file__).parents[1] / "examples" / "paper.toml"
 SPRING = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.02, load=200.0)
@@ -61,7 +68,9 @@ def trend_lines() -> Iterator[str]:
     for rate in (10e3, 20e3, 50e3, 200e3, None):
         figures = []
         for choices in ({"filter": "bilinear"}, {}, {"patch": "point"}):
-            model = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02, **{"filter": "continuous", **choices})
+            model = VibrationModel.preset(
+                "paper", mass=0.1, damping_ratio=0.02, **{"filter": "continuous", **choices}
+            )
             crfa = [
                 continuous_crfa(model, 30.0, 2e-6, load)
                 if rate is None
@@ -88,7 +97,9 @@ def speed_lines() -> Iterator[str]:
     yield f"- exact response, a million samples: {exact:.3f} s"
     rk5 = median_seconds(lambda: acceleration(SPRING, million, method="rk5", substeps=8), 3)
     yield f"- Runge-Kutta with 8 sub-steps, a million samples: {rk5:.3f} s"
-    nonlinear = median_seconds(lambda: acceleration(SPRING, million, method="nonlinear", substeps=8), 3)
+    nonlinear = median_seconds(
+        lambda: acceleration(SPRING, million, method="nonlinear", substeps=8), 3
+    )
     yield f"- nonlinear, the same: {nonlinear:.3f} s"
 
     def noise_to_spectrum() -> object:
@@ -96,7 +107,9 @@ def speed_lines() -> Iterator[str]:
         return power_spectrum(acceleration(SPRING, profile), segment=20_000)
 
     grid = Grid((512, 128), (-4e-4, -1e-4), (4e-4, 1e-4))
-    surface = gaussian_surface(grid, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
+    surface = gaussian_surface(
+        grid, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
+    )
 
     def surface_to_spectrum() -> object:
         profile = SurfaceTrack.of(surface, 0.42).profile(6_000_000, 20e3, 1)
@@ -106,7 +119,9 @@ def speed_lines() -> Iterator[str]:
     yield f"- 300 s at 20 kHz, surface's own spectrum to spectrum: {median_seconds(surface_to_spectrum, 3):.2f} s"
     few = Signal(million.values[:1000], 20e3, "m")
     reference = acceleration(SPRING, few).values
-    error = np.max(np.abs(acceleration(SPRING, few, method="rk5").values - reference)) / np.max(np.abs(reference))
+    error = np.max(np.abs(acceleration(SPRING, few, method="rk5").values - reference)) / np.max(
+        np.abs(reference)
+    )
     seconds, off = by_solve_ivp(few, reference, 1e-10)
     yield (
         f"- solve_ivp (RK45, rtol 1e-10; off by {off:.0e} of the largest acceleration), a million samples: "
@@ -127,12 +142,21 @@ def by_solve_ivp(profile: Signal, reference: np.ndarray, rtol: float) -> tuple[f
 
     began = perf_counter()
     solved = solve_ivp(
-        change, (0.0, times[-1]), (0.0, slopes[0]), "RK45", times, rtol=rtol, atol=1e-16, max_step=1 / profile.rate_hz
+        change,
+        (0.0, times[-1]),
+        (0.0, slopes[0]),
+        "RK45",
+        times,
+        rtol=rtol,
+        atol=1e-16,
+        max_step=1 / profile.rate_hz,
     )
     seconds = perf_counter() - began
     both_sides = np.convolve(slopes, [0.5, 0.5])
     both_sides[[0, -1]] = slopes[[0, -1]]
-    found = (SPRING.stiffness * solved.y[0] + SPRING.damping * (both_sides - solved.y[1])) / SPRING.mass
+    found = (
+        SPRING.stiffness * solved.y[0] + SPRING.damping * (both_sides - solved.y[1])
+    ) / SPRING.mass
     return seconds, float(np.max(np.abs(found - reference)) / np.max(np.abs(reference)))
 
 
@@ -142,9 +166,13 @@ def nonlinear_lines() -> Iterator[str]:
     rate, samples = 50e3, 2_000_000
     kicks = np.cumsum(np.cumsum(np.random.default_rng(5).standard_normal(samples)))
     kicks -= np.linspace(kicks[0], kicks[-1], samples)
-    unit = np.std(acceleration(SPRING, Signal(kicks, rate, "m")).values[samples // 50 :]) * SPRING.mass
+    unit = (
+        np.std(acceleration(SPRING, Signal(kicks, rate, "m")).values[samples // 50 :]) * SPRING.mass
+    )
     for force in (0.1, 0.22, 0.45, 0.89):
-        moved = mass_motion(SPRING, Signal(kicks * force * 200.0 / unit, rate, "m"), method="nonlinear", substeps=4)
+        moved = mass_motion(
+            SPRING, Signal(kicks * force * 200.0 / unit, rate, "m"), method="nonlinear", substeps=4
+        )
         spectrum = power_spectrum(Signal(moved.acceleration, rate, "m/s^2"), segment=20_000)
         highest = spectrum.frequency_hz[np.argmax(uniform_filter1d(spectrum.density, 16))]
         shift = highest / SPRING.natural_frequency_hz - 1.0
@@ -159,7 +187,11 @@ def stiffness_lines() -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|---|---|---|"
     for sq_um in (0.0, *SQ_UM):
         columns = [stiffness_row(sq_um, seed) for seed in (SEEDS if sq_um else SEEDS[:1])]
-        yield f"| {sq_um:g} | " + " | ".join(mean_and_range(column) for column in zip(*columns, strict=True)) + " |"
+        yield (
+            f"| {sq_um:g} | "
+            + " | ".join(mean_and_range(column) for column in zip(*columns, strict=True))
+            + " |"
+        )
 
 
 def stiffness_row(sq_um: float, seed: int) -> list[tuple[float, ...]]:
@@ -173,7 +205,9 @@ def stiffness_row(sq_um: float, seed: int) -> list[tuple[float, ...]]:
     for law in ("hertz-point", "parallel-film", "hertz-line"):
         model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law=law)
         silent = law != "parallel-film" and state.clr == 0.0
-        crf.append(np.nan if silent else oscillator(state, case.conditions, model).natural_frequency_hz)
+        crf.append(
+            np.nan if silent else oscillator(state, case.conditions, model).natural_frequency_hz
+        )
     micro = 1e-6
     return [
         (100.0 * state.clr,),

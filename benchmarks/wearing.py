@@ -20,19 +20,25 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from asperity import load_case, run_wear
-from asperity.ageing import Ageing, Solved, WearHistory, WearProgress, load_wear, of_body
-from asperity.ageing.rows import load_share
 from asperity.case import Case
+from asperity.core.quantities import quantity
 from asperity.paper import CRF_ENDS_HZ
-from asperity.quantities import quantity
 from asperity.report.style import BLUE, DASHED, GREEN, ON_PAGE, VERMILION, write_figure
+from asperity.simulation import Ageing, Solved, WearHistory, WearProgress, load_wear, of_body
+from asperity.simulation.wear.rows import load_share
 from asperity.surface.read import surface_topography
-from asperity.wearing import positions, seen
+from asperity.wear import positions, seen
 from benchmarks.unfinished import stamp
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "build" / "wearing"
-WEARS = ("wearing", "ehl", "kernels", "surface", "lubricant")  # rooms that decide a history; of their own room these:
+WEARS = (
+    "wearing",
+    "ehl",
+    "kernels",
+    "surface",
+    "lubricant",
+)  # rooms that decide a history; of their own room these:
 DECIDE = ("jump", "run", "contact", "reach", "worn")
 IMAGES = ROOT / "docs" / "images"
 EXAMPLE = ROOT / "examples" / "wear.toml"
@@ -41,13 +47,20 @@ KILLS = 10
 COARSE = ("grid.cells=[32,32]", 'surface.correlation_length="30 um"', "wear.patches=4")
 KILLED = {  # what is killed: hours, and what its case differs in from the example
     "removal alone, 32 x 32 cells, 12 h": (12.0, COARSE),
-    "pits, marks, scuffing and flattening, 32 x 32 cells, 0.5 h": (0.5, (
-        *COARSE, "wear.flattening=true", 'wear.fatigue={ law = "dang-van", limit = "200 MPa" }',
-        'wear.ploughing={ law = "debris", concentration = "1e10 1/m^3" }',
-        'wear.scuffing={ law = "temperature", limit = "20 K" }',
-    )),
-}  # fmt: skip
-ENDS = 14  # positions at which the end of a history is looked at, the same for all that are compared
+    "pits, marks, scuffing and flattening, 32 x 32 cells, 0.5 h": (
+        0.5,
+        (
+            *COARSE,
+            "wear.flattening=true",
+            'wear.fatigue={ law = "dang-van", limit = "200 MPa" }',
+            'wear.ploughing={ law = "debris", concentration = "1e10 1/m^3" }',
+            'wear.scuffing={ law = "temperature", limit = "20 K" }',
+        ),
+    ),
+}
+ENDS = (
+    14  # positions at which the end of a history is looked at, the same for all that are compared
+)
 SHORT_S = 240.0  # of a short run
 ENOUGH = 0.85  # of the time that a part has, that is spent on histories
 MANY = 14  # positions whose mean stands for the mean
@@ -147,7 +160,9 @@ def solved_at(history: WearHistory, count: int, seed: int) -> list[Solved]:
     surfaces = history.after
     cells = (surfaces.first.grid.cells[0], surfaces.second.grid.cells[0])
     places = positions(cells, ageing.surfaces.rough, count, 0, seed)
-    return [one for place in places if isinstance(one := ageing.solver(seen(surfaces, place)), Solved)]
+    return [
+        one for place in places if isinstance(one := ageing.solver(seen(surfaces, place)), Solved)
+    ]
 
 
 def end_mean(history: WearHistory) -> str:
@@ -190,10 +205,22 @@ def kills() -> Iterator[str]:
         yield f"| {name} | {len(whole.table) - 1} | {times} | {outcome} |"
 
 
-def _killed(folder: Path, hours: float, overrides: Sequence[str]) -> tuple[int, WearHistory, WearHistory]:
+def _killed(
+    folder: Path, hours: float, overrides: Sequence[str]
+) -> tuple[int, WearHistory, WearHistory]:
     """How often a history was killed as it ran, one that was let alone, and that one at its end."""
     changes = [word for override in overrides for word in ("--set", override)]
-    command = [sys.executable, "-m", "asperity", "wear", str(EXAMPLE), "--hours", f"{hours:g}", *changes, "--quiet"]
+    command = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "wear",
+        str(EXAMPLE),
+        "--hours",
+        f"{hours:g}",
+        *changes,
+        "--quiet",
+    ]
     command += ["--workers", "1", "--out"]
     began, rng, times = time.perf_counter(), np.random.default_rng(11), 0
     subprocess.run([*command, str(folder / "whole")], check=True, stdout=subprocess.DEVNULL)
@@ -216,7 +243,9 @@ def jumps(shelf: Shelf) -> Iterator[str]:
     ways = [(64, 0.1, 7), (64, 0.05, 7), (64, 0.025, 7), (64, 0.05, 4), (64, 0.05, 14)]
     plans = [
         Plan(
-            f"jumps-{cells}-{step}-{count}", 2.0, {"grid.cells": [cells] * 2, "wear.step": step, "wear.patches": count}
+            f"jumps-{cells}-{step}-{count}",
+            2.0,
+            {"grid.cells": [cells] * 2, "wear.step": step, "wear.patches": count},
         )
         for cells, step, count in ways
     ]
@@ -266,8 +295,16 @@ def intervals() -> Iterator[str]:
     yield f"\nThe interval is {np.mean(widths):.3f} wide on average.\n"
 
 
-LASTING = {"0.5 um": 3e-15, "1 um": 6e-15, "2 um": 9e-15}  # k of the ring times hours [h/Pa], to the plateau
-CLOCKS = 1e-16, 3e-17, 3e-16  # k of the ring [1/Pa]; those but the first so far as tells that they are clocks
+LASTING = {
+    "0.5 um": 3e-15,
+    "1 um": 6e-15,
+    "2 um": 9e-15,
+}  # k of the ring times hours [h/Pa], to the plateau
+CLOCKS = (
+    1e-16,
+    3e-17,
+    3e-16,
+)  # k of the ring [1/Pa]; those but the first so far as tells that they are clocks
 PLATEAUS = tuple(
     (sq, k, (lasting if k == CLOCKS[0] else min(LASTING.values()) / 3.0) / k)
     for k in CLOCKS
@@ -278,9 +315,12 @@ TIMES_K = (0.0, 3e-16, 1e-15, 3e-15, 6e-15, 9e-15)  # at which a plateau's curve
 
 def plateau_plan(sq: str, k: float, hours: float) -> Plan:
     overrides: Overrides = {
-        "surface.sq": sq, "surface.correlation_length": "30 um", "wear.k": coefficients(k), "grid.cells": [32, 32],
+        "surface.sq": sq,
+        "surface.correlation_length": "30 um",
+        "wear.k": coefficients(k),
+        "grid.cells": [32, 32],
         "wear.patches": 4,
-    }  # fmt: skip
+    }
     return Plan(f"plateau-{sq.replace(' ', '')}-{k:g}", hours, overrides)
 
 
@@ -290,7 +330,10 @@ def plateau(shelf: Shelf) -> Iterator[str]:
     yield "\n## Removal alone: three roughnesses, three coefficients (32 x 32 cells, correlation length 30 um)\n"
     yield f"| sq | k of the ring [1/Pa] | hours | k times hours | {heads(*keys)} | jumps |"
     yield f"|---|---|---|---|{'---|' * len(keys)}---|"
-    done = {plan.name: history for plan, history, _ in shelf.all([plateau_plan(*one) for one in PLATEAUS])}
+    done = {
+        plan.name: history
+        for plan, history, _ in shelf.all([plateau_plan(*one) for one in PLATEAUS])
+    }
     for sq, k, hours in PLATEAUS:
         if (history := done.get(plateau_plan(sq, k, hours).name)) is None:
             continue
@@ -313,13 +356,17 @@ def measured(shelf: Shelf) -> Iterator[str]:
     yield "\n## A measured surface, 3 h at 128 x 128 cells\n"
     yield f"| {MEASURED.name} | {heads(*keys)} | Sq by SurfaceTopography [µm] | Ssk from its heights |"
     yield f"|---|{'---|' * len(keys)}---|---|"
-    for _, history, _ in shelf.all([Plan("measured", 3.0, {"surface": surface, "grid.cells": [128, 128]})]):
+    for _, history, _ in shelf.all(
+        [Plan("measured", 3.0, {"surface": surface, "grid.cells": [128, 128]})]
+    ):
         for name, when in ((-2, "new"), (-1, "after")):
             line = history.table.iloc[0 if when == "new" else -1]
             theirs = surface_topography().open_topography(str(history.files[name])).topography()
             heights = theirs.heights() - np.mean(theirs.heights())
             sq = float(theirs.rms_height_from_area())
-            numbers = " | ".join(f"{quantity(key).factor * line[of_body(key, 1)]:.6g}" for key in keys)
+            numbers = " | ".join(
+                f"{quantity(key).factor * line[of_body(key, 1)]:.6g}" for key in keys
+            )
             yield f"| {when} | {numbers} | {1e6 * sq:.6g} | {np.mean(heights**3) / sq**3:.6g} |"
         yield f"\nIn {len(history.table) - 1} jumps.\n"
 
@@ -338,8 +385,11 @@ def rings(shelf: Shelf) -> Iterator[str]:
 
 
 PAPERS: Overrides = {
-    "surface.sq": "0.54 um", "grid.cells": [64, 32], "grid.x": [-3.0, 1.6], "wear.patches": 5,
-}  # fmt: skip
+    "surface.sq": "0.54 um",
+    "grid.cells": [64, 32],
+    "grid.x": [-3.0, 1.6],
+    "wear.patches": 5,
+}
 
 
 def debris_rings(shelf: Shelf) -> Iterator[str]:
@@ -351,8 +401,10 @@ def debris_rings(shelf: Shelf) -> Iterator[str]:
     yield "|---|---|---|---|---|---|"
     for seed in (7, 8, 9):
         overrides = PAPERS | {
-            "surface.seed": seed, "wear.k": ["1e-18 1/Pa", "3e-17 1/Pa"], "wear.ploughing": marks,
-        }  # fmt: skip
+            "surface.seed": seed,
+            "wear.k": ["1e-18 1/Pa", "3e-17 1/Pa"],
+            "wear.ploughing": marks,
+        }
         for _, history, _ in shelf.all([Plan(f"debris-{seed}", 10.0, overrides)]):
             yield f"| {seed} | {row(history, *keys)} | {1e6 * history.table['sq_2_m'].min():.4g} |"
 
@@ -361,9 +413,11 @@ def falls_and_rises(shelf: Shelf) -> Iterator[str]:
     """Removal at once, and pits as soon as sums are full."""
     keys = ("sq_m", "sq_1_m", "sq_2_m", "spk_m", "svk_m", "ssk", "clr", "crf_hz")
     overrides: Overrides = {
-        "grid.cells": [32, 32], "surface.correlation_length": "30 um", "wear.patches": 5,
+        "grid.cells": [32, 32],
+        "surface.correlation_length": "30 um",
+        "wear.patches": 5,
         "wear.fatigue": {"law": "dang-van", "limit": "260 MPa"},
-    }  # fmt: skip
+    }
     yield "\n## Sq falls, then rises: removal, and pits by fatigue (260 MPa; 32 x 32 cells, correlation length 30 um)\n"
     yield f"| hours | {heads(*keys)} |"
     yield f"|---|{'---|' * len(keys)}"
@@ -390,10 +444,15 @@ def draw_plateaus(histories: Mapping[str, WearHistory]) -> None:
             _, sq, k = name.split("-", 2)
             table = history.table
             axes.plot(
-                1e16 * float(k) * table["hours"], quantity(key).factor * table[key], STROKES[float(k)],
-                color=COLOURS[sq], linewidth=1.2,
-                label=f"Sq {sq.removesuffix('um')} µm" if float(k) == 1e-16 and key == "sq_m" else None,
-            )  # fmt: skip
+                1e16 * float(k) * table["hours"],
+                quantity(key).factor * table[key],
+                STROKES[float(k)],
+                color=COLOURS[sq],
+                linewidth=1.2,
+                label=f"Sq {sq.removesuffix('um')} µm"
+                if float(k) == 1e-16 and key == "sq_m"
+                else None,
+            )
         axes.set(ylabel=quantity(key).label, xlabel="k times hours [1e-16 h/Pa]")
     figure.legend(loc="lower center", ncols=3)
     write_figure(figure, IMAGES / "wear-plateau.png")
@@ -406,7 +465,11 @@ def draw_rise(history: WearHistory) -> None:
     figure.subplots_adjust(left=0.075, right=0.985, top=0.96, bottom=0.17, wspace=0.22)
     left, right = figure.subplots(1, 2)
     table = history.table
-    for key, name, colour in (("sq_m", "both", BLUE), ("sq_2_m", "ring", GREEN), ("sq_1_m", "roller", VERMILION)):
+    for key, name, colour in (
+        ("sq_m", "both", BLUE),
+        ("sq_2_m", "ring", GREEN),
+        ("sq_1_m", "roller", VERMILION),
+    ):
         left.plot(table["hours"], 1e6 * table[key], color=colour, label=name)
     left.legend()
     left.set(xlabel=quantity("hours").axis, ylabel=quantity("sq_m").label)

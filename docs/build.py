@@ -27,7 +27,9 @@ BESIDE = {
     "SECURITY.md": "security.md",
 }
 LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
-ERRORS = STAGE / "images" / "benchmark-error.png"  # drawn from the csv that the last `make bench` wrote
+ERRORS = (
+    STAGE / "images" / "benchmark-error.png"
+)  # drawn from the csv that the last `make bench` wrote
 MATHJAX = ("sphinx-mathjax-offline", "tex-svg.js")  # who has it, and what of it draws the equations
 REST = "<!-- the rest -->"  # where pages go that no other list of pages names
 
@@ -43,7 +45,9 @@ def sources() -> Iterator[Path]:
     yield from (ROOT / name for name in BESIDE)
     yield from (ROOT / "examples").glob("*.toml")
     yield ROOT / "benchmark" / "certified.csv"
-    yield from (path for path in DOCS.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    yield from (
+        path for path in DOCS.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+    )
 
 
 def relinked(path: Path) -> str:
@@ -69,9 +73,16 @@ def mathjax() -> Path:
 
 def listed(texts: dict[Path, str]) -> set[str]:
     """Pages of the stage's root that some list of pages names."""
-    blocks = (block for text in texts.values() for block in re.findall(r"```\{toctree\}.*?```", text, re.DOTALL))
+    blocks = (
+        block
+        for text in texts.values()
+        for block in re.findall(r"```\{toctree\}.*?```", text, re.DOTALL)
+    )
     return {
-        line.strip().rpartition("/")[2] for block in blocks for line in block.splitlines() if line.startswith("../")
+        line.strip().rpartition("/")[2]
+        for block in blocks
+        for line in block.splitlines()
+        if line.startswith("../")
     }
 
 
@@ -86,7 +97,11 @@ def stage() -> None:
     wanted[STAGE / "_static" / "mathjax" / MATHJAX[1]] = mathjax().read_bytes()
     made = [STAGE / name for name in ("gallery", "reference/names")]
     for path in STAGE.rglob("*"):
-        if path.is_file() and path not in (*wanted, ERRORS) and not any(path.is_relative_to(folder) for folder in made):
+        if (
+            path.is_file()
+            and path not in (*wanted, ERRORS)
+            and not any(path.is_relative_to(folder) for folder in made)
+        ):
             path.unlink()
     for path, content in wanted.items():
         if not path.exists() or path.read_bytes() != content:
@@ -100,9 +115,13 @@ def main() -> int:
     make_quantities.PAGE.write_text(make_quantities.page(), "utf-8")
     stage()
     shutil.rmtree(SITE, ignore_errors=True)
-    code = sphinx(["-W", "--keep-going", "-q", "-b", "html", "-d", str(KEPT), str(STAGE), str(SITE)])
+    code = sphinx(
+        ["-W", "--keep-going", "-q", "-b", "html", "-d", str(KEPT), str(STAGE), str(SITE)]
+    )
     if code == 0:
-        print(f"The site is in {SITE.relative_to(ROOT)}: open {(SITE / 'index.html').relative_to(ROOT)}.")  # noqa: T201
+        print(  # noqa: T201
+            f"The site is in {SITE.relative_to(ROOT)}: open {(SITE / 'index.html').relative_to(ROOT)}."
+        )
     return code
 
 

@@ -39,7 +39,9 @@ autodoc_default_options = {"members": True, "inherited-members": False}
 napoleon_google_docstring = False
 
 mathjax_path = "mathjax/tex-svg.js"  # staged: equations are drawn without a network
-mathjax3_config = {"options": {"enableMenu": False}}  # the menu is what would ask other machines for speech rules
+mathjax3_config = {
+    "options": {"enableMenu": False}
+}  # the menu is what would ask other machines for speech rules
 copybutton_prompt_text = "$ "
 
 html_theme = "pydata_sphinx_theme"

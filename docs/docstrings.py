@@ -26,13 +26,21 @@ def plain(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines: li
     lines[:] = ["".join(_escaped(part) for part in CODE.split(line)) for line in lines]
 
 
-def described(_app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
+def described(
+    _app: Any, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]
+) -> None:
     """Put what a parameter is on a line of its own: behind the colon numpy's form has types, and ours has words."""
     lines[:] = [part for line in lines for part in _entry(line)]
 
 
 def signed(
-    _app: Any, _what: str, _name: str, _thing: Any, _options: Any, signature: str | None, returns: str | None
+    _app: Any,
+    _what: str,
+    _name: str,
+    _thing: Any,
+    _options: Any,
+    signature: str | None,
+    returns: str | None,
 ) -> tuple[str | None, str | None]:
     """Arrays without what they are made of, and defaults that a factory makes as dots, so that the rest is parsed."""
     return _short(signature), _short(returns)
@@ -53,7 +61,9 @@ def _escaped(text: str) -> str:
 
 def _fields(owner: type) -> list[str]:
     """Fields that a comment explains in the source, as a list."""
-    told = re.findall(r"^    (\w+): .*?  # (?!noqa|type:)(.+)$", inspect.getsource(owner), re.MULTILINE)
+    told = re.findall(
+        r"^    (\w+): .*?  # (?!noqa|type:)(.+)$", inspect.getsource(owner), re.MULTILINE
+    )
     return ["", *(f"- ``{name}``: {comment}" for name, comment in told), ""] if told else []
 
 

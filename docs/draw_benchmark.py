@@ -11,7 +11,9 @@ from asperity.report.style import ON_PAGE, write_figure
 TABLE = Path(__file__).parent / "benchmarks" / "certified.csv"
 STROKES = {"asperity": "-", "tamaas": "--", "contactmechanics": ":"}
 
-Course = tuple[list[float], list[float]]  # time of a case [s] and error [%], medians, from coarse to fine
+Course = tuple[
+    list[float], list[float]
+]  # time of a case [s] and error [%], medians, from coarse to fine
 
 
 def courses(table: Path = TABLE) -> dict[tuple[str, str], Course]:
@@ -33,7 +35,9 @@ def figure(table: Path = TABLE) -> Figure:
     looks = {name: (colour, marker) for name, colour, marker in FAMILIES}
     for (solver, family), (times, errors) in courses(table).items():
         colour, marker = looks[family]
-        axes.loglog(times, errors, STROKES[solver], color=colour, marker=marker, label=f"{family}, {solver}")
+        axes.loglog(
+            times, errors, STROKES[solver], color=colour, marker=marker, label=f"{family}, {solver}"
+        )
     axes.set_xlabel("processor time of a case, median [s]")
     axes.set_ylabel("error over certified value, median [%]")
     axes.set_title("Certified values: error over time, coarse to fine cells")

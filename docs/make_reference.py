@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
-from asperity.quantities import catalogue  # noqa: E402
+from asperity.core.quantities import catalogue  # noqa: E402
 from support.vocabulary import case_sections, commands, golden  # noqa: E402  the documentation's tests read the same
 
 GROUPS = {  # of names, by the module that hands them out
@@ -55,21 +55,42 @@ def api_page() -> str:
     names = public_names()
     grouped = {module for modules in GROUPS.values() for module in modules}
     groups = GROUPS | {module.capitalize(): (module,) for module in names if module not in grouped}
-    parts = ["Python", "======", "", "``import asperity as asp``. SI throughout. Each is loaded when it is first used."]
+    parts = [
+        "Python",
+        "======",
+        "",
+        "``import asperity as asp``. SI throughout. Each is loaded when it is first used.",
+    ]
     for title, modules in groups.items():
         listed = [f"   {name}" for module in modules for name in names[module]]
         options = ["   :toctree: names", "   :nosignatures:"]
-        parts += ["", title, "-" * len(title), "", ".. currentmodule:: asperity", "", ".. autosummary::", *options, ""]
+        parts += [
+            "",
+            title,
+            "-" * len(title),
+            "",
+            ".. currentmodule:: asperity",
+            "",
+            ".. autosummary::",
+            *options,
+            "",
+        ]
         parts += listed
     return "\n".join([*parts, ""])
 
 
 def commands_page() -> str:
     """Every command as typer has it."""
-    parts = ["# Commands", "", "What `--help` says. What the output means is in [command-line](../command-line.md)."]
+    parts = [
+        "# Commands",
+        "",
+        "What `--help` says. What the output means is in [command-line](../command-line.md).",
+    ]
     for name, command in commands().items():
         options = [
-            entry for entry in command.params if entry.opts[0].startswith("-") or entry.param_type_name == "argument"
+            entry
+            for entry in command.params
+            if entry.opts[0].startswith("-") or entry.param_type_name == "argument"
         ]
         usage = " ".join(_usage(entry) for entry in options if entry.param_type_name == "argument")
         said = (command.help or "").strip().replace("\n", " ")
@@ -89,8 +110,17 @@ def _option(entry: Any) -> tuple[str, ...]:
     names = [_usage(entry)] if argument else [*entry.opts, *entry.secondary_opts]
     kind = getattr(entry.type_descriptor.annotation, "__name__", "").replace("str", "text").upper()
     value = "" if argument or entry.is_flag else entry.metavar or kind
-    default = "" if entry.default in (None, False, ()) or callable(entry.default) else f"`{entry.default}`"
-    return ", ".join(f"`{name}`" for name in names), f"`{value}`" if value else "", default, _cell(entry.help or "")
+    default = (
+        ""
+        if entry.default in (None, False, ()) or callable(entry.default)
+        else f"`{entry.default}`"
+    )
+    return (
+        ", ".join(f"`{name}`" for name in names),
+        f"`{value}`" if value else "",
+        default,
+        _cell(entry.help or ""),
+    )
 
 
 def case_page() -> str:
@@ -100,19 +130,36 @@ def case_page() -> str:
         "",
         "What each means, and why its default is what it is, says [the case file](../case-file.md).",
     ]
-    for name, section in sorted(case_sections().items(), key=lambda item: (item[0] != "Top level", item[0])):
+    for name, section in sorted(
+        case_sections().items(), key=lambda item: (item[0] != "Top level", item[0])
+    ):
         rows = [_key(*item) for item in section.model_fields.items()]
-        parts += ["", f"## {name.replace('file = ', 'file = ...')}", "", *_table(("key", "takes", "default"), rows)]
+        parts += [
+            "",
+            f"## {name.replace('file = ', 'file = ...')}",
+            "",
+            *_table(("key", "takes", "default"), rows),
+        ]
     return "\n".join([*parts, ""])
 
 
 def _key(name: str, field: Any) -> tuple[str, ...]:
     inside = list(_parts(field.annotation, *field.metadata))
-    units = [part.args[0] for part in inside if isinstance(part, partial) and part.func.__name__ == "parse_amount"]
+    units = [
+        part.args[0]
+        for part in inside
+        if isinstance(part, partial) and part.func.__name__ == "parse_amount"
+    ]
     choices = [f"`{part}`" for part in inside if isinstance(part, str)]
     plain = [word for kind, word in PLAIN.items() if kind in inside]
-    default = "required" if field.is_required() else _shown(field.get_default(call_default_factory=True))
-    return f"`{name}`", ", ".join([f"amount in {units[0]}"] if units else choices or plain or ["table"]), default
+    default = (
+        "required" if field.is_required() else _shown(field.get_default(call_default_factory=True))
+    )
+    return (
+        f"`{name}`",
+        ", ".join([f"amount in {units[0]}"] if units else choices or plain or ["table"]),
+        default,
+    )
 
 
 PLAIN = {bool: "true or false", int: "whole number", float: "number", str: "text"}
@@ -157,13 +204,22 @@ def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
         for entry in tree:
             yield from _leaves(entry, f"{path}[]")
     else:
-        yield path, {bool: "true or false", str: "text", list: "list", type(None): ""}.get(type(tree), "number")
+        yield (
+            path,
+            {bool: "true or false", str: "text", list: "list", type(None): ""}.get(
+                type(tree), "number"
+            ),
+        )
 
 
 def _meaning(path: str) -> tuple[str, str]:
     """Unit and name of the catalogue; of a value's deviation or beginning, those of the value."""
     key = re.split(r"[.\]]+", path.removesuffix("[]"))[-1]
-    for suffix, words in {"": "", "_start": ", at the beginning", "_std": ", standard deviation"}.items():
+    for suffix, words in {
+        "": "",
+        "_start": ", at the beginning",
+        "_std": ", standard deviation",
+    }.items():
         if key.endswith(suffix) and (entry := catalogue().get(key.removesuffix(suffix))):
             said = f"{entry.name}: {entry.meaning}" if entry.meaning else entry.name
             return entry.unit if entry.unit != "1" else "-", _cell(said + words)
@@ -171,7 +227,13 @@ def _meaning(path: str) -> tuple[str, str]:
 
 
 def _cell(text: str) -> str:
-    return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;").replace("*", r"\*").replace("[", r"\[")
+    return (
+        " ".join(text.split())
+        .replace("|", r"\|")
+        .replace("<", "&lt;")
+        .replace("*", r"\*")
+        .replace("[", r"\[")
+    )
 
 
 def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:

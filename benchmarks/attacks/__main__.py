@@ -32,7 +32,9 @@ def in_worker(kind: str, count: int) -> Iterator[str | None]:
     at, longest = 0, (0.0, 0.0, 0)
     while at < count:
         command = [sys.executable, "-m", "benchmarks.attacks.worker", kind, str(at), str(count)]
-        worker = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT)
+        worker = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT
+        )
         lines: queue.Queue[str] = queue.Queue()
         threading.Thread(target=_hand_on, args=(worker, lines), daemon=True).start()
         patience = 600.0  # to set up
@@ -61,7 +63,11 @@ def in_worker(kind: str, count: int) -> Iterator[str | None]:
                 patience = 3.0 * LONGEST_S
         worker.wait()
     processor, clock, number = longest
-    print(f"  longest: {kind} {number}, {processor:.1f} s of a processor, {clock:.1f} s", file=sys.stderr, flush=True)
+    print(
+        f"  longest: {kind} {number}, {processor:.1f} s of a processor, {clock:.1f} s",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def _hand_on(worker: "subprocess.Popen[str]", lines: "queue.Queue[str]") -> None:
@@ -74,7 +80,9 @@ def _hand_on(worker: "subprocess.Popen[str]", lines: "queue.Queue[str]") -> None
 def hostile(_: str, count: int) -> Iterator[str | None]:
     """Each in a process of its own, its memory watched."""
     for name, make in list(HOSTILE.items())[:count]:
-        yield endings.in_folder(lambda folder, name=name, make=make: _met(name, make(folder), folder))
+        yield endings.in_folder(
+            lambda folder, name=name, make=make: _met(name, make(folder), folder)
+        )
 
 
 def _met(name: str, arguments: tuple[str, ...], folder: Path) -> str | None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import BadInput
-from asperity.kept import digest
+from asperity.core.errors import BadInput
+from asperity.core.storage import digest
 
 if TYPE_CHECKING:
     from asperity.recording import OpenRecording
@@ -48,9 +48,9 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
 
 def make_results(folder: Path) -> None:
     """A run, a history and a study, each small."""
-    from asperity.history import run_history
     from asperity.paper import papers_case
     from asperity.results import solve_case
+    from asperity.simulation import run_history
     from asperity.study import plan_study, run_study
 
     case = papers_case().with_overrides(SMALL)
@@ -62,8 +62,8 @@ def make_results(folder: Path) -> None:
 
 def numbers_of(folder: Path, which: str) -> str:
     """All that a result gives, as text to compare."""
-    from asperity.history import load_history
     from asperity.results import load_run
+    from asperity.simulation import load_history
     from asperity.study import load_study
 
     def text(values: Any) -> str:
@@ -77,10 +77,14 @@ def numbers_of(folder: Path, which: str) -> str:
         moved = load_history(folder / which)
         values = {key: value for key, value in moved.scalars().items() if key != "folder"}
         held = [[digest(np.asarray(part)) for part in frame] for frame in moved.frames]
-        return text([values, moved.table.to_dict(), moved.case.text, held, digest(dict(moved.memory or {}))])
+        return text(
+            [values, moved.table.to_dict(), moved.case.text, held, digest(dict(moved.memory or {}))]
+        )
     result = load_study(folder / which)
     maps = [digest(result.maps(case.id)) for case in result.plan.cases]
-    return text([result.table.to_dict(), result.plan.points, [case.id for case in result.plan.cases], maps])
+    return text(
+        [result.table.to_dict(), result.plan.points, [case.id for case in result.plan.cases], maps]
+    )
 
 
 def results(folder: Path) -> Callable[[int], str | None]:
@@ -96,7 +100,11 @@ def results(folder: Path) -> Callable[[int], str | None]:
         whole = path.read_bytes()
         path.write_bytes(damaged(whole, rng))
         try:
-            return None if numbers_of(folder, which) == told[which] else f"{path.name}: silently different"
+            return (
+                None
+                if numbers_of(folder, which) == told[which]
+                else f"{path.name}: silently different"
+            )
         except BadInput as refusal:
             return too_long(refusal)
         finally:
@@ -146,7 +154,9 @@ def _made(folder: Path) -> list[Path]:
     scipy.io.savemat(folder / "a.mat", {"x": values, "rate": 2e4}, do_compression=True)
     soundfile.write(folder / "a.wav", values / 10.0, 20000)
     pandas.DataFrame({"x": values}).to_parquet(folder / "a.parquet")
-    pandas.DataFrame({"time (s)": np.arange(5000) / 2e4, "x (g)": values}).to_csv(folder / "a.csv", index=False)
+    pandas.DataFrame({"time (s)": np.arange(5000) / 2e4, "x (g)": values}).to_csv(
+        folder / "a.csv", index=False
+    )
     with h5py.File(folder / "a.h5", "w") as file:
         file.create_dataset("x", data=values, compression="gzip").attrs["sampling_rate_hz"] = 2e4
     x3pio.write(folder / "b.x3p", values[:4900].reshape(70, 70) * 1e-6, x_scale=1e-6, y_scale=1e-6)

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pandas
 
-from asperity.errors import BadInput
-from asperity.history import load_history
+from asperity.core.errors import BadInput
 from asperity.results import load_run
+from asperity.simulation import load_history
 from benchmarks.attacks.inputs import small_text
 
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
@@ -40,7 +40,9 @@ def kills(_: str, count: int) -> Iterator[str | None]:
     with tempfile.TemporaryDirectory(prefix="asperity-attack-") as place:
         home = Path(place)
         (home / "case.toml").write_text(small_text(100), "utf-8")
-        run = _command("run", str(home / "case.toml"), "--steps", "10", "--every", "5", "-q", "--out")
+        run = _command(
+            "run", str(home / "case.toml"), "--steps", "10", "--every", "5", "-q", "--out"
+        )
         begun = time.perf_counter()
         subprocess.run([*run, str(home / "whole")], check=True, **QUIET)
         length = time.perf_counter() - begun
@@ -62,7 +64,9 @@ def _kill(command: list[str], after: float) -> None:
     running.communicate()
 
 
-def _killed_history(run: list[str], folder: Path, after: float, table: pandas.DataFrame) -> str | None:
+def _killed_history(
+    run: list[str], folder: Path, after: float, table: pandas.DataFrame
+) -> str | None:
     _kill([*run, str(folder)], after)
     again = subprocess.run([*run, str(folder)], check=False, **QUIET)
     if again.returncode:
@@ -87,12 +91,24 @@ def full_disks(_: str, count: int) -> Iterator[str | None]:
     commands = (
         ("solve", "case.toml", "-q", "--out", "new/run.nc"),
         ("run", "case.toml", "--steps", "2", "-q", "--out", "new/history"),
-        ("study", "case.toml", "--workers", "1", "-q", "--set", "study.sq=['1 um']", "--out", "new/study"),
+        (
+            "study",
+            "case.toml",
+            "--workers",
+            "1",
+            "-q",
+            "--set",
+            "study.sq=['1 um']",
+            "--out",
+            "new/study",
+        ),
         ("rig", "--out", "new/rig", "--samples", "1", "--repeats", "1", "--duration", "5 s"),
     )
     for number in range(count):
         command, kilobytes = commands[number % 4], (1, 4, 9, 16, 23)[number // 4 % 5]
-        yield in_folder(lambda folder, command=command, kilobytes=kilobytes: _full(folder, command, kilobytes))
+        yield in_folder(
+            lambda folder, command=command, kilobytes=kilobytes: _full(folder, command, kilobytes)
+        )
 
 
 def _full(folder: Path, arguments: tuple[str, ...], kilobytes: int) -> str | None:
@@ -103,7 +119,9 @@ def _full(folder: Path, arguments: tuple[str, ...], kilobytes: int) -> str | Non
         resource.setrlimit(resource.RLIMIT_FSIZE, (kilobytes << 10, kilobytes << 10))
 
     environment = {**os.environ, "NUMBA_CACHE_DIR": os.environ.get("NUMBA_CACHE_DIR", "")}
-    ended = subprocess.run(_command(*arguments), cwd=folder, env=environment, preexec_fn=limit, check=False, **QUIET)
+    ended = subprocess.run(
+        _command(*arguments), cwd=folder, env=environment, preexec_fn=limit, check=False, **QUIET
+    )
     name = f"{arguments[0]} with {kilobytes} kB"
     if ended.returncode not in (0, 1) or ended.stderr.count("\n") > 1:
         return f"{name}: ends with {ended.returncode}, {ended.stderr.count(chr(10))} lines"

@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 
 GIGABYTE = 1 << 30
-Attack = Callable[[Path], tuple[str, ...]]  # makes its files in a folder; the arguments of the command
+Attack = Callable[
+    [Path], tuple[str, ...]
+]  # makes its files in a folder; the arguments of the command
 CASE = Path(__file__).parents[2] / "examples" / "paper.toml"
 
 
@@ -37,7 +39,13 @@ def _surface(path: Path, *more: str) -> tuple[str, ...]:
 
 
 def _matrix(path: Path) -> tuple[str, ...]:
-    return ("solve", str(CASE), "--set", f"surface={{file='{path}', unit='um', pixel='1 um'}}", "--quiet")
+    return (
+        "solve",
+        str(CASE),
+        "--set",
+        f"surface={{file='{path}', unit='um', pixel='1 um'}}",
+        "--quiet",
+    )
 
 
 # What claims to be large ----------------------------------------------------------------------------------------------
@@ -56,7 +64,9 @@ def sparse(name: str, head: bytes, size: int, command: Callable[[Path], tuple[st
     return make
 
 
-def content(name: str, make: Callable[[], bytes], command: Callable[[Path], tuple[str, ...]]) -> Attack:
+def content(
+    name: str, make: Callable[[], bytes], command: Callable[[Path], tuple[str, ...]]
+) -> Attack:
     """A file of these bytes."""
 
     def made(folder: Path) -> tuple[str, ...]:
@@ -95,7 +105,12 @@ MAIN_XML = """<?xml version="1.0"?>
 
 
 def x3p_bomb(folder: Path) -> tuple[str, ...]:
-    zeros_zip(folder / "bomb.x3p", {"main.xml": MAIN_XML.format(n=23170).encode()}, "bindata/data.bin", 4 * GIGABYTE)
+    zeros_zip(
+        folder / "bomb.x3p",
+        {"main.xml": MAIN_XML.format(n=23170).encode()},
+        "bindata/data.bin",
+        4 * GIGABYTE,
+    )
     return _surface(folder / "bomb.x3p")
 
 
@@ -170,7 +185,9 @@ def hdf5_outside(folder: Path) -> tuple[str, ...]:
     import h5py
 
     with h5py.File(folder / "outside.h5", "w") as file:
-        file.create_dataset("x", (10**9,), dtype="f8", external=[("/dev/zero", 0, h5py.h5f.UNLIMITED)])
+        file.create_dataset(
+            "x", (10**9,), dtype="f8", external=[("/dev/zero", 0, h5py.h5f.UNLIMITED)]
+        )
         file["link"] = h5py.ExternalLink("/dev/zero", "/x")
     return ("check", str(folder / "outside.h5"))
 
@@ -222,10 +239,13 @@ def parquet(name: str, columns: int, rows: int) -> Attack:
 def wav_head(size: int, rate: int = 20000, channels: int = 1, *, riff: bytes = b"RIFF") -> bytes:
     block = 2 * channels
     return (
-        riff + struct.pack("<I", min(36 + size, 2**32 - 1)) + b"WAVEfmt "
+        riff
+        + struct.pack("<I", min(36 + size, 2**32 - 1))
+        + b"WAVEfmt "
         + struct.pack("<IHHIIHH", 16, 1, channels, rate, rate * block % 2**32, block % 65536, 16)
-        + b"data" + struct.pack("<I", min(size, 2**32 - 1))
-    )  # fmt: skip
+        + b"data"
+        + struct.pack("<I", min(size, 2**32 - 1))
+    )
 
 
 def flac_bomb(folder: Path) -> tuple[str, ...]:
@@ -243,13 +263,25 @@ def tdms_claim() -> bytes:
 
     index = struct.pack("<IIIQ", 20, 10, 1, 10**12)
     meta = struct.pack("<I", 1) + text("/'g'/'x'") + index + struct.pack("<I", 0)
-    return b"TDSm" + struct.pack("<IIQQ", 0xE, 4713, len(meta) + 8 * 10**12, len(meta)) + meta + bytes(64)
+    return (
+        b"TDSm"
+        + struct.pack("<IIQQ", 0xE, 4713, len(meta) + 8 * 10**12, len(meta))
+        + meta
+        + bytes(64)
+    )
 
 
 def uff_claim() -> bytes:
-    lines = ["    -1", "    58", *(["NONE"] * 5), "    1         0    0         0 NONE       1   1 NONE       1   1"]
+    lines = [
+        "    -1",
+        "    58",
+        *(["NONE"] * 5),
+        "    1         0    0         0 NONE       1   1 NONE       1   1",
+    ]
     lines += ["         21000000000         1  0.00000E+00  5.00000E-05  0.00000E+00"]
-    lines += [" 17    0    0    0 Time                 s"] + [" 12    0    0    0 NONE                 g"] * 3
+    lines += [" 17    0    0    0 Time                 s"] + [
+        " 12    0    0    0 NONE                 g"
+    ] * 3
     lines += ["  1.00000E+00  1.00000E+00" * 3] * 100
     return ("\n".join([*lines, "    -1", ""])).encode()
 
@@ -259,9 +291,20 @@ def ide_formula(folder: Path) -> tuple[str, ...]:
     from ebmlite import loadSchema
 
     schema = loadSchema("mide_ide.xml")
-    head = {"EBMLVersion": 1, "EBMLReadVersion": 1, "EBMLMaxIDLength": 4, "EBMLMaxSizeLength": 8, "DocType": "mide"}
+    head = {
+        "EBMLVersion": 1,
+        "EBMLReadVersion": 1,
+        "EBMLMaxIDLength": 4,
+        "EBMLMaxSizeLength": 8,
+        "DocType": "mide",
+    }
     clock = {"TimeCodeScale": "9**9**9", "TimeCodeModulus": 16777216, "ChannelFormat": "<H"}
-    channel = {"ChannelID": 8, "ChannelName": "x", **clock, "SubChannel": [{"SubChannelID": 0, "SubChannelName": "x"}]}
+    channel = {
+        "ChannelID": 8,
+        "ChannelName": "x",
+        **clock,
+        "SubChannel": [{"SubChannelID": 0, "SubChannelName": "x"}],
+    }
     about = {"RecorderInfo": {"RecorderTypeUID": 18}, "ChannelList": {"Channel": [channel]}}
     content = schema.encodes({"EBML": head | {"DocTypeVersion": 2, "DocTypeReadVersion": 1}})
     (folder / "x.ide").write_bytes(content + schema.encodes({"RecordingProperties": about}))
@@ -336,7 +379,12 @@ def case_text(text: str) -> Callable[[], bytes]:
     return lambda: (CASE.read_text("utf-8") + text).encode()
 
 
-ALICONA = b"AliconaImaging\0\r\n" + b"Cols".ljust(20, b"\0") + b"2000000000".ljust(30, b"\0") + b"\r\n" * 99
+ALICONA = (
+    b"AliconaImaging\0\r\n"
+    + b"Cols".ljust(20, b"\0")
+    + b"2000000000".ljust(30, b"\0")
+    + b"\r\n" * 99
+)
 ASC = b"# Channel: T\n# Width: 1e9 um\n# Value units: m\n" + b"1 2\n" * 9
 NUMBERS = ("1," * 200_000).rstrip(",")
 HOSTILE: dict[str, Attack] = {
@@ -348,7 +396,9 @@ HOSTILE: dict[str, Attack] = {
     "mat 4 of 2e9 rows, sparse file": sparse("x.mat", mat4(2 * 10**9, 1), 16 * GIGABYTE, _check),
     "npy that claims 1e12 numbers": content("x.npy", partial(npy_head, "(1000000000000,)"), _check),
     "npy of 30 axes": content("x.npy", lambda: npy_head("(" + "9," * 30 + ")"), _check),
-    "npy map that claims 1e6 x 1e6": content("x.npy", partial(npy_head, "(1000000, 1000000)"), _matrix),
+    "npy map that claims 1e6 x 1e6": content(
+        "x.npy", partial(npy_head, "(1000000, 1000000)"), _matrix
+    ),
     "npy map of 30 GB, sparse": sparse("x.npy", npy_head("(60000, 65536)"), 30 * GIGABYTE, _matrix),
     "HDF5 that claims 1e11 samples": hdf5("x.h5", shape=(10**11,), dtype="f8", chunks=(10**6,)),
     "HDF5 with a chunk of 1 GB, gzip": hdf5(
@@ -366,33 +416,56 @@ HOSTILE: dict[str, Attack] = {
     )[1],
     "parquet of 300 million equal numbers": parquet("x.parquet", 1, 300_000_000),
     "parquet of 5000 columns": parquet("x.parquet", 5000, 100),
-    "parquet cut to its head": content("x.parquet", lambda: b"PAR1" + bytes(100) + b"\xff\xff\xff\x7fPAR1", _check),
-    "csv of 200 000 columns": content("x.csv", lambda: f"{NUMBERS}\n{NUMBERS}\n{NUMBERS}\n".encode(), _check),
-    "csv map of 200 000 columns": content("x.csv", lambda: f"{NUMBERS}\n{NUMBERS}\n{NUMBERS}\n".encode(), _matrix),
+    "parquet cut to its head": content(
+        "x.parquet", lambda: b"PAR1" + bytes(100) + b"\xff\xff\xff\x7fPAR1", _check
+    ),
+    "csv of 200 000 columns": content(
+        "x.csv", lambda: f"{NUMBERS}\n{NUMBERS}\n{NUMBERS}\n".encode(), _check
+    ),
+    "csv map of 200 000 columns": content(
+        "x.csv", lambda: f"{NUMBERS}\n{NUMBERS}\n{NUMBERS}\n".encode(), _matrix
+    ),
     "csv of one line of 50 MB": content("x.csv", lambda: b"1," * 25_000_000, _check),
     "csv map of one line of 50 MB": content("x.csv", lambda: b"1," * 25_000_000, _matrix),
-    "csv of one number of 10 MB": content("x.csv", lambda: b"1\n2\n3\n" + b"9" * 10_000_000, _check),
-    "csv with a quote that never ends": content("x.csv", lambda: b'a,b\n"1,2\n' + b"3,4\n" * 200_000, _check),
-    "csv whose lines change their columns": content("x.csv", lambda: b"1,2\n1,2,3\nx\n" * 100_000, _check),
+    "csv of one number of 10 MB": content(
+        "x.csv", lambda: b"1\n2\n3\n" + b"9" * 10_000_000, _check
+    ),
+    "csv with a quote that never ends": content(
+        "x.csv", lambda: b'a,b\n"1,2\n' + b"3,4\n" * 200_000, _check
+    ),
+    "csv whose lines change their columns": content(
+        "x.csv", lambda: b"1,2\n1,2,3\nx\n" * 100_000, _check
+    ),
     "text of blanks": content("x.txt", lambda: b" " * 20_000_000, _check),
     "text of commas": content("x.csv", lambda: b"," * 5_000_000 + b"\n" + b"1,2\n" * 100, _check),
     "UTF-16 that is none": content("x.csv", lambda: b"\xff\xfe" + b"\x00\xd8" * 2_000_000, _check),
     "xyz with one wrong byte": content("x.xyz", wrong_byte_xyz, partial(_surface)),
     "wav that claims 4 GB": content("x.wav", lambda: wav_head(2**32 - 1) + bytes(100), _stated),
-    "wav of 65535 channels": content("x.wav", lambda: wav_head(2**31, channels=65535) + bytes(9999), _series),
+    "wav of 65535 channels": content(
+        "x.wav", lambda: wav_head(2**31, channels=65535) + bytes(9999), _series
+    ),
     "wav of 4 GHz": content("x.wav", lambda: wav_head(4000, rate=2**32 - 1) + bytes(4000), _stated),
-    "wav of 20 GB, sparse": sparse("x.wav", wav_head(2**32 - 1, riff=b"RF64"), 20 * GIGABYTE, _stated),
+    "wav of 20 GB, sparse": sparse(
+        "x.wav", wav_head(2**32 - 1, riff=b"RF64"), 20 * GIGABYTE, _stated
+    ),
     "flac of silence": flac_bomb,
     "tdms that claims 1e12 samples": content("x.tdms", tdms_claim, _check),
     "uff that claims 1e9 points": content("x.uff", uff_claim, _stated),
-    "IDE of nonsense": content("x.ide", lambda: b"\x1a\x45\xdf\xa3" + b"\x08" * 3 + b"\xff" * 9999, _check),
+    "IDE of nonsense": content(
+        "x.ide", lambda: b"\x1a\x45\xdf\xa3" + b"\x08" * 3 + b"\xff" * 9999, _check
+    ),
     "IDE whose text is evaluated": ide_formula,
-    "opd that claims 30000 x 30000": content("x.opd", lambda: b"\x01\x00Directory\x00".ljust(6000, b"\x7f"), _surface),
+    "opd that claims 30000 x 30000": content(
+        "x.opd", lambda: b"\x01\x00Directory\x00".ljust(6000, b"\x7f"), _surface
+    ),
     "sdf that claims 1e9 x 1e9": content(
-        "x.sdf", lambda: b"aBCR-1.0" + bytes(34) + struct.pack("<HH", 65535, 65535) + bytes(60), _surface
+        "x.sdf",
+        lambda: b"aBCR-1.0" + bytes(34) + struct.pack("<HH", 65535, 65535) + bytes(60),
+        _surface,
     ),
     "al3d that claims 2e9 columns": content(
-        "x.al3d", lambda: ALICONA,
+        "x.al3d",
+        lambda: ALICONA,
         _surface,
     ),
     "asc of 1e9 x 1e9": content("x.asc", lambda: ASC, _surface),
@@ -407,14 +480,20 @@ HOSTILE: dict[str, Attack] = {
     "/dev/zero as surface": linked("x.x3p", "/dev/zero", _surface),
     "/dev/zero as case": linked("case.toml", "/dev/zero", _solve),
     "a link to itself": linked("x.csv", "x.csv", _check),
-    "run of 40 GB, sparse": sparse("run.nc", b"\x89HDF\r\n\x1a\n", 40 * GIGABYTE, lambda path: ("report", str(path))),
+    "run of 40 GB, sparse": sparse(
+        "run.nc", b"\x89HDF\r\n\x1a\n", 40 * GIGABYTE, lambda path: ("report", str(path))
+    ),
     "case of 4 GB, sparse": sparse("case.toml", b"[contact]\n", 4 * GIGABYTE, _solve),
-    "case with 3000 brackets": content("case.toml", case_text("\nx = " + "[" * 3000 + "]" * 3000), _solve),
-    "case with an integer of 5000 digits": content("case.toml", case_text("\n[more]\nx = " + "9" * 5000), _solve),
+    "case with 3000 brackets": content(
+        "case.toml", case_text("\nx = " + "[" * 3000 + "]" * 3000), _solve
+    ),
+    "case with an integer of 5000 digits": content(
+        "case.toml", case_text("\n[more]\nx = " + "9" * 5000), _solve
+    ),
     "sidecar with 100 000 brackets": sidecar("[" * 100_000, "json"),
     "sidecar with 3000 brackets": sidecar("x = " + "[" * 3000 + "]" * 3000),
     "sidecar with an integer of 5000 digits": sidecar("rate_hz = " + "9" * 5000),
     "pipe as manifest": folder_file("manifest.json", None, "history"),
     "manifest with 100 000 brackets": folder_file("manifest.json", b"[" * 100_000, "history"),
     "table of a history that is a pipe": folder_file("history.parquet", None, "history"),
-}  # fmt: skip
+}

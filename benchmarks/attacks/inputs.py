@@ -16,25 +16,125 @@ FAST = {
     '["20 um", "20 um"]': '["60 um", "60 um"]',
 }
 VALUES = (
-    "0", "-1", "1e308", "1e-308", "inf", "nan", "-inf", "1e400", '""', '" "', '"1 m"', '"1e309 N"', '"-5 N"',
-    '"0 Pa"', '"1 N m"', '"5"', "true", "[]", "[[]]", "[1]", "[1, 2, 3]", "{}", "{a=1}", '"none"', '"auto"',
-    "1979-05-27", "0x7fff", "9" * 400, f'"{"x" * 5000}"', '"\\u0000"', '"\\u001b[31m"', "'''\n'''", "[8, 8]",
-    "[1e9, 8]", "[99999999, 99999999]", '["1 um", "1 km"]', '"1e-30 m"', '"1e30 m"', '"1 parsec"', '"5 µm"',
-    '"5 degC"', '"10 cSt"', '"5 %"', '"1/0 m"', '"m"', '{ law = "barus" }', '{ law = "unheard of" }', "{ from = 1 }",
-    "0.1", "1.0", "2", "-0.0", '"gaussian"', '"flat"', '"line"', '"point"', '"elliptic"', '"unified"', '"conserving"',
-    '"paper"', '["1 m"]', '"9**9**9 m"', '"__import__(\'os\') m"',
-)  # fmt: skip
+    "0",
+    "-1",
+    "1e308",
+    "1e-308",
+    "inf",
+    "nan",
+    "-inf",
+    "1e400",
+    '""',
+    '" "',
+    '"1 m"',
+    '"1e309 N"',
+    '"-5 N"',
+    '"0 Pa"',
+    '"1 N m"',
+    '"5"',
+    "true",
+    "[]",
+    "[[]]",
+    "[1]",
+    "[1, 2, 3]",
+    "{}",
+    "{a=1}",
+    '"none"',
+    '"auto"',
+    "1979-05-27",
+    "0x7fff",
+    "9" * 400,
+    f'"{"x" * 5000}"',
+    '"\\u0000"',
+    '"\\u001b[31m"',
+    "'''\n'''",
+    "[8, 8]",
+    "[1e9, 8]",
+    "[99999999, 99999999]",
+    '["1 um", "1 km"]',
+    '"1e-30 m"',
+    '"1e30 m"',
+    '"1 parsec"',
+    '"5 µm"',
+    '"5 degC"',
+    '"10 cSt"',
+    '"5 %"',
+    '"1/0 m"',
+    '"m"',
+    '{ law = "barus" }',
+    '{ law = "unheard of" }',
+    "{ from = 1 }",
+    "0.1",
+    "1.0",
+    "2",
+    "-0.0",
+    '"gaussian"',
+    '"flat"',
+    '"line"',
+    '"point"',
+    '"elliptic"',
+    '"unified"',
+    '"conserving"',
+    '"paper"',
+    '["1 m"]',
+    '"9**9**9 m"',
+    "\"__import__('os') m\"",
+)
 KEYS = (
-    "model", "contact", "contact.geometry", "contact.radius", "contact.length", "contact.load",
-    "contact.entrainment_speed", "contact.slip", "material.youngs_modulus", "material.poisson_ratio",
-    "material.hardness", "material.boundary_friction", "lubricant", "lubricant.viscosity", "lubricant.viscosity.eta0",
-    "lubricant.viscosity.alpha", "lubricant.density", "lubricant.rheology", "surface", "surface.kind", "surface.sq",
-    "surface.correlation_length", "surface.seed", "surface.file", "grid.cells", "grid.x", "grid.y", "grid.accuracy",
-    "solver.tolerance", "solver.max_iterations", "solver.contact_film", "solver.surfaces", "thermal",
-    "thermal.feedback", "vibration", "vibration.mass", "vibration.rate", "vibration.duration",
-    "vibration.damping_ratio", "vibration.preset", "motion", "motion.steps", "motion.track", "study.sq",
-    "study.seeds", "study.samples", "nothing", "contact.nothing", "a.b.c.d", "..", "contact.", '\x1b[2J', "é",
-)  # fmt: skip
+    "model",
+    "contact",
+    "contact.geometry",
+    "contact.radius",
+    "contact.length",
+    "contact.load",
+    "contact.entrainment_speed",
+    "contact.slip",
+    "material.youngs_modulus",
+    "material.poisson_ratio",
+    "material.hardness",
+    "material.boundary_friction",
+    "lubricant",
+    "lubricant.viscosity",
+    "lubricant.viscosity.eta0",
+    "lubricant.viscosity.alpha",
+    "lubricant.density",
+    "lubricant.rheology",
+    "surface",
+    "surface.kind",
+    "surface.sq",
+    "surface.correlation_length",
+    "surface.seed",
+    "surface.file",
+    "grid.cells",
+    "grid.x",
+    "grid.y",
+    "grid.accuracy",
+    "solver.tolerance",
+    "solver.max_iterations",
+    "solver.contact_film",
+    "solver.surfaces",
+    "thermal",
+    "thermal.feedback",
+    "vibration",
+    "vibration.mass",
+    "vibration.rate",
+    "vibration.duration",
+    "vibration.damping_ratio",
+    "vibration.preset",
+    "motion",
+    "motion.steps",
+    "motion.track",
+    "study.sq",
+    "study.seeds",
+    "study.samples",
+    "nothing",
+    "contact.nothing",
+    "a.b.c.d",
+    "..",
+    "contact.",
+    "\x1b[2J",
+    "é",
+)
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
@@ -43,7 +143,9 @@ def small_text(iterations: int = 5) -> str:
     text = CASE.read_text("utf-8")
     for old, new in FAST.items():
         text = text.replace(old, new)
-    return text.replace("[solver]", f"[solver]\nsurfaces = 1\nmax_iterations = {iterations}").split("[vibration]")[0]
+    return text.replace("[solver]", f"[solver]\nsurfaces = 1\nmax_iterations = {iterations}").split(
+        "[vibration]"
+    )[0]
 
 
 def commanded(*arguments: str) -> str | None:
@@ -60,7 +162,9 @@ def commanded(*arguments: str) -> str | None:
         return f"ends with {code}"
     if _CONTROL.search(text) or _CONTROL.search(out.getvalue()):
         return "control characters on the terminal"
-    if code in (1, 2) and (len(text) > 500 or text.count("\n") != 1 or not text.startswith("error: ")):
+    if code in (1, 2) and (
+        len(text) > 500 or text.count("\n") != 1 or not text.startswith("error: ")
+    ):
         return f"refusal of {len(text)} characters, {text.count(chr(10))} lines: {text[:80]!r}"
     return None
 
@@ -88,7 +192,9 @@ def mutated(text: str, rng: random.Random) -> str:
             lines[at] = lines[at].replace("1", rng.choice(("9" * 30, "-1", "1e99", "0", ".")))
         elif kind == 5:
             lines[at] = re.sub(
-                r'"(\S+) (\S+)"', lambda m: f'"{m[1]} {rng.choice(("kg", "N", "Hz", "µm", "%", "K", "°C"))}"', lines[at]
+                r'"(\S+) (\S+)"',
+                lambda m: f'"{m[1]} {rng.choice(("kg", "N", "Hz", "µm", "%", "K", "°C"))}"',
+                lines[at],
             )
         else:
             lines[at] = lines[at][::-1]
@@ -100,7 +206,9 @@ def cases(folder: Path) -> Callable[[int], str | None]:
     text = small_text()
 
     def attack(number: int) -> str | None:
-        (folder / "case.toml").write_text(mutated(text, random.Random(number)), "utf-8", errors="replace")
+        (folder / "case.toml").write_text(
+            mutated(text, random.Random(number)), "utf-8", errors="replace"
+        )
         return commanded("solve", str(folder / "case.toml"), "-q")
 
     return attack
@@ -113,7 +221,13 @@ def settings(folder: Path) -> Callable[[int], str | None]:
     def attack(number: int) -> str | None:
         rng = random.Random(number)
         key, value = rng.choice(KEYS), rng.choice(VALUES)
-        commands = (("solve",), ("solve",), ("run", "--steps", "1"), ("study", "--dry-run"), ("vibrate",))
+        commands = (
+            ("solve",),
+            ("solve",),
+            ("run", "--steps", "1"),
+            ("study", "--dry-run"),
+            ("vibrate",),
+        )
         command, *more = rng.choice(commands)
         return commanded(command, str(folder / "case.toml"), "-q", *more, "--set", f"{key}={value}")
 

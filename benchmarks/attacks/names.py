@@ -54,15 +54,21 @@ def injections(folder: Path) -> Callable[[int], str | None]:
         for copy in range(2):
             rows = "\n".join(f"{a:.6f},{b:.6f}" for a, b in values)
             quoted = name.replace('"', '""').replace("\r", "").replace("\n", "")
-            (place / f"{copy}{file}").write_text(f'"{quoted} ({quoted})",b\n{rows}\n', "utf-8", errors="replace")
+            (place / f"{copy}{file}").write_text(
+                f'"{quoted} ({quoted})",b\n{rows}\n', "utf-8", errors="replace"
+            )
         fault = commanded("check", str(place), "--rate", "20000")
         page, table = place / "page.html", place / "track.csv"
         about = ("--rate", "20000", "--channel", "1", "--band", "1000", "5000", "--method", "peak")
-        fault = fault or commanded("track", str(place), *about, "--report", str(page), "--out", str(table))
+        fault = fault or commanded(
+            "track", str(place), *about, "--report", str(page), "--out", str(table)
+        )
         case = place / (re.sub(r"[/\x00]", "_", name)[:60] + ".toml")
         case.write_text(small_text(), "utf-8")
         fault = fault or commanded("solve", str(case), "-q", "--out", str(place / "run.nc"))
-        fault = fault or commanded("report", str(place / "run.nc"), "--out", str(place / "run.html"))
+        fault = fault or commanded(
+            "report", str(place / "run.nc"), "--out", str(place / "run.html")
+        )
         return fault or _in_page(page) or _in_page(place / "run.html") or _in_table(table)
 
     return attack

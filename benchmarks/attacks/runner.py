@@ -45,7 +45,9 @@ class Outcome:
             if not self.said.startswith("error: "):
                 found.append("no sentence")
             if self.processor_s > LONGEST_S:
-                found.append(f"refusal after {self.processor_s:.0f} s of a processor, {self.seconds:.0f} s in all")
+                found.append(
+                    f"refusal after {self.processor_s:.0f} s of a processor, {self.seconds:.0f} s in all"
+                )
             if self.megabytes > MOST_MB:
                 found.append(f"refusal took {self.megabytes:.0f} MB")
         if _CONTROL.search(self.said):
@@ -82,7 +84,11 @@ def _resident(pid: int) -> float:
     total = 0.0
     for member in _family(pid):
         try:
-            total += int(Path(f"/proc/{member}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+            total += (
+                int(Path(f"/proc/{member}/statm").read_text().split()[1])
+                * os.sysconf("SC_PAGE_SIZE")
+                / 1e6
+            )
         except (OSError, IndexError):
             continue
     return total
@@ -94,8 +100,12 @@ def run(name: str, arguments: tuple[str, ...], folder: Path, *, limit_s: float =
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as said:
         process = subprocess.Popen(
             [sys.executable, "-m", "asperity", *arguments],
-            cwd=folder, stdout=out, stderr=said, stdin=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
+            cwd=folder,
+            stdout=out,
+            stderr=said,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
         while process.poll() is None and time.perf_counter() - begun < limit_s:
             most = max(most, _resident(process.pid))
             if most > 6000.0:

@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from benchmarks.attacks import damage, inputs, names, runner
 
 KINDS = {
@@ -42,7 +42,13 @@ def main(kind: str, first: int, last: int) -> None:
             megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
             processor = runner.processor_s(os.getpid()) - spent
             seconds = time.perf_counter() - begun
-            tell(done=number, fault=fault, seconds=seconds, processor_s=processor, megabytes=megabytes)
+            tell(
+                done=number,
+                fault=fault,
+                seconds=seconds,
+                processor_s=processor,
+                megabytes=megabytes,
+            )
 
 
 if __name__ == "__main__":

@@ -22,7 +22,9 @@ contact = asp.ContactConditions(
     surface_speeds=(2.2, 1.8),
 )
 oil = asp.Lubricant(
-    viscosity=asp.Roelands(eta0=0.04, alpha=18.2e-9), density=asp.DowsonHigginson(rho0=880.0), rheology=asp.Newtonian()
+    viscosity=asp.Roelands(eta0=0.04, alpha=18.2e-9),
+    density=asp.DowsonHigginson(rho0=880.0),
+    rheology=asp.Newtonian(),
 )
 
 # %%
@@ -37,10 +39,18 @@ state = asp.contact_state(solution)
 figure, (above, below) = plt.subplots(2, 1, sharex=True, figsize=(7, 5))
 x = grid.x / a
 above.plot(x, solution.pressure[:, 0] / 1e9, label="oil")
-above.plot(x, contact.hertz.p_max / 1e9 * np.sqrt(np.clip(1 - x**2, 0, None)), "--", color="0.4", label="dry (Hertz)")
+above.plot(
+    x,
+    contact.hertz.p_max / 1e9 * np.sqrt(np.clip(1 - x**2, 0, None)),
+    "--",
+    color="0.4",
+    label="dry (Hertz)",
+)
 above.set(ylabel="pressure [GPa]")
 above.legend()
 below.plot(x, solution.gap[:, 0] * 1e6)
 below.set(xlabel="x / half-width", ylabel="film [µm]", ylim=(0, 1.5))
-below.annotate(f"{state.h_central * 1e6:.2f} µm", (0, state.h_central * 1e6), (0, 0.75), ha="center")
+below.annotate(
+    f"{state.h_central * 1e6:.2f} µm", (0, state.h_central * 1e6), (0, 0.75), ha="center"
+)
 below.annotate(f"{state.h_min * 1e6:.2f} µm", (0.9, state.h_min * 1e6), (1.2, 0.1))

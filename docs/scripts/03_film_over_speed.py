@@ -13,7 +13,9 @@ import asperity as asp
 from asperity import ehl
 
 oil = asp.Lubricant(
-    viscosity=asp.Roelands(eta0=0.08, alpha=20e-9), density=asp.DowsonHigginson(rho0=870.0), rheology=asp.Newtonian()
+    viscosity=asp.Roelands(eta0=0.08, alpha=20e-9),
+    density=asp.DowsonHigginson(rho0=870.0),
+    rheology=asp.Newtonian(),
 )
 
 
@@ -46,7 +48,9 @@ for place, marker, ours, fit in zip(
     ("central", "least"), "os", zip(*solved, strict=True), zip(*fitted, strict=True), strict=True
 ):
     (line,) = axis.loglog(speeds, np.array(fit) * 1e9, label=f"{place}, Hamrock and Dowson")
-    axis.loglog(speeds, np.array(ours) * 1e9, marker, color=line.get_color(), label=f"{place}, solved")
+    axis.loglog(
+        speeds, np.array(ours) * 1e9, marker, color=line.get_color(), label=f"{place}, solved"
+    )
 axis.set(xlabel="rolling speed [m/s]", ylabel="film [nm]")
 axis.legend()
 for speed, ours, fit in zip(speeds, solved, fitted, strict=True):

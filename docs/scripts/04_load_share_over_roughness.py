@@ -18,7 +18,9 @@ clr, car = np.empty((levels.size, 3)), np.empty((levels.size, 3))
 for i, sq in enumerate(levels):
     for seed in range(3):
         rough = case.with_overrides({"surface.sq": f"{sq} um", "surface.seed": seed})
-        solution = asp.solve_contact(rough.conditions, rough.lubricant, rough.surface(), options=rough.options)
+        solution = asp.solve_contact(
+            rough.conditions, rough.lubricant, rough.surface(), options=rough.options
+        )
         state = asp.contact_state(solution)
         clr[i, seed], car[i, seed] = state.clr, state.car
 

@@ -23,7 +23,9 @@ a = contact.hertz.half_widths[0]
 
 def error_on(cells: int) -> tuple[float, float]:
     """Relative error of the largest pressure, and of the pressure everywhere in the mean."""
-    grid = asp.Grid((cells, cells), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), periodic=(False, False))
+    grid = asp.Grid(
+        (cells, cells), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), periodic=(False, False)
+    )
     pressure = asp.solve_contact(contact, None, asp.flat_surface(grid)).pressure
     radius = np.hypot(grid.x[:, None], grid.y[None, :]) / a
     exact = contact.hertz.p_max * np.sqrt(np.clip(1.0 - radius**2, 0.0, None))
@@ -38,6 +40,8 @@ largest, mean = np.array([error_on(n) for n in cells]).T
 figure, axis = plt.subplots(figsize=(7, 4))
 axis.loglog(cells, 100 * largest, "o-", label="largest pressure")
 axis.loglog(cells, 100 * mean, "s-", label="pressure everywhere, mean")
-axis.loglog(cells, 100 * mean[0] * (cells[0] / cells) ** 1.5, ":", color="0.4", label="cells to the -1.5")
+axis.loglog(
+    cells, 100 * mean[0] * (cells[0] / cells) ** 1.5, ":", color="0.4", label="cells to the -1.5"
+)
 axis.set(xlabel="cells each way", ylabel="error [%]")
 axis.legend()

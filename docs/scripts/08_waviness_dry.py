@@ -26,7 +26,12 @@ for share in shares:
         geometry="line",
         radius=half_width * pair.reduced_modulus / (2.0 * share * full),
         length=10e-3,
-        load=0.5 * np.pi * half_width * share * full * 10e-3,  # then Hertz's largest pressure is that share of p*
+        load=0.5
+        * np.pi
+        * half_width
+        * share
+        * full
+        * 10e-3,  # then Hertz's largest pressure is that share of p*
         surface_speeds=(1.0, 1.0),
     )
     grid = asp.Grid((2048, 8), (-1.5e-3, -4e-6), (1.5e-3, 4e-6))

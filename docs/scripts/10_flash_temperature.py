@@ -11,7 +11,9 @@ import matplotlib.pyplot as plt
 from asperity.paper import papers_case
 from asperity.results import solve_case
 
-case = papers_case().with_overrides({"grid.cells": [160, 96], "surface.sq": "1 um", "contact.slip": 0.4})
+case = papers_case().with_overrides(
+    {"grid.cells": [160, 96], "surface.sq": "1 um", "contact.slip": 0.4}
+)
 run = solve_case(case)
 
 # %%

@@ -9,7 +9,8 @@ tilt spends that reserve. Dry, and thus quick: what presses on the ends is a mat
 import matplotlib.pyplot as plt
 
 import asperity as asp
-from asperity import ehl, rollers
+from asperity import ehl
+from asperity.contact import rollers
 
 pair = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
 length, radius = 9e-3, 4.0e-3
@@ -35,5 +36,7 @@ for name, shape in shapes.items():
     grid = ehl.auto_grid(roller, None, accuracy=0.05)
     solution = asp.solve_contact(roller, None, asp.flat_surface(grid))
     axis.plot(grid.y * 1e3, solution.pressure.max(axis=0) / 1e9, label=name)
-axis.set(xlabel="along the roller [mm]", ylabel="largest pressure of each line [GPa]", ylim=(0, None))
+axis.set(
+    xlabel="along the roller [mm]", ylabel="largest pressure of each line [GPa]", ylim=(0, None)
+)
 axis.legend()

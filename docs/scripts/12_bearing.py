@@ -25,7 +25,12 @@ for clearance in (0.0, 20e-6, 50e-6):
     angle = np.degrees((np.array(bearing.angles) + np.pi) % (2 * np.pi) - np.pi)
     order = np.argsort(angle)
     loads = np.array(bearing.loads)
-    axis.plot(angle[order], loads[order], "o-", label=f"clearance {clearance * 1e6:.0f} µm: {loads.max():.0f} N")
+    axis.plot(
+        angle[order],
+        loads[order],
+        "o-",
+        label=f"clearance {clearance * 1e6:.0f} µm: {loads.max():.0f} N",
+    )
 
 # %%
 # Stribeck's estimate for a bearing without clearance: the most loaded roller bears 4 F/Z.

@@ -45,7 +45,9 @@ for axis, (label, values) in zip(axes.flat, rows, strict=True):
     axis.plot(place, values, "o-")
     axis.set(ylabel=label)
 for contact, x in zip(contacts, place, strict=True):
-    axes[0, 0].annotate(contact.name, (x, 0.02), xycoords=("data", "axes fraction"), ha="center", fontsize="small")
+    axes[0, 0].annotate(
+        contact.name, (x, 0.02), xycoords=("data", "axes fraction"), ha="center", fontsize="small"
+    )
 for axis in axes[1]:
     axis.set(xlabel="along the path of contact [mm]")
 figure.tight_layout()

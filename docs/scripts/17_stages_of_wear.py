@@ -9,11 +9,15 @@ the probability of severe wear at each recording.
 import matplotlib.pyplot as plt
 
 import asperity as asp
-from asperity import paper, wear
+from asperity import paper, resonance
 
 rig = paper.simulate_rig(repeats=2, duration_s=5.0, disturbance=paper.Disturbance(snr_db=6.0))
-clean = [wear.remove_lines(one.spectrum(20_000), shaft_hz=rig.shaft_hz) for one in rig.recordings]
-found = wear.series_resonances([one.spectrum for one in clean], band_hz=rig.band_hz, kept=[one.kept for one in clean])
+clean = [
+    resonance.remove_lines(one.spectrum(20_000), shaft_hz=rig.shaft_hz) for one in rig.recordings
+]
+found = resonance.series_resonances(
+    [one.spectrum for one in clean], band_hz=rig.band_hz, kept=[one.kept for one in clean]
+)
 
 # %%
 sq = [1e6 * one.sq_m for one in rig.recordings]
@@ -22,7 +26,9 @@ crf = [one.crf_hz for one in found]
 stages = asp.split_stages(sq, crf, x_std=sq_std, unit="um")
 
 figure, axis = plt.subplots(figsize=(7, 4))
-points = axis.scatter(sq, crf, c=100 * stages.probability, cmap="coolwarm", vmin=0, vmax=100, edgecolor="k")
+points = axis.scatter(
+    sq, crf, c=100 * stages.probability, cmap="coolwarm", vmin=0, vmax=100, edgecolor="k"
+)
 axis.axvspan(*stages.interval, color="0.85", zorder=0, label="break, 90 % interval")
 axis.axvline(stages.split, color="0.4", ls="--", label=f"break at {stages.split:.2f} µm")
 figure.colorbar(points, label="probability of severe wear [%]")

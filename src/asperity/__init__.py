@@ -1,8 +1,8 @@
 """asperity hears how a lubricated contact wears.
 
-Mixed-EHL contact, load sharing of asperities and oil, contact resonance. The names of a working day are reached from
-here, the rest by their module (`asperity.lubricant.BairWiner`). Each is loaded when it is first used, so that
-`import asperity` costs next to nothing.
+Mixed-EHL contact, load sharing of asperities and oil, contact resonance. The names of a working
+day are reached from here, the rest by their module (`asperity.lubricant.BairWiner`). Each is
+loaded when it is first used, so that `import asperity` costs next to nothing.
 """
 
 from typing import Any

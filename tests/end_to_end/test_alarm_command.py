@@ -39,7 +39,9 @@ def test_a_level_that_grows_alarms_and_claims_no_resonance(asp):
     assert STEADY < [row["state"] for row in said["recordings"]].index("alarm") < STEADY + LOUD - 5
     assert said["verdict"].startswith("ALARM since s-")
     assert "no contact resonance found in 36 recordings" in said["verdict"]
-    assert not any("off" in row["reason"] for row in said["recordings"])  # the quiet ones were healthy
+    assert not any(
+        "off" in row["reason"] for row in said["recordings"]
+    )  # the quiet ones were healthy
     for row in said["recordings"]:
         assert row["kurtosis"] == pytest.approx(3.0, abs=0.4)  # of Gaussian noise
         assert row["crest"] == pytest.approx(3.8, abs=1.2)
@@ -79,9 +81,18 @@ def test_a_watch_keeps_its_alarm_until_it_is_acknowledged(asp):
     assert (code, json.loads(out)["alarm"]["state"]) == (0, "none")
     snapshots("in", levels[:3], first=STEADY + LOUD + 1)
     code, out, _ = asp("watch", "in", *rates)
-    assert (code, json.loads(out)["alarm"]["state"]) == (4, "cannot-tell")  # the baseline is learned anew
+    assert (code, json.loads(out)["alarm"]["state"]) == (
+        4,
+        "cannot-tell",
+    )  # the baseline is learned anew
     log = rows("SELECT state, since, time FROM judgement ORDER BY id")
-    assert [state for state, _, _ in log] == ["alarm", "alarm", "acknowledged", "none", "cannot-tell"]
+    assert [state for state, _, _ in log] == [
+        "alarm",
+        "alarm",
+        "acknowledged",
+        "none",
+        "cannot-tell",
+    ]
     assert log[0][1] == since
     assert log[2][1] == "s-036.npz"
     assert all(time for _, _, time in log)

@@ -5,17 +5,34 @@ from benchmarks.attacks import damage, endings, inputs, names, runner
 from benchmarks.attacks.hostile import HOSTILE
 
 QUICK = (
-    "x3p with entities of entities", "npy that claims 1e12 numbers", "HDF5 that claims 1e11 samples",
-    "mat 4 of 1e9 x 1e9", "HDF5 whose groups hold themselves", "csv of 200 000 columns",
-    "tdms that claims 1e12 samples", "pipe as recording", "pipe as case", "pipe as manifest", "/dev/zero as surface",
-    "run of 40 GB, sparse", "case with 3000 brackets", "case with an integer of 5000 digits",
-    "manifest with 100 000 brackets", "HDF5 whose text is of no kind",
-)  # fmt: skip
+    "x3p with entities of entities",
+    "npy that claims 1e12 numbers",
+    "HDF5 that claims 1e11 samples",
+    "mat 4 of 1e9 x 1e9",
+    "HDF5 whose groups hold themselves",
+    "csv of 200 000 columns",
+    "tdms that claims 1e12 samples",
+    "pipe as recording",
+    "pipe as case",
+    "pipe as manifest",
+    "/dev/zero as surface",
+    "run of 40 GB, sparse",
+    "case with 3000 brackets",
+    "case with an integer of 5000 digits",
+    "manifest with 100 000 brackets",
+    "HDF5 whose text is of no kind",
+)
 
 
 @pytest.mark.parametrize(
     ("kind", "count"),
-    [(inputs.cases, 12), (inputs.settings, 12), (damage.results, 60), (damage.measured, 60), (names.injections, 6)],
+    [
+        (inputs.cases, 12),
+        (inputs.settings, 12),
+        (damage.results, 60),
+        (damage.measured, 60),
+        (names.injections, 6),
+    ],
 )
 def test_attacks_hold(tmp_path, kind, count):
     attack = kind(tmp_path)
@@ -30,4 +47,6 @@ def test_a_hostile_file_is_refused_in_a_sentence(tmp_path, name):
 
 
 def test_ends_that_nobody_asked_for_leave_nothing_half_written():
-    assert [fault for fault in (*endings.kills("", 2), *endings.full_disks("", 2)) if fault is not None] == []
+    assert [
+        fault for fault in (*endings.kills("", 2), *endings.full_disks("", 2)) if fault is not None
+    ] == []

@@ -8,7 +8,11 @@ import x3pio
 
 from asperity.cli import main
 
-PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8").replace("[256, 256]", "[64, 64]")
+PAPER = (
+    (Path(__file__).parents[2] / "examples" / "paper.toml")
+    .read_text("utf-8")
+    .replace("[256, 256]", "[64, 64]")
+)
 
 
 @pytest.fixture
@@ -39,19 +43,43 @@ def write_case(old: str = "", new: str = "") -> None:
 MISTAKES = {
     "mistyped key": ('load = "500 N"', 'laod = "500 N"', ("contact.laod", "did you mean load?")),
     "mistyped section": ("[contact]", "[contcat]", ("contcat", "did you mean contact?")),
-    "unknown law": ('law = "barus"', 'law = "doolittle"', ("viscosity.law", "doolittle", "barus, roelands")),
+    "unknown law": (
+        'law = "barus"',
+        'law = "doolittle"',
+        ("viscosity.law", "doolittle", "barus, roelands"),
+    ),
     "wrong unit": ('load = "500 N"', 'load = "500 mm"', ("contact.load", "500 mm", "a force")),
     "unknown unit": ('mass = "0.1 kg"', 'mass = "0.1 kq"', ("vibration.mass", "0.1 kq", "a mass")),
     "bare number": ('load = "500 N"', "load = 500", ("contact.load", "500", "its unit")),
-    "negative length": ('length = "10 mm"', 'length = "-10 mm"', ("contact.length", "-10 mm", "positive")),
+    "negative length": (
+        'length = "10 mm"',
+        'length = "-10 mm"',
+        ("contact.length", "-10 mm", "positive"),
+    ),
     "load 0": ('load = "500 N"', 'load = "0 N"', ("contact.load", "0 N", "positive")),
     "grid of 3 cells": ("cells = [64, 64]", "cells = [3, 3]", ("grid", "at least 8 cells", "3")),
     "no TOML": ("[contact]", "[contact", ("case.toml", "not valid TOML")),
-    "other geometry": ('geometry = "line"', 'geometry = "point"', ("length belongs to a line contact", "leave it out")),
+    "other geometry": (
+        'geometry = "line"',
+        'geometry = "point"',
+        ("length belongs to a line contact", "leave it out"),
+    ),
     "missing surface file": ('kind = "gaussian"', 'file = "ring.x3p"', ("surface",)),
-    "fine surface on coarse grid": ("cells = [64, 64]", "cells = [16, 16]", ("correlation length", "20 um")),
-    "roughness of nothing": ('sq = "1 um"', 'sq = "1e-300 um"', ("sq must be at least 1e-15 m", "got 1e-306 m")),
-    "slow sampling": ("damping_ratio", 'rate = "5 kHz"\ndamping_ratio', ("sampling rate", "5000 Hz")),
+    "fine surface on coarse grid": (
+        "cells = [64, 64]",
+        "cells = [16, 16]",
+        ("correlation length", "20 um"),
+    ),
+    "roughness of nothing": (
+        'sq = "1 um"',
+        'sq = "1e-300 um"',
+        ("sq must be at least 1e-15 m", "got 1e-306 m"),
+    ),
+    "slow sampling": (
+        "damping_ratio",
+        'rate = "5 kHz"\ndamping_ratio',
+        ("sampling rate", "5000 Hz"),
+    ),
 }
 
 
@@ -82,7 +110,9 @@ def test_an_oil_that_is_no_liquid_under_the_load_is_refused(refused):
 def test_a_surface_with_too_much_missing_is_refused(refused):
     write_case()
     measured("ring.x3p", (300, 200), 2e-6, missing=0.6)
-    assert "ring.x3p misses" in refused("solve", "case.toml", "--surface", "ring.x3p", "--out", "run.nc")
+    assert "ring.x3p misses" in refused(
+        "solve", "case.toml", "--surface", "ring.x3p", "--out", "run.nc"
+    )
 
 
 def test_a_surface_smaller_than_the_contact_is_refused(refused):

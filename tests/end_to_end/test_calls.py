@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.tracking import calls
-from asperity.tracking.sensors import Sensors
-from asperity.tracking.store import Place, Store
+from asperity.monitoring import notify as calls
+from asperity.monitoring.sensors import Sensors
+from asperity.monitoring.store import Place, Store
 
 STORE = "in/asperity-watch/asperity.db"
 LISTENER = """
@@ -36,7 +36,19 @@ def snapshots(levels, first=0):
 
 
 def watched(asp, *more):
-    return asp("watch", "in", "--once", "--settle", "0", "--quiet", "--machine", "Pump 3", "--point", "DE", *more)
+    return asp(
+        "watch",
+        "in",
+        "--once",
+        "--settle",
+        "0",
+        "--quiet",
+        "--machine",
+        "Pump 3",
+        "--point",
+        "DE",
+        *more,
+    )
 
 
 def kept(query):
@@ -50,7 +62,12 @@ def listener(tmp_path):
     Path(tmp_path / "listen.py").write_text(LISTENER)
     heard = tmp_path / "heard; $(touch never).jsonl"
     command = f"'{sys.executable}' '{tmp_path / 'listen.py'}' '{heard}'"
-    return command, lambda: [json.loads(line) for line in heard.read_text().splitlines()] if heard.exists() else []
+    return (
+        command,
+        lambda: (
+            [json.loads(line) for line in heard.read_text().splitlines()] if heard.exists() else []
+        ),
+    )
 
 
 def test_a_command_is_called_once_a_change_of_state(asp, listener):
@@ -84,9 +101,13 @@ def test_a_call_that_fails_is_noted_and_made_again(asp, listener, tmp_path):
     code, out, err = watched(asp, "--on-alarm", command)
     assert (code, heard()) == (4, [])
     assert "could not be called (exit code 1: nobody is at home); it is tried again" in err
-    assert kept("SELECT attempts, answered, failure FROM call") == [(1, None, "exit code 1: nobody is at home")]
+    assert kept("SELECT attempts, answered, failure FROM call") == [
+        (1, None, "exit code 1: nobody is at home")
+    ]
     (tmp_path / "listen.py").write_text(script)
-    code, again, err = watched(asp, "--on-alarm", command)  # nothing is new, but somebody still has to be told
+    code, again, err = watched(
+        asp, "--on-alarm", command
+    )  # nothing is new, but somebody still has to be told
     assert (code, again, err) == (4, out, "")
     assert [said["state"] for said in heard()] == ["cannot-tell"]
     assert kept("SELECT attempts, failure FROM call WHERE answered IS NOT NULL") == [(2, None)]
@@ -113,7 +134,11 @@ def served(codes):
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self):
             heard.append(
-                (self.path, self.headers["Content-Type"], self.rfile.read(int(self.headers["Content-Length"])))
+                (
+                    self.path,
+                    self.headers["Content-Type"],
+                    self.rfile.read(int(self.headers["Content-Length"])),
+                )
             )
             code = codes[min(len(heard), len(codes)) - 1]
             self.send_response(code)
@@ -217,7 +242,9 @@ def broker():
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-c", BROKER, f"127.0.0.1:{port}"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
         try:
             assert process.stdout.readline() == "ready\n"
             yield port
@@ -229,7 +256,9 @@ def retained(port, topic):
     """What a broker holds for who asks later."""
     from paho.mqtt import subscribe
 
-    return json.loads(subscribe.simple(topic, hostname="127.0.0.1", port=port, keepalive=20).payload)
+    return json.loads(
+        subscribe.simple(topic, hostname="127.0.0.1", port=port, keepalive=20).payload
+    )
 
 
 def test_an_mqtt_broker_holds_the_last_state(asp):
@@ -241,7 +270,9 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
         assert watched(asp, "--mqtt", f"mqtt://127.0.0.1:{port}")[2] == ""
         assert retained(port, "asperity/Pump 3/DE/sensor")["machine"] == "Pump 3"
     snapshots([1.0], first=3)
-    watched(asp, "--mqtt", f"mqtt://127.0.0.1:{port}/plant/alarms")  # the state is the same: nobody is called
+    watched(
+        asp, "--mqtt", f"mqtt://127.0.0.1:{port}/plant/alarms"
+    )  # the state is the same: nobody is called
     assert kept("SELECT count(*) FROM call WHERE answered IS NULL") == [(0,)]
     code, _, err = watched(asp, "--mqtt", f"mqtt://somebody:secret@127.0.0.1:{port}/other")
     assert code == 4
@@ -256,7 +287,11 @@ def test_an_mqtt_broker_holds_the_last_state(asp):
         ("--on-alarm", "", "there is no program '' to call"),
         ("--on-alarm", "echo 'open", "cannot be split"),
         ("--webhook", "ftp://there/x", "it begins with http or https"),
-        ("--webhook", "http://:80", "an address such as https://alarms.example/hook is needed, got 'http://:80'"),
+        (
+            "--webhook",
+            "http://:80",
+            "an address such as https://alarms.example/hook is needed, got 'http://:80'",
+        ),
         ("--mqtt", "broker:1883", "it begins with mqtt or mqtts"),
         ("--mqtt", "mqtt://broker:port/x", "it begins with mqtt or mqtts"),
         ("--mqtt", "mqtt://broker/plant/+/alarms", "has neither + nor #"),

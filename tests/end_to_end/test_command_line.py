@@ -11,24 +11,50 @@ import x3pio
 
 import asperity.ehl
 from asperity import NotConverged, load_case, load_run, solve_case
-from asperity.ehl import OwnResonance, ShakenContact
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.solution import OwnResonance, ShakenContact
 from asperity.surface import flat_surface
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
 KEYS = [  # design.md, section 4, errors, the load on capped oil, parts of friction, shear, the last two's deviations
     *("car", "car_error", "car_domain", "clr", "clr_error", "capped_oil_load_ratio"),
-    *("load_below_20nm", "load_below_50nm", "load_below_100nm", "load_below_200nm", "load_at_floor"),
+    *(
+        "load_below_20nm",
+        "load_below_50nm",
+        "load_below_100nm",
+        "load_below_200nm",
+        "load_at_floor",
+    ),
     *("cavitated_share", "oil_film_m", "sq_m", "contact_slope"),
-    *("h_min_m", "h_min_error_m", "h_central_m", "h_central_error_m", "h_mean_m", "p_max_pa", "lambda_ratio"),
+    *(
+        "h_min_m",
+        "h_min_error_m",
+        "h_central_m",
+        "h_central_error_m",
+        "h_mean_m",
+        "p_max_pa",
+        "lambda_ratio",
+    ),
     *("friction_coefficient", "friction_asperity_part", "friction_oil_part", "friction_power_w"),
     *("flash_temperature_max_k", "film_temperature_max_k"),
     *("von_mises_max_pa", "von_mises_depth_m", "von_mises_core_pa", "von_mises_core_depth_m"),
     *("shear_stress_max_pa", "shear_stress_depth_m"),
     *("cells", "notes", "regime_card", "determined"),
-    *("converged", "iterations", "reynolds_residual", "load_error", "mass_flux_imbalance", "seconds"),
+    *(
+        "converged",
+        "iterations",
+        "reynolds_residual",
+        "load_error",
+        "mass_flux_imbalance",
+        "seconds",
+    ),
     *("crf_hz", "crfa", "crf_std_hz", "crfa_std"),
-    *("contact_resonance_hz", "contact_stiffness_n_m", "contact_damping_ratio", "contact_damping_error"),
+    *(
+        "contact_resonance_hz",
+        "contact_stiffness_n_m",
+        "contact_damping_ratio",
+        "contact_damping_error",
+    ),
     *("contact_stiffness_virgin_n_m", "contact_damping_ratio_virgin"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
     *("clr_surfaces_error", "crf_error_hz", "crf_surfaces_error_hz", "crf_record_error_hz"),
@@ -52,12 +78,16 @@ def test_json_holds_the_contract_and_nothing_else_is_on_stdout(asp):
 def test_what_is_not_shown_is_not_worked_out(asp, monkeypatch):
     """The virgin contact's stiffness stands in no short table, and costs as much as the other limit."""
     expected = asp("solve", "case.toml")
-    monkeypatch.setattr(OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to")))
+    monkeypatch.setattr(
+        OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to"))
+    )
     found = asp("solve", "case.toml")
     assert [line for line in found[1].splitlines() if " s" not in line] == [
         line for line in expected[1].splitlines() if " s" not in line
     ]
-    monkeypatch.setattr(ShakenContact, "resonance", lambda *_: pytest.fail("shaken without being asked to"))
+    monkeypatch.setattr(
+        ShakenContact, "resonance", lambda *_: pytest.fail("shaken without being asked to")
+    )
     assert asp("solve", "case.toml", "--quiet")[:2] == (0, f"{expected[1].splitlines()[0]}\n")
 
 
@@ -111,7 +141,12 @@ def test_several_surfaces_are_solved_and_kept(asp):
     ],
 )
 def test_a_terminal_without_our_signs_shows_plain_ones(asp, monkeypatch, arguments, plain):
-    x3pio.write("ring.x3p", np.random.default_rng(5).standard_normal((32, 48)) * 1e-6, x_scale=2e-6, y_scale=3e-6)
+    x3pio.write(
+        "ring.x3p",
+        np.random.default_rng(5).standard_normal((32, 48)) * 1e-6,
+        x_scale=2e-6,
+        y_scale=3e-6,
+    )
     code, out, _ = asp(*arguments)
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
     command = [sys.executable, "-m", "asperity", *arguments]
@@ -140,7 +175,9 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     first = load_run("run.nc")
     assert first.case.contents.surface.file == "maps/ring.x3p"
     Path("maps/ring.x3p").unlink()
-    assert numbers(asp("solve", "run.nc", "--json")[1]) == {k: v for k, v in first.summary().items() if k != "seconds"}
+    assert numbers(asp("solve", "run.nc", "--json")[1]) == {
+        k: v for k, v in first.summary().items() if k != "seconds"
+    }
     assert any("removed a quadratic form" in note for note in first.notes)
     assert "note: removed a quadratic form" in asp("solve", "run.nc", "--out", "again.nc")[1]
     assert load_run("again.nc").notes == first.notes
@@ -148,7 +185,14 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
 
 def test_set_changes_the_case(asp):
     code, out, _ = asp(
-        "solve", "case.toml", "--set", "contact.load=250 N", "--set", "surface.seed=3", "--out", "run.nc"
+        "solve",
+        "case.toml",
+        "--set",
+        "contact.load=250 N",
+        "--set",
+        "surface.seed=3",
+        "--out",
+        "run.nc",
     )
     assert code == 0
     assert "Kept in run.nc" in out
@@ -158,7 +202,9 @@ def test_set_changes_the_case(asp):
 
 
 def test_a_dry_smooth_contact_is_hertz_and_rings_at_full_load(asp):
-    _, out, _ = asp("solve", "case.toml", "--set", "lubricant=none", "--set", "surface=flat", "--json")
+    _, out, _ = asp(
+        "solve", "case.toml", "--set", "lubricant=none", "--set", "surface=flat", "--json"
+    )
     dry = json.loads(out)
     assert dry["clr"] == pytest.approx(1.0, abs=1e-3)
     assert dry["p_max_pa"] == pytest.approx(0.5691e9, rel=0.02)  # physics: p_h of the paper's case
@@ -168,7 +214,9 @@ def test_a_dry_smooth_contact_is_hertz_and_rings_at_full_load(asp):
 
 def test_python_and_command_line_agree(asp):
     run = solve_case(load_case("case.toml"))
-    assert {k: v for k, v in run.summary().items() if k != "seconds"} == numbers(asp("solve", "case.toml", "--json")[1])
+    assert {k: v for k, v in run.summary().items() if k != "seconds"} == numbers(
+        asp("solve", "case.toml", "--json")[1]
+    )
 
 
 def test_a_case_without_vibration_has_no_resonance(asp):
@@ -180,7 +228,9 @@ def test_a_case_without_vibration_has_no_resonance(asp):
 
 
 def test_a_solve_that_does_not_converge_is_loud_and_kept(asp):
-    code, out, err = asp("solve", "case.toml", "--set", "solver.max_iterations=1", "--out", "run.nc")
+    code, out, err = asp(
+        "solve", "case.toml", "--set", "solver.max_iterations=1", "--out", "run.nc"
+    )
     assert code == 1
     assert out.startswith("NOT CONVERGED")
     assert err.startswith("error: not converged")

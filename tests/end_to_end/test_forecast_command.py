@@ -22,7 +22,9 @@ def rig(tmp_path_factory):
     """Seven recordings of a contact whose roughness, and load share, rise steadily: too few for any other alarm."""
     folder = tmp_path_factory.mktemp("rig") / "rising"
     folder.mkdir()
-    found = simulate_rig(samples=12, repeats=1, trend="smooth", duration_s=3.0, disturbance=QUIET, seed=4)
+    found = simulate_rig(
+        samples=12, repeats=1, trend="smooth", duration_s=3.0, disturbance=QUIET, seed=4
+    )
     rows = ["file,hours,load_n,entrainment_m_s"]
     for number, one in enumerate(found.recordings[:7]):
         with h5py.File(folder / f"{number}.h5", "w") as file:
@@ -38,7 +40,15 @@ def asked(rig, small, tmp_path):
     """What all commands are given."""
     shutil.copytree(rig, tmp_path / "rising")
     (tmp_path / "infer.toml").write_text(load_case(CASE).with_overrides(SMALL).text, "utf-8")
-    return ("rising", "--table", "rising/table.csv", "--case", "infer.toml", "--emulator", str(small[2]))
+    return (
+        "rising",
+        "--table",
+        "rising/table.csv",
+        "--case",
+        "infer.toml",
+        "--emulator",
+        str(small[2]),
+    )
 
 
 def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
@@ -53,26 +63,48 @@ def test_a_track_foretells_and_the_forecast_is_an_alarm(asp, asked):
     page = Path("track.html").read_text("utf-8")
     assert "CLR rises above" in page
     assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (1, 1)
-    code, out, _ = asp("track", *asked, *LIMIT, "--acknowledge", "last", "--report", "silent.html", "--json")
+    code, out, _ = asp(
+        "track", *asked, *LIMIT, "--acknowledge", "last", "--report", "silent.html", "--json"
+    )
     said = json.loads(out)
     assert (code, said["alarm"]["state"]) == (0, "none")
-    assert said["forecast"] == {"sentence": "No forecast: a forecast takes resonances of 4 recordings at different "
-                                "times or more, got 0; leave --forecast out, or record again."}  # fmt: skip
+    assert said["forecast"] == {
+        "sentence": "No forecast: a forecast takes resonances of 4 recordings at different "
+        "times or more, got 0; leave --forecast out, or record again."
+    }
     assert said["verdict"].endswith(said["forecast"]["sentence"])
     page = Path("silent.html").read_text("utf-8")
-    assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (1, 0)  # said, not drawn
+    assert (page.count('id="ahead"'), page.count("its forecast with the limit")) == (
+        1,
+        0,
+    )  # said, not drawn
     assert json.loads(asp("track", *asked[:-2], "--json")[1])["forecast"] is None
 
 
 def test_a_watch_foretells_keeps_it_and_stops_when_somebody_has_looked(asp, asked):
-    Path("call.py").write_text("import sys; open('called.json', 'a').write(sys.stdin.read() + '\\n')\n")
-    command = ("watch", *asked, *LIMIT, "--once", "--settle", "0", "--json", "--on-alarm", "python call.py")
+    Path("call.py").write_text(
+        "import sys; open('called.json', 'a').write(sys.stdin.read() + '\\n')\n"
+    )
+    command = (
+        "watch",
+        *asked,
+        *LIMIT,
+        "--once",
+        "--settle",
+        "0",
+        "--json",
+        "--on-alarm",
+        "python call.py",
+    )
     code, out, _ = asp(*command)
     first = json.loads(out)
     assert (code, first["alarm"]["raised_by"], len(first["new"])) == (3, "forecast", 7)
     assert first["forecast"]["sentence"].rstrip(".") == first["alarm"]["reason"]
     told = [json.loads(line) for line in Path("called.json").read_text().splitlines()]
-    assert [(one["before"], one["state"]) for one in told] == [(None, "cannot-tell"), ("cannot-tell", "alarm")]
+    assert [(one["before"], one["state"]) for one in told] == [
+        (None, "cannot-tell"),
+        ("cannot-tell", "alarm"),
+    ]
     code, out, _ = asp(*command)
     again = json.loads(out)
     assert (code, again["new"], again["forecast"]) == (3, [], first["forecast"])
@@ -80,7 +112,9 @@ def test_a_watch_foretells_keeps_it_and_stops_when_somebody_has_looked(asp, aske
     code, out, _ = asp(*command, "--acknowledge", "last")
     looked = json.loads(out)
     assert (code, looked["alarm"]["state"]) == (0, "none")
-    assert looked["forecast"]["sentence"].startswith("No forecast: a forecast takes resonances of 4")
+    assert looked["forecast"]["sentence"].startswith(
+        "No forecast: a forecast takes resonances of 4"
+    )
 
 
 def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
@@ -96,10 +130,19 @@ def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
     known = json.loads(asp("infer", *asked, "--surface", "ring.x3p", "--json")[1])
     assert any(note.startswith("Sq is taken as ring.x3p shows it, 1.5") for note in known["notes"])
     free = json.loads(asp("infer", *asked, "--json")[1])
-    widths = [one["posterior"]["sq_m"]["high"] - one["posterior"]["sq_m"]["low"] for one in (known, free)]
+    widths = [
+        one["posterior"]["sq_m"]["high"] - one["posterior"]["sq_m"]["low"] for one in (known, free)
+    ]
     assert widths[0] < 0.5 * widths[1]
     Path("wear.toml").write_text((CASE.parent / "wear.toml").read_text("utf-8"), "utf-8")
-    coarse = ("--set", "grid.cells=[32, 16]", "--set", "surface.correlation_length='50 um'", "--workers", "1")
+    coarse = (
+        "--set",
+        "grid.cells=[32, 16]",
+        "--set",
+        "surface.correlation_length='50 um'",
+        "--workers",
+        "1",
+    )
     assert asp("wear", "wear.toml", "--hours", "1", "--out", "worn", *coarse)[0] == 0
     code, out, _ = asp("infer", *asked, *LIMIT, "--worn", "worn", "--json")
     expected = json.loads(out)["forecast"]
@@ -113,12 +156,29 @@ def test_infer_foretells_with_a_wear_history_and_a_measured_surface(asp, asked):
     [
         (("track", "rising", *LIMIT), "--forecast needs the contact; give --case"),
         (("track", "rising", "--worn", "d"), "give --forecast, too"),
-        (("watch", "rising", "--emulator", "d"), "--emulator is what foretells a series; give --forecast, too"),
-        (("watch", "rising", "--case", "infer.toml", "--forecast", "clr=2"), "must lie between 0 and 1"),
-        (("track", "rising", "--case", "infer.toml", "--forecast", "hardness=1.5 GPa", "--worn", "d"),
-         "hardness"),
+        (
+            ("watch", "rising", "--emulator", "d"),
+            "--emulator is what foretells a series; give --forecast, too",
+        ),
+        (
+            ("watch", "rising", "--case", "infer.toml", "--forecast", "clr=2"),
+            "must lie between 0 and 1",
+        ),
+        (
+            (
+                "track",
+                "rising",
+                "--case",
+                "infer.toml",
+                "--forecast",
+                "hardness=1.5 GPa",
+                "--worn",
+                "d",
+            ),
+            "hardness",
+        ),
     ],
-)  # fmt: skip
+)
 @pytest.mark.usefixtures("asked")
 def test_what_cannot_be_foretold_is_refused_before_anything_is_read(asp, arguments, said):
     code, out, err = asp(*arguments)

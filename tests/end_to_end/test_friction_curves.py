@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from asperity import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.results import stribeck_curve, traction_curve
 
 SMALL = ("--set", "grid.cells=[48, 32]", "--set", "surface.correlation_length=40 um")
@@ -21,7 +21,9 @@ def case(asp):  # noqa: ARG001 - it makes the folder
 
 
 def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
-    code, out, err = asp("stribeck", "case.toml", *SMALL, "--sq", "0.5 um", "--json", "--out", "curve.png")
+    code, out, err = asp(
+        "stribeck", "case.toml", *SMALL, "--sq", "0.5 um", "--json", "--out", "curve.png"
+    )
     assert (code, err) == (0, "")
     told = json.loads(out)
     assert told["figures"] == ["curve.png"]
@@ -36,14 +38,28 @@ def test_stribeck_falls_from_boundary_friction_to_the_oils(asp):
     assert all(slower >= faster for slower, faster in pairwise(friction))
     assert points[-1]["clr"] < 0.01 < points[0]["clr"]
     assert all(
-        point["friction_coefficient"] == pytest.approx(point["asperity_part"] + point["oil_part"]) for point in points
+        point["friction_coefficient"] == pytest.approx(point["asperity_part"] + point["oil_part"])
+        for point in points
     )
-    assert told["verdict"].startswith(f"Friction goes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}")
+    assert told["verdict"].startswith(
+        f"Friction goes from {friction[0]:.4f} at 0.0191 m/s to {friction[-1]:.4f}"
+    )
 
 
 def test_traction_rises_from_nothing_and_meets_its_limit(asp):
     wanted = [argument for slip in ("0", "0.3", "0.001", "3") for argument in ("--slip", slip)]
-    code, out, _ = asp("traction", "case.toml", *SMALL, "--sq", "0.5 um", "--sq", "1 um", *wanted, "--out", "curve.png")
+    code, out, _ = asp(
+        "traction",
+        "case.toml",
+        *SMALL,
+        "--sq",
+        "0.5 um",
+        "--sq",
+        "1 um",
+        *wanted,
+        "--out",
+        "curve.png",
+    )
     assert code == 0
     first, second = out.splitlines()[:2]
     assert first.startswith("Friction is at most 0.0")
@@ -59,7 +75,12 @@ def test_a_traction_curve_in_python(case):
     slips = [point.slide_to_roll for point in curve.points]
     assert slips == pytest.approx([0.0, 0.001, 0.3])
     friction = [point.friction_coefficient for point in curve.points]
-    assert friction[0] == curve.points[0].flash_temperature_max_k == curve.points[0].friction_power_w == 0.0
+    assert (
+        friction[0]
+        == curve.points[0].flash_temperature_max_k
+        == curve.points[0].friction_power_w
+        == 0.0
+    )
     assert friction[1] < friction[2]
     assert seen
     assert (
@@ -78,7 +99,9 @@ def test_feedback_is_heard_by_the_curve(case):
 
 
 def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
-    code, out, err = asp("stribeck", "case.toml", *SMALL, "--speed", "1.9", "--set", "solver.max_iterations=1")
+    code, out, err = asp(
+        "stribeck", "case.toml", *SMALL, "--speed", "1.9", "--set", "solver.max_iterations=1"
+    )
     assert code == 1
     assert out.startswith("NOT CONVERGED at 1 of 1 points: ")
     assert "NOT CONVERGED" in out.splitlines()[-1]
@@ -88,11 +111,17 @@ def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("stribeck", "case.toml", "--set", "contact.slip=0.0"), "contact.slip is 0 and nothing slides"),
+        (
+            ("stribeck", "case.toml", "--set", "contact.slip=0.0"),
+            "contact.slip is 0 and nothing slides",
+        ),
         (("stribeck", "case.toml", "--speed", "-1"), "entrainment speed must be positive"),
         (("stribeck", "case.toml", "--out", "curve.pdf"), "must be a file that ends in .png"),
         (("stribeck", "case.toml", "--sq", "1 kg"), "surface.sq must be a length"),
-        (("traction", "case.toml", "--slip", "-0.1"), "slide-to-roll ratio must lie between 0 and 1000, got -0.1"),
+        (
+            ("traction", "case.toml", "--slip", "-0.1"),
+            "slide-to-roll ratio must lie between 0 and 1000, got -0.1",
+        ),
     ],
 )
 def test_what_cannot_be_is_one_line(asp, arguments, says):

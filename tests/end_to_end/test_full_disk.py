@@ -17,8 +17,24 @@ def limited(kilobytes: int):
 COMMANDS = {  # what writes, and kilobytes that are too few for it
     "run": (("solve", "case.toml", "--surfaces", "1", *SMALL, "--out", "new/run.nc"), 30),
     "history": (("run", "case.toml", "--steps", "2", *SMALL, "--out", "new/history"), 5),
-    "study": (("study", "case.toml", "--workers", "1", *SMALL, "--set", "study.sq=['1 um']", "--out", "new/study"), 4),
-    "rig": (("rig", "--out", "new/rig", "--samples", "1", "--repeats", "1", "--duration", "5 s"), 50),
+    "study": (
+        (
+            "study",
+            "case.toml",
+            "--workers",
+            "1",
+            *SMALL,
+            "--set",
+            "study.sq=['1 um']",
+            "--out",
+            "new/study",
+        ),
+        4,
+    ),
+    "rig": (
+        ("rig", "--out", "new/rig", "--samples", "1", "--repeats", "1", "--duration", "5 s"),
+        50,
+    ),
 }
 
 

@@ -19,8 +19,17 @@ def test_numbers_are_what_they_were(name):
 
 def test_a_difference_is_seen():
     then = {"rows": [{"clr": 0.5, "found": True, "reason": None}]}
-    assert differences(then, {"rows": [{"clr": 0.5004, "found": True, "reason": None, "new": 1}]}, 2e-3) == []
-    assert len(differences(then, {"rows": [{"clr": 0.502, "found": False, "reason": ""}]}, 2e-3)) == 3
+    assert (
+        differences(
+            then, {"rows": [{"clr": 0.5004, "found": True, "reason": None, "new": 1}]}, 2e-3
+        )
+        == []
+    )
+    assert (
+        len(differences(then, {"rows": [{"clr": 0.502, "found": False, "reason": ""}]}, 2e-3)) == 3
+    )
     assert differences({"load_error": 2e-9}, {"load_error": -3e-8}, 2e-3) == []
     assert len(differences({"load_error": 2e-9}, {"load_error": 2e-4}, 2e-3)) == 1
-    assert differences(then, {"rows": []}, 2e-3) == [".rows: [{'clr': 0.5, 'found': True, 'reason': None}] is now []"]
+    assert differences(then, {"rows": []}, 2e-3) == [
+        ".rows: [{'clr': 0.5, 'found': True, 'reason': None}] is now []"
+    ]

@@ -11,7 +11,7 @@ import pytest
 from scipy.io import wavfile
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.inference import (
     Forward,
     Observation,
@@ -27,9 +27,9 @@ from asperity.inference import (
 )
 from asperity.inference.outputs import OUTPUTS
 from asperity.inference.posterior import emulated_share, posterior_shares
+from asperity.monitoring import read_table
 from asperity.report import write_inference_report
 from asperity.study import overrides_at, plan_points, run_study
-from asperity.tracking import read_table
 from support.emulated import SMALL, formula_emulator, formula_setting
 from support.recordings import SHARED
 
@@ -42,9 +42,13 @@ def test_an_emulator_foretells_contacts_and_says_how_well(small):
     quality = emulator.quality["clr"]
     assert quality.error < 3.0 * quality.scatter
     assert set(emulator.grid) == set(emulator.quality)
-    rough, smooth = (emulator.values(np.array([[share, 0.5, 0.5]]), "clr")[0] for share in (0.9, 0.1))
+    rough, smooth = (
+        emulator.values(np.array([[share, 0.5, 0.5]]), "clr")[0] for share in (0.9, 0.1)
+    )
     assert rough > smooth + 0.2  # more of the load on rougher surfaces
-    slow, fast = (emulator.values(np.array([[0.5, 0.5, share]]), "clr")[0] for share in (0.05, 0.95))
+    slow, fast = (
+        emulator.values(np.array([[0.5, 0.5, share]]), "clr")[0] for share in (0.05, 0.95)
+    )
     assert slow > fast + 0.05  # and less where the film is thicker
     assert "which is corrected for" in emulator.sentence()
 
@@ -81,7 +85,9 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
     z = np.zeros((1, len(setting.unknowns)))
     shown = Forward(setting, emulator, tuple(points)).shown(z, "hertz-point")
     heard = [
-        Observation(load_n=point.load_n, entrainment_m_s=point.entrainment_m_s, crf_hz=hertz, crf_std_hz=3.0)
+        Observation(
+            load_n=point.load_n, entrainment_m_s=point.entrainment_m_s, crf_hz=hertz, crf_std_hz=3.0
+        )
         for point, hertz in zip(points, np.exp(shown.crf[0]), strict=True)
     ]
     found = infer_observations(setting, emulator, heard)
@@ -89,17 +95,25 @@ def test_an_emulator_is_extended_where_the_posterior_is(small, tmp_path):
         wider = with_further(found, 24, executor=executor)
         near = posterior_shares(found.forward, found.draws, 12, seed=99)
         plan = plan_points(
-            setting.case, [overrides_at(setting.case, setting.ranges, one) for one in near], seeds=6, kind="still"
+            setting.case,
+            [overrides_at(setting.case, setting.ranges, one) for one in near],
+            seeds=6,
+            kind="still",
         )
         solved = run_study(plan, executor=executor).table
     groups, scale = solved.groupby("point")["clr"], OUTPUTS["clr"]
     truth = groups.mean().to_numpy()
-    by_chance = np.sqrt(np.mean(groups.var() / 6)) * scale.slope(truth)  # as much as the emulators are off
+    by_chance = np.sqrt(np.mean(groups.var() / 6)) * scale.slope(
+        truth
+    )  # as much as the emulators are off
     (_, before), (mean, after) = (one(near, ["clr"])["clr"] for one in (emulator, wider.emulator))
     assert after.mean() < 0.75 * before.mean()
     assert np.sqrt(np.mean(((scale.forward(truth) - mean) / np.hypot(after, by_chance)) ** 2)) < 2.0
     assert (wider.emulator.points, wider.emulator.further) == (40, 24)
-    assert f"makes {100 * emulated_share(wider.forward, wider.draws):.0f} % of the variance of CLR" in wider.notes[-1]
+    assert (
+        f"makes {100 * emulated_share(wider.forward, wider.draws):.0f} % of the variance of CLR"
+        in wider.notes[-1]
+    )
     assert "before it was extended by 24 points where the posterior is" in wider.notes[-1]
     again = build_emulator(setting, folder=tmp_path / "own")
     assert np.array_equal(again(near, ["clr"])["clr"], wider.emulator(near, ["clr"])["clr"])
@@ -116,10 +130,20 @@ def test_noise_cannot_be_told_by_command(asp, small):
     rng = np.random.default_rng(1)
     for number in range(2):
         wavfile.write(f"noise-{number}.wav", 20_000, rng.standard_normal(40_000).astype(np.float32))
-    Path("recordings.toml").write_text('unit = "m/s^2"\nscale = 1\nload_n = 500\nentrainment_m_s = 2\n', "utf-8")
+    Path("recordings.toml").write_text(
+        'unit = "m/s^2"\nscale = 1\nload_n = 500\nentrainment_m_s = 2\n', "utf-8"
+    )
     folder = small[2]
     Path("infer.toml").write_text(load_case(EXAMPLE).with_overrides(SMALL).text, "utf-8")
-    command = ("infer", "noise-0.wav", "noise-1.wav", "--case", "infer.toml", "--emulator", str(folder))
+    command = (
+        "infer",
+        "noise-0.wav",
+        "noise-1.wav",
+        "--case",
+        "infer.toml",
+        "--emulator",
+        str(folder),
+    )
     code, out, err = asp(*command, "--json", "--report", "page.html")
     assert (code, err) == (0, "")
     said = json.loads(out)
@@ -132,18 +156,26 @@ def test_noise_cannot_be_told_by_command(asp, small):
     code, out, err = asp(*command, "--forecast", "clr=0.5")
     assert (code, out) == (2, "")
     assert "a forecast takes resonances of 4 recordings at different times or more, got 0" in err
-    code, out, _ = asp("infer", "--case", "infer.toml", "--emulator", str(folder), "--design", "0.6", "--json")
+    code, out, _ = asp(
+        "infer", "--case", "infer.toml", "--emulator", str(folder), "--design", "0.6", "--json"
+    )
     design = json.loads(out)["design"]
     assert code == 0
     assert design["sentence"].startswith("CLR stays below 60.0 % with a probability of")
-    assert [lever["key"] for lever in design["levers"]] == ["sq_m", "load_n", "entrainment_speed_m_s"]
+    assert [lever["key"] for lever in design["levers"]] == [
+        "sq_m",
+        "load_n",
+        "entrainment_speed_m_s",
+    ]
     smooth, rough = (design["levers"][0]["chances"][end] for end in (0, -1))
     assert smooth > rough + 0.3
 
 
 def test_refusals_are_one_sentence(asp):
     shutil.copy(EXAMPLE, "infer.toml")
-    wavfile.write("a.wav", 20_000, np.random.default_rng(1).standard_normal(20_000).astype(np.float32))
+    wavfile.write(
+        "a.wav", 20_000, np.random.default_rng(1).standard_normal(20_000).astype(np.float32)
+    )
     Path("kilo.csv").write_text("file,load_kn\na.wav,0.5\n", "utf-8")
     Path("nan.csv").write_text("file,load_n\na.wav,nan\n", "utf-8")
     Path("empty").mkdir()
@@ -151,15 +183,36 @@ def test_refusals_are_one_sentence(asp):
         (("a.wav",), "give --case"),
         (("--case", "infer.toml"), "asperity infer needs recordings"),
         (("a.wav", "--case", "infer.toml", "--worn", "d"), "give --forecast, too"),
-        (("a.wav", "--case", "infer.toml", "--forecast", "crf=3 kHz"), "--forecast takes a limit such as clr=0.5"),
-        (("a.wav", "--case", "infer.toml", "--forecast", "clr=nan"), "a limit of CLR must lie between 0 and 1"),
-        (("a.wav", "--case", "infer.toml", "--forecast", "clr=0.5", "--worn", "d"), "d holds no wear"),
-        (("a.wav", "--case", "infer.toml", "--forecast", "sq=1 m"), "a limit of Sq must lie within what [infer]"),
-        (("--case", "infer.toml", "--design", "nan"), "--design must be a load share between 0 and 1"),
+        (
+            ("a.wav", "--case", "infer.toml", "--forecast", "crf=3 kHz"),
+            "--forecast takes a limit such as clr=0.5",
+        ),
+        (
+            ("a.wav", "--case", "infer.toml", "--forecast", "clr=nan"),
+            "a limit of CLR must lie between 0 and 1",
+        ),
+        (
+            ("a.wav", "--case", "infer.toml", "--forecast", "clr=0.5", "--worn", "d"),
+            "d holds no wear",
+        ),
+        (
+            ("a.wav", "--case", "infer.toml", "--forecast", "sq=1 m"),
+            "a limit of Sq must lie within what [infer]",
+        ),
+        (
+            ("--case", "infer.toml", "--design", "nan"),
+            "--design must be a load share between 0 and 1",
+        ),
         (("empty", "--case", "infer.toml"), "holds no recordings"),
-        (("a.wav", "--case", "infer.toml", "--table", "kilo.csv"), "has a column load_kn; take load_n"),
+        (
+            ("a.wav", "--case", "infer.toml", "--table", "kilo.csv"),
+            "has a column load_kn; take load_n",
+        ),
         (("a.wav", "--case", "infer.toml", "--table", "nan.csv"), "load_n must be a number"),
-        (("a.wav", "--case", "infer.toml", "--sampler", "mcmc"), "--sampler must be one of importance, nested"),
+        (
+            ("a.wav", "--case", "infer.toml", "--sampler", "mcmc"),
+            "--sampler must be one of importance, nested",
+        ),
     ):
         code, out, err = asp("infer", *arguments)
         assert (code, out) == (2, "")
@@ -169,9 +222,15 @@ def test_refusals_are_one_sentence(asp):
 
 def test_a_table_of_operating_points_needs_no_x(tmp_path):
     path = tmp_path / "conditions.csv"
-    path.write_text("file,load_n,entrainment_m_s,temperature_degc\na.wav,500,1.5,60\nb.wav,,2,61\n", "utf-8")
+    path.write_text(
+        "file,load_n,entrainment_m_s,temperature_degc\na.wav,500,1.5,60\nb.wav,,2,61\n", "utf-8"
+    )
     places = read_table(path).places
-    assert (places["a.wav"].load_n, places["a.wav"].entrainment_m_s, places["a.wav"].temperature_degc) == (500, 1.5, 60)
+    assert (
+        places["a.wav"].load_n,
+        places["a.wav"].entrainment_m_s,
+        places["a.wav"].temperature_degc,
+    ) == (500, 1.5, 60)
     assert (places["b.wav"].load_n, places["b.wav"].x) == (None, 2.0)
 
 
@@ -183,21 +242,37 @@ def test_no_real_recording_is_told_anything_from(folder):
     setting = formula_setting()
     options = {"ims": {"rate_hz": 20_000.0, "unit": "g", "channel": "1"}, "endaq": {"channel": "1"}}
     heard = listen([SHARED / "vibration" / folder], setting, **options.get(folder, {}))
-    found = infer_observations(setting, formula_emulator(setting), heard.observations, silent=heard.silent)
+    found = infer_observations(
+        setting, formula_emulator(setting), heard.observations, silent=heard.silent
+    )
     assert found.verdict().startswith("Cannot be told")
     assert not found.identifiable
 
 
 def test_a_page_shows_what_was_heard(tmp_path):
     setting = formula_setting()
-    heard = [Observation(load_n=load, entrainment_m_s=1.0, crf_hz=3300.0 * (load / 500.0) ** 0.2, crf_std_hz=5.0,
-                         name=f"{load:g}.wav") for load in (300.0, 500.0, 900.0)]  # fmt: skip
-    found = infer_observations(setting, formula_emulator(setting), heard, notes=("A note of its own.",))
-    series = [replace(heard[1], x=10.0 * number, crf_hz=3300.0 + 12.0 * number) for number in range(8)]
+    heard = [
+        Observation(
+            load_n=load,
+            entrainment_m_s=1.0,
+            crf_hz=3300.0 * (load / 500.0) ** 0.2,
+            crf_std_hz=5.0,
+            name=f"{load:g}.wav",
+        )
+        for load in (300.0, 500.0, 900.0)
+    ]
+    found = infer_observations(
+        setting, formula_emulator(setting), heard, notes=("A note of its own.",)
+    )
+    series = [
+        replace(heard[1], x=10.0 * number, crf_hz=3300.0 + 12.0 * number) for number in range(8)
+    ]
     path = write_inference_report(
         found,
         tmp_path / "page.html",
-        forecast=forecast_observations(setting, found.emulator, series, limit=("clr", 0.5), laws=("hertz-point",)),
+        forecast=forecast_observations(
+            setting, found.emulator, series, limit=("clr", 0.5), laws=("hertz-point",)
+        ),
         design=design_contact(found.forward, found.draws.z, clr=0.3),
     )
     text = path.read_text("utf-8")

@@ -8,16 +8,34 @@ import pytest
 
 from asperity.case import load_machine
 from asperity.cli import main
-from asperity.errors import BadInput
-from asperity.study import machine_conditions
+from asperity.core.errors import BadInput
+from asperity.machines import machine_conditions
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CONDITIONS = [  # of design.md, section 9, and the bodies' names
-    *("name", "bodies", "position", "load_n", "line_load_n_m", "radius_m", "length_m", "u1_m_s", "u2_m_s"),
+    *(
+        "name",
+        "bodies",
+        "position",
+        "load_n",
+        "line_load_n_m",
+        "radius_m",
+        "length_m",
+        "u1_m_s",
+        "u2_m_s",
+    ),
     *("entrainment_m_s", "slide_to_roll", "p_hertz_pa", "overrolling_hz"),
 ]
 SOLVED = [  # of the same place, and more of what a solved contact has
-    *("h_central_m", "lambda_ratio", "clr", "car", "friction_coefficient", "flash_temperature_max_k", "crf_hz"),
+    *(
+        "h_central_m",
+        "lambda_ratio",
+        "clr",
+        "car",
+        "friction_coefficient",
+        "flash_temperature_max_k",
+        "crf_hz",
+    ),
     *("h_min_m", "determined", "p_max_pa", "friction_power_w", "von_mises_core_pa", "reason"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
 ]
@@ -81,7 +99,9 @@ def test_a_dry_run_gives_the_conditions_alone(asp, name, contacts, worst, freque
 
 def test_a_dry_run_needs_neither_oil_nor_roughness_and_solving_does(asp):
     lines = Path("nu206.toml").read_text("utf-8").splitlines()
-    Path("bare.toml").write_text("\n".join(line for line in lines if line.startswith("machine")), "utf-8")
+    Path("bare.toml").write_text(
+        "\n".join(line for line in lines if line.startswith("machine")), "utf-8"
+    )
     assert asp("machine", "bare.toml", "--dry-run")[0] == 0
     code, out, err = asp("machine", "bare.toml", "--out", "kept")
     assert (code, out) == (2, "")
@@ -106,7 +126,9 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
     said = json.loads(out)
     rows = {row["name"]: row for row in said["contacts"]}
     assert [sorted(row) for row in rows.values()] == [sorted(CONDITIONS + SOLVED)] * 10
-    assert rows["roller 1, inner ring"]["h_min_m"] == rows["roller 12, inner ring"]["h_min_m"]  # the same contact
+    assert (
+        rows["roller 1, inner ring"]["h_min_m"] == rows["roller 12, inner ring"]["h_min_m"]
+    )  # the same contact
     films = [rows[f"roller {number}, inner ring"]["h_min_m"] for number in (0, 1, 2)]
     assert films == sorted(films)
     assert rows["roller 0, outer ring"]["h_min_m"] > films[0]  # of larger radius
@@ -123,7 +145,9 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
     parts[0].unlink()  # as if it had been killed before this one
     again = json.loads(asp(*arguments, "--json")[1])
     assert again["contacts"] == said["contacts"]
-    assert [part.stat().st_mtime_ns for part in parts[1:]] == times[1:]  # the first may be told in other batches now
+    assert [part.stat().st_mtime_ns for part in parts[1:]] == times[
+        1:
+    ]  # the first may be told in other batches now
     assert Path("kept/worst.nc").stat().st_mtime_ns == opened
     code, _, err = asp(*arguments, "--set", "machine.radial_load=3 kN")
     assert code == 2
@@ -132,7 +156,9 @@ def test_every_contact_is_solved_kept_and_not_solved_again(asp):
 
 def test_a_contacts_interval_is_what_solve_gives(asp):
     """Over several surfaces of one kind."""
-    rough = 'surface = { kind = "gaussian", sq = "0.6 um", correlation_length = "20 um", seed = 3 }\n'
+    rough = (
+        'surface = { kind = "gaussian", sq = "0.6 um", correlation_length = "20 um", seed = 3 }\n'
+    )
     rest = "[grid]\ncells = [96, 48]\n[solver]\nsurfaces = 3\n"
     Path("discs.toml").write_text(rough + DISCS + rest, "utf-8")
     (row,) = json.loads(asp("machine", "discs.toml", "--workers", "1", "--json")[1])["contacts"]
@@ -161,9 +187,19 @@ def test_a_contact_is_what_solve_makes_of_it(asp):
 
 def test_sliding_keeps_its_sign(asp):
     rows = json.loads(asp("machine", "fzg-c.toml", "--dry-run", "--json")[1])["contacts"]
-    assert [row["slide_to_roll"] > 0.0 for row in rows] == [False, False, False, False, True, True, True]
+    assert [row["slide_to_roll"] > 0.0 for row in rows] == [
+        False,
+        False,
+        False,
+        False,
+        True,
+        True,
+        True,
+    ]
     for row in rows:
-        assert row["slide_to_roll"] * row["entrainment_m_s"] == pytest.approx(row["u1_m_s"] - row["u2_m_s"])
+        assert row["slide_to_roll"] * row["entrainment_m_s"] == pytest.approx(
+            row["u1_m_s"] - row["u2_m_s"]
+        )
 
 
 def test_what_is_not_solved_is_loud(asp):
@@ -188,15 +224,35 @@ def test_what_is_not_solved_is_loud(asp):
         ("fzg-c", "machine.centre_distance=90 mm", "jams the teeth"),
         ("fzg-c", "material=none", "material must be a table, got"),
         ("fzg-c", "lubricant.grade=VG 99", "grade must be an ISO viscosity grade"),
-        ("fzg-c", "lubricant.temperature=170 degC", "temperature must lie between -20 and 150 degC"),
+        (
+            "fzg-c",
+            "lubricant.temperature=170 degC",
+            "temperature must lie between -20 and 150 degC",
+        ),
         ("fzg-c", "lubricant.base=ester", "alpha is missing, which base ester has to state"),
         ("fzg-c", "machine.profile_shift=[-0.6, 0.3]", "the teeth cannot mesh"),
         ("fzg-c", 'machine.tip_diameters=["74 mm", "110 mm"]', "the teeth lose contact"),
         ("fzg-c", "machine.centre_distance=80 mm", "lets the base circles overlap"),
-        ("fzg-c", "rating.contamination=0.5", "rating.contamination says nothing of a spur-gear; leave it out"),
-        ("nu206", "rating.scuffing_stage=12", "rating.scuffing_stage says nothing of a cylindrical-roller-bearing"),
-        ("6206", "rating.contamination=50", "rating.contamination must lie between 0 and 1, got 50"),
-        ("fzg-c", "rating.fatigue_limit=3 MPa", "rating.fatigue_limit is not a known key; did you mean fatigue_limits"),
+        (
+            "fzg-c",
+            "rating.contamination=0.5",
+            "rating.contamination says nothing of a spur-gear; leave it out",
+        ),
+        (
+            "nu206",
+            "rating.scuffing_stage=12",
+            "rating.scuffing_stage says nothing of a cylindrical-roller-bearing",
+        ),
+        (
+            "6206",
+            "rating.contamination=50",
+            "rating.contamination must lie between 0 and 1, got 50",
+        ),
+        (
+            "fzg-c",
+            "rating.fatigue_limit=3 MPa",
+            "rating.fatigue_limit is not a known key; did you mean fatigue_limits",
+        ),
         ("nu206", "machine.clearance=2 mm", "holds no roller in place"),
         ("nu206", "machine.radial_load=0 N", "unloads every roller"),
         ("nu206", "machine.radial_load=-4 kN", "must be finite, and not negative"),
@@ -225,7 +281,10 @@ def test_what_states_a_machine_is_not_a_single_contact(asp):
     for command in ("solve", "study", "run", "vibrate"):
         code, _, err = asp(command, "nu206.toml", *(("--dry-run",) if command == "study" else ()))
         assert code == 2
-        assert "states a [machine], which has several contacts; asperity machine solves them all" in err
+        assert (
+            "states a [machine], which has several contacts; asperity machine solves them all"
+            in err
+        )
     shutil.copy(EXAMPLES / "paper.toml", "paper.toml")
     assert "has no [machine]" in asp("machine", "paper.toml")[2]
 
@@ -238,24 +297,42 @@ def test_a_setting_mends_a_file_that_is_refused(asp):
 
 def test_a_disc_may_stand(asp):
     Path("discs.toml").write_text(DISCS, "utf-8")
-    out = asp("machine", "discs.toml", "--dry-run", "--json", "--set", 'machine.speeds=["1000 r/min", "0 r/min"]')[1]
+    out = asp(
+        "machine",
+        "discs.toml",
+        "--dry-run",
+        "--json",
+        "--set",
+        'machine.speeds=["1000 r/min", "0 r/min"]',
+    )[1]
     (contact,) = json.loads(out)["contacts"]
-    assert (contact["slide_to_roll"], contact["u2_m_s"], contact["overrolling_hz"][1]) == (2.0, 0.0, 0.0)
+    assert (contact["slide_to_roll"], contact["u2_m_s"], contact["overrolling_hz"][1]) == (
+        2.0,
+        0.0,
+        0.0,
+    )
     for speeds in ('["0 r/min", "0 r/min"]', '["-1 r/min", "3 r/min"]'):
-        assert asp("machine", "discs.toml", "--dry-run", "--set", f"machine.speeds={speeds}")[0] == 2
+        assert (
+            asp("machine", "discs.toml", "--dry-run", "--set", f"machine.speeds={speeds}")[0] == 2
+        )
 
 
 def test_speeds_that_slip_backwards_are_said_or_refused(asp):
     Path("discs.toml").write_text(DISCS, "utf-8")
     for setting, words in (
-        ('machine.speeds=["1000 r/min", "-500 r/min"]', "machine.speeds[1] must be finite, and not negative"),
+        (
+            'machine.speeds=["1000 r/min", "-500 r/min"]',
+            "machine.speeds[1] must be finite, and not negative",
+        ),
         ("machine.slide_to_roll=0.1", "slide_to_roll is that of both speeds"),
         ("machine.entrainment_speed=2 m/s", "both are given; give one"),
     ):
         code, out, err = asp("machine", "discs.toml", "--dry-run", "--set", setting)
         assert (code, out) == (2, "")
         assert words in err
-    slid = DISCS.replace('speeds = ["1000 r/min", "500 r/min"]', 'entrainment_speed = "2 m/s"\nslide_to_roll = 2.2')
+    slid = DISCS.replace(
+        'speeds = ["1000 r/min", "500 r/min"]', 'entrainment_speed = "2 m/s"\nslide_to_roll = 2.2'
+    )
     Path("discs.toml").write_text(slid, "utf-8")
     assert (
         "slide_to_roll must lie between -2 and 2, where one disc stands, got 2.2"
@@ -268,7 +345,12 @@ def test_discs_from_python(tmp_path):
     path.write_text(DISCS, "utf-8")
     (row,) = machine_conditions(load_machine(path)).rows
     assert (row["u1_m_s"], row["u2_m_s"]) == pytest.approx((2.0943951, 1.5707963))
-    path.write_text(DISCS.replace('"1000 r/min"', '"104.71975512 rad/s"').replace("500 r/min", "500 rpm"), "utf-8")
-    assert machine_conditions(load_machine(path)).rows[0]["u1_m_s"] == pytest.approx(row["u1_m_s"], rel=1e-9)
+    path.write_text(
+        DISCS.replace('"1000 r/min"', '"104.71975512 rad/s"').replace("500 r/min", "500 rpm"),
+        "utf-8",
+    )
+    assert machine_conditions(load_machine(path)).rows[0]["u1_m_s"] == pytest.approx(
+        row["u1_m_s"], rel=1e-9
+    )
     with pytest.raises(BadInput, match="length"):
         load_machine(path).with_overrides({"machine.crown_radius": "1 m"})

@@ -8,7 +8,9 @@ import pytest
 
 EXAMPLE = str(Path(__file__).parents[2] / "examples" / "6206.toml")
 RATE, SECONDS = 20e3, 2.0
-OUTER = 9.0 / 2.0 * (1.0 - 9.525 / 46.0)  # passages over the outer ring in a turn, 9 balls of 9.525 on 46 mm
+OUTER = (
+    9.0 / 2.0 * (1.0 - 9.525 / 46.0)
+)  # passages over the outer ring in a turn, 9 balls of 9.525 on 46 mm
 BAND = ("--band", "2000", "4000")
 
 
@@ -32,7 +34,9 @@ def test_a_growing_fault_is_called_by_its_name_at_any_speed(asp):
         np.savez(f"in/r-{number:02}.npz", acc=bearing(rng, speed, size)[0], fs=RATE, unit="m/s^2")
         rows.append(f"r-{number:02}.npz,{speed:.4f}")
     Path("speeds.csv").write_text("\n".join(rows))
-    code, out, _ = asp("track", "in", "--table", "speeds.csv", "--case", EXAMPLE, *BAND, "--json", "--out", "t.csv")
+    code, out, _ = asp(
+        "track", "in", "--table", "speeds.csv", "--case", EXAMPLE, *BAND, "--json", "--out", "t.csv"
+    )
     said = json.loads(out)
     assert code == 3
     first, *_, last = said["recordings"]
@@ -55,7 +59,10 @@ def test_a_tacho_gathers_a_fault_that_a_changing_speed_smears(asp):
         Path(f"{name}/a.npz.json").write_text(
             json.dumps({"channel": "acc", "faults_per_turn": {"BPFO": OUTER}} | stated)
         )
-    told, blind = (json.loads(asp("track", name, *BAND, "--json")[1])["recordings"][0] for name in ("with", "without"))
+    told, blind = (
+        json.loads(asp("track", name, *BAND, "--json")[1])["recordings"][0]
+        for name in ("with", "without")
+    )
     assert told["speed_hz"] == pytest.approx(35.0, rel=0.01)
     assert told["depths"]["BPFO"] > 2.5 * blind["depths"]["BPFO"]
 
@@ -64,16 +71,26 @@ def test_conditions_are_read_from_channels_in_their_units(asp):
     Path("in").mkdir()
     time = np.arange(4000) / RATE
     rows = np.stack(
-        [time, np.random.default_rng(3).standard_normal(4000), np.full(4000, 1.5), 60.0 + time, 0 * time + 1500]
+        [
+            time,
+            np.random.default_rng(3).standard_normal(4000),
+            np.full(4000, 1.5),
+            60.0 + time,
+            0 * time + 1500,
+        ]
     )
     header = "time [s],acc [m/s^2],force [kN],oil [degC],shaft [rpm]\n"
-    Path("in/a.csv").write_text(header + "\n".join(",".join(f"{value:.6f}" for value in row) for row in rows.T))
+    Path("in/a.csv").write_text(
+        header + "\n".join(",".join(f"{value:.6f}" for value in row) for row in rows.T)
+    )
     beside = {"load_n": "force", "temperature_degc": "oil", "speed_hz": "shaft"}
     Path("in/a.csv.json").write_text(json.dumps({"channel": "acc", "condition_channels": beside}))
     row = json.loads(asp("track", "in", *BAND, "--json")[1])["recordings"][0]
     assert (row["load_n"], row["speed_hz"]) == (1500.0, pytest.approx(25.0))
     assert row["temperature_degc"] == pytest.approx(60.1, abs=0.01)
-    Path("in/a.csv.json").write_text(json.dumps({"channel": "acc", "condition_channels": {"load_n": "oil"}}))
+    Path("in/a.csv.json").write_text(
+        json.dumps({"channel": "acc", "condition_channels": {"load_n": "oil"}})
+    )
     row = json.loads(asp("track", "in", *BAND, "--json")[1])["recordings"][0]
     assert "channel oil is in degC, and load_n takes N, kN, mN, MN" in row["remarks"]
 
@@ -93,7 +110,9 @@ def heard_beside(asp, stated, **channels):
 
 
 def test_a_speed_channel_without_a_number_is_told_beside_its_recording(asp):
-    row = heard_beside(asp, {"condition_channels": {"speed_hz": "shaft"}}, shaft=np.full(40_000, np.nan))
+    row = heard_beside(
+        asp, {"condition_channels": {"speed_hz": "shaft"}}, shaft=np.full(40_000, np.nan)
+    )
     assert "channel shaft has no number; leave it out" in row["remarks"]
     assert row["speed_hz"] is None
     assert row["depths"] == {}
@@ -108,7 +127,10 @@ def test_a_tacho_of_other_samples_is_not_laid_beside_the_vibration(asp):
 @pytest.mark.parametrize(
     ("stated", "refusal"),
     [
-        ({"faults_per_turn": {"BPFO": 0}}, "faults_per_turn must be positive rates by name, such as { BPFO = 3.58 }"),
+        (
+            {"faults_per_turn": {"BPFO": 0}},
+            "faults_per_turn must be positive rates by name, such as { BPFO = 3.58 }",
+        ),
         ({"bands_hz": {"low": [100]}}, "bands_hz must be two frequencies by name"),
         ({"condition_channels": {"load": "F"}}, "condition_channels must name channels by load_n"),
         ({"pulses_per_turn": 0}, "pulses_per_turn must be a positive number"),

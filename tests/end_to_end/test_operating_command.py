@@ -19,7 +19,9 @@ def loud(folder, loads, sidecar=False):
         np.savez(Path(folder) / name, acc=values, fs=20e3, unit="m/s^2")
         rows.append(f"{name},{load:g},{60 + number % 2}")
         if sidecar:
-            Path(folder, f"{name}.toml").write_text(f"load_n = {load:g}\ntemperature_degc = {60 + number % 2}\n")
+            Path(folder, f"{name}.toml").write_text(
+                f"load_n = {load:g}\ntemperature_degc = {60 + number % 2}\n"
+            )
     Path(f"{folder}.csv").write_text("\n".join(rows))
 
 
@@ -56,7 +58,10 @@ def test_a_load_by_another_name_or_unit_is_refused(asp):
     code, _, err = asp("track", "in", "--table", "kilo.csv")
     assert code == 2
     assert "has a column load_kn; take load_n, by that name and in that unit" in err
-    for name, meant in (("speed_rpm", "speed_hz or entrainment_m_s"), ("oil_temperature", "temperature_degc")):
+    for name, meant in (
+        ("speed_rpm", "speed_hz or entrainment_m_s"),
+        ("oil_temperature", "temperature_degc"),
+    ):
         Path("other.csv").write_text(f"file,{name}\ns-000.npz,1500\ns-001.npz,1500\n")
         code, _, err = asp("track", "in", "--table", "other.csv")
         assert code == 2

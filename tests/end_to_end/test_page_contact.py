@@ -9,31 +9,48 @@ import numpy as np
 import pytest
 import x3pio
 
-from asperity.page.knobs import knobs_of
-from asperity.page.opening import paper
+from asperity.app.inputs import knobs_of
+from asperity.app.opening import paper
 from support.browser import Visit, chromium, click_mark, expect, require_operable, serving
 
-uploads = pytest.importorskip("asperity.page.uploads", reason="the extra page is not installed")
+uploads = pytest.importorskip("asperity.app.uploads", reason="the extra page is not installed")
 
 HOSTILE_NAMES = [
-    "<img src=x onerror=window.pwned=1>.x3p", "..%2f..%2fetc%2fpasswd.x3p", "$(touch pwned).x3p", "`touch pwned`.x3p",
-    "a'; import os; os.system('touch pwned').x3p", '"><script>window.pwned=1</script>.x3p', "{{7*7}}.x3p",
-    "{file=1}\n[surface].x3p", "-rf .x3p", ".." + "x" * 200 + ".x3p",
-]  # fmt: skip
+    "<img src=x onerror=window.pwned=1>.x3p",
+    "..%2f..%2fetc%2fpasswd.x3p",
+    "$(touch pwned).x3p",
+    "`touch pwned`.x3p",
+    "a'; import os; os.system('touch pwned').x3p",
+    '"><script>window.pwned=1</script>.x3p',
+    "{{7*7}}.x3p",
+    "{file=1}\n[surface].x3p",
+    "-rf .x3p",
+    ".." + "x" * 200 + ".x3p",
+]
 HOSTILE_ADDRESSES = [
-    "contact.load=<script>window.pwned=1</script>", "<img src=x onerror=window.pwned=1>=1",
-    "contact.load=\"><svg onload=window.pwned=1>", "dropped=<img src=x onerror=window.pwned=1>",
-    "case=</script><script>window.pwned=1</script>", "contact.load={{7*7}}", "surface.file=/etc/passwd",
-    "contact.load=__import__('os').system('touch pwned')", "contact.load=500 N%0d%0aSet-Cookie: a=b",
+    "contact.load=<script>window.pwned=1</script>",
+    "<img src=x onerror=window.pwned=1>=1",
+    'contact.load="><svg onload=window.pwned=1>',
+    "dropped=<img src=x onerror=window.pwned=1>",
+    "case=</script><script>window.pwned=1</script>",
+    "contact.load={{7*7}}",
+    "surface.file=/etc/passwd",
+    "contact.load=__import__('os').system('touch pwned')",
+    "contact.load=500 N%0d%0aSet-Cookie: a=b",
     "surface.seed=javascript:window.pwned=1",
-]  # fmt: skip
+]
 HOSTILE_HEADERS = [
-    {"Host": "evil.example"}, {"Host": "\"><script>pwned</script>"}, {"X-Forwarded-Host": "<script>pwned</script>"},
-    {"X-Forwarded-Proto": "javascript"}, {"X-Forwarded-Prefix": "/<script>pwned</script>"},
-    {"Referer": "<script>pwned</script>"}, {"User-Agent": "<script>pwned</script>"},
-    {"Cookie": "is_guest=1; user=<script>pwned</script>"}, {"Bokeh-Session-Id": "<script>pwned</script>"},
+    {"Host": "evil.example"},
+    {"Host": '"><script>pwned</script>'},
+    {"X-Forwarded-Host": "<script>pwned</script>"},
+    {"X-Forwarded-Proto": "javascript"},
+    {"X-Forwarded-Prefix": "/<script>pwned</script>"},
+    {"Referer": "<script>pwned</script>"},
+    {"User-Agent": "<script>pwned</script>"},
+    {"Cookie": "is_guest=1; user=<script>pwned</script>"},
+    {"Bokeh-Session-Id": "<script>pwned</script>"},
     {"Accept-Language": "{{7*7}}<script>pwned</script>"},
-]  # fmt: skip
+]
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +156,9 @@ def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
     changed(page, clr)
     changed(page, crf, "CRF")
     assert film(page) != map_before
-    assert page.evaluate("() => Math.max(...window.tops) - Math.min(...window.tops)") < 4  # nothing jumps on the way
+    assert (
+        page.evaluate("() => Math.max(...window.tops) - Math.min(...window.tops)") < 4
+    )  # nothing jumps on the way
     again = tile(page).inner_text()
     page.reload()
     page.get_by_text("Solved on").wait_for()
@@ -151,7 +170,9 @@ def test_a_knob_leads_to_new_maps_and_numbers_and_into_the_address(visit):
 def test_a_slider_turns_by_the_keyboard_and_says_its_value(visit):
     page = visit.solved()
     handles = page.get_by_role("slider").all()
-    assert len(handles) == sum(not (knob.more or knob.choices) for knob in knobs_of(paper()).values())
+    assert len(handles) == sum(
+        not (knob.more or knob.choices) for knob in knobs_of(paper()).values()
+    )
     assert all(handle.get_attribute("aria-label") for handle in handles)
     assert page.get_by_role("slider", name="Load, F").get_attribute("aria-valuetext") == "500 N"
     assert "- slider:" not in page.locator("body").aria_snapshot()  # one without a name
@@ -172,7 +193,9 @@ def test_every_control_is_named_and_reached_by_the_keyboard(visit):
 def test_a_wrong_value_is_named_beside_its_knob(visit):
     page = visit.solved()
     box = turn(page, "Composite roughness, Sq", "2")
-    sentence = page.get_by_text('surface.sq must be a length such as "5.4 mm", got the bare number 2')
+    sentence = page.get_by_text(
+        'surface.sq must be a length such as "5.4 mm", got the bare number 2'
+    )
     sentence.wait_for()
     below, above = sentence.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
@@ -194,7 +217,10 @@ def test_a_pinned_contact_is_compared_with(visit):
 
 def test_a_setting_that_was_tried_is_clicked_back(visit):
     page = visit.solved()
-    first, speed = tile(page).inner_text(), page.get_by_role("textbox", name="Entrainment speed, u").input_value()
+    first, speed = (
+        tile(page).inner_text(),
+        page.get_by_role("textbox", name="Entrainment speed, u").input_value(),
+    )
     turn(page, "Entrainment speed, u", "3 m/s")
     page.wait_for_function("() => location.search.includes('entrainment')")
     changed(page, first)
@@ -258,8 +284,12 @@ def test_a_files_name_is_a_name_and_nothing_more(visit, server):
     page = visit.solved()
     for number, name in enumerate(HOSTILE_NAMES):
         content = f"no surface {number}".encode() * (number + 1)
-        page.locator("input[type=file]").set_input_files({"name": name, "mimeType": "", "buffer": content})
-        page.get_by_text(uploads.safe_name(name)).filter(has_text=re.compile("in no format|cannot|is no")).wait_for()
+        page.locator("input[type=file]").set_input_files(
+            {"name": name, "mimeType": "", "buffer": content}
+        )
+        page.get_by_text(uploads.safe_name(name)).filter(
+            has_text=re.compile("in no format|cannot|is no")
+        ).wait_for()
         assert page.evaluate("() => window.pwned") is None
     assert not (server.log.parent / "pwned").exists()
 
@@ -288,8 +318,15 @@ def test_a_header_is_nowhere_in_the_page(server, header):
 
 def handshake(server, origin):
     connection = http.client.HTTPConnection(server.host)
-    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Origin": origin}
-    connection.request("GET", "/contact/ws", headers={**upgrade, "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="})
+    upgrade = {
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Version": "13",
+        "Origin": origin,
+    }
+    connection.request(
+        "GET", "/contact/ws", headers={**upgrade, "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
+    )
     status = connection.getresponse().status
     connection.close()
     return status
@@ -317,7 +354,10 @@ def test_dark_and_light_have_legible_ink(browser, server):
         colours = page.evaluate(
             "() => { const s = getComputedStyle(document.body); return JSON.stringify([s.color, s.backgroundColor]) }"
         )
-        ink, paper = ([int(part) / 255 for part in re.findall(r"\d+", text)[:3]] for text in json.loads(colours))
+        ink, paper = (
+            [int(part) / 255 for part in re.findall(r"\d+", text)[:3]]
+            for text in json.loads(colours)
+        )
         assert contrast(ink, paper) > 7.0
         assert (sum(paper) < 1.0) == (scheme == "dark")
         visit.close()

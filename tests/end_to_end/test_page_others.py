@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from asperity.cli import main
-from asperity.history import run_history
 from asperity.paper import papers_case
+from asperity.simulation import run_history
 from asperity.study import plan_study, run_study
 from support.browser import Visit, chromium, click_mark, expect, require_operable, serving
 
@@ -29,7 +29,20 @@ def rig(tmp_path_factory):
     """Seven short recordings of the simulated rig."""
     folder = tmp_path_factory.mktemp("rig") / "rig"
     with pytest.raises(SystemExit):
-        main(["rig", "--out", str(folder), "--samples", "7", "--repeats", "1", "--duration", "2 s", "--quiet"])
+        main(
+            [
+                "rig",
+                "--out",
+                str(folder),
+                "--samples",
+                "7",
+                "--repeats",
+                "1",
+                "--duration",
+                "2 s",
+                "--quiet",
+            ]
+        )
     return folder
 
 
@@ -79,7 +92,11 @@ def test_a_folder_is_watched(browser, tmp_path, rig):
 
 def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tmp_path):
     study = {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}
-    run_study(plan_study(papers_case().with_overrides({**SMALL, "study": study})), out=tmp_path / "wear", workers=1)
+    run_study(
+        plan_study(papers_case().with_overrides({**SMALL, "study": study})),
+        out=tmp_path / "wear",
+        workers=1,
+    )
     with serving(tmp_path, "wear") as server:
         visit = Visit(browser, server)
         page = visit.go("study")
@@ -88,7 +105,9 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         require_operable(page)
         click_mark(page, "A study's results over what was swept", 1)
-        page.get_by_text(re.compile(r"^surface.sq 0.5\sµm, surface.seed .*asperities carry")).wait_for()
+        page.get_by_text(
+            re.compile(r"^surface.sq 0.5\sµm, surface.seed .*asperities carry")
+        ).wait_for()
         click_mark(page, "A study's results over what was swept", 3)
         page.get_by_text(re.compile(r"^surface.sq 1.5\sµm.*asperities carry")).wait_for()
         clr = page.locator("dl div", has_text="CLR").locator("dd").first.inner_text()
@@ -96,7 +115,9 @@ def test_a_point_of_a_study_becomes_a_contact_whose_knobs_are_turned(browser, tm
         page.wait_for_url(re.compile("/contact[?]"))
         page.get_by_text("Solved on 32 × 24 cells").wait_for()
         expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_value("1.5 um")
-        expect(page.locator("dl div", has_text="CLR").locator("dd").first).to_have_text(clr, use_inner_text=True)
+        expect(page.locator("dl div", has_text="CLR").locator("dd").first).to_have_text(
+            clr, use_inner_text=True
+        )
         visit.close()
 
 
@@ -123,7 +144,10 @@ def test_others_have_to_know_the_password(browser, tmp_path):
         connection.request("GET", "/contact")
         answer = connection.getresponse()
         body = answer.read()
-        assert (answer.status, answer.getheader("Location", "").split("?")[0].lstrip(".")) == (302, "/login")
+        assert (answer.status, answer.getheader("Location", "").split("?")[0].lstrip(".")) == (
+            302,
+            "/login",
+        )
         assert b"Bokeh" not in body
         connection.close()
         visit = Visit(browser, server)

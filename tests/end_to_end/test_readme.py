@@ -23,7 +23,10 @@ def same(printed: str, shown: str) -> bool:
     if TOLERANCE == 0.0:
         return printed == shown
     pairs = zip(NUMBER.findall(printed), NUMBER.findall(shown), strict=False)
-    near = (float(a) == pytest.approx(float(b), rel=TOLERANCE, abs=1.01 * last_digit(b)) for a, b in pairs)
+    near = (
+        float(a) == pytest.approx(float(b), rel=TOLERANCE, abs=1.01 * last_digit(b))
+        for a, b in pairs
+    )
     return NUMBER.sub("", printed) == NUMBER.sub("", shown) and all(near)
 
 
@@ -47,19 +50,32 @@ def test_the_first_commands_print_the_verdict_that_is_shown(asp):
 
 def test_the_python_prints_what_is_shown():
     (block,) = (block for block in README.blocks if block.language == "python")
-    after = next(line.text for line in README.prose if line.number > block.line.number and "This prints" in line.text)
+    after = next(
+        line.text
+        for line in README.prose
+        if line.number > block.line.number and "This prints" in line.text
+    )
     printed = io.StringIO()
     with redirect_stdout(printed):
         exec(compile(block.text, "README.md", "exec"), {})
     assert same(printed.getvalue().strip(), re.search(r"`([^`]+)`", after)[1])
 
 
-REFUSED = ('contact.lod="400 N"', "lubricant.viscosity.law=baruss", "contact.radius=5.4", 'contact.load="-5 N"')
+REFUSED = (
+    'contact.lod="400 N"',
+    "lubricant.viscosity.law=baruss",
+    "contact.radius=5.4",
+    'contact.load="-5 N"',
+)
 
 
 def test_refusals_are_those_that_are_shown(asp):
-    *_, shown = (block for block in read(ROOT / "docs" / "case-file.md").blocks if not block.language)
-    assert [asp("solve", "case.toml", "--set", mistake)[2].strip() for mistake in REFUSED] == shown.text.splitlines()
+    *_, shown = (
+        block for block in read(ROOT / "docs" / "case-file.md").blocks if not block.language
+    )
+    assert [
+        asp("solve", "case.toml", "--set", mistake)[2].strip() for mistake in REFUSED
+    ] == shown.text.splitlines()
 
 
 def test_a_difference_is_seen():

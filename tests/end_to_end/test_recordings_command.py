@@ -16,7 +16,9 @@ KEYS = {"file", "x", "crf_hz", "crf_std_hz", "crfa", "found", "reason"}  # the c
 
 def write_rig(folder, trend, **shape):
     """Recordings of the rig as HDF5, and the table of their roughness; the truth by file."""
-    rig = simulate_rig(trend=trend, duration_s=3.0, disturbance=Disturbance(snr_db=15.0), seed=4, **shape)
+    rig = simulate_rig(
+        trend=trend, duration_s=3.0, disturbance=Disturbance(snr_db=15.0), seed=4, **shape
+    )
     folder.mkdir()
     rows, truth = ["file,sq_um,sq_um_std,load_n"], {}
     for one in rig.recordings:
@@ -39,9 +41,22 @@ def rig(tmp_path_factory):
 def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     folder, truth = rig
     code, out, err = asp(
-        "track", str(folder), "--table", str(folder / "table.csv"), "--case", "case.toml", "--report", "page.html",
-        "--out", "t.csv", "--out", "t.nc", "--out", "t.parquet", "--json",
-    )  # fmt: skip
+        "track",
+        str(folder),
+        "--table",
+        str(folder / "table.csv"),
+        "--case",
+        "case.toml",
+        "--report",
+        "page.html",
+        "--out",
+        "t.csv",
+        "--out",
+        "t.nc",
+        "--out",
+        "t.parquet",
+        "--json",
+    )
     said = json.loads(out)
     assert (code, err) == (3, "")
     assert said["verdict"].startswith("ALARM since sample-")
@@ -54,7 +69,9 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     assert said["stages"]["interval"][0] < said["stages"]["split"] < said["stages"]["interval"][1]
     assert len(said["stages"]["probability"]) == len(said["stages"]["labels"]) == 24
     assert said["method"] == "joint"
-    assert [row["x"] for row in said["recordings"]] == sorted(row["x"] for row in said["recordings"])
+    assert [row["x"] for row in said["recordings"]] == sorted(
+        row["x"] for row in said["recordings"]
+    )
     assert Path("t.csv").read_text().count("\n") == 25
     page = Path("page.html").read_text("utf-8")
     assert page.index("ALARM") < page.index("Trend and stage") < page.index('id="limits"')
@@ -67,14 +84,17 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
         assert kept["density"].shape[0] == 24
         assert kept.attrs["verdict"] == said["verdict"]
         assert kept["crf_hz"].values.tolist() == [row["crf_hz"] for row in said["recordings"]]
-    assert pandas.read_parquet("t.parquet")["file"].tolist() == [row["file"] for row in said["recordings"]]
+    assert pandas.read_parquet("t.parquet")["file"].tolist() == [
+        row["file"] for row in said["recordings"]
+    ]
 
 
 def test_damping_decides_where_it_is_asked_to(asp, rig):
     folder, _ = rig
     series = (str(folder), "--table", str(folder / "table.csv"), "--case", "case.toml")
     by_crf, by_damping = (
-        json.loads(asp("track", *series, *more, "--json")[1]) for more in ((), ("--stages-from", "damping"))
+        json.loads(asp("track", *series, *more, "--json")[1])
+        for more in ((), ("--stages-from", "damping"))
     )
     assert by_crf["stages_by"] == by_damping["stages_by"]
     assert by_crf["stages"]["source"] == "crf"
@@ -90,7 +110,7 @@ def test_damping_decides_where_it_is_asked_to(asp, rig):
 
 def test_a_long_series_is_separated_in_groups(asp, rig, monkeypatch):
     folder, truth = rig
-    monkeypatch.setattr("asperity.tracking.track.MOST_TOGETHER", 12)
+    monkeypatch.setattr("asperity.monitoring.track.MOST_TOGETHER", 12)
     said = json.loads(asp("track", str(folder), "--case", "case.toml", "--json")[1])
     for row in said["recordings"]:
         assert row["crf_hz"] == pytest.approx(truth[Path(row["file"]).name], abs=50.0)
@@ -129,7 +149,9 @@ def test_a_copy_is_named_and_too_few_places_have_no_stage(asp, rig, tmp_path):
 
 def test_constant_wear_is_no_alarm(asp, tmp_path):
     write_rig(tmp_path / "still", "constant", repeats=1)
-    code, out, _ = asp("track", "still", "--table", "still/table.csv", "--case", "case.toml", "--json")
+    code, out, _ = asp(
+        "track", "still", "--table", "still/table.csv", "--case", "case.toml", "--json"
+    )
     assert code == 0
     assert json.loads(out)["stages"]["kind"] == "no change"
 
@@ -138,9 +160,13 @@ def test_recordings_without_a_resonance_cannot_tell(asp):
     rng = np.random.default_rng(1)
     for number in range(7):
         np.savez(f"noise-{number}.npz", acc=rng.standard_normal(40_000), fs=20e3, unit="m/s^2")
-    code, out, _ = asp("track", *(f"noise-{number}.npz" for number in range(7)), "--case", "case.toml")
+    code, out, _ = asp(
+        "track", *(f"noise-{number}.npz" for number in range(7)), "--case", "case.toml"
+    )
     assert code == 4
-    assert out.startswith("These recordings cannot tell: no contact resonance found in 7 recordings")
+    assert out.startswith(
+        "These recordings cannot tell: no contact resonance found in 7 recordings"
+    )
 
 
 def test_check_shows_the_good_beside_the_bad(asp, rig):
@@ -207,11 +233,20 @@ def test_watch_waits_for_a_file_that_is_still_written(asp, rig):
             ("track", "bare.npy", "--rate", "20000", "--out", "t.txt"),
             "--out must be a file that ends in .csv, .parquet or .nc",
         ),
-        (("track", "bare.npy", "--rate", "20000", "--band", "4000", "2000"), "band must go from low to high"),
+        (
+            ("track", "bare.npy", "--rate", "20000", "--band", "4000", "2000"),
+            "band must go from low to high",
+        ),
         (("track", "bare.npy", "--rate", "20000", "--method", "guess"), "method must be one of"),
-        (("track", "bare.npy", "--rate", "20000", "--stages-from", "width"), "crf, damping, both, got 'width'"),
+        (
+            ("track", "bare.npy", "--rate", "20000", "--stages-from", "width"),
+            "crf, damping, both, got 'width'",
+        ),
         (("watch", "empty", "--once", "--stages-from", "width"), "crf, damping, both, got 'width'"),
-        (("track", "bare.npy", "--rate", "20000", "--table", "t.csv"), "t.csv has no row for bare.npy"),
+        (
+            ("track", "bare.npy", "--rate", "20000", "--table", "t.csv"),
+            "t.csv has no row for bare.npy",
+        ),
         (("watch", "bare.npy"), "is not a folder"),
     ],
 )

@@ -12,7 +12,10 @@ def test_a_rig_is_written_and_tracked_to_its_truth(asp):
     command = out.split("Try next: asperity ")[1].split()
     code, out, err = asp(*command, "--json")
     found = json.loads(out)
-    truth = {row["file"]: row for row in csv.DictReader(Path("rig/truth.csv").read_text("utf-8").splitlines())}
+    truth = {
+        row["file"]: row
+        for row in csv.DictReader(Path("rig/truth.csv").read_text("utf-8").splitlines())
+    }
     assert len(found["recordings"]) == 12
     for one in found["recordings"]:
         assert one["found"]
@@ -21,11 +24,16 @@ def test_a_rig_is_written_and_tracked_to_its_truth(asp):
 
 
 def test_json_is_one_object_with_every_path(asp):
-    code, out, _ = asp("rig", "--out", "rig", "--samples", "2", "--repeats", "1", "--duration", "0.5 s", "--json")
+    code, out, _ = asp(
+        "rig", "--out", "rig", "--samples", "2", "--repeats", "1", "--duration", "0.5 s", "--json"
+    )
     said = json.loads(out)
     assert code == 0
     assert said["split_sq_m"] == 1.8e-6
-    assert all(Path(path).is_file() for path in (*said["recordings"], said["table"], said["truth"], said["case"]))
+    assert all(
+        Path(path).is_file()
+        for path in (*said["recordings"], said["table"], said["truth"], said["case"])
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.tracking import watch_folder
-from asperity.tracking.silence import silence, spoken
+from asperity.monitoring import watch_folder
+from asperity.monitoring.silence import silence, spoken
 
 NOON = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
 LOOK = ("--once", "--settle", "0", "--store", "plant.db", "--machine", "Fan 1", "--point", "DE")
-LISTENER = "import sys, pathlib\npathlib.Path(sys.argv[1]).open('a').write(sys.stdin.read() + chr(10))\n"
+LISTENER = (
+    "import sys, pathlib\npathlib.Path(sys.argv[1]).open('a').write(sys.stdin.read() + chr(10))\n"
+)
 
 
 def snapshots(folder, levels, first=0):
@@ -29,7 +31,9 @@ def snapshots(folder, levels, first=0):
 
 def judged(column):
     with closing(sqlite3.connect("plant.db")) as connection:
-        return [value for (value,) in connection.execute(f"SELECT {column} FROM judgement ORDER BY id")]
+        return [
+            value for (value,) in connection.execute(f"SELECT {column} FROM judgement ORDER BY id")
+        ]
 
 
 def test_what_is_usual_is_learned_from_when_recordings_came():
@@ -37,7 +41,10 @@ def test_what_is_usual_is_learned_from_when_recordings_came():
     last = every_10_min[-1]
     assert silence(every_10_min, None, last + timedelta(minutes=49)) == ""
     said = silence(every_10_min, None, last + timedelta(minutes=51))
-    assert said == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; one comes every 10 min"
+    assert (
+        said
+        == "no recording has come for 51 min, since 2026-11-22T13:50:00+00:00; one comes every 10 min"
+    )
     assert silence(every_10_min[:5], None, NOON + timedelta(days=300)) == ""  # nobody knows yet
     assert "for 2 h" in silence(every_10_min[:1], 3600.0, NOON + timedelta(hours=2))
     assert [spoken(120.0), spoken(3600.0), spoken(7 * 86400.0)] == ["2 min", "60 min", "7 days"]
@@ -85,7 +92,11 @@ def test_an_alarm_stands_in_silence(asp):
     time.sleep(0.2)
     code, out, _ = asp("watch", "in", *LOOK, "--expect", "0.1", "--json")
     said = json.loads(out)
-    assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (3, "alarm", "the level (rms)")
+    assert (code, said["alarm"]["state"], said["alarm"]["raised_by"]) == (
+        3,
+        "alarm",
+        "the level (rms)",
+    )
     assert said["verdict"].startswith("Blind: no recording has come")
     assert "ALARM since" in said["verdict"]
     page = Path(said["results"], "report.html").read_text("utf-8")
@@ -96,7 +107,9 @@ def test_an_alarm_stands_in_silence(asp):
 @pytest.mark.skipif(os.name == "nt", reason="clocks of Windows are too coarse for it")
 def test_a_watch_that_runs_says_so_by_itself(tmp_path):
     snapshots(tmp_path / "in", np.ones(8))
-    looks = watch_folder(tmp_path / "in", tmp_path / "out", every_s=0.05, settle_s=0.0, expect_s=0.6)
+    looks = watch_folder(
+        tmp_path / "in", tmp_path / "out", every_s=0.05, settle_s=0.0, expect_s=0.6
+    )
     assert next(looks).track is not None
     silent = next(looks)
     assert silent.said["alarm"]["state"] == silent.track.alarm.state == "blind"

@@ -72,14 +72,21 @@ def test_every_link_leads_somewhere(site):
             target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
             target = target / "index.html" if target.is_dir() else target
             anchored = not parts.fragment or target.suffix != ".html" or not target.is_file()
-            if not target.is_file() or not (anchored or unquote(parts.fragment) in read(target).anchors):
+            if not target.is_file() or not (
+                anchored or unquote(parts.fragment) in read(target).anchors
+            ):
                 broken.append(f"{page.relative_to(site)}: {link}")
     assert len(html()) > 100
     assert broken == []
 
 
 def test_no_page_loads_anything_from_elsewhere(site):
-    foreign = {link for page in html() for link in read(page).loaded if urlsplit(link).scheme in ("http", "https")}
+    foreign = {
+        link
+        for page in html()
+        for link in read(page).loaded
+        if urlsplit(link).scheme in ("http", "https")
+    }
     foreign |= {link for page in html() for link in read(page).loaded if link.startswith("//")}
     styles = "".join(path.read_text("utf-8") for path in site.rglob("*.css"))
     assert foreign == set()
@@ -99,12 +106,19 @@ def test_the_reference_has_every_name_command_and_key(site):
     text = (site / "reference" / "commands.html").read_text("utf-8")
     assert [name for name in commands() if f"asperity {name}".strip() not in text] == []
     keys = (site / "reference" / "case-keys.html").read_text("utf-8")
-    missing = [key for section in case_sections().values() for key in section.model_fields if f">{key}<" not in keys]
+    missing = [
+        key
+        for section in case_sections().values()
+        for key in section.model_fields
+        if f">{key}<" not in keys
+    ]
     assert missing == []
     import asperity
 
     assert [
-        name for name in dir(asperity) if not (site / "reference" / "names" / f"asperity.{name}.html").is_file()
+        name
+        for name in dir(asperity)
+        if not (site / "reference" / "names" / f"asperity.{name}.html").is_file()
     ] == []
 
 
@@ -115,13 +129,25 @@ def test_a_browser_asks_no_other_machine_and_draws_mathematics(site):
         page.on("request", lambda request: asked.append(request.url))
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
-        for name in ("index", "gallery/index", "gallery/01_smooth_line", "reference/names/asperity.Grid", "search"):
+        for name in (
+            "index",
+            "gallery/index",
+            "gallery/01_smooth_line",
+            "reference/names/asperity.Grid",
+            "search",
+        ):
             page.goto((site / f"{name}.html").as_uri())
         page.goto((site / "theory" / "equations.html").as_uri())
         page.locator("mjx-container svg").first.wait_for()
         drawn = page.locator("mjx-container svg").count()
         wide = []
-        for name in ("index", "gallery/index", "reference/api", "reference/case-keys", "theory/equations"):
+        for name in (
+            "index",
+            "gallery/index",
+            "reference/api",
+            "reference/case-keys",
+            "theory/equations",
+        ):
             page.set_viewport_size({"width": 390, "height": 800})
             page.goto((site / f"{name}.html").as_uri())
             if page.evaluate("document.documentElement.scrollWidth > window.innerWidth + 1"):

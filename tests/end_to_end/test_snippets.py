@@ -15,7 +15,11 @@ from asperity.cli import main
 from support.pages import Block, Page, pages, read
 from support.source import ROOT
 
-RUN = ("sh", "console", "python")  # of other languages nothing can be run: cases and what is printed
+RUN = (
+    "sh",
+    "console",
+    "python",
+)  # of other languages nothing can be run: cases and what is printed
 REASON = re.compile(r"<!-- not run: (\S.*\S) -->")
 FINE = {0, 3, 4, 5}  # exit codes of a command that did what it is for
 SHOWN = re.compile(r"(--[\w-]+|\S+\.\w+)")
@@ -36,7 +40,9 @@ def with_snippets() -> list[Page]:
     return [page for page in pages() if snippets(page) and page.path.name != "README.md"]
 
 
-@pytest.mark.parametrize("page", with_snippets(), ids=lambda page: page.path.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "page", with_snippets(), ids=lambda page: page.path.relative_to(ROOT).as_posix()
+)
 def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples", "examples")
@@ -56,7 +62,11 @@ def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys):
 def unsaid(shown: str, said: str) -> list[str]:
     """The lines that a page shows and nothing printed."""
     patterns = {line: ".*".join(map(re.escape, line.split("..."))) for line in shown.splitlines()}
-    return [line for line, pattern in patterns.items() if not re.search(f"^{pattern}$", said, re.MULTILINE)]
+    return [
+        line
+        for line, pattern in patterns.items()
+        if not re.search(f"^{pattern}$", said, re.MULTILINE)
+    ]
 
 
 def run(line: str, refusal: str | None, capsys) -> str:
@@ -77,7 +87,11 @@ def run(line: str, refusal: str | None, capsys) -> str:
 
 def test_a_reason_stands_above_a_snippet_and_nowhere_else():
     for page in pages():
-        marks = [number for number, line in enumerate(page.text.splitlines(), 1) if REASON.fullmatch(line.strip())]
+        marks = [
+            number
+            for number, line in enumerate(page.text.splitlines(), 1)
+            if REASON.fullmatch(line.strip())
+        ]
         fences = {block.line.number for block in page.blocks if block.language in RUN}
         assert [number for number in marks if number + 1 not in fences] == [], page.path
 
@@ -101,5 +115,7 @@ def test_readme_is_run_by_its_own_tests_or_says_why_not():
     page = read(ROOT / "README.md")
     marked = [block for block in page.blocks if block.language in RUN and reason(page, block)]
     own = list(snippets(page))
-    assert len(own) == 2, [block.text for block in own]  # the first commands and the Python, see test_readme
+    assert len(own) == 2, [
+        block.text for block in own
+    ]  # the first commands and the Python, see test_readme
     assert marked

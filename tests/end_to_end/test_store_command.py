@@ -15,9 +15,9 @@ import numpy as np
 import pandas
 import pytest
 
-from asperity.errors import AsperityError, UnreadableFile
-from asperity.tracking import store_overview, watch_folder
-from asperity.tracking.store import Store
+from asperity.core.errors import AsperityError, UnreadableFile
+from asperity.monitoring import store_overview, watch_folder
+from asperity.monitoring.store import Store
 
 ONCE = ("--once", "--settle", "0", "--quiet")
 
@@ -44,18 +44,38 @@ def asked(store, query):
 def without_times(store):
     """All that a store holds, but for when it was written."""
     return [
-        asked(store, "SELECT sensor, file, started, state, row, reading FROM recording ORDER BY sensor, file"),
-        asked(store, "SELECT sensor, state, since, reason, raised_by, verdict, recordings FROM judgement ORDER BY id"),
-        asked(store, "SELECT name, settings, json_remove(said, '$.numbers') FROM sensor ORDER BY id"),
+        asked(
+            store,
+            "SELECT sensor, file, started, state, row, reading FROM recording ORDER BY sensor, file",
+        ),
+        asked(
+            store,
+            "SELECT sensor, state, since, reason, raised_by, verdict, recordings FROM judgement ORDER BY id",
+        ),
+        asked(
+            store, "SELECT name, settings, json_remove(said, '$.numbers') FROM sensor ORDER BY id"
+        ),
     ]
 
 
 def test_one_store_holds_many_machines_and_says_which_needs_somebody(asp):
     snapshots("drive", np.ones(10))
     snapshots("fan", failing())
-    assert asp("watch", "drive", *ONCE, "--store", "plant.db", "--machine", "Pump 3", "--point", "DE")[0] == 4
-    assert asp("track", "fan", "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE", "--quiet")[0] == 3
-    code, out, _ = asp("store", "plant.db", "--json", "--out", "plant.parquet", "--out", "plant.csv")
+    assert (
+        asp("watch", "drive", *ONCE, "--store", "plant.db", "--machine", "Pump 3", "--point", "DE")[
+            0
+        ]
+        == 4
+    )
+    assert (
+        asp(
+            "track", "fan", "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE", "--quiet"
+        )[0]
+        == 3
+    )
+    code, out, _ = asp(
+        "store", "plant.db", "--json", "--out", "plant.parquet", "--out", "plant.csv"
+    )
     said = json.loads(out)
     assert (code, said["state"]) == (3, "alarm")
     assert said["verdict"] == "2 sensors on 2 machines, 46 recordings: ALARM 1, cannot tell 1."
@@ -67,7 +87,9 @@ def test_one_store_holds_many_machines_and_says_which_needs_somebody(asp):
     rms = asked("plant.db", "SELECT rms FROM trend WHERE machine = 'Fan 1' ORDER BY x")
     assert np.allclose([value for (value,) in rms], failing(), rtol=0.1)  # as anybody may ask
     assert len(pandas.read_csv("plant.csv")) == 46
-    code, out, _ = asp("watch", "fan", *ONCE, "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE")
+    code, out, _ = asp(
+        "watch", "fan", *ONCE, "--store", "plant.db", "--machine", "Fan 1", "--point", "NDE"
+    )
     assert code == 3
     assert out.startswith("ALARM since s-")
 
@@ -76,7 +98,7 @@ def test_what_is_known_is_not_judged_again(asp, monkeypatch):
     snapshots("in", np.ones(10))
     first = asp("watch", "in", "--once", "--settle", "0", "--json")
     judged = []
-    monkeypatch.setattr("asperity.tracking.watch.judge", lambda *_, **__: judged.append(1))
+    monkeypatch.setattr("asperity.monitoring.watch.judge", lambda *_, **__: judged.append(1))
     second = asp("watch", "in", "--once", "--settle", "0", "--json")
     assert (judged, second[0]) == ([], first[0])
     before, after = json.loads(first[1]), json.loads(second[1])
@@ -85,12 +107,16 @@ def test_what_is_known_is_not_judged_again(asp, monkeypatch):
     assert after == before
 
 
-@pytest.mark.parametrize("change", [("--false-alarms", "1/500"), ("--acknowledge", "last"), ("--stages-from", "both")])
+@pytest.mark.parametrize(
+    "change", [("--false-alarms", "1/500"), ("--acknowledge", "last"), ("--stages-from", "both")]
+)
 def test_another_question_is_judged_again(asp, change):
     snapshots("in", np.ones(10))
     asp("watch", "in", *ONCE)
     asp("watch", "in", *ONCE, *change)
-    states = asked("in/asperity-watch/asperity.db", "SELECT state FROM judgement WHERE state != 'acknowledged'")
+    states = asked(
+        "in/asperity-watch/asperity.db", "SELECT state FROM judgement WHERE state != 'acknowledged'"
+    )
     assert len(states) == 2
 
 
@@ -98,7 +124,18 @@ def test_another_question_is_judged_again(asp, change):
 def test_a_watch_killed_again_and_again_ends_with_the_same_store(tmp_path, channels):
     levels = failing()
     snapshots(tmp_path / "in", levels, sensors=("acc", "other")[: 1 + bool(channels)])
-    command = [sys.executable, "-m", "asperity", "watch", "in", *ONCE, *channels, "--workers", "1", "--store"]
+    command = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "watch",
+        "in",
+        *ONCE,
+        *channels,
+        "--workers",
+        "1",
+        "--store",
+    ]
     assert subprocess.run([*command, "whole.db"], cwd=tmp_path, check=False).returncode == 3
     store = tmp_path / "killed.db"
     heard = [0]
@@ -125,21 +162,28 @@ def _count(store):
 
 def test_many_that_arrive_at_once_are_judged_one_after_another(tmp_path, monkeypatch):
     """An alarm long before the latest recordings is not passed over, and stands."""
-    monkeypatch.setattr("asperity.tracking.order.LATEST", 16)
-    monkeypatch.setattr("asperity.tracking.watch.STRIDE", 8)
+    monkeypatch.setattr("asperity.monitoring.ordering.LATEST", 16)
+    monkeypatch.setattr("asperity.monitoring.watch.STRIDE", 8)
     snapshots(tmp_path / "in", [*failing(), *np.ones(30)])
     (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)
     assert update.track.alarm.state == "alarm"
     since = Path(update.track.recordings[update.track.alarm.since].file).name
     assert "s-012.npz" < since < "s-036.npz"
-    assert len(update.track.recordings) in (24, 25)  # the first eight, the latest, and the one that raised it
+    assert len(update.track.recordings) in (
+        24,
+        25,
+    )  # the first eight, the latest, and the one that raised it
     states = asked(tmp_path / "out/asperity.db", "SELECT state FROM recording ORDER BY file")
     assert all(state for (state,) in states)  # each was judged
     snapshots(tmp_path / "in", [1.0], first=66)
     (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0)
     assert update.track.alarm.state == "alarm"
-    assert "raised before and not acknowledged" not in update.track.alarm.reason  # it is among those judged
-    (update,) = watch_folder(tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0, acknowledge="last")
+    assert (
+        "raised before and not acknowledged" not in update.track.alarm.reason
+    )  # it is among those judged
+    (update,) = watch_folder(
+        tmp_path / "in", tmp_path / "out", once=True, settle_s=0.0, acknowledge="last"
+    )
     assert update.track.alarm.state == "none"
 
 
@@ -170,11 +214,19 @@ def _empty(path):
 
 
 def test_a_store_that_another_program_holds_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("asperity.tracking.store.BUSY_S", 0.05)
+    monkeypatch.setattr("asperity.monitoring.store.BUSY_S", 0.05)
     snapshots(tmp_path / "in", [1.0])
     store = Store(tmp_path / "plant.db")
     with store.transaction(), pytest.raises(AsperityError, match="another program holds it"):
-        next(watch_folder(tmp_path / "in", tmp_path / "out", store=tmp_path / "plant.db", once=True, settle_s=0.0))
+        next(
+            watch_folder(
+                tmp_path / "in",
+                tmp_path / "out",
+                store=tmp_path / "plant.db",
+                once=True,
+                settle_s=0.0,
+            )
+        )
 
 
 def test_a_damaged_recording_of_the_store_is_read_again(tmp_path):
@@ -254,7 +306,9 @@ def test_what_one_process_acknowledges_another_does_not_raise_again(asp):
     looks = watch_folder("in", "out", every_s=0.0, settle_s=0.0, machine="Fan 1", point="DE")
     assert next(looks).track.alarm.state == "alarm"
     assert asp("store", "out/asperity.db", "--quiet")[0] == 3
-    assert asp("store", "out/asperity.db", "--quiet", "--acknowledge", "Fan 1/DE/sensor")[0] == 3  # nothing new is said
+    assert (
+        asp("store", "out/asperity.db", "--quiet", "--acknowledge", "Fan 1/DE/sensor")[0] == 3
+    )  # nothing new is said
     snapshots("in", [1.0], first=40)
     assert next(looks).track.alarm.state == "cannot-tell"
     looks.close()
@@ -288,7 +342,9 @@ def test_a_store_of_an_older_version_goes_on(asp, version):
 def test_a_track_acknowledges_in_the_store_and_ends_as_the_store_does(asp):
     snapshots("in", failing())
     assert asp("track", "in", "--store", "plant.db", "--quiet")[0] == 3
-    assert asp("track", "in/s-001.npz", "in/s-002.npz", "--store", "plant.db", "--quiet")[0] == 3  # it stands
+    assert (
+        asp("track", "in/s-001.npz", "in/s-002.npz", "--store", "plant.db", "--quiet")[0] == 3
+    )  # it stands
     assert asp("track", "in", "--store", "plant.db", "--quiet", "--acknowledge", "last")[0] == 0
     assert asp("store", "plant.db", "--quiet")[0] == 0
 
@@ -299,14 +355,19 @@ def test_two_folders_of_one_name_are_two_machines(asp):
         snapshots(f"{machine}/DE", failing() if machine == "pump1" else np.ones(10))
         asp("watch", f"{machine}/DE", *ONCE, "--store", "plant.db")
     said = json.loads(asp("store", "plant.db", "--json")[1])
-    assert [(row["machine"], row["state"]) for row in said["sensors"]] == [("pump1", "alarm"), ("pump2", "cannot-tell")]
+    assert [(row["machine"], row["state"]) for row in said["sensors"]] == [
+        ("pump1", "alarm"),
+        ("pump2", "cannot-tell"),
+    ]
     Path("other/pump1").mkdir(parents=True)
     snapshots("other/pump1/DE", np.ones(3))
     code, _, err = asp("watch", "other/pump1/DE", *ONCE, "--store", "plant.db")
     assert code == 2
     assert "was begun with folder" in err
     absolute = str(Path("pump1/DE").resolve())
-    assert asp("watch", absolute, *ONCE, "--store", "plant.db")[0] == 3  # the same folder, named otherwise
+    assert (
+        asp("watch", absolute, *ONCE, "--store", "plant.db")[0] == 3
+    )  # the same folder, named otherwise
     assert json.loads(asp("store", "plant.db", "--json")[1])["sensors"][0]["recordings"] == 36
 
 

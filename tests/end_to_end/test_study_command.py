@@ -28,12 +28,32 @@ WORDS = [word for key, value in SETTINGS.items() for word in ("--set", f"{key}={
 
 
 def study(out, *more):
-    command = [sys.executable, "-m", "asperity", "study", str(CASE), "--out", str(out), *WORDS, *more]
+    command = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "study",
+        str(CASE),
+        "--out",
+        str(out),
+        *WORDS,
+        *more,
+    ]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def started(out, *more):
-    command = [sys.executable, "-m", "asperity", "study", str(CASE), "--out", str(out), *WORDS, *more]
+    command = [
+        sys.executable,
+        "-m",
+        "asperity",
+        "study",
+        str(CASE),
+        "--out",
+        str(out),
+        *WORDS,
+        *more,
+    ]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -67,7 +87,9 @@ def whole(tmp_path_factory):
 def test_a_study_whose_parent_is_killed_goes_on_to_the_same_table(whole, tmp_path):
     running = started(tmp_path, "--workers", "2")
     wait_for(lambda: parts(tmp_path) >= 2)
-    workers = subprocess.run(["pgrep", "-P", str(running.pid)], capture_output=True, text=True, check=False).stdout
+    workers = subprocess.run(
+        ["pgrep", "-P", str(running.pid)], capture_output=True, text=True, check=False
+    ).stdout
     running.kill()
     running.communicate()
     there = parts(tmp_path)
@@ -83,7 +105,10 @@ def test_a_study_survives_a_killed_worker(whole, tmp_path):
     running = started(tmp_path, "--workers", "2")
     wait_for(lambda: parts(tmp_path) >= 2)
     found = subprocess.run(
-        ["pgrep", "-P", str(running.pid), "-f", "spawn_main"], capture_output=True, text=True, check=False
+        ["pgrep", "-P", str(running.pid), "-f", "spawn_main"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     os.kill(int(found.stdout.split()[0]), signal.SIGKILL)
     _, complaint = running.communicate(timeout=120)
@@ -95,8 +120,24 @@ def test_a_study_survives_a_killed_worker(whole, tmp_path):
 def dask_cluster(folder):
     environment = {**os.environ, "DASK_DISTRIBUTED__ADMIN__LOG_LENGTH": "0"}
     address = folder / "scheduler.json"
-    scheduler = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--host", "127.0.0.1"]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(address), "--nthreads", "1"]
+    scheduler = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--port",
+        "0",
+        "--host",
+        "127.0.0.1",
+    ]
+    worker = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_worker",
+        "--scheduler-file",
+        str(address),
+        "--nthreads",
+        "1",
+    ]
     options = ["--no-dashboard", "--scheduler-file", str(address)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
     processes = [subprocess.Popen([*scheduler, *options], **quiet)]
@@ -126,10 +167,14 @@ def test_dask_workers_of_which_one_is_killed_give_the_same_rows(whole, tmp_path)
 
 def test_shards_merge_to_the_whole(whole, asp):
     for k in ("1", "2"):
-        code, out, _ = asp("study", str(CASE), "--out", k, *WORDS, "--shard", f"{k}/2", "--workers", "1", "--json")
+        code, out, _ = asp(
+            "study", str(CASE), "--out", k, *WORDS, "--shard", f"{k}/2", "--workers", "1", "--json"
+        )
         assert code == 0
         assert (json.loads(out)["cases"], json.loads(out)["planned"]) == (12, 24)
-    code, out, _ = asp("study", str(CASE), "--out", "merged", *WORDS, "--merge", "1", "--merge", "2", "--json")
+    code, out, _ = asp(
+        "study", str(CASE), "--out", "merged", *WORDS, "--merge", "1", "--merge", "2", "--json"
+    )
     assert code == 0
     assert json.loads(out)["computed"] == 0
     pandas.testing.assert_frame_equal(rows(Path("merged")), whole, check_exact=True)
@@ -137,7 +182,9 @@ def test_shards_merge_to_the_whole(whole, asp):
 
 def test_the_verdict_comes_first_and_failures_are_loud(asp):
     sweep = 'study={sq=["1 um"], correlation_length=["30 um", "3 um"]}'
-    code, out, err = asp("study", str(CASE), "--out", "out", *WORDS[:-4], "--set", sweep, "--workers", "1")
+    code, out, err = asp(
+        "study", str(CASE), "--out", "out", *WORDS[:-4], "--set", sweep, "--workers", "1"
+    )
     assert code == 1
     assert out.startswith("2 cases, 1 failed")
     assert "correlation length along x must be at least 2 cells" in out
@@ -148,7 +195,13 @@ def test_a_dry_run_tells_what_it_would_cost(asp):
     code, out, err = asp("study", str(CASE), "--dry-run", *WORDS, "--workers", "4", "--json")
     assert (code, err) == (0, "")
     told = json.loads(out)
-    assert (told["cases"], told["kept"], told["points"], told["seeds"], told["workers"]) == (24, 0, 4, 6, 4)
+    assert (told["cases"], told["kept"], told["points"], told["seeds"], told["workers"]) == (
+        24,
+        0,
+        4,
+        6,
+        4,
+    )
     at_work = 24 * told["seconds_a_case"] / min(4, execution.cores())
     assert at_work < told["seconds"] < at_work + 120.0  # workers have to start before
 
@@ -158,7 +211,10 @@ def test_a_dry_run_tells_what_it_would_cost(asp):
     [
         (["--shard", "4/3"], "--shard must be k/N with 1 <= k <= N, such as 1/3, got 4/3"),
         (["--executor", "slurm"], "--executor must be dask:ADDRESS"),
-        (["--executor", "dask:tcp://127.0.0.1:1"], "no dask scheduler answers at tcp://127.0.0.1:1"),
+        (
+            ["--executor", "dask:tcp://127.0.0.1:1"],
+            "no dask scheduler answers at tcp://127.0.0.1:1",
+        ),
         (["--fields", "colour"], "fields must be among"),
         (["--set", "study.sq=none"], "study.sq must be a list of values or a range"),
         (["--merge", "nowhere"], "nowhere holds no study"),

@@ -21,7 +21,9 @@ def ran(*arguments: str, **about) -> subprocess.CompletedProcess[str]:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
 def test_output_that_cannot_be_written_is_one_sentence():
     with Path("/dev/full").open("w", encoding="utf-8") as full:
-        done = ran("vibrate", str(CASE), "-q", capture_output=False, stdout=full, stderr=subprocess.PIPE)
+        done = ran(
+            "vibrate", str(CASE), "-q", capture_output=False, stdout=full, stderr=subprocess.PIPE
+        )
     assert done.returncode == 1
     assert done.stderr.startswith("error: the output could not be written: No space left")
     assert done.stderr.count("\n") == 1
@@ -39,14 +41,20 @@ def test_a_listener_that_has_heard_enough_gets_no_traceback(tmp_path):
 
 @pytest.mark.parametrize("encoding", ["ascii", "ascii:strict", "latin-1"])
 def test_the_result_reaches_an_output_that_knows_few_letters(encoding):
-    done = ran("vibrate", str(CASE), "-q", env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"})
+    done = ran(
+        "vibrate",
+        str(CASE),
+        "-q",
+        env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"},
+    )
     assert done.returncode == 0
     assert done.stderr == ""
     assert "Contact resonance at" in done.stdout
 
 
 @pytest.mark.parametrize(
-    "arguments", [("solve", "bad\x1b[31m.toml"), ("check", "bad\x1b[2J\x07.csv"), ("solve", "a\x00b.toml")]
+    "arguments",
+    [("solve", "bad\x1b[31m.toml"), ("check", "bad\x1b[2J\x07.csv"), ("solve", "a\x00b.toml")],
 )
 def test_names_do_not_steer_the_terminal(arguments, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -66,7 +74,13 @@ def test_a_channels_name_does_not_steer_the_terminal(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "override", ["contact.load=" + "x" * 10**5, "x" * 10**5 + "=1", f"surface.file='{'y' * 10**5}'", "no equals" * 9999]
+    "override",
+    [
+        "contact.load=" + "x" * 10**5,
+        "x" * 10**5 + "=1",
+        f"surface.file='{'y' * 10**5}'",
+        "no equals" * 9999,
+    ],
 )
 def test_a_refusal_is_never_long(capsys, override):
     with pytest.raises(SystemExit) as end:

@@ -11,12 +11,24 @@ PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8
 
 
 def test_table_1_has_the_contracts_rows(asp):
-    code, out, _ = asp("vibrate", "case.toml", "--preset", "paper", "--table1", "--records", "20", "--json")
+    code, out, _ = asp(
+        "vibrate", "case.toml", "--preset", "paper", "--table1", "--records", "20", "--json"
+    )
     assert code == 0
     rows = json.loads(out)["rows"]
     assert len(rows) == 12
     assert list(rows[0]) == [
-        *("cutoff_hz", "height_m", "load_n", "crf_hz", "crfa", "crfa_low", "crfa_high", "paper_crf_hz", "paper_crfa")
+        *(
+            "cutoff_hz",
+            "height_m",
+            "load_n",
+            "crf_hz",
+            "crfa",
+            "crfa_low",
+            "crfa_high",
+            "paper_crf_hz",
+            "paper_crfa",
+        )
     ]
     assert rows[7]["height_m"] == 4e-6
     assert rows[7]["paper_crfa"] == 2.58
@@ -35,7 +47,9 @@ def test_a_case_is_heard_dry_with_all_load_on_asperities(asp):
     assert (code, err) == (0, "")
     heard = json.loads(out)
     assert heard["clr"] == heard["car"] == 1.0
-    assert heard["natural_frequency_hz"] == pytest.approx(3834.6, abs=0.1)  # physics.md: 3834 Hz at 500 N, E 200 GPa
+    assert heard["natural_frequency_hz"] == pytest.approx(
+        3834.6, abs=0.1
+    )  # physics.md: 3834 Hz at 500 N, E 200 GPa
     assert heard["crf_hz"] == pytest.approx(3834.6, abs=3 * heard["crf_std_hz"])
     assert asp("vibrate", "case.toml")[1].splitlines()[0] == heard["verdict"]
     assert asp("vibrate", "case.toml", "--quiet")[1] == heard["verdict"] + "\n"
@@ -49,8 +63,14 @@ def test_the_papers_preset_replaces_the_cases_choices_and_draws_figs_3_and_4(asp
 
 
 def test_a_stiffness_that_needs_the_solved_contact_solves_it(asp):
-    wanted = ("vibration.stiffness_law=tangent", "vibration.rate=200 kHz", "surface.correlation_length=30 um")
-    code, out, _ = asp("vibrate", "case.toml", "--json", *(word for key in wanted for word in ("--set", key)))
+    wanted = (
+        "vibration.stiffness_law=tangent",
+        "vibration.rate=200 kHz",
+        "surface.correlation_length=30 um",
+    )
+    code, out, _ = asp(
+        "vibrate", "case.toml", "--json", *(word for key in wanted for word in ("--set", key))
+    )
     assert code == 0
     heard = json.loads(out)
     assert "solved contact" in heard["verdict"]
@@ -59,7 +79,11 @@ def test_a_stiffness_that_needs_the_solved_contact_solves_it(asp):
 
 
 def test_a_contact_that_cannot_be_solved_is_kept_without_its_tangent_stiffness(asp):
-    wanted = ("vibration.stiffness_law=tangent", "vibration.rate=200 kHz", "solver.max_iterations=1")
+    wanted = (
+        "vibration.stiffness_law=tangent",
+        "vibration.rate=200 kHz",
+        "solver.max_iterations=1",
+    )
     sets = [word for key in wanted for word in ("--set", key)]
     code, out, _ = asp("solve", "case.toml", "--out", "run.nc", *sets)
     assert code == 1
@@ -71,7 +95,9 @@ def test_a_contact_that_cannot_be_solved_is_kept_without_its_tangent_stiffness(a
 def test_too_strong_a_shaking_for_a_linear_spring_is_said(asp):
     loud = ("--set", "vibration.cutoff_reference=5 kHz")
     assert "too much for a linear spring" in asp("vibrate", "case.toml", *loud)[1].splitlines()[0]
-    code, out, _ = asp("vibrate", "case.toml", *loud, "--set", "vibration.response=nonlinear", "--json")
+    code, out, _ = asp(
+        "vibrate", "case.toml", *loud, "--set", "vibration.response=nonlinear", "--json"
+    )
     assert code == 0
     assert json.loads(out)["contact_loss"] > 0.0
 
@@ -87,7 +113,10 @@ def test_too_strong_a_shaking_for_a_linear_spring_is_said(asp):
         (("case.toml", "--set", "vibration.filter=rc"), ("continuous, bilinear", "rc")),
         (("case.toml", "--set", "vibration=none"), ("[vibration]",)),
         (("case.toml", "--set", "vibration.damping=5 kg"), ("vibration.damping", "N s/m")),
-        (("case.toml", "--set", "vibration.response=rk5", "--set", "vibration.substeps=0"), ("sub-steps", "0")),
+        (
+            ("case.toml", "--set", "vibration.response=rk5", "--set", "vibration.substeps=0"),
+            ("sub-steps", "0"),
+        ),
         (("case.toml", "--figures", "case.toml"), ("case.toml", "folder")),
         (("absent.toml", "--table1"), ("absent.toml",)),
     ],

@@ -7,10 +7,36 @@ import pandas
 import pytest
 
 WEAR = (Path(__file__).parents[2] / "examples" / "wear.toml").read_text("utf-8")
-COARSE = ("--set", "grid.cells=[32, 16]", "--set", "surface.correlation_length='50 um'", "--workers", "1")
+COARSE = (
+    "--set",
+    "grid.cells=[32, 16]",
+    "--set",
+    "surface.correlation_length='50 um'",
+    "--workers",
+    "1",
+)
 KEYS = [
-    *("verdict", "hours", "overrollings", "worn_volume_m3", "worn_volume_interval_m3", "worn_depth_m", "volume_error"),
-    *("jump_error", "jumps", "computed", "failed", "patches", "seconds", "folder", "table", "surfaces", "notes"),
+    *(
+        "verdict",
+        "hours",
+        "overrollings",
+        "worn_volume_m3",
+        "worn_volume_interval_m3",
+        "worn_depth_m",
+        "volume_error",
+    ),
+    *(
+        "jump_error",
+        "jumps",
+        "computed",
+        "failed",
+        "patches",
+        "seconds",
+        "folder",
+        "table",
+        "surfaces",
+        "notes",
+    ),
     *("sq_m", "clr", "car", "h_mean_m", "friction_coefficient", "crf_hz", "crfa"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "stage", "report"),
     *("clr_mean_low", "clr_mean_high", "crf_mean_low_hz", "crf_mean_high_hz"),
@@ -25,7 +51,18 @@ def worn_case(tmp_path, monkeypatch):
 
 
 def test_json_holds_the_contract(asp, worn_case):
-    code, out, err = asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--report", "w.html", "--json", *COARSE)
+    code, out, err = asp(
+        "wear",
+        "wear.toml",
+        "--hours",
+        "1",
+        "--out",
+        "worn",
+        "--report",
+        "w.html",
+        "--json",
+        *COARSE,
+    )
     assert (code, err) == (0, "")
     said = json.loads(out)
     assert sorted(said) == sorted(KEYS)
@@ -40,9 +77,13 @@ def test_json_holds_the_contract(asp, worn_case):
     page = (worn_case / "w.html").read_text("utf-8")
     assert "A contact that wears" in page
     shown = json.loads(page.split('id="data">')[1].split("</script>")[0])
-    assert len(shown["frames"]) == len(shown["words"]) == said["jumps"] + 1  # fewer than are thinned out
+    assert (
+        len(shown["frames"]) == len(shown["words"]) == said["jumps"] + 1
+    )  # fewer than are thinned out
     assert shown["words"][-1].startswith("after 1 h, at ")
-    again = json.loads(asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--json", *COARSE)[1])
+    again = json.loads(
+        asp("wear", "wear.toml", "--hours", "1", "--out", "worn", "--json", *COARSE)[1]
+    )
     assert again["computed"] == 0
     assert {key: again[key] for key in ("sq_m", "clr", "crf_hz")} == {
         key: said[key] for key in ("sq_m", "clr", "crf_hz")
@@ -68,9 +109,18 @@ def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG
     [
         (("--hours", "0"), "hours of wear must be positive"),
         (("--hours", "1", "--set", "wear=none"), "wear is left out; add [wear] with k"),
-        (("--hours", "1", "--set", "wear.k=hard"), 'wear.k[0] must be such as "1e-18 1/Pa", or one of mild'),
-        (("--hours", "1", "--set", "wear.k=mild", "--set", "material.hardness=none"), "the case states no hardness"),
-        (("--hours", "1", "--set", "wear.law=archrd"), "must be one of archard, energy, film-defect"),
+        (
+            ("--hours", "1", "--set", "wear.k=hard"),
+            'wear.k[0] must be such as "1e-18 1/Pa", or one of mild',
+        ),
+        (
+            ("--hours", "1", "--set", "wear.k=mild", "--set", "material.hardness=none"),
+            "the case states no hardness",
+        ),
+        (
+            ("--hours", "1", "--set", "wear.law=archrd"),
+            "must be one of archard, energy, film-defect",
+        ),
         (("--hours", "1", "--report", "w.txt"), "--report must be a file that ends in .html"),
     ],
 )

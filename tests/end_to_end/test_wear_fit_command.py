@@ -13,7 +13,9 @@ def recorded(tmp_path):
     trace = tmp_path / "trace.csv"
     trace.write_text("Time;Distance;Laps;mu;FrictionForce\n" + "\n".join(rows))
     x = np.arange(4000) * 0.5e-3
-    z = -np.maximum(1.0 - ((x - 0.9) / 0.1) ** 2, 0.0) + 0.005 * np.random.default_rng(1).standard_normal(x.size)
+    z = -np.maximum(1.0 - ((x - 0.9) / 0.1) ** 2, 0.0) + 0.005 * np.random.default_rng(
+        1
+    ).standard_normal(x.size)
     scar = tmp_path / "scar.csv"
     scar.write_text("x,z\n" + "\n".join(f"{a:.5f},{b:.5f}" for a, b in zip(x, z, strict=True)))
     return str(trace), str(scar)
@@ -21,8 +23,21 @@ def recorded(tmp_path):
 
 KEYS = [
     *("verdict", "wear_coefficient", "wear_coefficient_all_lost", "wear_coefficient_none_lost"),
-    *("energy_wear_coefficient", "scar_volume_m3", "second_volume_m3", "second_load_n", "second_distance_m"),
-    *("load_n", "distance_m", "laps", "track_radius_m", "friction_coefficient", "friction_energy_j"),
+    *(
+        "energy_wear_coefficient",
+        "scar_volume_m3",
+        "second_volume_m3",
+        "second_load_n",
+        "second_distance_m",
+    ),
+    *(
+        "load_n",
+        "distance_m",
+        "laps",
+        "track_radius_m",
+        "friction_coefficient",
+        "friction_energy_j",
+    ),
     *("scar_width_m", "scar_missing_m2", "scar_piled_m2", "profile_roughness_m", "notes"),
 ]
 
@@ -39,10 +54,26 @@ def test_k_and_what_a_second_test_loses(asp, recorded):
     assert said["wear_coefficient"]["low"] < k < said["wear_coefficient"]["high"]
     assert said["load_n"] == pytest.approx(5.0)
     halved = json.loads(
-        asp("wear", "--fit", trace, "--scar", scar, *units, "--second-distance", "50 m", "--load", "10 N", "--json")[1]
+        asp(
+            "wear",
+            "--fit",
+            trace,
+            "--scar",
+            scar,
+            *units,
+            "--second-distance",
+            "50 m",
+            "--load",
+            "10 N",
+            "--json",
+        )[1]
     )
-    assert halved["wear_coefficient"]["median"] == pytest.approx(said["wear_coefficient"]["median"] / 2.0, rel=1e-9)
-    assert halved["second_volume_m3"]["high"] == pytest.approx(said["second_volume_m3"]["high"] / 2.0, rel=1e-9)
+    assert halved["wear_coefficient"]["median"] == pytest.approx(
+        said["wear_coefficient"]["median"] / 2.0, rel=1e-9
+    )
+    assert halved["second_volume_m3"]["high"] == pytest.approx(
+        said["second_volume_m3"]["high"] / 2.0, rel=1e-9
+    )
     code, out, _ = asp("wear", "--fit", trace, "--scar", scar, *units)
     assert code == 0
     assert out.splitlines()[0] == said["verdict"]
@@ -54,7 +85,10 @@ def test_half_a_fit_is_refused(asp, recorded):
     for given, said in (
         (("--fit", trace), "--fit TRACE and --scar PROFILE go together"),
         (("--scar", scar), "--fit TRACE and --scar PROFILE go together"),
-        (("case.toml", "--hours", "1", "--fit", trace, "--scar", scar), "without a case or --hours"),
+        (
+            ("case.toml", "--hours", "1", "--fit", trace, "--scar", scar),
+            "without a case or --hours",
+        ),
         (("case.toml",), "takes a case and --hours"),
         ((), "takes a case and --hours"),
         (("--fit", trace, "--scar", scar), "names no units"),

@@ -12,7 +12,9 @@ from urllib.parse import urlsplit
 import pytest
 
 PATIENCE_MS = 60_000
-REQUIRED = "ASPERITY_CHROMIUM"  # where it is set, as in CI, a browser that is not there fails the tests
+REQUIRED = (
+    "ASPERITY_CHROMIUM"  # where it is set, as in CI, a browser that is not there fails the tests
+)
 
 
 def missing(what: str) -> None:
@@ -30,8 +32,12 @@ class Server:
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "asperity", "page", *arguments, "--port", "0"],
-                stdout=subprocess.PIPE, stderr=log, text=True, cwd=folder, env={**os.environ, **environment},
-            )  # fmt: skip
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                cwd=folder,
+                env={**os.environ, **environment},
+            )
         said = self.process.stdout.readline()
         found = re.search(r"http://\S+/", said)
         if not found:
@@ -96,14 +102,19 @@ class Visit:
 
     def __init__(self, browser, server: Server, **settings) -> None:
         self.server, self.foreign, self.errors = server, [], []
-        self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 1000}, **settings})
+        self.context = browser.new_context(
+            **{"viewport": {"width": 1280, "height": 1000}, **settings}
+        )
         self.context.route(re.compile(".*"), self._let_through)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE_MS)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._heard)
         self.page.on("websocket", self._socket)
-        self.page.on("dialog", lambda dialog: (self.errors.append(f"dialog {dialog.message}"), dialog.dismiss()))
+        self.page.on(
+            "dialog",
+            lambda dialog: (self.errors.append(f"dialog {dialog.message}"), dialog.dismiss()),
+        )
 
     def _let_through(self, route):
         if urlsplit(route.request.url).netloc == self.server.host:
@@ -123,7 +134,9 @@ class Visit:
     def go(self, path: str = "contact"):
         """Visit a path and wait until a document is there."""
         self.page.goto(f"{self.server.url}{path}")
-        self.page.wait_for_function("() => window.Bokeh !== undefined && Bokeh.documents.length > 0")
+        self.page.wait_for_function(
+            "() => window.Bokeh !== undefined && Bokeh.documents.length > 0"
+        )
         return self.page
 
     def solved(self, path: str = "contact"):
@@ -138,7 +151,18 @@ class Visit:
         assert self.errors == []
 
 
-CONTROLS = {"button", "checkbox", "combobox", "link", "listbox", "radio", "slider", "spinbutton", "switch", "textbox"}
+CONTROLS = {
+    "button",
+    "checkbox",
+    "combobox",
+    "link",
+    "listbox",
+    "radio",
+    "slider",
+    "spinbutton",
+    "switch",
+    "textbox",
+}
 FOCUSED = """() => {
   let element = document.activeElement
   while (element?.shadowRoot?.activeElement) element = element.shadowRoot.activeElement
@@ -156,9 +180,13 @@ def accessible(page):
     pictures = [
         node
         for node in tree
-        if roles[node["nodeId"]] == "image" and not node["ignored"] and roles.get(node.get("parentId")) != "button"
+        if roles[node["nodeId"]] == "image"
+        and not node["ignored"]
+        and roles.get(node.get("parentId")) != "button"
     ]  # an icon says what its button says
-    nameless = [node for node in (*controls, *pictures) if not node.get("name", {}).get("value", "").strip()]
+    nameless = [
+        node for node in (*controls, *pictures) if not node.get("name", {}).get("value", "").strip()
+    ]
     return controls, pictures, [roles[node["nodeId"]] for node in nameless]
 
 

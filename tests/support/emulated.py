@@ -8,19 +8,26 @@ from scipy.stats import qmc
 from asperity.case import load_case
 from asperity.inference import Emulator, Quality, Setting, setting_of
 from asperity.inference.emulator import features_of
+from asperity.inference.gaussian_process import Process
 from asperity.inference.outputs import OUTPUTS
-from asperity.inference.process import Process
 
 CASE = Path(__file__).parents[2] / "examples" / "infer.toml"
 POINTS = 64  # a power of two
 SMALL = {  # a few small contacts
     "surface.correlation_length": "40 um",
     "infer": {
-        "points": 16, "surfaces": 2, "cells": [32, 24], "sq": {"from": "0.5 um", "to": "2 um"},
-        "correlation_length": "known", "hardness": "known", "eta0": "known", "alpha": "known",
-        "load": {"from": "400 N", "to": "600 N"}, "entrainment_speed": {"from": "1 m/s", "to": "3 m/s"},
+        "points": 16,
+        "surfaces": 2,
+        "cells": [32, 24],
+        "sq": {"from": "0.5 um", "to": "2 um"},
+        "correlation_length": "known",
+        "hardness": "known",
+        "eta0": "known",
+        "alpha": "known",
+        "load": {"from": "400 N", "to": "600 N"},
+        "entrainment_speed": {"from": "1 m/s", "to": "3 m/s"},
     },
-}  # fmt: skip
+}
 
 
 def formula_setting(**overrides: object) -> Setting:
@@ -57,7 +64,9 @@ def formula_emulator(setting: Setting) -> Emulator:
         for key, output in OUTPUTS.items()
     }
     quality = {key: Quality(0.01, 0.9, 0.05, 0.02) for key in OUTPUTS}
-    return Emulator(setting.ranges, features, processes, quality, POINTS, 4, 0, Path("formula"), 0.0)
+    return Emulator(
+        setting.ranges, features, processes, quality, POINTS, 4, 0, Path("formula"), 0.0
+    )
 
 
 def _z(share: np.ndarray) -> np.ndarray:

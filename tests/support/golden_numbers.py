@@ -22,7 +22,10 @@ REFERENCE = TESTS / "reference" / "golden"
 EXAMPLES = TESTS.parent / "examples"
 ROUNDING = 1e-11  # of what would be nothing
 TIMES = ("seconds", "solve_seconds")  # what no two runs share
-LEFT = ("reynolds_residual", "load_error")  # of equations that are solved: any two processors leave something else
+LEFT = (
+    "reynolds_residual",
+    "load_error",
+)  # of equations that are solved: any two processors leave something else
 SOLVED = 1e-4  # the solver's tolerance, which it has to be below
 SMALL = ("grid.cells=[64, 48]", "vibration.duration=0.2 s")
 ROLLING = ("grid.cells=[48, 32]", "surface.correlation_length=40 um")
@@ -56,21 +59,48 @@ def solved(*overrides: str, case: str = "paper.toml") -> dict[str, Any]:
 
 def elliptic() -> dict[str, Any]:
     text = (EXAMPLES / "ball-on-disc.toml").read_text("utf-8")
-    text = text.replace('geometry = "point"', 'geometry = "elliptic"').replace('"12.5 mm"', '["8 mm", "20 mm"]')
+    text = text.replace('geometry = "point"', 'geometry = "elliptic"').replace(
+        '"12.5 mm"', '["8 mm", "20 mm"]'
+    )
     start, rest = text.split("[surface]")
-    Path("case.toml").write_text(f"{start}[surface]{GROUND}\n[grid]{rest.split('[grid]')[1]}", "utf-8")
-    return say("solve", "case.toml", "--surfaces", "1", *_set(("grid.cells=[48, 48]", "thermal.feedback=true")))
+    Path("case.toml").write_text(
+        f"{start}[surface]{GROUND}\n[grid]{rest.split('[grid]')[1]}", "utf-8"
+    )
+    return say(
+        "solve",
+        "case.toml",
+        "--surfaces",
+        "1",
+        *_set(("grid.cells=[48, 48]", "thermal.feedback=true")),
+    )
 
 
 def study() -> dict[str, Any]:
     swept = ('study.sq=["0.5 um", "1.5 um", "3 um", "4 um"]', "study.seeds=2")
-    said = say("study", str(EXAMPLES / "paper.toml"), "--out", "study", "--workers", "1", *_set((*SMALL, *swept)))
+    said = say(
+        "study",
+        str(EXAMPLES / "paper.toml"),
+        "--out",
+        "study",
+        "--workers",
+        "1",
+        *_set((*SMALL, *swept)),
+    )
     return {**said, "rows": _rows(Path("study/table.parquet"))}
 
 
 def history(*overrides: str, steps: int, listen: bool = False) -> dict[str, Any]:
     words = ("--listen",) if listen else ()
-    said = say("run", str(EXAMPLES / "paper.toml"), "--steps", str(steps), "--out", "h", *words, *_set(overrides))
+    said = say(
+        "run",
+        str(EXAMPLES / "paper.toml"),
+        "--steps",
+        str(steps),
+        "--out",
+        "h",
+        *words,
+        *_set(overrides),
+    )
     table, *_ = Path("h").glob("*.parquet")
     return {**said, "rows": _rows(table)}
 
@@ -78,17 +108,30 @@ def history(*overrides: str, steps: int, listen: bool = False) -> dict[str, Any]
 def tracked() -> dict[str, Any]:
     made = say("rig", "--out", "rig", "--samples", "6", "--repeats", "2", "--duration", "2 s")
     table = ("--table", "rig/table.csv", "--case", "rig/rig.toml", "--workers", "1")
-    checked = say("check", "rig/recordings" if Path("rig/recordings").is_dir() else "rig", "--case", "rig/rig.toml")
+    checked = say(
+        "check",
+        "rig/recordings" if Path("rig/recordings").is_dir() else "rig",
+        "--case",
+        "rig/rig.toml",
+    )
     return {"rig": made, "check": checked, "track": say("track", "rig", *table)}
 
 
 def measured() -> dict[str, Any]:
     x, y = np.meshgrid(np.arange(96), np.arange(80), indexing="ij")
-    waves = 0.8 * np.sin(x / 5.0) + 0.5 * np.cos(y / 7.0 + x / 11.0) + 0.1 * ((7 * x + 13 * y) % 17) / 17 + 0.01 * x
+    waves = (
+        0.8 * np.sin(x / 5.0)
+        + 0.5 * np.cos(y / 7.0 + x / 11.0)
+        + 0.1 * ((7 * x + 13 * y) % 17) / 17
+        + 0.01 * x
+    )
     np.savetxt("map.txt", waves.T, fmt="%.6f")
     words = ("--unit", "um", "--pixel", "2 um")
     filtered = ("--form", "cylinder", "--s-filter", "8 um", "--outliers", "remove")
-    return {"plain": say("surface", "map.txt", *words), "filtered": say("surface", "map.txt", *words, *filtered)}
+    return {
+        "plain": say("surface", "map.txt", *words),
+        "filtered": say("surface", "map.txt", *words, *filtered),
+    }
 
 
 def curves() -> dict[str, Any]:
@@ -114,23 +157,36 @@ CASES: dict[str, Callable[[], dict[str, Any]]] = {
         "vibration.rate=200 kHz",
         "surface.sq=2 um",
     ),
-    "warm": lambda: solved(*SMALL, "thermal.feedback=true", 'lubricant.rheology={law="ree-eyring", tau0="5 MPa"}'),
-    "warm-paper-model": lambda: solved(
-        *SMALL, "thermal.feedback=true", 'lubricant.rheology={law="ree-eyring", tau0="5 MPa"}', "model=paper"
+    "warm": lambda: solved(
+        *SMALL, "thermal.feedback=true", 'lubricant.rheology={law="ree-eyring", tau0="5 MPa"}'
     ),
-    "ball": lambda: solved("grid.cells=[64, 64]", "vibration.duration=0.2 s", case="ball-on-disc.toml"),
+    "warm-paper-model": lambda: solved(
+        *SMALL,
+        "thermal.feedback=true",
+        'lubricant.rheology={law="ree-eyring", tau0="5 MPa"}',
+        "model=paper",
+    ),
+    "ball": lambda: solved(
+        "grid.cells=[64, 64]", "vibration.duration=0.2 s", case="ball-on-disc.toml"
+    ),
     "ball-paper-model": lambda: solved(
         "grid.cells=[64, 64]", "vibration.duration=0.2 s", "model=paper", case="ball-on-disc.toml"
     ),
     "ellipse": elliptic,
     "study": study,
     "history": lambda: history(*ROLLING, "motion.flattening=true", steps=6, listen=True),
-    "history-paper-model": lambda: history(*ROLLING, "motion.flattening=true", "model=paper", steps=6, listen=True),
-    "history-conserving": lambda: history(*ROLLING, "model=conserving", "surface.sq=0.6 um", steps=2),
+    "history-paper-model": lambda: history(
+        *ROLLING, "motion.flattening=true", "model=paper", steps=6, listen=True
+    ),
+    "history-conserving": lambda: history(
+        *ROLLING, "model=conserving", "surface.sq=0.6 um", steps=2
+    ),
     "vibrate": lambda: {
         "sound": say("vibrate", str(EXAMPLES / "paper.toml")),
         "paper": say("vibrate", str(EXAMPLES / "paper-as-printed.toml"), "--preset", "paper"),
-        "nonlinear": say("vibrate", str(EXAMPLES / "paper.toml"), *_set(("vibration.response=nonlinear",))),
+        "nonlinear": say(
+            "vibrate", str(EXAMPLES / "paper.toml"), *_set(("vibration.response=nonlinear",))
+        ),
         "table1": say("vibrate", "--table1", "--records", "20"),
     },
     "track": tracked,
@@ -149,10 +205,17 @@ def differences(then: Any, now: Any, tolerance: float, where: str = "") -> list[
     """Where two trees of numbers differ, a line each; numbers by more than `tolerance` of the larger one."""
     if isinstance(then, dict) and isinstance(now, dict):
         gone = [f"{where}.{key} is gone" for key in then.keys() - now.keys()]
-        each = [differences(then[key], now[key], tolerance, f"{where}.{key}") for key in then if key in now]
+        each = [
+            differences(then[key], now[key], tolerance, f"{where}.{key}")
+            for key in then
+            if key in now
+        ]
         return [*gone, *(line for lines in each for line in lines)]
     if isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
-        each = [differences(*pair, tolerance, f"{where}[{n}]") for n, pair in enumerate(zip(then, now, strict=True))]
+        each = [
+            differences(*pair, tolerance, f"{where}[{n}]")
+            for n, pair in enumerate(zip(then, now, strict=True))
+        ]
         return [line for lines in each for line in lines]
     if where.endswith(LEFT) and type(now) is float:
         same = abs(now) < SOLVED

@@ -15,7 +15,8 @@ def love(x, y, half_x, half_y):
         r = np.hypot(edge_x, edge_y)
         # asinh(y/|x|) = ln((y + r)/|x|) keeps its digits where y + r cancels
         total = total + sign * (
-            edge_x * np.arcsinh(edge_y / np.abs(edge_x)) + edge_y * np.arcsinh(edge_x / np.abs(edge_y))
+            edge_x * np.arcsinh(edge_y / np.abs(edge_x))
+            + edge_y * np.arcsinh(edge_x / np.abs(edge_y))
         )
         assert np.all(r > 0.0)
     return total
@@ -29,5 +30,7 @@ def periodic_compliance(x, y, spacing, period, images=3000):
     """
     dx, dy = spacing
     image = np.arange(-images, images + 1) * period
-    cells = love(x[..., None], y[..., None] - image, dx / 2.0, dy / 2.0).sum(axis=-1) / (2.0 * np.pi)
+    cells = love(x[..., None], y[..., None] - image, dx / 2.0, dy / 2.0).sum(axis=-1) / (
+        2.0 * np.pi
+    )
     return cells - dx * dy / (np.pi * period) * np.log((2 * images + 1) * period)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from asperity.wear import line_shape
+from asperity.resonance import line_shape
 
 RATE, SECONDS, BAND = 10_000.0, 4.0, (1800.0, 4000.0)
 TRUTH = np.linspace(2900.0, 3750.0, 8)
@@ -14,10 +14,14 @@ def hears(rng, f0, heights):
     frequency = np.fft.rfftfreq(samples, 1.0 / RATE)
 
     def waves():
-        return (rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)) / np.sqrt(2.0)
+        return (
+            rng.standard_normal(frequency.size) + 1j * rng.standard_normal(frequency.size)
+        ) / np.sqrt(2.0)
 
     line = np.sqrt(line_shape(frequency, f0, 0.02)) * waves()
     return [
-        np.fft.irfft((np.sqrt(height) * line + 0.3 * waves()) * np.sqrt(RATE * samples / 2.0), samples)
+        np.fft.irfft(
+            (np.sqrt(height) * line + 0.3 * waves()) * np.sqrt(RATE * samples / 2.0), samples
+        )
         for height in heights
     ]

@@ -13,15 +13,32 @@ from pathlib import Path
 
 from support.pages import Line, Page, read
 from support.source import PACKAGE, ROOT
-from support.vocabulary import ELSEWHERE, commands, is_case_key, is_leaf, metavars, options, toml, vocabulary
+from support.vocabulary import (
+    ELSEWHERE,
+    commands,
+    is_case_key,
+    is_leaf,
+    metavars,
+    options,
+    toml,
+    vocabulary,
+)
 
 AMOUNT = re.compile(r"[+-]?[\d.]+(?:e[+-]?\d+)? [\w/^ *.]+")
-SUFFIXES = "py|pyi|toml|md|csv|json|html|nc|npz|png|pdf|parquet|txt|zarr|sh|css|j2|h5|yaml|x3p|sdf|plu|opd"
+SUFFIXES = (
+    "py|pyi|toml|md|csv|json|html|nc|npz|png|pdf|parquet|txt|zarr|sh|css|j2|h5|yaml|x3p|sdf|plu|opd"
+)
 A_FILE = re.compile(rf"[\w./*{{}}-]*\.({SUFFIXES})|[\w.*-]+/[\w./*-]*|\.\w+")
 PLACEHOLDERS = r"NAME|NNNNNN|CASE_ID"
 TREES = ("src", "tests", "docs", "examples", "benchmarks", "benchmark")
 IMPORTS = ast.Import | ast.ImportFrom
-FREE = {*dir(builtins), *ELSEWHERE, "asp", "Path", "Annotated"}  # names that need no definition of ours
+FREE = {
+    *dir(builtins),
+    *ELSEWHERE,
+    "asp",
+    "Path",
+    "Annotated",
+}  # names that need no definition of ours
 OTHER_TOOLS = ("--nthreads", "-n")  # of dask's worker and of pytest
 
 
@@ -37,7 +54,11 @@ def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
     if word.startswith("-"):
         return wrong_options(text, headings)
     if A_FILE.fullmatch(text):
-        return None if is_file(text, page) or vocabulary().is_written(text) else "no such file, and nothing writes one"
+        return (
+            None
+            if is_file(text, page) or vocabulary().is_written(text)
+            else "no such file, and nothing writes one"
+        )
     if re.fullmatch(r"\w+", text):
         return None if is_word(text) else "nothing has this name"
     if (table := toml(text.strip("'"))) is not None:
@@ -46,7 +67,14 @@ def judged(text: str, page: Path, headings: tuple[str, ...] = ()) -> str | None:
         key = text.strip("'").split("=")[0]
         return None if key == "KEY" or is_case_key(key) else f"{key} is not a key of a case"
     if re.fullmatch(r"\w+(, ?\w+)+", text):
-        return next((f"{part}: {wrong}" for part in text.split(",") if (wrong := judged(part.strip(), page))), None)
+        return next(
+            (
+                f"{part}: {wrong}"
+                for part in text.split(",")
+                if (wrong := judged(part.strip(), page))
+            ),
+            None,
+        )
     if vocabulary().is_written(text):
         return None
     if "..." in text and re.fullmatch(r"[\w.]+", text):
@@ -63,17 +91,28 @@ def is_word(text: str) -> bool:
     if text.startswith("_") and any(key.endswith(text) for key in vocabulary().keys):
         return True  # "and their _std"
     is_value = toml(f"value = {text}") is not None
-    return is_value or vocabulary().is_name(text) or text in metavars() or text in commands() or is_leaf(text)
+    return (
+        is_value
+        or vocabulary().is_name(text)
+        or text in metavars()
+        or text in commands()
+        or is_leaf(text)
+    )
 
 
 def is_file(text: str, page: Path) -> bool:
     """Is it there, from the root, the package, the page's folder; or as a bare name anywhere in the repository?"""
     if text.startswith("."):
         hidden = (ROOT / text).exists() or text in ROOT.joinpath(".gitignore").read_text("utf-8")
-        return hidden or is_suffix(text) or vocabulary().is_name(text[1:])  # .gain, of what was named before
+        return (
+            hidden or is_suffix(text) or vocabulary().is_name(text[1:])
+        )  # .gain, of what was named before
     bare = re.sub(r"^DIR/|/$", "", text)
     pattern = re.sub(PLACEHOLDERS, "*", bare)
-    if any(any(folder.glob(pattern)) for folder in (ROOT, PACKAGE.parent, PACKAGE, page.parent, ROOT / "tests")):
+    if any(
+        any(folder.glob(pattern))
+        for folder in (ROOT, PACKAGE.parent, PACKAGE, page.parent, ROOT / "tests")
+    ):
         return True
     if "/" not in bare:
         return any(any(ROOT.joinpath(tree).rglob(bare)) for tree in TREES) or is_output(bare)
@@ -81,7 +120,9 @@ def is_file(text: str, page: Path) -> bool:
 
 
 def is_suffix(text: str) -> bool:
-    return vocabulary().is_written(text) or any(value.endswith(text) for value in vocabulary().constants)
+    return vocabulary().is_written(text) or any(
+        value.endswith(text) for value in vocabulary().constants
+    )
 
 
 def is_output(name: str) -> bool:
@@ -90,7 +131,11 @@ def is_output(name: str) -> bool:
     return (
         "*" in name.replace("*.", "")
         or vocabulary().is_written(name)
-        or (vocabulary().is_written(stem.strip("*")) and is_suffix(f"{dot}{suffix}") and bool(suffix))
+        or (
+            vocabulary().is_written(stem.strip("*"))
+            and is_suffix(f"{dot}{suffix}")
+            and bool(suffix)
+        )
     )
 
 
@@ -103,10 +148,15 @@ def wrong_command(text: str) -> str | None:
     name = words.pop(0) if not words[0].startswith("-") else ""
     if name not in commands():
         return f"there is no command {name}"
-    known, arguments = options(name), [p for p in commands()[name].params if p.param_type_name == "argument"]
+    known, arguments = (
+        options(name),
+        [p for p in commands()[name].params if p.param_type_name == "argument"],
+    )
     given = 0
     while words:
-        word, _, value = words.pop(0).partition("=") if words[0].startswith("--") else (words.pop(0), "", "")
+        word, _, value = (
+            words.pop(0).partition("=") if words[0].startswith("--") else (words.pop(0), "", "")
+        )
         if not word.startswith("-") or re.fullmatch(r"-[\d.]+", word):
             given += 1
             continue
@@ -114,7 +164,9 @@ def wrong_command(text: str) -> str | None:
             return f"asperity {name} has no option {word}"
         takes = 0 if known[word] is None or known[word].is_flag or value else known[word].nargs
         values = [words.pop(0) for _ in range(min(takes, len(words)))]
-        if (len(values) < takes and len(values) + len(words) > 0) or any(value.startswith("--") for value in values):
+        if (len(values) < takes and len(values) + len(words) > 0) or any(
+            value.startswith("--") for value in values
+        ):
             return f"{word} of asperity {name} takes a value"
         if word == "--set" and name != "check" and (wrong := wrong_override(values[0])):
             return wrong
@@ -137,25 +189,39 @@ def wrong_override(text: str) -> str | None:
 def wrong_shell(text: str) -> str | None:
     words = shlex.split(text, comments=True)
     if words[0] == "make":
-        targets = re.findall(r"^([\w-]+):", ROOT.joinpath("Makefile").read_text("utf-8"), re.MULTILINE)
-        return next((f"the Makefile has no target {word}" for word in words[1:] if word not in targets), None)
+        targets = re.findall(
+            r"^([\w-]+):", ROOT.joinpath("Makefile").read_text("utf-8"), re.MULTILINE
+        )
+        return next(
+            (f"the Makefile has no target {word}" for word in words[1:] if word not in targets),
+            None,
+        )
     if "-m" in words:
         module = words[words.index("-m") + 1]
-        known = module in ("pytest", "asperity") or {module, f"tests.{module}"} & vocabulary().contents.keys()
+        known = (
+            module in ("pytest", "asperity")
+            or {module, f"tests.{module}"} & vocabulary().contents.keys()
+        )
         files = (word for word in words if "/" in word and not word.startswith("."))
         return next(
-            (f"no {file}" for file in files if not ROOT.joinpath(file).exists()), None if known else "no module"
+            (f"no {file}" for file in files if not ROOT.joinpath(file).exists()),
+            None if known else "no module",
         )
     if words[0] == "pip":
         extras = re.findall(r"\[(\w+)\]", words[-1])
         project = ROOT.joinpath("pyproject.toml").read_text("utf-8")
-        return next((f"there is no extra {extra}" for extra in extras if f"\n{extra} = [" not in project), None)
+        return next(
+            (f"there is no extra {extra}" for extra in extras if f"\n{extra} = [" not in project),
+            None,
+        )
     return None if words[0] == "source" or vocabulary().resolves(words[-1]) else "no such module"
 
 
 def wrong_options(text: str, headings: tuple[str, ...]) -> str | None:
     """An option of the command that the section is about, or of any command where it is about none."""
-    about = [name for heading in headings for name in re.split(r",? ", heading) if name in commands()]
+    about = [
+        name for heading in headings for name in re.split(r",? ", heading) if name in commands()
+    ]
     words = re.findall(r"(?<!\S)--?[a-z][\w-]*", text)
     for word in words:
         if word in OTHER_TOOLS:
@@ -173,7 +239,9 @@ def wrong_table(table: object, parents: tuple[str, ...] = ()) -> str | None:
     if isinstance(table, dict):
         for key, value in table.items():
             bare = key == "value" and not parents
-            if not bare and not (is_case_key(".".join((*parents, key))) or vocabulary().is_name(key)):
+            if not bare and not (
+                is_case_key(".".join((*parents, key))) or vocabulary().is_name(key)
+            ):
                 return f"{key} is not a key of a case"
             if wrong := wrong_table(value, parents if bare else (*parents, key)):
                 return wrong
@@ -187,14 +255,27 @@ def wrong_table(table: object, parents: tuple[str, ...] = ()) -> str | None:
 def is_choice(text: str) -> bool:
     """Is this an amount, a choice that the code knows, or a file?"""
     shaped = AMOUNT.fullmatch(text) or A_FILE.fullmatch(text) or text.isdigit()
-    return bool(shaped) or vocabulary().is_written(text) or text in metavars() or text[0] == "[" or is_case_key(text)
+    return (
+        bool(shaped)
+        or vocabulary().is_written(text)
+        or text in metavars()
+        or text[0] == "["
+        or is_case_key(text)
+    )
 
 
 def wrong_expression(text: str) -> str | None:
     """An expression of Python: what is called, looked up and given by name must be there."""
     source = re.sub(r"\.\.\.(?=[,)\]])", "_", re.sub(r"=\.\.\.", "=_", text)).lstrip(".")
     source = re.sub(r", _\)", ")", source)
-    for attempt in (f"({source})", source, f"{source}0", f"dict({source})", f"def {source}: ...", f"{source} ..."):
+    for attempt in (
+        f"({source})",
+        source,
+        f"{source}0",
+        f"dict({source})",
+        f"def {source}: ...",
+        f"{source} ...",
+    ):
         try:
             tree = ast.parse(attempt)
         except SyntaxError:
@@ -208,7 +289,9 @@ def wrong_node(node: ast.AST) -> str | None:
     if isinstance(node, ast.FunctionDef | ast.arg):
         name = node.name if isinstance(node, ast.FunctionDef) else node.arg
         return None if is_word(name) else f"nothing is called {name}"
-    if isinstance(node, ast.Name) and not (is_word(node.id) or node.id in FREE or len(node.id) <= 2):
+    if isinstance(node, ast.Name) and not (
+        is_word(node.id) or node.id in FREE or len(node.id) <= 2
+    ):
         return f"nothing is called {node.id}"
     if isinstance(node, ast.Attribute) and not is_path(ast.unparse(node)):
         return f"{ast.unparse(node)} leads nowhere"
@@ -252,25 +335,54 @@ def block_problems(page: Page) -> Iterator[tuple[Line, str]]:
     """Commands that the command line would refuse, keys that a case would, names that Python would not find."""
     for block in page.blocks:
         if block.language == "sh":
-            typed = (line for line in block.text.splitlines() if line.startswith(("asperity", "make", "python")))
+            typed = (
+                line
+                for line in block.text.splitlines()
+                if line.startswith(("asperity", "make", "python"))
+            )
             yield from ((block.line, wrong) for line in typed if (wrong := judged(line, page.path)))
         elif block.language == "toml":
             table = toml(block.text)
-            wrong = "not TOML" if table is None else wrong_table({k: v for k, v in table.items() if k != "anchor"})
+            wrong = (
+                "not TOML"
+                if table is None
+                else wrong_table({k: v for k, v in table.items() if k != "anchor"})
+            )
             if wrong:
                 yield block.line, wrong
         elif block.language == "python":
             nodes = list(ast.walk(ast.parse(block.text)))
-            bound = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-            bound |= {alias.asname or alias.name for node in nodes if isinstance(node, IMPORTS) for alias in node.names}
-            yield from ((block.line, wrong) for node in nodes if (wrong := wrong_in_block(node, bound)))
+            bound = {
+                node.id
+                for node in nodes
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+            }
+            bound |= {
+                alias.asname or alias.name
+                for node in nodes
+                if isinstance(node, IMPORTS)
+                for alias in node.names
+            }
+            yield from (
+                (block.line, wrong) for node in nodes if (wrong := wrong_in_block(node, bound))
+            )
 
 
 def wrong_in_block(node: ast.AST, bound: set[str]) -> str | None:
     if isinstance(node, ast.ImportFrom):
-        missing = [alias.name for alias in node.names if not vocabulary().resolves(f"{node.module}.{alias.name}")]
+        missing = [
+            alias.name
+            for alias in node.names
+            if not vocabulary().resolves(f"{node.module}.{alias.name}")
+        ]
         private = node.module.startswith("asperity.") and node.module.count(".") > 1
-        return f"{node.module} is no face" if private else f"{node.module} has no {missing[0]}" if missing else None
+        return (
+            f"{node.module} is no face"
+            if private
+            else f"{node.module} has no {missing[0]}"
+            if missing
+            else None
+        )
     if isinstance(node, ast.Attribute):
         head = ast.unparse(node).partition(".")[0]
         if (head in bound and head not in FREE) or not head.isidentifier():

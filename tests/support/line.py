@@ -66,7 +66,9 @@ def line_contact(lower, upper, nodes, speed, oil):
         tried = set()
         while rupture not in tried:
             tried.add(rupture)
-            pressure, approach, outflow = _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture)
+            pressure, approach, outflow = _full_film(
+                x, matrix, pressure, approach, speed, oil, stiffening, rupture
+            )
             if pressure[rupture - 1] < 0.0:
                 rupture -= 1
             elif outflow[rupture - 1] < 0.0:  # the first dry node would take in oil
@@ -90,7 +92,9 @@ def _full_film(x, matrix, pressure, approach, speed, oil, stiffening, rupture):
         jacobian[:-1, :-1] = np.diff(by_p, axis=0)[wet, 1:rupture]
         jacobian[:-1, -1] = np.diff(by_approach)[wet]
         jacobian[-1, :-1] = spacing
-        step = -np.linalg.solve(jacobian, np.append(outflow[wet], spacing * pressure.sum() - np.pi / 2.0))
+        step = -np.linalg.solve(
+            jacobian, np.append(outflow[wet], spacing * pressure.sum() - np.pi / 2.0)
+        )
         if np.abs(step).max() < 1e-9:
             return pressure, approach, outflow
         pressure[1:rupture] += np.clip(step[:-1], -0.3, 0.3)

@@ -34,17 +34,23 @@ def rectangle(x, y, half_length, half_width, speed, conductivity, diffusivity):
     """Steady rise at (x, y) under heat on |x| < half_length, |y| < half_width: point sources in polar coordinates."""
     v = speed / (2.0 * diffusivity)
 
-    def ray(angle):  # along a ray the 1/r of the source cancels the r of the area: an elementary integral
+    def ray(
+        angle,
+    ):  # along a ray the 1/r of the source cancels the r of the area: an elementary integral
         dx, dy = np.cos(angle), np.sin(angle)
         reach = min(
             ((np.sign(d) * half - at) / d if d != 0.0 else np.inf)
             for d, half, at in ((dx, half_length, x), (dy, half_width, y))
         )
-        rate = abs(v) + v * dx  # the source lies upstream at -r (dx, dy) of the rise: exponent v * (x - x') - |v| r
+        rate = (
+            abs(v) + v * dx
+        )  # the source lies upstream at -r (dx, dy) of the rise: exponent v * (x - x') - |v| r
         return reach if rate * reach < 1e-9 else -np.expm1(-rate * reach) / rate
 
     corners = sorted(
-        np.arctan2(sy * half_width - y, sx * half_length - x) % (2.0 * np.pi) for sx in (-1, 1) for sy in (-1, 1)
+        np.arctan2(sy * half_width - y, sx * half_length - x) % (2.0 * np.pi)
+        for sx in (-1, 1)
+        for sy in (-1, 1)
     )
     ends = [*corners, corners[0] + 2.0 * np.pi]
     wake = (
@@ -53,7 +59,9 @@ def rectangle(x, y, half_length, half_width, speed, conductivity, diffusivity):
         np.pi + 30.0 / np.sqrt(max(abs(v) * half_length, 1.0)),
     )
     ends = sorted({*ends, *(a for a in wake if ends[0] < a < ends[-1])})
-    total = sum(quad(ray, low, high, epsabs=0.0, epsrel=1e-9, limit=400)[0] for low, high in pairwise(ends))
+    total = sum(
+        quad(ray, low, high, epsabs=0.0, epsrel=1e-9, limit=400)[0] for low, high in pairwise(ends)
+    )
     return total / (2.0 * np.pi * conductivity)
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
 from asperity.surface import gaussian_surface
 
@@ -38,7 +38,9 @@ def contact(*, speed=1.91, **changes):
 
 
 def barus(alpha=18.2e-9):
-    return Lubricant(viscosity=Barus(ETA0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian())
+    return Lubricant(
+        viscosity=Barus(ETA0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian()
+    )
 
 
 def grid(cells, x=(-4.5, 1.9), y=(-1.6, 1.6)):
@@ -48,4 +50,6 @@ def grid(cells, x=(-4.5, 1.9), y=(-1.6, 1.6)):
 
 
 def rough(on, sq, seed=5, correlation_length=20e-6):
-    return gaussian_surface(on, sq=sq, correlation_length=correlation_length, rng=np.random.default_rng(seed))
+    return gaussian_surface(
+        on, sq=sq, correlation_length=correlation_length, rng=np.random.default_rng(seed)
+    )

@@ -2,14 +2,16 @@
 
 import numpy as np
 
-from asperity.grid import Grid
-from asperity.wearing import Body, Passage, Patch
+from asperity.contact.grid import Grid
+from asperity.wear import Body, Passage, Patch
 
 STEEL = Body(youngs_modulus=210e9, poisson_ratio=0.3, hardness=None, speed=1.6)
 
 
 def track(cells=(64, 32), size=(400e-6, 200e-6)):
-    return Grid(cells, (-0.5 * size[0], -0.5 * size[1]), (0.5 * size[0], 0.5 * size[1]), (False, True))
+    return Grid(
+        cells, (-0.5 * size[0], -0.5 * size[1]), (0.5 * size[0], 0.5 * size[1]), (False, True)
+    )
 
 
 def hertz_patches(grid, half_width, p_max, count, *, friction=0.0, asperities=0.0, film=0.5e-6):
@@ -17,7 +19,9 @@ def hertz_patches(grid, half_width, p_max, count, *, friction=0.0, asperities=0.
     patches = []
     length = grid.extent[0]
     for number in range(count):
-        away = (grid.x - grid.lower[0] - (number + 0.5) * length / count + 0.5 * length) % length - 0.5 * length
+        away = (
+            grid.x - grid.lower[0] - (number + 0.5) * length / count + 0.5 * length
+        ) % length - 0.5 * length
         along = p_max * np.sqrt(np.maximum(1.0 - (away / half_width) ** 2, 0.0))
         pressure = np.repeat(along[:, None], grid.cells[1], axis=1)
         patches.append(

@@ -16,7 +16,9 @@ def vibration(samples=4000, seed=3):
     noise = rng.standard_normal(samples)
     time = np.arange(samples) / RATE
     return np.round(
-        0.3 * noise + np.convolve(noise, np.exp(-time[:200] * 80) * np.sin(5654.9 * time[:200]))[:samples], 6
+        0.3 * noise
+        + np.convolve(noise, np.exp(-time[:200] * 80) * np.sin(5654.9 * time[:200]))[:samples],
+        6,
     )
 
 
@@ -37,14 +39,26 @@ def write_all(folder, values):
         said[name] = beside
 
     def lines(separator, comma, times=time, quote=""):
-        rows = (f"{quote}{t:.6f}{quote}{separator}{quote}{v:.6f}{quote}" for t, v in zip(times, values, strict=True))
+        rows = (
+            f"{quote}{t:.6f}{quote}{separator}{quote}{v:.6f}{quote}"
+            for t, v in zip(times, values, strict=True)
+        )
         return "\n".join(row.replace(".", ",") if comma else row for row in rows) + "\n"
 
     put("comma.csv", "time_s,acc_g\n" + lines(",", comma=False))
-    put("german.csv", "Messung 1\nKanal: Lager 2\n\nZeit [s];Beschleunigung [g]\n" + lines(";", comma=True))
-    put("quoted.csv", '"time (ms)","acc (g)"\n' + lines(",", comma=False, times=1e3 * time, quote='"'))
+    put(
+        "german.csv",
+        "Messung 1\nKanal: Lager 2\n\nZeit [s];Beschleunigung [g]\n" + lines(";", comma=True),
+    )
+    put(
+        "quoted.csv",
+        '"time (ms)","acc (g)"\n' + lines(",", comma=False, times=1e3 * time, quote='"'),
+    )
     put("units.txt", "time\tacc\ns\tg\n" + lines("\t", comma=False))
-    put("declared.txt", "# sampling rate: 5 kHz\n# unit = g\n" + "".join(f"{v:.6f}\n" for v in values))
+    put(
+        "declared.txt",
+        "# sampling rate: 5 kHz\n# unit = g\n" + "".join(f"{v:.6f}\n" for v in values),
+    )
     put("2024.01.31.12.00.00", "".join(f"{v:.6f}\n" for v in values), rate_hz=RATE, unit="g")
     (folder / "wide.txt").write_bytes(("time_s,acc_g\n" + lines(",", comma=False)).encode("utf-16"))
     said["wide.txt"] = {}
@@ -55,7 +69,9 @@ def write_all(folder, values):
     savemat(folder / "plain.mat", {"acc": values, "fs": RATE, "unit": "g"}, do_compression=True)
     savemat(folder / "struct.mat", {"bearing": {"sr": RATE, "rate": 25.0, "gs": values}})
     said |= {"plain.mat": {}, "struct.mat": {"unit": "g"}}
-    with h5py.File(folder / "v73.mat", "w", userblock_size=512) as file:  # as MATLAB -v7.3 lays it out
+    with h5py.File(
+        folder / "v73.mat", "w", userblock_size=512
+    ) as file:  # as MATLAB -v7.3 lays it out
         file["s/acc"] = values[None, :]
         file["s/fs"] = np.array([[RATE]])
         file["s/unit"] = np.array([[ord("g")]], np.uint16)
@@ -107,13 +123,30 @@ def write_uff(path, one):
 def uff_set(values, *, binary=1, func_type=1):
     """A data set 58 as pyuff takes it, in m/s2."""
     return {
-        "type": 58, "binary": binary, "func_type": func_type, "rsp_node": 1, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3,
-        "rsp_ent_name": "ring", "data": values, "x": np.arange(values.size) / RATE, "abscissa_spacing": 1,
-        "abscissa_min": 0.0, "abscissa_inc": 1.0 / RATE, "ord_data_type": 4, "num_pts": values.size,
-        "ordinate_spec_data_type": 12, "ordinate_axis_lab": "Acceleration", "ordinate_axis_units_lab": "m/s2",
-        "abscissa_spec_data_type": 17, "abscissa_axis_lab": "Time", "abscissa_axis_units_lab": "s",
-        "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0,
-    }  # fmt: skip
+        "type": 58,
+        "binary": binary,
+        "func_type": func_type,
+        "rsp_node": 1,
+        "rsp_dir": 3,
+        "ref_node": 1,
+        "ref_dir": 3,
+        "rsp_ent_name": "ring",
+        "data": values,
+        "x": np.arange(values.size) / RATE,
+        "abscissa_spacing": 1,
+        "abscissa_min": 0.0,
+        "abscissa_inc": 1.0 / RATE,
+        "ord_data_type": 4,
+        "num_pts": values.size,
+        "ordinate_spec_data_type": 12,
+        "ordinate_axis_lab": "Acceleration",
+        "ordinate_axis_units_lab": "m/s2",
+        "abscissa_spec_data_type": 17,
+        "abscissa_axis_lab": "Time",
+        "abscissa_axis_units_lab": "s",
+        "orddenom_spec_data_type": 0,
+        "z_axis_spec_data_type": 0,
+    }
 
 
 def damaged(content, rng):
@@ -140,7 +173,11 @@ def damaged(content, rng):
             at = int(rng.integers(max(min(size, 2000) - 8, 1)))
             data[at : at + 8] = b"\xff" * int(rng.integers(2, 8)) + b"\x7f"
         case 7:
-            data[where : where + 8] = [b"\x00\x00\xc0\x7f" * 2, b"\x00\x00\x80\x7f" * 2, b"1e999,na"][rng.integers(3)]
+            data[where : where + 8] = [
+                b"\x00\x00\xc0\x7f" * 2,
+                b"\x00\x00\x80\x7f" * 2,
+                b"1e999,na",
+            ][rng.integers(3)]
         case 8:
             data[where : where + 5] = b"oops\n"
         case 9:

@@ -10,7 +10,17 @@ def mean(own, following, logarithmic):
     return (own - following) / np.log(own / following) if logarithmic else (own + following) / 2.0
 
 
-def faces(pressure, content, mobility, ambient, inlet_content, dx, dy, wedge=SECOND_ORDER, logarithmic=False):
+def faces(
+    pressure,
+    content,
+    mobility,
+    ambient,
+    inlet_content,
+    dx,
+    dy,
+    wedge=SECOND_ORDER,
+    logarithmic=False,
+):
     """Fluxes through all x faces, shape (nx + 1, ny), and through the north face of each cell; complex welcome.
 
     `ambient` is the mobility that the first and the last cells would have at the ambient pressure of the outer faces,
@@ -25,7 +35,9 @@ def faces(pressure, content, mobility, ambient, inlet_content, dx, dy, wedge=SEC
     couette[-1] = 1.5 * content[-1] - 0.5 * content[-2]
     poiseuille = np.empty_like(couette)
     poiseuille[0] = -(mobility[0] + ambient[0]) / 2.0 * pressure[0] / (dx / 2.0)
-    poiseuille[1:-1] = -mean(mobility[:-1], mobility[1:], logarithmic) * np.diff(pressure, axis=0) / dx
+    poiseuille[1:-1] = (
+        -mean(mobility[:-1], mobility[1:], logarithmic) * np.diff(pressure, axis=0) / dx
+    )
     poiseuille[-1] = (mobility[-1] + ambient[1]) / 2.0 * pressure[-1] / (dx / 2.0)
     following = np.roll(mobility, -1, 1)
     north = -mean(mobility, following, logarithmic) * (np.roll(pressure, -1, 1) - pressure) / dy
@@ -52,16 +64,24 @@ def mass_outflow(solution):
     mobility = density * h**3 / (12.0 * oil.viscosity(p))
     if solution.oil is None:
         return net_outflow(p, u * density * h, mobility, at_rest, entering, dx, dy)
-    contact_film = solution.options.contact_film  # ambient oil in it moves as easily as any in a film as thin does
-    mobility = np.maximum(mobility, oil.density.rho0 * contact_film**6 / h**3 / (12.0 * oil.viscosity.eta0))
-    return net_outflow(p, u * density * h, mobility, at_rest, entering, dx, dy, wedge=(0.0, 0.0)) + leaning(
-        solution, dx
+    contact_film = (
+        solution.options.contact_film
+    )  # ambient oil in it moves as easily as any in a film as thin does
+    mobility = np.maximum(
+        mobility, oil.density.rho0 * contact_film**6 / h**3 / (12.0 * oil.viscosity.eta0)
     )
+    return net_outflow(
+        p, u * density * h, mobility, at_rest, entering, dx, dy, wedge=(0.0, 0.0)
+    ) + leaning(solution, dx)
 
 
 def leaning(solution, dx):
     """What the mixed model's wedge adds to the first-order one: less where the film jumps, none beside closed cells."""
-    film = solution.conditions.entrainment_speed * solution.lubricant.density(solution.oil.pressure) * solution.gap
+    film = (
+        solution.conditions.entrainment_speed
+        * solution.lubricant.density(solution.oil.pressure)
+        * solution.gap
+    )
     opened = np.clip(2.0 * (solution.gap / solution.options.contact_film - 1.0), 0.0, 1.0)
     before, here = film[:-1], film[1:]
     share = opened[1:] * opened[:-1] * before * here / (before**2 + here**2)

@@ -17,5 +17,7 @@ def sampled(conditions, lubricant, grid, pressure, gap, in_contact=None):
         gap=np.broadcast_to(np.asarray(gap, float), grid.cells).copy(),
         in_contact=np.zeros(grid.cells, bool) if in_contact is None else in_contact,
         rigid_approach=0.0,
-        convergence=Convergence(SolveStatus.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0),
+        convergence=Convergence(
+            SolveStatus.CONVERGED, (Iteration(grid.cells, 1, 0.0, 0.0, 0.0),), 1e-4, 0.0
+        ),
     )

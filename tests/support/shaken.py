@@ -5,7 +5,7 @@ Takes from the package what decides each cell and nothing else of its linearisat
 
 import numpy as np
 
-from asperity.ehl.mixed import MixedBalance
+from asperity.ehl.models.mixed import MixedBalance
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
 from support.reynolds import net_outflow
 
@@ -35,7 +35,11 @@ def shaken_cells(balance, frequencies):
     solid = balance.solid if two else balance.rows.state
     closed = (solid == TOUCHING).ravel()
     free = ~closed & (solid != CAPPED).ravel()
-    held = balance.film.content_by_gap == 0.0 if two else (balance.gap <= problem.contact_gap) & (solid != LUBRICATED)
+    held = (
+        balance.film.content_by_gap == 0.0
+        if two
+        else (balance.gap <= problem.contact_gap) & (solid != LUBRICATED)
+    )
     bend = compliance(problem)
 
     def oil_rows(d_pressure, d_gap):
@@ -62,9 +66,16 @@ def shaken_cells(balance, frequencies):
     rows, kept = oil_rows(np.zeros(problem.cells), by_approach)
     wanted = np.concatenate([rows[oil_cells], np.ones(solid_cells.size)])
     kept = np.concatenate([kept[oil_cells], np.zeros(solid_cells.size)])
-    matrix, stores, total = np.stack(columns, axis=1), np.stack(stored, axis=1), np.array(totals).sum(axis=1)
+    matrix, stores, total = (
+        np.stack(columns, axis=1),
+        np.stack(stored, axis=1),
+        np.array(totals).sum(axis=1),
+    )
     return [
-        complex(total @ np.linalg.solve(matrix + 1j * frequency * stores, wanted + 1j * frequency * kept))
+        complex(
+            total
+            @ np.linalg.solve(matrix + 1j * frequency * stores, wanted + 1j * frequency * kept)
+        )
         for frequency in frequencies
     ]
 
@@ -83,8 +94,12 @@ def _outflow(balance, pressure, gap):
     content = density * gap
     dx, dy = problem.spacing
     ahead = gap[0] + ((problem.x[0] - dx) ** 2 - problem.x[0] ** 2) / 2.0
-    outflow = net_outflow(pressure, content, mobility, ambient, (ahead + gap[0]) / 2.0, dx, dy, **faces_of(balance))
-    if isinstance(balance, MixedBalance):  # second order, less where the film's content jumps; how open it is stays
+    outflow = net_outflow(
+        pressure, content, mobility, ambient, (ahead + gap[0]) / 2.0, dx, dy, **faces_of(balance)
+    )
+    if isinstance(
+        balance, MixedBalance
+    ):  # second order, less where the film's content jumps; how open it is stays
         here, before = content[1:-1], content[:-2]
         lean = here * before / (here**2 + before**2)
         added = np.zeros_like(content)

@@ -50,7 +50,10 @@ def boussinesq(x, y, z, nu):
     xx = beside * ((1.0 - z / d) * (x**2 - y**2) / r2 + z * y**2 / d**3) - 3.0 * z * x**2 / d**5
     yy = beside * ((1.0 - z / d) * (y**2 - x**2) / r2 + z * x**2 / d**3) - 3.0 * z * y**2 / d**5
     xy = beside * ((1.0 - z / d) * 2.0 * x * y / r2 - x * y * z / d**3) - 3.0 * x * y * z / d**5
-    return [s / (2.0 * np.pi) for s in (xx, yy, -3.0 * z**3 / d**5, xy, -3.0 * y * z**2 / d**5, -3.0 * x * z**2 / d**5)]
+    return [
+        s / (2.0 * np.pi)
+        for s in (xx, yy, -3.0 * z**3 / d**5, xy, -3.0 * y * z**2 / d**5, -3.0 * x * z**2 / d**5)
+    ]
 
 
 def cerruti(x, y, z, nu):

@@ -18,7 +18,11 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 def files() -> Iterator[Path]:
     """What the package is made of."""
-    return (path for path in sorted(PACKAGE.rglob("*")) if path.is_file() and "__pycache__" not in path.parts)
+    return (
+        path
+        for path in sorted(PACKAGE.rglob("*"))
+        if path.is_file() and "__pycache__" not in path.parts
+    )
 
 
 @cache
@@ -38,20 +42,34 @@ def functions(tree: ast.AST) -> Iterator[Function]:
 
 def imports_inside_functions(tree: ast.Module) -> list[ast.stmt]:
     inside = (node for function in functions(tree) for node in ast.walk(function))
-    return list({id(node): node for node in inside if isinstance(node, ast.Import | ast.ImportFrom)}.values())
+    return list(
+        {
+            id(node): node for node in inside if isinstance(node, ast.Import | ast.ImportFrom)
+        }.values()
+    )
 
 
 def faces() -> dict[str, types.ModuleType]:
     """The modules that outside code imports from: every folder's face, and the modules that lie in no folder."""
-    names = [path.parent.name for path in PACKAGE.glob("*/__init__.pyi")] + [path.stem for path in PACKAGE.glob("*.py")]
-    return {name: importlib.import_module(f"asperity.{name}") for name in sorted(names) if not name.startswith("_")}
+    names = [path.parent.name for path in PACKAGE.glob("*/__init__.pyi")] + [
+        path.stem for path in PACKAGE.glob("*.py")
+    ]
+    return {
+        name: importlib.import_module(f"asperity.{name}")
+        for name in sorted(names)
+        if not name.startswith("_")
+    }
 
 
 def exported(face: types.ModuleType) -> dict[str, Any]:
     """What a face hands out: the names of its stub, or the public names that a module defines itself."""
     if hasattr(face, "__path__"):
         return {name: getattr(face, name) for name in face.__all__}
-    own = {name: value for name, value in vars(face).items() if getattr(value, "__module__", None) == face.__name__}
+    own = {
+        name: value
+        for name, value in vars(face).items()
+        if getattr(value, "__module__", None) == face.__name__
+    }
     return {name: value for name, value in own.items() if not name.startswith("_")}
 
 
@@ -64,12 +82,18 @@ def own_types(thing: Any) -> set[type]:
         hints = [holds, *(_hints(member) for member in members if member)]
     else:
         hints = [_hints(thing)] if inspect.isfunction(thing) else []
-    return {leaf for each in hints for hint in each.values() for leaf in _leaves(hint) if _is_own(leaf)}
+    return {
+        leaf for each in hints for hint in each.values() for leaf in _leaves(hint) if _is_own(leaf)
+    }
 
 
 def _function(member: Any) -> Any:
     """The function behind a method, a property, a cached property or a class method."""
-    inner = getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member)
+    inner = (
+        getattr(member, "fget", None)
+        or getattr(member, "func", None)
+        or getattr(member, "__func__", member)
+    )
     return inner if inspect.isfunction(inner) else None
 
 
@@ -100,7 +124,11 @@ def _names_for_type_checkers(module: str) -> dict[str, Any]:
 def _leaves(hint: Any) -> Iterator[Any]:
     parts = [part for part in get_args(hint) if part is not hint]
     for part in parts:
-        yield from (leaf for inner in part for leaf in _leaves(inner)) if isinstance(part, list) else _leaves(part)
+        yield from (
+            (leaf for inner in part for leaf in _leaves(inner))
+            if isinstance(part, list)
+            else _leaves(part)
+        )
     if typing.get_origin(hint) is None or inspect.isclass(hint):
         yield hint
 

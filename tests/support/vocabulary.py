@@ -14,12 +14,29 @@ from typing import Any, get_args
 from support.source import PACKAGE, ROOT, Function, functions, modules
 
 FOLDERS = (PACKAGE, ROOT / "tests", ROOT / "benchmarks", ROOT / "benchmark")
-ELSEWHERE = ("scipy", "numpy", "np", "concurrent", "itertools", "pathlib")  # other people's modules that the docs name
+ELSEWHERE = (
+    "scipy",
+    "numpy",
+    "np",
+    "concurrent",
+    "itertools",
+    "pathlib",
+)  # other people's modules that the docs name
 TIMES = {"seconds", "solve_seconds"}  # left out of golden numbers, as no two runs share them
 GOLDEN = {  # command: where its JSON lies in the golden numbers
     "solve": [
         (name,)
-        for name in ("paper", "smooth", "printed-preset", "conserving", "dry", "tangent", "warm", "ball", "ellipse")
+        for name in (
+            "paper",
+            "smooth",
+            "printed-preset",
+            "conserving",
+            "dry",
+            "tangent",
+            "warm",
+            "ball",
+            "ellipse",
+        )
     ],
     "stribeck": [("curves", "stribeck")],
     "traction": [("curves", "traction")],
@@ -37,17 +54,28 @@ class Vocabulary:
     """Names by what they are; `members` has the attributes of each class, those of its bases among them."""
 
     def __init__(self) -> None:
-        self.defined: set[str] = set()  # functions, classes, attributes, module constants, parameters
+        self.defined: set[str] = (
+            set()
+        )  # functions, classes, attributes, module constants, parameters
         self.own_members: dict[str, set[str]] = defaultdict(set)
         self.bases: dict[str, set[str]] = defaultdict(set)
-        self.types: dict[str, set[str]] = defaultdict(set)  # attribute or function: classes named in its annotation
-        self.parameters: dict[str, set[str]] = defaultdict(set)  # of functions, and of classes that are called
+        self.types: dict[str, set[str]] = defaultdict(
+            set
+        )  # attribute or function: classes named in its annotation
+        self.parameters: dict[str, set[str]] = defaultdict(
+            set
+        )  # of functions, and of classes that are called
         self.contents: dict[str, set[str]] = defaultdict(set)  # module, dotted: what it defines
         self.constants: set[str] = set()  # strings in the package's code, docstrings left out
         self.patterns: set[str] = set()  # strings that are put together, as regular expressions
         for folder in FOLDERS:
             for name, tree in modules(folder):
-                self._read(".".join([folder.name, *Path(name).with_suffix("").parts]).removesuffix(".__init__"), tree)
+                self._read(
+                    ".".join([folder.name, *Path(name).with_suffix("").parts]).removesuffix(
+                        ".__init__"
+                    ),
+                    tree,
+                )
         for stub in PACKAGE.rglob("*.pyi"):
             folder = ".".join(("asperity", *stub.parent.relative_to(PACKAGE).parts))
             for node in ast.parse(stub.read_text("utf-8")).body:
@@ -75,7 +103,11 @@ class Vocabulary:
             if isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name):
                 self.types[entry.target.id] |= _words(entry.annotation)
         for inner in ast.walk(node):
-            if isinstance(inner, ast.Attribute) and isinstance(inner.ctx, ast.Store) and _is_self(inner.value):
+            if (
+                isinstance(inner, ast.Attribute)
+                and isinstance(inner.ctx, ast.Store)
+                and _is_self(inner.value)
+            ):
                 members.add(inner.attr)
         self.own_members[node.name] |= members
         self.parameters[node.name] |= members
@@ -96,11 +128,22 @@ class Vocabulary:
     def _read_strings(self, tree: ast.Module) -> None:
         described = {id(node.body[0].value) for node in ast.walk(tree) if _has_docstring(node)}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in described:
+            if (
+                isinstance(node, ast.Constant)
+                and isinstance(node.value, str)
+                and id(node) not in described
+            ):
                 self.constants.add(node.value)
             elif isinstance(node, ast.JoinedStr):
-                parts = [re.escape(p.value) if isinstance(p, ast.Constant) else r"[\w.-]+" for p in node.values]
-                fixed = (re.sub(r"\.\w+$", "", p.value) for p in node.values if isinstance(p, ast.Constant))
+                parts = [
+                    re.escape(p.value) if isinstance(p, ast.Constant) else r"[\w.-]+"
+                    for p in node.values
+                ]
+                fixed = (
+                    re.sub(r"\.\w+$", "", p.value)
+                    for p in node.values
+                    if isinstance(p, ast.Constant)
+                )
                 if any(re.search("[a-z]{3}", part, re.IGNORECASE) for part in fixed):
                     self.patterns.add("".join(parts))
 
@@ -111,7 +154,7 @@ class Vocabulary:
     @cached_property
     def keys(self) -> set[str]:
         """Keys of JSON, of the catalogue of quantities and of columns."""
-        from asperity.quantities import catalogue
+        from asperity.core.quantities import catalogue
 
         return TIMES | set(catalogue()) | {key for command in GOLDEN for key in json_keys(command)}
 
@@ -154,7 +197,11 @@ class Vocabulary:
 
     def _classes(self, name: str) -> set[str]:
         """The classes that a name stands for: itself, or those that its annotation names."""
-        return {name} if name in self.own_members else {word for word in self.types[name] if word in self.own_members}
+        return (
+            {name}
+            if name in self.own_members
+            else {word for word in self.types[name] if word in self.own_members}
+        )
 
     def _in_class(self, classes: set[str], rest: list[str]) -> bool:
         if not rest:
@@ -175,7 +222,12 @@ def _bound(node: ast.stmt) -> set[str]:
     if isinstance(node, Function | ast.ClassDef):
         return {node.name}
     if isinstance(node, ast.Assign):
-        return {name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+        return {
+            name.id
+            for target in node.targets
+            for name in ast.walk(target)
+            if isinstance(name, ast.Name)
+        }
     if isinstance(node, ast.AnnAssign):
         return {node.target.id} if isinstance(node.target, ast.Name) else set()
     return set()
@@ -184,8 +236,14 @@ def _bound(node: ast.stmt) -> set[str]:
 def _words(annotation: ast.expr) -> set[str]:
     """Names in an annotation, quoted ones too."""
     nodes = list(ast.walk(annotation))
-    quoted = " ".join(node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str))
-    named = {node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "") for node in nodes}
+    quoted = " ".join(
+        node.value
+        for node in nodes
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+    named = {
+        node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "") for node in nodes
+    }
     return named | set(re.findall(r"\w+", quoted))
 
 
@@ -194,7 +252,10 @@ def _is_self(node: ast.expr) -> bool:
 
 
 def _has_docstring(node: ast.AST) -> bool:
-    return isinstance(node, Function | ast.ClassDef | ast.Module) and ast.get_docstring(node) is not None
+    return (
+        isinstance(node, Function | ast.ClassDef | ast.Module)
+        and ast.get_docstring(node) is not None
+    )
 
 
 def _leads_elsewhere(dotted: str) -> bool:
@@ -220,7 +281,9 @@ def golden(command: str) -> tuple[Any, ...]:
     """What a command's JSON was when the golden numbers were taken; nothing for commands that have none."""
     trees = []
     for name, *inside in GOLDEN.get(command, ()):
-        tree = json.loads((ROOT / "tests" / "reference" / "golden" / f"{name}.json").read_text("utf-8"))
+        tree = json.loads(
+            (ROOT / "tests" / "reference" / "golden" / f"{name}.json").read_text("utf-8")
+        )
         for key in inside:
             tree = tree[key]
         trees.append(tree)
@@ -238,7 +301,9 @@ def json_texts(command: str) -> set[str]:
 def _tree_words(tree: Any) -> Iterator[tuple[str, bool]]:
     if isinstance(tree, dict):
         yield from ((key, True) for key in tree)
-    for inner in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ():
+    for inner in (
+        tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ()
+    ):
         yield from _tree_words(inner)
     if isinstance(tree, str):
         yield tree, False
@@ -257,13 +322,23 @@ def commands() -> dict[str, Any]:
 
 def options(command: str) -> dict[str, Any]:
     """What may follow a command: each option by each of its names."""
-    own = {name: option for option in commands()[command].params for name in option.opts if name.startswith("-")}
+    own = {
+        name: option
+        for option in commands()[command].params
+        for name in option.opts
+        if name.startswith("-")
+    }
     return own | {"--help": None}
 
 
 def metavars() -> set[str]:
     """What usage lines call a value."""
-    return {p.metavar or p.name.upper() for command in commands().values() for p in command.params if p.name}
+    return {
+        p.metavar or p.name.upper()
+        for command in commands().values()
+        for p in command.params
+        if p.name
+    }
 
 
 @cache
@@ -277,7 +352,9 @@ def bases_for_keys() -> tuple[Any, ...]:
         paper.with_overrides({"surface": "flat"}),
         *(paper.with_overrides({"surface": table}) for table in _SURFACE_TABLES),
         *(paper.with_overrides({"lubricant.friction": table}) for table in _FRICTION_TABLES),
-        paper.with_overrides({"lubricant.viscosity.law": "roelands", "lubricant.rheology": _EYRING}),
+        paper.with_overrides(
+            {"lubricant.viscosity.law": "roelands", "lubricant.rheology": _EYRING}
+        ),
         paper.with_overrides({"thermal.warmth": {"law": "roelands", "s0": 1.1}, "motion.steps": 2}),
         paper.with_overrides({"lubricant": {"grade": "VG 100", "temperature": "70 degC"}}),
         paper.with_overrides({"study": {"sq": ["1 um"]}}),
@@ -300,16 +377,21 @@ _SURFACE_TABLES = (
 @cache
 def is_case_key(dotted: str) -> bool:
     """Does a case have this key? A case refuses keys that it does not know, and says so."""
-    from asperity.errors import BadInput
+    from asperity.core.errors import BadInput
 
-    if dotted.startswith("study."):  # a study's table has, beside its own keys, those of what it sweeps
+    if dotted.startswith(
+        "study."
+    ):  # a study's table has, beside its own keys, those of what it sweeps
         key = dotted.removeprefix("study.")
         return key in case_sections()["[study]"].model_fields or is_case_key(key) or is_leaf(key)
 
     if dotted.startswith("machine."):  # in place of the contact that the bases have
         from asperity.case.machines import MACHINES
 
-        return any(dotted.removeprefix("machine.") in section.model_fields for section, _ in MACHINES.values())
+        return any(
+            dotted.removeprefix("machine.") in section.model_fields
+            for section, _ in MACHINES.values()
+        )
 
     if dotted.startswith("rating."):  # beside a machine
         return dotted.removeprefix("rating.") in case_sections()["[rating]"].model_fields
@@ -331,14 +413,22 @@ def is_case_key(dotted: str) -> bool:
 def is_leaf(word: str) -> bool:
     """Is there a table of the case that has this key?"""
     stated = [tomllib.loads(case.text) for case in bases_for_keys()]
-    tables = {name for case in stated for name, table in case.items() if isinstance(table, dict)} - {"study"}
-    return word in case_sections()["[study]"].model_fields or any(is_case_key(f"{table}.{word}") for table in tables)
+    tables = {
+        name for case in stated for name, table in case.items() if isinstance(table, dict)
+    } - {"study"}
+    return word in case_sections()["[study]"].model_fields or any(
+        is_case_key(f"{table}.{word}") for table in tables
+    )
 
 
 def case_sections() -> dict[str, Any]:
     """The tables of a case file as docs/case-file.md calls them, each as the model that reads it."""
-    base = next(name for name, tree in modules() if any(_is_class(node, "Section") for node in tree.body))
-    section = importlib.import_module("asperity." + base.removesuffix(".py").replace("/", ".")).Section
+    base = next(
+        name for name, tree in modules() if any(_is_class(node, "Section") for node in tree.body)
+    )
+    section = importlib.import_module(
+        "asperity." + base.removesuffix(".py").replace("/", ".")
+    ).Section
     importlib.import_module("asperity.case.machines")  # which no other table needs
     paper = bases_for_keys()[0]
     known: dict[str, Any] = {}

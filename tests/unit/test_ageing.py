@@ -13,15 +13,16 @@ import pandas
 import pytest
 
 from asperity import read_surface, run_wear
-from asperity.ageing import WearHistory, WearProgress, frames, load_wear, of_body, store
-from asperity.ageing.frames import is_kept
-from asperity.ageing.worn import Worn
-from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
-from asperity.kept import read_sealed, write_sealed
+from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.core.storage import read_sealed, write_sealed
 from asperity.paper import simulate_rig, write_rig
+from asperity.simulation import WearHistory, WearProgress, load_wear, of_body
+from asperity.simulation.wear import frames, store
+from asperity.simulation.wear.frames import is_kept
+from asperity.simulation.wear.state import Worn
 from asperity.surface import height_parameters
 from asperity.surface.read import surface_topography
-from asperity.wearing import seen
+from asperity.wear import seen
 from support.wearing import CASE, FEW, POINT, worn_case
 
 HOURS = 1.0
@@ -47,7 +48,9 @@ def unbroken() -> WearHistory:
     return run_wear(case(), hours=HOURS)
 
 
-def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(unbroken, tmp_path, monkeypatch):
+def test_stopped_at_any_jump_it_goes_on_to_the_same_to_the_last_bit(
+    unbroken, tmp_path, monkeypatch
+):
     monkeypatch.setattr(store, "KEPT_EVERY_S", 0.0)
     jumps = len(unbroken.table) - 1
     assert jumps >= 10
@@ -82,7 +85,9 @@ def test_killed_by_the_system_it_goes_on_to_the_same(unbroken, tmp_path):
         "--quiet",
     ]
     for seconds in (4.0, 6.5):
-        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
         time.sleep(seconds)
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -100,7 +105,11 @@ def test_more_hours_go_on_as_if_they_had_been_asked_for_at_first(unbroken, tmp_p
 def test_fewer_hours_than_are_kept_are_refused_and_nothing_is_lost(tmp_path):
     """Between the last jump but one and the end too."""
     kept = run_wear(case(), hours=0.5, out=tmp_path / "worn")
-    files = [path for path in (tmp_path / "worn").rglob("*") if path.is_file() and path.name != store.LOCK]
+    files = [
+        path
+        for path in (tmp_path / "worn").rglob("*")
+        if path.is_file() and path.name != store.LOCK
+    ]
     before = [path.read_bytes() for path in files]
     last = float(kept.table["hours"].iloc[-2])
     with pytest.raises(BadInput, match=r"holds 0.5 h of wear, got 0.\d+ h"):
@@ -116,8 +125,11 @@ def test_processes_change_nothing(unbroken):
 def test_surfaces_are_files_that_others_open(tmp_path):
     worn = run_wear(case(), hours=0.2, out=tmp_path / "worn")
     assert [path.name for path in worn.files] == [
-        "first-before.x3p", "first-after.x3p", "second-before.x3p", "second-after.x3p"
-    ]  # fmt: skip
+        "first-before.x3p",
+        "first-after.x3p",
+        "second-before.x3p",
+        "second-after.x3p",
+    ]
     for path, surface in zip(worn.files[:2], (worn.before.first, worn.after.first), strict=True):
         theirs = surface_topography().open_topography(str(path)).topography()
         assert theirs.unit == "m"
@@ -127,7 +139,11 @@ def test_surfaces_are_files_that_others_open(tmp_path):
         np.testing.assert_array_equal(ours.heights, surface.heights)
         row = worn.table.iloc[0 if "before" in path.name else -1]
         parameters = height_parameters(ours)
-        for key, value in (("sq_m", parameters.sq), ("spk_m", parameters.spk), ("ssk", parameters.ssk)):
+        for key, value in (
+            ("sq_m", parameters.sq),
+            ("spk_m", parameters.spk),
+            ("ssk", parameters.ssk),
+        ):
             assert row[of_body(key, 0)] == pytest.approx(value, rel=1e-9, abs=0.0)
 
 
@@ -168,7 +184,9 @@ def test_flattening_is_kept_apart_from_what_is_lost():
     assert worn.table["flattened_1_m"].iloc[-1] > 1e-9
     assert worn.table["clr"].iloc[-1] < worn.table["clr"].iloc[0]
     assert worn.after.first.sq < worn.before.first.sq
-    np.testing.assert_array_equal(worn.after.second.heights, worn.before.second.heights)  # smooth, and lies below
+    np.testing.assert_array_equal(
+        worn.after.second.heights, worn.before.second.heights
+    )  # smooth, and lies below
 
 
 def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
@@ -176,7 +194,9 @@ def test_what_cannot_be_meant_is_refused_and_nothing_is_left(tmp_path):
         run_wear(case({"wear": "none"}), hours=1.0)
     with pytest.raises(BadInput, match="hours of wear must be positive"):
         run_wear(case(), hours=0.0, out=tmp_path / "worn")
-    with pytest.raises(BadInput, match=r"wear of 10000 h in .* jumps would take about .*; ask for less"):
+    with pytest.raises(
+        BadInput, match=r"wear of 10000 h in .* jumps would take about .*; ask for less"
+    ):
         run_wear(case({"wear.k": "1e-9 1/Pa"}), hours=1e4, out=tmp_path / "worn")
     assert not (tmp_path / "worn").exists()
     (tmp_path / "other").mkdir()
@@ -205,9 +225,13 @@ def test_a_folder_of_another_case_or_a_damaged_one_is_refused(tmp_path):
 
 def test_contacts_that_cannot_be_solved_stop_it_with_a_reason(tmp_path):
     few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6}
-    with pytest.raises(NotConverged, match=r"4 of 4 contacts .*; raise solver.tolerance or solver.max_iterations$"):
+    with pytest.raises(
+        NotConverged, match=r"4 of 4 contacts .*; raise solver.tolerance or solver.max_iterations$"
+    ):
         run_wear(case(few), hours=1.0)
-    with pytest.raises(NotConverged, match=r"4 of 4 contacts could not be solved after 0 h: contact not solved"):
+    with pytest.raises(
+        NotConverged, match=r"4 of 4 contacts could not be solved after 0 h: contact not solved"
+    ):
         run_wear(case(few), hours=1.0, out=tmp_path / "worn")
 
 
@@ -215,18 +239,25 @@ def test_a_standing_body_that_cannot_be_solved_is_told_what_helps():
     """It has one position, solved from nothing: going on would fail in the same way."""
     few = {"solver.max_iterations": 1, "solver.tolerance": 1e-6, "contact.slip": 2.0}
     few |= {"motion.rough": "second"}
-    with pytest.raises(NotConverged, match=r"1 of 1 contacts .*; raise solver.tolerance or solver.max_iterations, .*"):
+    with pytest.raises(
+        NotConverged,
+        match=r"1 of 1 contacts .*; raise solver.tolerance or solver.max_iterations, .*",
+    ):
         run_wear(case(few), hours=1.0)
 
 
 def test_a_contact_that_outgrows_its_grid_is_stopped():
     narrow = {"contact.load": "60 N", "lubricant": "none", "surface": "flat", "grid.y": [-1.6, 1.6]}
-    with pytest.raises(AsperityError, match=r"as wide as its grid after .* h; state a wider grid.y"):
+    with pytest.raises(
+        AsperityError, match=r"as wide as its grid after .* h; state a wider grid.y"
+    ):
         run_wear(worn_case(FEW | narrow, POINT), hours=10.0)
 
 
 def test_a_rig_records_a_contact_as_it_wears(unbroken, tmp_path):
-    rig = simulate_rig(case=unbroken.case, moments=unbroken.moments([0.0, HOURS]), repeats=2, repeat_std_hz=0.0)
+    rig = simulate_rig(
+        case=unbroken.case, moments=unbroken.moments([0.0, HOURS]), repeats=2, repeat_std_hz=0.0
+    )
     assert [recording.sample for recording in rig.recordings] == [1, 1, 2, 2]
     for recording, hours in zip(rig.recordings[::2], (0.0, HOURS), strict=True):
         moment = unbroken.at(hours)
@@ -265,8 +296,14 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
     with monkeypatch.context() as before:
         before.setattr(store, "FORMAT", store.FORMAT - 1)
         run_wear(case(), hours=0.05, out=tmp_path / "old")
-    for opened in (lambda: load_wear(tmp_path / "old"), lambda: run_wear(case(), hours=0.1, out=tmp_path / "old")):
-        with pytest.raises(UnreadableFile, match="not a wear's manifest that this asperity can read; choose another"):
+    for opened in (
+        lambda: load_wear(tmp_path / "old"),
+        lambda: run_wear(case(), hours=0.1, out=tmp_path / "old"),
+    ):
+        with pytest.raises(
+            UnreadableFile,
+            match="not a wear's manifest that this asperity can read; choose another",
+        ):
             opened()
     run_wear(case(), hours=0.05, out=tmp_path / "worn")
     for name in (store.MEMORY, store.END):
@@ -277,7 +314,10 @@ def test_a_folder_of_another_layout_is_refused_in_a_sentence(tmp_path, monkeypat
         shorter = BytesIO()
         np.savez(shorter, **arrays)
         write_sealed(tmp_path / name / name, shorter.getvalue())
-        with pytest.raises(UnreadableFile, match="is damaged, or of another asperity; wear the case in another folder"):
+        with pytest.raises(
+            UnreadableFile,
+            match="is damaged, or of another asperity; wear the case in another folder",
+        ):
             run_wear(case(), hours=0.1, out=tmp_path / name)
 
 
@@ -296,7 +336,9 @@ def test_frames_show_the_contact_spread_over_the_history(unbroken, tmp_path):
     assert numbers[-1] == jumps
     assert len(numbers) <= frames.MOST + 1
     assert all(is_kept(number, jumps) for number in numbers[:-1])
-    assert [frame.hours for frame in unbroken.frames] == [unbroken.table["hours"][number] for number in numbers]
+    assert [frame.hours for frame in unbroken.frames] == [
+        unbroken.table["hours"][number] for number in numbers
+    ]
     first = unbroken.frames[0]
     seen_first = unbroken.ageing.solver(seen(unbroken.before, first.position))
     np.testing.assert_array_equal(first.pressure, seen_first.pressure.astype(np.float32))
@@ -312,4 +354,6 @@ def test_frames_are_few_however_many_jumps_there_are():
         kept = [number for number in range(latest + 1) if is_kept(number, latest)]
         assert kept[0] == 0
         assert frames.MOST // 2 <= len(kept) <= frames.MOST or latest < frames.MOST
-        assert set(kept) <= {number for number in range(latest + 1) if is_kept(number, max(0, latest - 1))} | {latest}
+        assert set(kept) <= {
+            number for number in range(latest + 1) if is_kept(number, max(0, latest - 1))
+        } | {latest}

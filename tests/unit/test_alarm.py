@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.wear import Sight, Watched, knee_weight, sequential_alarm
-from asperity.wear.sequential import growth, knee, step, threshold
+from asperity.core.errors import BadInput
+from asperity.trend import Sight, Watched, knee_weight, sequential_alarm
+from asperity.trend.sequential import growth, knee, step, threshold
 
 NUMBER = np.arange(40.0)
 PER_THOUSAND = threshold(1e-3)
@@ -14,7 +14,9 @@ PER_THOUSAND = threshold(1e-3)
 def knee_at(place, scatter, seed, after=0.18):
     """The paper's rise of CRF, 2922 to 3640 Hz, and its slower one behind, over its first value."""
     pace = 718.0 / place
-    course = 2922.0 + np.where(place > NUMBER, pace * NUMBER, 718.0 + after * pace * (NUMBER - place))
+    course = 2922.0 + np.where(
+        place > NUMBER, pace * NUMBER, 718.0 + after * pace * (NUMBER - place)
+    )
     return (course + scatter * np.random.default_rng(seed).standard_normal(NUMBER.size)) / 2922.0
 
 
@@ -28,7 +30,11 @@ def first(test, values, least, above=PER_THOUSAND):
 
 def watched(values, contact=True, least=0.05):
     return Watched(
-        name="CRF", values=np.asarray(values), least=least, contact=contact, in_words=lambda by: f"by {by:.2f}"
+        name="CRF",
+        values=np.asarray(values),
+        least=least,
+        contact=contact,
+        in_words=lambda by: f"by {by:.2f}",
     )
 
 
@@ -73,7 +79,10 @@ def test_what_is_no_knee_raises_nothing_after_any_recording(name):
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
 def test_the_evidence_of_a_knee_does_not_depend_on_the_unit_of_x(unit):
     values = knee_at(18, 5.0, 1)[:24]
-    one, other = knee(NUMBER[:24], values, least=0.05), knee(7.0 * unit + NUMBER[:24] * unit, values, least=0.05)
+    one, other = (
+        knee(NUMBER[:24], values, least=0.05),
+        knee(7.0 * unit + NUMBER[:24] * unit, values, least=0.05),
+    )
     assert other.log_ratio == pytest.approx(one.log_ratio, rel=1e-4)
     assert (other.at - 7.0 * unit) / unit == pytest.approx(one.at, rel=1e-4)
 
@@ -85,9 +94,11 @@ def test_the_likelihood_ratio_of_white_scatter_is_that_of_least_squares():
 
     def left(columns):
         design = np.stack([np.ones(20), *columns], axis=1)
-        return float(np.sum((values - design @ np.linalg.lstsq(design, values, rcond=None)[0]) ** 2))
+        return float(
+            np.sum((values - design @ np.linalg.lstsq(design, values, rcond=None)[0]) ** 2)
+        )
 
-    from asperity.wear import sequential
+    from asperity.trend import sequential
 
     hinges = np.maximum(at - np.arange(3.0, 18.0)[:, None], 0.0)
     own = sequential._gains(values, hinges, beside=at)[list(sequential.MEMORY).index(0.0)]
@@ -101,7 +112,7 @@ def test_scatter_that_remembers_has_the_likelihood_of_its_whole_covariance(memor
     """Slow twin: generalised least squares with the dense covariance, its determinant by its own factors."""
     from scipy.linalg import toeplitz
 
-    from asperity.wear import sequential
+    from asperity.trend import sequential
 
     values = knee_at(10, 20.0, 6)[:20]
     rows = sequential._saturating(NUMBER[:20])[::7]
@@ -180,16 +191,25 @@ def test_a_step_of_load_or_gain_is_not_told_from_damage():
     assert judged(HEALTHY["load step"] + scatter(5), acknowledged=15).state == "none"
 
 
-@pytest.mark.parametrize(("level", "state"), [(0.0, "alarm"), (0.4, "cannot-tell")], ids=["fault", "moved sensor"])
+@pytest.mark.parametrize(
+    ("level", "state"), [(0.0, "alarm"), (0.4, "cannot-tell")], ids=["fault", "moved sensor"]
+)
 def test_a_depth_that_jumps_is_a_fault_unless_all_that_is_loud_moves_with_it(level, state):
     """A sensor that is moved hears a bearing better: the level moves too, which a fault hardly does."""
     jump = (NUMBER >= 20).astype(float)
     series = {"depth": 0.9 * jump + scatter(1, 0.1), "rms": level * jump + scatter(2, 0.05)}
     watching = [
-        Watched(name=name, values=values, least=np.log(2.0), contact=False, in_words="by {:.2f}".format,
-                loud=name == "rms", jumps=name == "depth")
+        Watched(
+            name=name,
+            values=values,
+            least=np.log(2.0),
+            contact=False,
+            in_words="by {:.2f}".format,
+            loud=name == "rms",
+            jumps=name == "depth",
+        )
         for name, values in series.items()
-    ]  # fmt: skip
+    ]
     assert sequential_alarm(NUMBER, watching, [Sight()] * 40).state == state
 
 
@@ -203,7 +223,10 @@ def test_a_knee_weighs_much_and_a_step_or_a_bend_little():
 
 def test_a_smaller_rate_of_false_alarms_takes_longer():
     values = knee_at(15, 15.0, 3)
-    delays = [judged(values, false_alarm_rate=rate).states.index("alarm") for rate in (1e-1 - 1e-9, 1e-3, 1e-5)]
+    delays = [
+        judged(values, false_alarm_rate=rate).states.index("alarm")
+        for rate in (1e-1 - 1e-9, 1e-3, 1e-5)
+    ]
     assert delays[0] < delays[1] < delays[2]
 
 

@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from asperity import apart
-from asperity.apart import read_apart
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core import sandbox as apart
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.sandbox import read_apart
 
 
 def reads(path, factor):

@@ -14,5 +14,7 @@ def test_a_case_to_start_from_is_a_case(kind):
 
 
 def test_every_quantity_is_explained():
-    lines = [line for line in beginning("line").splitlines() if "=" in line and not line.startswith("#")]
+    lines = [
+        line for line in beginning("line").splitlines() if "=" in line and not line.startswith("#")
+    ]
     assert sum("#" in line for line in lines) > len(lines) / 2

@@ -13,7 +13,7 @@ from benchmark.certify import stated
 from benchmark.fields import HERE as FIELDS
 
 from asperity.benchmark import load_benchmark, run_benchmark, solver_named
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from support.source import ROOT
 
 CASES = {case.name: case for case in load_benchmark()}
@@ -28,14 +28,23 @@ QUICK = {  # by the beginning of a name: both ways that take less than a second
     "dry-ellipse": (ways.hertz_ellipse, ways.ellipse_by_chords),
     "dry-wave": (ways.westergaard, lambda given: ways.dense_wave(given, 400)),
     "cavity-journal": (ways.sommerfeld, ways.journal),
-    "cavity-parabola": (ways.parabola, lambda given: ways.refined("asperity", given, (400, 800, 1600))[0]),
+    "cavity-parabola": (
+        ways.parabola,
+        lambda given: ways.refined("asperity", given, (400, 800, 1600))[0],
+    ),
     "ehl-line": (
         lambda given: ways.newton_on_nodes(given, (201, 401)),
         lambda given: solver_named("asperity").solve(given, 512),
     ),
 }
 # how near the second way is on fewer nodes than it was certified on
-FEWER_NODES = {"dry-line": 3e-4, "dry-wavy-line": 3e-3, "dry-ringed": 2e-3, "dry-wave": 3e-4, "ehl-line": 5e-4}
+FEWER_NODES = {
+    "dry-line": 3e-4,
+    "dry-wavy-line": 3e-3,
+    "dry-ringed": 2e-3,
+    "dry-wave": 3e-4,
+    "ehl-line": 5e-4,
+}
 
 
 SLOW = [f"ehl-line-{number}" for number in (1, 3, 4, 5, 6, 7)]  # as the other
@@ -48,7 +57,9 @@ def ways_of(name):
 def test_every_value_has_two_ways_and_an_uncertainty_of_at_most_two_per_cent():
     assert len(CASES) == 41
     values = sum(len(case.certified) for case in CASES.values())
-    shared = sum(any(way.startswith("asperity") for way in case.certified[0].ways) for case in CASES.values())
+    shared = sum(
+        any(way.startswith("asperity") for way in case.certified[0].ways) for case in CASES.values()
+    )
     page = (ROOT / "docs" / "measured" / "benchmark-set.md").read_text("utf-8")
     assert f"{len(CASES)} cases, {values} values" in page
     assert f"holds for asperity on {shared} of the cases" in page
@@ -70,7 +81,9 @@ def test_the_table_is_that_of_the_cases():
         assert float(row["value"]) == pytest.approx(entry.value, rel=1e-7)
         assert float(row["uncertainty"]) == pytest.approx(entry.uncertainty, rel=0.06)
         assert (row["first way"], row["second way"]) == entry.ways
-        assert float(row["found by it"]) == pytest.approx(entry.value, rel=1e-7, abs=1.06 * entry.uncertainty)
+        assert float(row["found by it"]) == pytest.approx(
+            entry.value, rel=1e-7, abs=1.06 * entry.uncertainty
+        )
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if ways_of(name) and name not in SLOW])
@@ -79,8 +92,12 @@ def test_both_ways_give_the_certified_value(name):
     off = next((share for start, share in FEWER_NODES.items() if name.startswith(start)), 0.0)
     first, second = (way(case.given) for way in ways_of(name))
     for entry in case.certified:
-        assert first[entry.quantity] == pytest.approx(entry.value, rel=off, abs=1.01 * entry.uncertainty)
-        assert second[entry.quantity] == pytest.approx(entry.value, rel=off, abs=1.01 * entry.uncertainty)
+        assert first[entry.quantity] == pytest.approx(
+            entry.value, rel=off, abs=1.01 * entry.uncertainty
+        )
+        assert second[entry.quantity] == pytest.approx(
+            entry.value, rel=off, abs=1.01 * entry.uncertainty
+        )
 
 
 @pytest.mark.parametrize(
@@ -133,7 +150,9 @@ def test_moving_waves_are_what_a_slow_twin_and_asperity_find():
     given = CASES["moving-line-1"].given
     twins, ours = oiled.moving(given, 121), solver_named("asperity").solve(given, 128)
     for entry in CASES["moving-line-1"].certified:
-        assert twins[entry.quantity] == pytest.approx(entry.value, rel=0.12), entry.quantity  # a fourth of the nodes
+        assert twins[entry.quantity] == pytest.approx(entry.value, rel=0.12), (
+            entry.quantity
+        )  # a fourth of the nodes
         assert ours[entry.quantity] == pytest.approx(entry.value, rel=0.05), entry.quantity
 
 
@@ -143,12 +162,16 @@ def test_the_twins_bodies_bend_as_hertz_and_a_wave_ask():
     assert np.ptp(bent[np.abs(line.x) < 0.95]) < 1e-3
     ball = twin.half_ball(-1.4, 1.4, 1.4, (57, 29))
     apart = ball.x[:, None] ** 2 + ball.y[None, :] ** 2
-    bent = twin.compliance(ball) @ np.sqrt(np.maximum(1.0 - apart, 0.0)).ravel() + apart.ravel() / 2.0
+    bent = (
+        twin.compliance(ball) @ np.sqrt(np.maximum(1.0 - apart, 0.0)).ravel() + apart.ravel() / 2.0
+    )
     assert np.ptp(bent[apart.ravel() < 0.8]) < 5e-3
     strip = twin.strip(-4.0, 4.0, 1.0, (161, 16))  # long: in its middle as if it had no ends
     wave = np.cos(2.0 * np.pi * strip.y)
     bent = (twin.compliance(strip) @ np.tile(wave, 161)).reshape(strip.shape)[80]
-    np.testing.assert_allclose(bent, wave / (2.0 * np.pi), atol=1e-3)  # 2 p/(E* k), and p_h is E* a/(2 R)
+    np.testing.assert_allclose(
+        bent, wave / (2.0 * np.pi), atol=1e-3
+    )  # 2 p/(E* k), and p_h is E* a/(2 R)
 
 
 def test_the_twin_keeps_its_oil_and_its_load():
@@ -177,7 +200,9 @@ def test_fields_bear_the_load_and_give_the_certified_values(path):
         load = float(pressure.integrate("x").integrate("y")) * (2.0 if fields.y[0] == 0.0 else 1.0)
         assert load == pytest.approx(given["load_n"], rel=0.01)
     elif "line_load_n_m" in given:
-        assert float(pressure.integrate("x").mean()) == pytest.approx(given["line_load_n_m"], rel=0.01)
+        assert float(pressure.integrate("x").mean()) == pytest.approx(
+            given["line_load_n_m"], rel=0.01
+        )
     known = {entry.quantity: entry.value for entry in case.certified}
     if "h_central_m" in known:
         middle = fields.film if "y" not in fields.dims else fields.film.isel(y=0)
@@ -204,7 +229,10 @@ def test_what_stands_still_has_fields():
 def test_errors_fall_as_cells_are_added():
     def errors(cells):
         found = solver_named("asperity").solve(CASES["ehl-line-2"].given, cells)
-        return [abs(found[entry.quantity] / entry.value - 1.0) for entry in CASES["ehl-line-2"].certified]
+        return [
+            abs(found[entry.quantity] / entry.value - 1.0)
+            for entry in CASES["ehl-line-2"].certified
+        ]
 
     assert all(fine < coarse / 2.0 for fine, coarse in zip(errors(128), errors(64), strict=True))
 
@@ -229,7 +257,9 @@ class Exact:
         if given["kind"] == "slider":
             raise BadInput("has no oil")
         (case,) = (case for case in CASES.values() if case.given == given)
-        return {entry.quantity: entry.value + 2.0 * entry.uncertainty for entry in case.certified[:1]}
+        return {
+            entry.quantity: entry.value + 2.0 * entry.uncertainty for entry in case.certified[:1]
+        }
 
 
 def test_a_runner_counts_errors_in_uncertainties_and_says_what_is_left_out(tmp_path):
@@ -237,7 +267,9 @@ def test_a_runner_counts_errors_in_uncertainties_and_says_what_is_left_out(tmp_p
     dry = [case for case in CASES.values() if case.kind == "dry"]
     assert len(result.rows) == len(dry)
     np.testing.assert_allclose([row.over_uncertainty for row in result.rows], 2.0, rtol=1e-6)
-    assert {name for name, _ in result.left_out} == {case.name for case in CASES.values() if case.kind != "dry"}
+    assert {name for name, _ in result.left_out} == {
+        case.name for case in CASES.values() if case.kind != "dry"
+    }
     assert ("cavity-parabola", "has no oil") in result.left_out
     assert "exact on 64 cells" in result.verdict()
     with result.save(tmp_path / "rows.csv").open(encoding="utf-8") as file:
@@ -245,7 +277,9 @@ def test_a_runner_counts_errors_in_uncertainties_and_says_what_is_left_out(tmp_p
 
 
 def test_what_is_no_solver_or_no_case_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="--solver must be asperity, tamaas, contactmechanics or package"):
+    with pytest.raises(
+        BadInput, match="--solver must be asperity, tamaas, contactmechanics or package"
+    ):
         solver_named("abaqus")
     with pytest.raises(BadInput, match="No module named 'nothing_like_it'"):
         solver_named("nothing_like_it:Thing")
@@ -263,7 +297,12 @@ def test_what_is_no_solver_or_no_case_is_refused(tmp_path):
 def test_contactmechanics_meets_waves_balls_and_rough_ones():
     pytest.importorskip("ContactMechanics", reason="a package of the development group")
     solver = solver_named("contactmechanics")
-    for name, within in (("dry-wave-2", 2e-3), ("dry-ellipse-1", 1e-3), ("dry-ball-1", 2e-3), ("dry-rough-2", 0.02)):
+    for name, within in (
+        ("dry-wave-2", 2e-3),
+        ("dry-ellipse-1", 1e-3),
+        ("dry-ball-1", 2e-3),
+        ("dry-rough-2", 0.02),
+    ):
         found = solver.solve(CASES[name].given, 64)
         for entry in CASES[name].certified:
             loose = 0.05 if entry.quantity == "contact_area_m2" else within
@@ -285,8 +324,12 @@ def test_a_solver_that_lies_is_seen():
     assert all(row.error > 0.05 for row in run_benchmark(Lying(), cells=(64,)).rows)
 
 
-@pytest.mark.parametrize(("lasting", "least", "solves"), [((0.5, 0.25, 0.75), 0.25, 4), ((1.5,), 1.5, 2)])
-def test_seconds_are_the_least_of_three_and_count_no_first_solve(monkeypatch, lasting, least, solves):
+@pytest.mark.parametrize(
+    ("lasting", "least", "solves"), [((0.5, 0.25, 0.75), 0.25, 4), ((1.5,), 1.5, 2)]
+)
+def test_seconds_are_the_least_of_three_and_count_no_first_solve(
+    monkeypatch, lasting, least, solves
+):
     case = CASES["dry-ball-1"]
     clock = iter([time for seconds in lasting for time in (10.0, 10.0 + seconds)])
     monkeypatch.setattr("asperity.benchmark.run.load_benchmark", lambda _: (case,))
@@ -339,6 +382,8 @@ def test_the_command_runs_a_folder_of_cases(tmp_path, monkeypatch, capsys):
 
 
 def test_a_certified_value_that_moves_is_seen():
-    moved = replace(CASES["dry-ball-1"].certified[0], value=1.001 * CASES["dry-ball-1"].certified[0].value)
+    moved = replace(
+        CASES["dry-ball-1"].certified[0], value=1.001 * CASES["dry-ball-1"].certified[0].value
+    )
     found = ways.hertz_point(CASES["dry-ball-1"].given)[moved.quantity]
     assert abs(found - moved.value) > moved.uncertainty

@@ -14,11 +14,11 @@ import pytest
 
 from asperity import load_case
 from asperity.cli import main
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.paper import Anchor
 from asperity.study import calibrate, plan_points, run_study
 from asperity.study.calibration import _levels
-from asperity.study.slopes import MisfitSlopes
+from asperity.study.sensitivities import MisfitSlopes
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 DRY = {
@@ -60,10 +60,20 @@ def full_load_crf(modulus):
 
 
 def test_what_made_the_anchors_is_found_and_what_they_do_not_see_is_said(dry, threads, tmp_path):
-    truth = dry.with_overrides({"material.hardness": "1.3 GPa", "material.youngs_modulus": "230 GPa"})
-    made = run_study(plan_points(truth, [{"surface.sq": "3 um"}], seeding="common"), executor=threads).table
+    truth = dry.with_overrides(
+        {"material.hardness": "1.3 GPa", "material.youngs_modulus": "230 GPa"}
+    )
+    made = run_study(
+        plan_points(truth, [{"surface.sq": "3 um"}], seeding="common"), executor=threads
+    ).table
     anchors = [
-        Anchor(name="CAR", quantity="car_domain", sq=3e-6, value=float(made["car_domain"].iloc[0]), tolerance=0.01),
+        Anchor(
+            name="CAR",
+            quantity="car_domain",
+            sq=3e-6,
+            value=float(made["car_domain"].iloc[0]),
+            tolerance=0.01,
+        ),
         Anchor(name="CRF", quantity="crf_hz", sq=3e-6, value=full_load_crf(230e9), tolerance=10.0),
     ]
     settings = {"free": [CAP, MODULUS, FRICTION], **QUICK, "out": tmp_path}
@@ -107,7 +117,10 @@ def test_anchors_that_contradict_each_other_are_met_halfway_and_named(silent, th
     assert miss["little"] == pytest.approx(0.05, abs=0.01)
     assert miss["much"] == pytest.approx(-0.05, abs=0.01)
     assert found.misfit == pytest.approx(2.0 * 5.0**2, rel=0.1)
-    assert {(trade.given_up, trade.relieved) for trade in found.trade_offs} == {("little", "much"), ("much", "little")}
+    assert {(trade.given_up, trade.relieved) for trade in found.trade_offs} == {
+        ("little", "much"),
+        ("much", "little"),
+    }
     for trade in found.trade_offs:
         assert trade.misfit == pytest.approx(5.0**2, rel=0.4)
         assert trade.without < 0.05 * trade.misfit
@@ -116,7 +129,9 @@ def test_anchors_that_contradict_each_other_are_met_halfway_and_named(silent, th
 
 def test_a_bound_that_is_kept_does_not_pull(silent, threads):
     car = Anchor(name="CAR", quantity="car_domain", sq=2e-6, value=0.3, tolerance=0.01)
-    bound = Anchor(name="above", quantity="car_domain", sq=2e-6, value=0.1, tolerance=0.001, sense="at least")
+    bound = Anchor(
+        name="above", quantity="car_domain", sq=2e-6, value=0.1, tolerance=0.001, sense="at least"
+    )
     found = calibrate(silent, [car, bound], free=[CAP], **QUICK, executor=threads)
     alone = calibrate(silent, [car], free=[CAP], **QUICK, executor=threads)
     assert found.parameters == alone.parameters
@@ -138,7 +153,9 @@ def test_scatter_over_surfaces_is_no_information():
         naive.append(float(np.sum(slopes.mean**2)))
     assert np.mean(naive) == pytest.approx(4 * 25.0 / 6.0, rel=0.1)
     assert np.median(learnt) < 0.25 * np.mean(naive)
-    assert np.mean(np.array(learnt) > 12.0) < 0.2  # seldom enough to count as determined; the squares mostly are
+    assert (
+        np.mean(np.array(learnt) > 12.0) < 0.2
+    )  # seldom enough to count as determined; the squares mostly are
     assert np.mean(np.array(naive) > 12.0) > 0.5
     true = MisfitSlopes(np.zeros((6, 4)), 5.0 + 5.0 * rng.standard_normal((6, 4, 1)))
     assert true.information[0, 0] == pytest.approx(4 * 25.0, rel=0.5)
@@ -159,7 +176,9 @@ def test_levels_are_the_anchors_and_near_ones_are_solved_once():
         Anchor(name=f"{sq}", quantity="clr", sq=1e-6 * sq, since=None, value=0.5, tolerance=0.1)
         for sq in (0.5, 0.54, 2.5, 3.49, 3.5, 4.0)
     ]
-    assert [1e6 * level for level in _levels(anchors, None)] == pytest.approx([0.5, 0.54, 2.5, 3.5, 4.0])
+    assert [1e6 * level for level in _levels(anchors, None)] == pytest.approx(
+        [0.5, 0.54, 2.5, 3.5, 4.0]
+    )
     assert _levels(anchors, [4e-6, 0.5e-6]) == (0.5e-6, 4e-6)
     with pytest.raises(BadInput, match=r"must span the anchors' Sq from 0\.5 to 4 um, got 1, 4"):
         _levels(anchors, [1e-6, 4e-6])
@@ -173,7 +192,11 @@ CRF = Anchor(name="CRF", quantity="crf_hz", sq=2e-6, value=3800.0, tolerance=10.
     [
         ([], {}, "needs an anchor"),
         ([replace(CRF, fitted=False)], {}, "needs an anchor"),
-        ([Anchor(name="bend", quantity="split", value=2.0, tolerance=0.1)], {}, "'bend' is a split"),
+        (
+            [Anchor(name="bend", quantity="split", value=2.0, tolerance=0.1)],
+            {},
+            "'bend' is a split",
+        ),
         ([CRF], {"free": ["surface.sq=1 um..2 um"]}, "surface.sq cannot be varied"),
         ([CRF], {"free": []}, "nothing is varied"),
         ([CRF], {"seeds": 0}, "seeds must be 1 or more"),
@@ -196,12 +219,29 @@ def test_the_command_writes_a_case_that_a_study_can_run(silent, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     Path("case.toml").write_text(silent.text, "utf-8")
     Path("anchors.toml").write_text(
-        '[[anchor]]\nname = "CAR"\nquantity = "car_domain"\nsq = "2 um"\nvalue = 0.3\ntolerance = 0.01\n', "utf-8"
+        '[[anchor]]\nname = "CAR"\nquantity = "car_domain"\nsq = "2 um"\nvalue = 0.3\ntolerance = 0.01\n',
+        "utf-8",
     )
     arguments = [
-        "calibrate", "case.toml", "--anchors", "anchors.toml", "--free", CAP, "--cells", "32", "--seeds", "1",
-        "--screened", "2", "--starts", "1", "--workers", "1", "--out", "found",
-    ]  # fmt: skip
+        "calibrate",
+        "case.toml",
+        "--anchors",
+        "anchors.toml",
+        "--free",
+        CAP,
+        "--cells",
+        "32",
+        "--seeds",
+        "1",
+        "--screened",
+        "2",
+        "--starts",
+        "1",
+        "--workers",
+        "1",
+        "--out",
+        "found",
+    ]
     with pytest.raises(SystemExit) as end:
         main(arguments)
     out, err = capsys.readouterr()

@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.case import amounts, load_case
+from asperity.case import load_case
+from asperity.case import units as amounts
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.coupling import VibrationModel
 from asperity.ehl import Options
-from asperity.errors import BadInput, UnreadableFile
 from asperity.lubricant import Barus, DowsonHigginson, Roelands
 from asperity.surface import Surface
 
@@ -35,7 +36,9 @@ def test_the_papers_table_2_arrives_in_si(paper):
         0.010,
         500.0,
     )
-    assert conditions.pair.effective_modulus == pytest.approx(219.78e9, rel=1e-5)  # printed in Table 2
+    assert conditions.pair.effective_modulus == pytest.approx(
+        219.78e9, rel=1e-5
+    )  # printed in Table 2
     assert conditions.entrainment_speed == pytest.approx(1.91, rel=1e-15)
     assert conditions.slide_to_roll == pytest.approx(0.2, rel=1e-14)
     assert oil.viscosity == Barus(0.096, 18.2e-9)
@@ -62,7 +65,9 @@ def test_a_domain_that_starves_says_by_how_much(paper):
     for case, film in ((printed, 0.448), (paper, 0.722)):
         case = case.with_overrides({"lubricant.viscosity.alpha": "20 1/GPa"})
         said = float(re.search(r"starves the film by about ([\d.]+) %", case.notes[0])[1])
-        assert said == pytest.approx(100.0 * (1.0 - film / 0.772), rel=0.25)  # 0.772: 0.763 um from -8 is 1.2 % thin
+        assert said == pytest.approx(
+            100.0 * (1.0 - film / 0.772), rel=0.25
+        )  # 0.772: 0.763 um from -8 is 1.2 % thin
     assert paper.with_overrides({"grid.x": [-12, 3]}).notes == ()
 
 
@@ -74,8 +79,19 @@ def test_a_domain_that_starves_says_by_how_much(paper):
         {"material.hardness": "none", "vibration": "none"},
         {"surface": "flat"},
         {"surface": {"file": 'quo"te\\ü/ring.x3p', "sq": "0.8 um", "fit": "tile"}},
-        {"surface": {"kind": "self-affine", "sq": "1 um", "hurst": 0.8, "cutoffs": ["2 um", "80 um"]}},
-        {"lubricant.viscosity.law": "roelands", "solver.contact_film": "2 nm", "solver.tolerance": 1e-6},
+        {
+            "surface": {
+                "kind": "self-affine",
+                "sq": "1 um",
+                "hurst": 0.8,
+                "cutoffs": ["2 um", "80 um"],
+            }
+        },
+        {
+            "lubricant.viscosity.law": "roelands",
+            "solver.contact_film": "2 nm",
+            "solver.tolerance": 1e-6,
+        },
         {"study.sq": {"from": "0.5 um", "to": "4 um", "step": "0.1 um"}, "study.seeds": 5},
     ],
 )
@@ -93,7 +109,11 @@ def test_the_text_of_a_case_loads_to_an_equal_case(paper, overrides):
     )
 
 
-COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}
+COPIES = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),
+}
 
 
 @pytest.mark.parametrize("how", COPIES)
@@ -113,19 +133,29 @@ def test_a_case_and_its_contents_can_be_copied_and_sent_to_another_process(how):
     assert copied > 3
 
 
-@settings(deadline=None)  # the first case read loads what reads cases; a busy machine took 0.25 s for it
-@given(st.floats(1e-3, 1e6), st.sampled_from([("mm", 1e-3), ("um", 1e-6), ("m", 1.0), ("nm", 1e-9)]))
+@settings(
+    deadline=None
+)  # the first case read loads what reads cases; a busy machine took 0.25 s for it
+@given(
+    st.floats(1e-3, 1e6), st.sampled_from([("mm", 1e-3), ("um", 1e-6), ("m", 1.0), ("nm", 1e-9)])
+)
 def test_lengths_in_any_unit_are_the_same_length(value, unit):
     text, factor = unit
-    case = load_case(EXAMPLES / "paper.toml").with_overrides({"contact.length": f"{value!r} {text}"})
+    case = load_case(EXAMPLES / "paper.toml").with_overrides(
+        {"contact.length": f"{value!r} {text}"}
+    )
     assert case.conditions.length == pytest.approx(value * factor, rel=1e-15)
 
 
 def test_overrides_read_toml_and_text_without_its_quotes(paper):
-    case = paper.with_overrides({"contact.load": "400 N", "grid.cells": "[64, 32]", "surface.seed": "3"})
+    case = paper.with_overrides(
+        {"contact.load": "400 N", "grid.cells": "[64, 32]", "surface.seed": "3"}
+    )
     assert case.conditions.load == 400.0
     assert case.grid.cells == (64, 32)
-    assert case == paper.with_overrides({"contact.load": '"400 N"', "grid.cells": [64, 32], "surface.seed": 3})
+    assert case == paper.with_overrides(
+        {"contact.load": '"400 N"', "grid.cells": [64, 32], "surface.seed": 3}
+    )
 
 
 def test_roelands_takes_its_own_reference_pressure(paper):
@@ -137,7 +167,9 @@ def test_one_seed_is_one_surface_at_any_roughness(paper):
     coarse = paper.with_overrides({"grid.cells": [64, 64]})
     rougher = coarse.with_overrides({"surface.sq": "2 um"})
     assert coarse.surface().sq == pytest.approx(1e-6, rel=1e-12)
-    np.testing.assert_allclose(rougher.surface().heights, 2.0 * coarse.surface().heights, rtol=1e-12)
+    np.testing.assert_allclose(
+        rougher.surface().heights, 2.0 * coarse.surface().heights, rtol=1e-12
+    )
     other = coarse.with_overrides({"surface.seed": 8}).surface()
     assert not np.allclose(other.heights, coarse.surface().heights)
 
@@ -206,7 +238,9 @@ def test_what_cannot_be_meant_is_refused_in_one_sentence(paper, key, value, sent
 
 @pytest.mark.parametrize("section", ["contact", "material", "lubricant", "surface"])
 def test_a_missing_section_is_named(section):
-    text = (EXAMPLES / "paper.toml").read_text("utf-8").replace(f"[{section}]", f"[study.{section}]")
+    text = (
+        (EXAMPLES / "paper.toml").read_text("utf-8").replace(f"[{section}]", f"[study.{section}]")
+    )
     with pytest.raises(BadInput):
         load_case(text)
     tables = text.split(f"[study.{section}]")
@@ -229,18 +263,27 @@ def test_files_that_are_no_case_are_named(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
     (tmp_path / "broken.toml").write_text("[contact\n")
     for name in ("absent.toml", "binary.toml", "broken.toml", "."):
-        with pytest.raises(UnreadableFile, match=name.replace(".", r"\.") if name != "." else str(tmp_path)):
+        with pytest.raises(
+            UnreadableFile, match=name.replace(".", r"\.") if name != "." else str(tmp_path)
+        ):
             load_case(tmp_path / name)
 
 
 def test_ball_and_barrel_are_measured_in_their_own_half_widths(paper):
     ball = paper.with_overrides(
-        {"contact.geometry": "point", "contact.length": "none", "contact.load": "20 N", "grid.y": [-3, 3]}
+        {
+            "contact.geometry": "point",
+            "contact.length": "none",
+            "contact.load": "20 N",
+            "grid.y": [-3, 3],
+        }
     )
     a = ball.conditions.hertz.half_widths[0]
     assert ball.grid.periodic == (False, False)
     assert ball.grid.extent == pytest.approx((6.4 * a, 6.0 * a))
-    barrel = ball.with_overrides({"contact.geometry": "elliptic", "contact.radius": ["5.4 mm", "20 mm"]})
+    barrel = ball.with_overrides(
+        {"contact.geometry": "elliptic", "contact.radius": ["5.4 mm", "20 mm"]}
+    )
     a, b = barrel.conditions.hertz.half_widths
     assert b > 1.5 * a
     assert barrel.grid.extent == pytest.approx((6.4 * a, 6.0 * b))

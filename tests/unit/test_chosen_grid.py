@@ -5,7 +5,7 @@ import pytest
 import x3pio
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.surface import correlation_lengths
 from support.paper import contact
 
@@ -69,7 +69,10 @@ def test_what_is_given_is_obeyed():
 @pytest.mark.parametrize(
     ("grid", "said"),
     [
-        ("cells = [64, 64]\nx = [-4.5, 1.9]\ny = [-1, 1]\naccuracy = 0.01", "accuracy chooses a grid"),
+        (
+            "cells = [64, 64]\nx = [-4.5, 1.9]\ny = [-1, 1]\naccuracy = 0.01",
+            "accuracy chooses a grid",
+        ),
         ("accuracy = 0.9", "grid.accuracy must be less than or equal to 0.2, got 0.9"),
         ('cells = "fine"', 'grid.cells must be a list of two such as [256, 128], or "auto", got'),
         ("x = [-0.5, 1.9]", "x must reach beyond the contact on both sides"),

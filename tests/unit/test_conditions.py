@@ -1,8 +1,8 @@
 import pytest
 
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput
-from asperity.hertz import elliptic_contact, point_contact
+from asperity.contact.conditions import ElasticPair
+from asperity.contact.hertz import elliptic_contact, point_contact
+from asperity.core.errors import BadInput
 from support.paper import contact
 
 
@@ -14,7 +14,9 @@ def test_the_papers_modulus_is_the_effective_one():
 
 
 def test_a_rigid_partner_leaves_the_others_plane_strain_modulus():
-    assert ElasticPair((70e9, 1e30), (0.33, 0.2)).reduced_modulus == pytest.approx(70e9 / (1.0 - 0.33**2), rel=1e-12)
+    assert ElasticPair((70e9, 1e30), (0.33, 0.2)).reduced_modulus == pytest.approx(
+        70e9 / (1.0 - 0.33**2), rel=1e-12
+    )
 
 
 def test_the_papers_contact_has_the_papers_size():
@@ -68,7 +70,9 @@ def test_a_contact_that_cannot_be_is_refused_in_one_sentence(changes, said):
         contact(**changes)
 
 
-@pytest.mark.parametrize(("moduli", "ratios"), [((0.0, 2e11), (0.3, 0.3)), ((2e11, 2e11), (0.3, 0.51))])
+@pytest.mark.parametrize(
+    ("moduli", "ratios"), [((0.0, 2e11), (0.3, 0.3)), ((2e11, 2e11), (0.3, 0.51))]
+)
 def test_a_material_that_cannot_be_is_refused(moduli, ratios):
     with pytest.raises(BadInput, match=r"must"):
         ElasticPair(moduli, ratios)

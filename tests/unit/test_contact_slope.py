@@ -10,7 +10,9 @@ from support.paper import contact, grid
 def test_the_mean_slope_of_waves_is_that_of_their_cosine():
     where = grid((96, 48))
     length, height = where.extent[0] / 4.0, 0.2e-6
-    waves = height * np.sin(2.0 * np.pi * (where.x[:, None] - where.lower[0]) / length) + 0.0 * where.y
+    waves = (
+        height * np.sin(2.0 * np.pi * (where.x[:, None] - where.lower[0]) / length) + 0.0 * where.y
+    )
     solution = solve_contact(contact(), None, Surface(waves, where), strict=False)
     assert solution.in_contact.any()
     everywhere = replace(solution, in_contact=np.ones_like(solution.in_contact))

@@ -8,25 +8,33 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from asperity.history import run_history
+from asperity.core.signals import power_spectrum
+from asperity.monitoring import track_recordings
 from asperity.paper import papers_case
 from asperity.recording import check_recording, open_recording, read_recording
+from asperity.resonance import contact_resonance
 from asperity.results import solve_case
-from asperity.signals import power_spectrum
+from asperity.simulation import run_history
 from asperity.study import curve_of, plan_study, run_study, study_scalars
 from asperity.surface import describe_surface
-from asperity.tracking import track_recordings
-from asperity.wear import contact_resonance
 
-COPIES = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda thing: pickle.loads(pickle.dumps(thing))}
+COPIES = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),
+}
 
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
     """Results, and what is to be the same of each."""
     folder = tmp_path_factory.mktemp("copies")
-    case = papers_case().with_overrides({"grid.cells": [32, 32], "surface.correlation_length": "60 um"})
-    dry = case.with_overrides({"lubricant": "none", "vibration.duration": "0.1 s", "grid.x": [-1.9, 1.9]})
+    case = papers_case().with_overrides(
+        {"grid.cells": [32, 32], "surface.correlation_length": "60 um"}
+    )
+    dry = case.with_overrides(
+        {"lubricant": "none", "vibration.duration": "0.1 s", "grid.x": [-1.9, 1.9]}
+    )
     plan = plan_study(dry.with_overrides({"study": {"sq": ["1 um", "2 um", "3 um"], "seeds": 2}}))
     with ThreadPoolExecutor(1) as executor:
         study = run_study(plan, executor=executor)
@@ -40,26 +48,37 @@ def told(tmp_path_factory):
     spectrum = power_spectrum(recording)
     return {
         "run": (solve_case(case, strict=False), lambda run: [run.verdict(), run.scalars()]),
-        "history": (run_history(case, steps=2, every=1, strict=False), lambda moved: [moved.scalars(), moved.table]),
+        "history": (
+            run_history(case, steps=2, every=1, strict=False),
+            lambda moved: [moved.scalars(), moved.table],
+        ),
         "plan": (plan, lambda plan: [plan.design, [entry.id for entry in plan.cases]]),
         "study": (study, lambda study: [study_scalars(study), study.table]),
         "curve": (curve_of(study), lambda curve: [curve.verdict(), curve.summary()]),
         "recording": (recording, lambda recording: [recording.values, recording.facts]),
-        "quality": (check_recording(open_recording(paths[0], rate_hz=2e4)), lambda quality: [quality]),
+        "quality": (
+            check_recording(open_recording(paths[0], rate_hz=2e4)),
+            lambda quality: [quality],
+        ),
         "spectrum": (spectrum, lambda spectrum: [spectrum.density, spectrum.unit]),
         "resonance": (contact_resonance(spectrum, band_hz=(1e3, 5e3)), lambda line: [line]),
         "track": (
             track_recordings(paths, band_hz=(1e3, 5e3), rate_hz=2e4),
             lambda track: [track.verdict(), track.scalars()],
         ),
-        "surface": (describe_surface(folder / "map.txt", unit="m", pixel=1e-6), lambda surface: [surface.scalars()]),
+        "surface": (
+            describe_surface(folder / "map.txt", unit="m", pixel=1e-6),
+            lambda surface: [surface.scalars()],
+        ),
     }
 
 
 def in_words(value):
     if hasattr(value, "to_json"):
         return value.to_json(double_precision=15)
-    return json.dumps(value, default=lambda other: getattr(other, "tolist", lambda: str(other))(), sort_keys=True)
+    return json.dumps(
+        value, default=lambda other: getattr(other, "tolist", lambda: str(other))(), sort_keys=True
+    )
 
 
 RESULTS = (
@@ -85,6 +104,7 @@ def test_a_result_can_be_copied_and_sent_to_another_process(told, name, how):
     assert type(again) is type(result)
     both = [tells(each) for each in (result, again)]
     first, second = (
-        [in_words(part) for part in parts] if isinstance(parts, list) else in_words(parts) for parts in both
+        [in_words(part) for part in parts] if isinstance(parts, list) else in_words(parts)
+        for parts in both
     )
     assert first == second

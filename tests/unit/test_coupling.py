@@ -5,7 +5,10 @@ from typing import Annotated
 import numpy as np
 import pytest
 
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
+from asperity.core.quantities import Parameter
 from asperity.coupling import (
     DAMPING_LAWS,
     PRESETS,
@@ -27,10 +30,7 @@ from asperity.coupling import (
     vibration_choices,
 )
 from asperity.ehl import ContactState, solve_contact
-from asperity.errors import BadInput
-from asperity.grid import Grid
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
-from asperity.quantities import Parameter
 from asperity.surface import flat_surface
 
 CONDITIONS = ContactConditions(
@@ -71,12 +71,16 @@ def test_full_load_gives_the_stiffness_worked_out_by_hand():
 
 def test_resonance_grows_with_the_sixth_root_of_the_load_share():
     full, shared = (oscillator(state(clr=clr), CONDITIONS, MODEL) for clr in (1.0, 0.2))
-    assert shared.natural_frequency_hz == pytest.approx(full.natural_frequency_hz * 0.2 ** (1 / 6), rel=1e-12)
+    assert shared.natural_frequency_hz == pytest.approx(
+        full.natural_frequency_hz * 0.2 ** (1 / 6), rel=1e-12
+    )
 
 
 def test_cutoff_follows_the_area_share():
     assert MODEL.excitation.cutoff_hz(1.0) == pytest.approx(30.0)
-    proportional = VibrationModel(mass=0.1, damping_ratio=0.02, cutoff_exponent=1.0, car_reference=0.5)
+    proportional = VibrationModel(
+        mass=0.1, damping_ratio=0.02, cutoff_exponent=1.0, car_reference=0.5
+    )
     assert proportional.excitation.cutoff_hz(0.25) == pytest.approx(15.0)
 
 
@@ -91,19 +95,28 @@ def test_one_seed_is_one_record():
     first, again = (contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, MODEL) for _ in range(2))
     assert np.array_equal(first.response.values, again.response.values)
     assert first.resonance == again.resonance
-    other = contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, seed=2))
+    other = contact_vibration(
+        state(clr=0.5, car=0.3), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, seed=2)
+    )
     assert not np.array_equal(first.profile.values, other.profile.values)
 
 
 def test_record_scatters_about_the_expected_spectrum():
     seen = contact_vibration(state(clr=0.5, car=0.3), CONDITIONS, MODEL)
-    inside = (seen.spectrum.frequency_hz > seen.band_hz[0]) & (seen.spectrum.frequency_hz < seen.band_hz[1])
+    inside = (seen.spectrum.frequency_hz > seen.band_hz[0]) & (
+        seen.spectrum.frequency_hz < seen.band_hz[1]
+    )
     ratio = seen.spectrum.density[inside] / seen.expected.density[inside]
     assert np.mean(ratio) == pytest.approx(1.0, abs=4.0 / np.sqrt(ratio.size) + 0.01)
 
 
 @pytest.mark.parametrize(
-    ("silent", "why"), [(state(clr=0.0, car=0.0), "no asperity"), (state(car=0.0), "outside"), (state(sq=0.0), "flat")]
+    ("silent", "why"),
+    [
+        (state(clr=0.0, car=0.0), "no asperity"),
+        (state(car=0.0), "outside"),
+        (state(sq=0.0), "flat"),
+    ],
 )
 def test_without_touching_asperities_there_is_no_resonance_but_a_reason(silent, why):
     seen = contact_vibration(silent, CONDITIONS, MODEL)
@@ -122,7 +135,9 @@ def test_a_share_too_small_for_the_band_is_not_found():
 
 def test_bad_input_is_named():
     slow = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=20e3)
-    with pytest.raises(BadInput, match=r"15 times the full-load resonance of 33\d\d Hz, got 20000 Hz"):
+    with pytest.raises(
+        BadInput, match=r"15 times the full-load resonance of 33\d\d Hz, got 20000 Hz"
+    ):
         contact_vibration(state(), CONDITIONS, slow)
     with pytest.raises(BadInput, match="hertz-point, hertz-line, parallel-film, tangent"):
         VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="palmgren")
@@ -133,7 +148,9 @@ def test_bad_input_is_named():
     with pytest.raises(BadInput, match="CLR"):
         oscillator(state(clr=0.0), CONDITIONS, MODEL)
     with pytest.raises(BadInput, match="cut-off must lie"):
-        contact_vibration(state(), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, duration_s=0.01))
+        contact_vibration(
+            state(), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, duration_s=0.01)
+        )
     choices = {
         "damping_law": "stiff",
         "excitation": "hammer",
@@ -153,7 +170,9 @@ def test_bad_input_is_named():
     with pytest.raises(BadInput, match="N s/m"):
         VibrationModel(mass=0.1, damping_ratio=0.02, damping_law="constant")
     with pytest.raises(BadInput, match="point spring"):
-        VibrationModel(mass=0.1, damping_ratio=0.02, response="nonlinear", stiffness_law="hertz-line")
+        VibrationModel(
+            mass=0.1, damping_ratio=0.02, response="nonlinear", stiffness_law="hertz-line"
+        )
     with pytest.raises(BadInput, match="sound, paper"):
         VibrationModel.preset("papper", mass=0.1, damping_ratio=0.02)
     for name in ("tangent", "surface"):
@@ -169,18 +188,26 @@ def test_the_presets_differ_in_what_the_paper_did_and_sound_is_the_default():
     assert set(preset_choices("sound")) == set(PRESETS["paper"])
     paper = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02)
     assert (paper.rate_hz, paper.damping_law) == (10e3, HertzForRadian())
-    assert paper.excitation == NoiseExcitation(filter="bilinear", height_of="record", coefficient="kept")
+    assert paper.excitation == NoiseExcitation(
+        filter="bilinear", height_of="record", coefficient="kept"
+    )
     vibration = contact_vibration(dry_full_load(CONDITIONS, 2e-6), CONDITIONS, paper)
     assert vibration.oscillator.damping_ratio == pytest.approx(0.02 / (2 * np.pi))
     assert vibration.response.rate_hz == 10e3
     assert vibration.resonance.found
-    assert vibration.dynamic_load == pytest.approx(0.002, abs=0.001)  # physics.md section 4: 0.002 F
+    assert vibration.dynamic_load == pytest.approx(
+        0.002, abs=0.001
+    )  # physics.md section 4: 0.002 F
 
 
 def test_a_law_is_stated_by_its_name_with_its_parameters_or_is_given_itself():
-    line = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="hertz-line", reference_depth=1e-3)
+    line = VibrationModel(
+        mass=0.1, damping_ratio=0.02, stiffness_law="hertz-line", reference_depth=1e-3
+    )
     assert line.stiffness_law == HertzLine(1e-3)
-    assert line == VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law=HertzLine(reference_depth=1e-3))
+    assert line == VibrationModel(
+        mass=0.1, damping_ratio=0.02, stiffness_law=HertzLine(reference_depth=1e-3)
+    )
     assert replace(line, rate_hz=2e5).stiffness_law == HertzLine(1e-3)
     assert replace(MODEL, filter_order=3).excitation == NoiseExcitation(filter_order=3)
     assert pickle.loads(pickle.dumps(line)) == line
@@ -222,7 +249,9 @@ def test_a_new_law_is_a_class_and_a_line_in_its_table(monkeypatch):
 def test_damping_laws_are_eq_5_with_radians_with_hertz_and_a_constant():
     springs = {
         law: oscillator(
-            state(), CONDITIONS, VibrationModel(mass=0.1, damping_ratio=0.02, damping_law=law, damping=50.0)
+            state(),
+            CONDITIONS,
+            VibrationModel(mass=0.1, damping_ratio=0.02, damping_law=law, damping=50.0),
         )
         for law in ("ratio", "hertz-for-radian", "constant")
     }
@@ -245,10 +274,15 @@ def test_a_film_that_feeds_more_than_the_rest_damps_is_refused():
     conditions = replace(CONDITIONS, pair=ElasticPair((200e9, 200e9), (0.3, 0.3)), load=500.0)
     a = conditions.hertz.half_widths[0]
     on = Grid((96, 8), (-4.5 * a, -a), (1.9 * a, a))
-    oil = Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian())
+    oil = Lubricant(
+        viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()
+    )
     film = solve_contact(conditions, oil, flat_surface(on))
     stiffness = 0.1 * (2.0 * np.pi * 10e3) ** 2
-    assert DAMPING_LAWS["contact"]()(mass=0.1, stiffness=stiffness, damping_ratio=0.02, solution=film) < 0.02
+    assert (
+        DAMPING_LAWS["contact"]()(mass=0.1, stiffness=stiffness, damping_ratio=0.02, solution=film)
+        < 0.02
+    )
     with pytest.raises(BadInput, match="feeds a vibration of 10000 Hz"):
         DAMPING_LAWS["contact"]()(mass=0.1, stiffness=stiffness, damping_ratio=0.005, solution=film)
 
@@ -273,11 +307,15 @@ def test_the_film_beside_the_asperities_is_softer_than_the_bodies_and_stiffer_th
     both = oscillator(oily, CONDITIONS, law).stiffness
     layers = 1 / (1 / both - 1 / bodies)
     assert layers == pytest.approx(0.3 * 200 / (0.48 * 1e-6) + 0.7 * 200 / (0.13 * 0.7e-6))
-    assert oscillator(replace(oily, clr=0.0), CONDITIONS, law).stiffness < bodies  # no asperity touches: still a spring
+    assert (
+        oscillator(replace(oily, clr=0.0), CONDITIONS, law).stiffness < bodies
+    )  # no asperity touches: still a spring
 
 
 def test_the_excitations_choices_reach_the_noise():
-    model = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02, filter_order=3, patch="line")
+    model = VibrationModel.preset(
+        "paper", mass=0.1, damping_ratio=0.02, filter_order=3, patch="line"
+    )
     averaged = excitation(state(car=0.3), CONDITIONS, model)
     assert averaged.half_width == pytest.approx(CONDITIONS.hertz.half_widths[0])
     assert averaged.speed == pytest.approx(0.42)

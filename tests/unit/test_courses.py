@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.inference import (
     Follower,
     Forward,
@@ -22,17 +22,34 @@ from asperity.inference import (
     read_limit,
     wear_drift,
 )
-from asperity.inference.course import DRIFT_STD, KNOTS, Course, Extra, Table, between_knots
+from asperity.inference.drifting_contact import (
+    DRIFT_STD,
+    KNOTS,
+    Course,
+    Extra,
+    Table,
+    between_knots,
+)
 from asperity.inference.forecast import Limit
-from asperity.inference.likelihood import ALONG, EMULATED_HEIGHT_STD, EXPONENT_STD, GAIN_STD, OWN, WEIGHTS
-from asperity.inference.process import Process
+from asperity.inference.gaussian_process import Process
+from asperity.inference.likelihood import (
+    ALONG,
+    EMULATED_HEIGHT_STD,
+    EXPONENT_STD,
+    GAIN_STD,
+    OWN,
+    WEIGHTS,
+)
 from asperity.inference.sampling import RULED_OUT, Pool, importance
 from asperity.inference.visits import MOST, MOST_PLACES, series_of
 from support.emulated import formula, formula_emulator, formula_setting
 
 TIMES = np.array([0.0, 0.15, 0.4, 0.75, 1.0])
 SIZE, RESTLESS, SCATTER = {"crf": 0.02, "damping": 0.005, "crfa": 0.08}, 0.2, 0.003
-EMULATED, ALIKE = {"crf": 0.01, "damping": 0.02, "crfa": EMULATED_HEIGHT_STD}, 0.6  # deviations, and their correlation
+EMULATED, ALIKE = (
+    {"crf": 0.01, "damping": 0.02, "crfa": EMULATED_HEIGHT_STD},
+    0.6,
+)  # deviations, and their correlation
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +104,10 @@ def straight_table(share, memory, places=2):
     count = 2
     return Table(
         {key: np.tile(line, (count, places, 1)) for key, line in lines.items()},
-        {key: np.tile(std**2 * np.array([[1.0, ALIKE], [ALIKE, 1.0]]), (count, 1, 1)) for key, std in EMULATED.items()},
+        {
+            key: np.tile(std**2 * np.array([[1.0, ALIKE], [ALIKE, 1.0]]), (count, 1, 1))
+            for key, std in EMULATED.items()
+        },
         np.tile([-0.3, 0.3], (count, 1)),
         np.full(count, share),
         Extra(
@@ -98,16 +118,24 @@ def straight_table(share, memory, places=2):
 
 
 @pytest.mark.parametrize(
-    ("moving", "memory", "aside"), [(False, 0.0, 0.0), (True, 0.0, 0.0), (True, 0.65, 0.0), (True, 0.0, 0.02)]
+    ("moving", "memory", "aside"),
+    [(False, 0.0, 0.0), (True, 0.0, 0.0), (True, 0.65, 0.0), (True, 0.0, 0.02)],
 )
-def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, emulator, moving, memory, aside):
+def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(
+    setting, emulator, moving, memory, aside
+):
     """Twenty logarithms' joint density, their covariance by the integrated Wiener process's own formula."""
     rng = np.random.default_rng(3)
     observations = [
-        replace(recording(time, 2980.0 * (1.0 + 0.01 * rng.standard_normal()), 15.0, crfa=2.9, crfa_std=0.2),
-                load_n=load * (1.0 + aside * (number % 2)))
-        for number, time in enumerate(TIMES) for load in (400.0, 700.0)
-    ]  # fmt: skip
+        replace(
+            recording(
+                time, 2980.0 * (1.0 + 0.01 * rng.standard_normal()), 15.0, crfa=2.9, crfa_std=0.2
+            ),
+            load_n=load * (1.0 + aside * (number % 2)),
+        )
+        for number, time in enumerate(TIMES)
+        for load in (400.0, 700.0)
+    ]
     series = series_of(observations)
     forward = Forward(setting, emulator, series.places)
     course = Course(forward, series, "hertz-point", "sq_m")
@@ -116,7 +144,9 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
     assert len(course.leanings) == (3 if aside else 0)  # of each channel, with load
     slope = np.array([{"crf": 0.4, "crfa": 2.0}[sound.channel] for sound in sounds])
     begin = np.array([{"crf": 8.0, "crfa": 1.0}[sound.channel] for sound in sounds]) + 0.4 * slope
-    lever = np.array([(-0.3, 0.3)[sound.place] if sound.channel == "crf" else 0.0 for sound in sounds])
+    lever = np.array(
+        [(-0.3, 0.3)[sound.place] if sound.channel == "crf" else 0.0 for sound in sounds]
+    )
     time = np.array([sound.at for sound in sounds])
     early, late = np.minimum.outer(time, time), np.maximum.outer(time, time)
     wandered = RESTLESS**2 * (early**2 * late / 2.0 - early**3 / 6.0)
@@ -128,20 +158,30 @@ def test_the_filter_is_the_normal_distribution_of_all_that_was_heard(setting, em
             if one.channel == other.channel == "crfa":
                 covariance[row, column] += GAIN_STD**2
             if one.channel == other.channel:
-                covariance[row, column] += emulated**2 * (1.0 if one.place == other.place else ALIKE)
+                covariance[row, column] += emulated**2 * (
+                    1.0 if one.place == other.place else ALIKE
+                )
             if one.channel == other.channel:
                 apart = 0.0 if one.place == other.place else 0.6  # of their levers
                 alike = OWN * (apart == 0.0) + (1.0 - OWN) * np.exp(-0.5 * (apart / ALONG) ** 2)
                 covariance[row, column] += (weight * SIZE[one.channel]) ** 2 * alike
-            if aside and one.channel == other.channel:  # a contact that is moved too far once is so each time
+            if (
+                aside and one.channel == other.channel
+            ):  # a contact that is moved too far once is so each time
                 lean = course.leanings[one.channel, 0]
-                covariance[row, column] += one.aside[0] * lean[one.place] * other.aside[0] * lean[other.place]
+                covariance[row, column] += (
+                    one.aside[0] * lean[one.place] * other.aside[0] * lean[other.place]
+                )
             if memory and one.channel == other.channel == "crf":
-                covariance[row, column] += SCATTER**2 * memory ** (abs(one.at - other.at) * (len(TIMES) - 1))
+                covariance[row, column] += SCATTER**2 * memory ** (
+                    abs(one.at - other.at) * (len(TIMES) - 1)
+                )
         white = one.channel != "crf" or not memory
         covariance[row, row] += one.heard.std**2 + white * (weight * SCATTER) ** 2
     values = np.array([sound.heard.value for sound in sounds])
-    assert walked.log == pytest.approx(multivariate_normal(begin, covariance).logpdf(values), abs=1e-6)
+    assert walked.log == pytest.approx(
+        multivariate_normal(begin, covariance).logpdf(values), abs=1e-6
+    )
 
 
 def test_errors_of_near_operating_points_are_nearly_the_same():
@@ -171,7 +211,9 @@ def test_tables_are_straight_between_knots_and_level_beyond():
 def test_a_share_of_a_range_goes_both_ways(setting):
     for unknown in setting.unknowns:
         if unknown.key != "grid_error":
-            assert unknown.share(unknown.at_share(np.array([0.2, 0.5, 0.8]))) == pytest.approx([0.2, 0.5, 0.8])
+            assert unknown.share(unknown.at_share(np.array([0.2, 0.5, 0.8]))) == pytest.approx(
+                [0.2, 0.5, 0.8]
+            )
 
 
 # Forecasts -----------------------------------------------------------------------------------------------------------
@@ -183,7 +225,9 @@ def test_a_roughening_contact_is_foretold(setting, emulator):
     heard, clr = heard_along(setting, emulator, shares)
     there, limit = int(np.argmax(clr >= 0.5)), 0.5
     seen = there - 12
-    found = forecast_observations(setting, emulator, heard[: seen + 1 : 2], limit=("clr", limit), x_name="hours")
+    found = forecast_observations(
+        setting, emulator, heard[: seen + 1 : 2], limit=("clr", limit), x_name="hours"
+    )
     crossing = np.interp(limit, clr[there - 1 : there + 1], [heard[there - 1].x, heard[there].x])
     crossing -= heard[: seen + 1 : 2][-1].x
     assert found.told
@@ -228,7 +272,9 @@ def test_a_wear_history_is_the_first_drift(setting, emulator):
     """A fourth of a range of 0.25 to 4 um, an eighth of it in 100 h."""
     assert wear_drift(setting, Worn(), 100.0) == pytest.approx((0.125, 0.125))
     assert wear_drift(setting, Worn(), 400.0) == pytest.approx((0.5, 0.5))
-    heard, _ = heard_along(setting, emulator, np.full(6, 0.5), std=0.3)  # which tells next to nothing
+    heard, _ = heard_along(
+        setting, emulator, np.full(6, 0.5), std=0.3
+    )  # which tells next to nothing
     ends = []
     for drift in ((0.6, 0.05), (-0.6, 0.05)):
         found = forecast_observations(setting, emulator, heard, drift=drift, laws=("hertz-point",))
@@ -250,24 +296,37 @@ def test_many_visits_are_taken_together_and_none_is_lost():
     )
 
 
-def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_for(setting, emulator):
+def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_for(
+    setting, emulator
+):
     """A load that differs at every visit: one table, and CRF moved to it to within what contacts differ by."""
     rng = np.random.default_rng(8)
     loads = 500.0 * np.exp(0.012 * rng.standard_normal(12))
-    heard = [replace(recording(float(number)), load_n=load) for number, load in enumerate([500.0, *loads, 800.0])]
+    heard = [
+        replace(recording(float(number)), load_n=load)
+        for number, load in enumerate([500.0, *loads, 800.0])
+    ]
     series = series_of(heard)
     assert [place.load_n for place in series.places] == [500.0, 800.0]
     assert series.usual == 0
     forward = Forward(setting, emulator, series.places)
     course = Course(forward, series, "hertz-point", "sq_m")
     z = rng.standard_normal((400, forward.dims))
-    there = Forward(setting, emulator, tuple(Point(load, 1.91) for load in loads)).shown(z, "hertz-point").crf
+    there = (
+        Forward(setting, emulator, tuple(Point(load, 1.91) for load in loads))
+        .shown(z, "hertz-point")
+        .crf
+    )
     here = forward.shown(z, "hertz-point").crf[:, 0]
-    for load, moved, raw, sound in zip(loads, there.T, series.sounds[1:], course.sounds[1:], strict=False):
+    for load, moved, raw, sound in zip(
+        loads, there.T, series.sounds[1:], course.sounds[1:], strict=False
+    ):
         change = moved - here
         assert raw.heard.value - sound.heard.value == pytest.approx(change.mean(), abs=2e-4)
         assert sound.heard.std == raw.heard.std
-        assert (sound.aside[0] * course.leanings["crf", 0][0]) ** 2 == pytest.approx(change.var(), rel=0.5, abs=1e-8)
+        assert (sound.aside[0] * course.leanings["crf", 0][0]) ** 2 == pytest.approx(
+            change.var(), rel=0.5, abs=1e-8
+        )
         assert np.sign(change.mean()) == np.sign(load - 500.0)
     many = [replace(recording(float(number)), load_n=250.0 + 45.0 * number) for number in range(15)]
     assert len(series_of(many).places) <= MOST_PLACES
@@ -276,34 +335,67 @@ def test_near_operating_points_are_one_place_and_what_lies_between_is_allowed_fo
 
 
 def test_the_last_recordings_of_a_contact_that_changes_are_of_one_age():
-    heard = [replace(recording(x), load_n=load) for x, load in ((0.0, 300.0), (80.0, 700.0), (91.0, 500.0))]
+    heard = [
+        replace(recording(x), load_n=load)
+        for x, load in ((0.0, 300.0), (80.0, 700.0), (91.0, 500.0))
+    ]
     now = latest(Listened(observations=(*heard, recording(100.0))))
-    assert [one.x for one in now.observations] == [100.0]  # 500 N; 700 N was last heard too long ago
+    assert [one.x for one in now.observations] == [
+        100.0
+    ]  # 500 N; 700 N was last heard too long ago
     assert now.notes[-1].endswith("Operating points that were last recorded before: 2.")
 
 
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda _: series_of([replace(recording(float(x)), temperature_k=(None, 340.0)[x % 2]) for x in range(6)]),
-         "some recordings have a temperature and some have none"),
-        (lambda setting: read_limit("crf=3000 Hz", setting), "--forecast takes a limit such as clr=0.5, of clr, sq or"),
-        (lambda setting: read_limit("clr=half", setting), "--forecast clr takes a share of the load"),
+        (
+            lambda _: series_of(
+                [replace(recording(float(x)), temperature_k=(None, 340.0)[x % 2]) for x in range(6)]
+            ),
+            "some recordings have a temperature and some have none",
+        ),
+        (
+            lambda setting: read_limit("crf=3000 Hz", setting),
+            "--forecast takes a limit such as clr=0.5, of clr, sq or",
+        ),
+        (
+            lambda setting: read_limit("clr=half", setting),
+            "--forecast clr takes a share of the load",
+        ),
         (lambda setting: read_limit("sq=2 N", setting), "--forecast sq must be"),
         (lambda _: series_of([recording(float("nan"))]), "has no place in time; give a column x"),
         (lambda _: series_of([recording(float("inf"))]), "has no place in time"),
-        (lambda _: series_of([recording(1.0)] * 9), "4 recordings at different times or more, got 1"),
-        (lambda setting: forecast_observations(setting, None, [], limit=("clr", 1.5)), "must lie between 0 and 1"),
-        (lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-6), drifting="oil_alpha_1_pa"),
-         "a limit must be of clr or oil_alpha_1_pa"),
-        (lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-5)),
-         "a limit of Sq must lie within what .infer. allows, 0.25 µm to 4 µm, got 10 µm"),
-        (lambda setting: forecast_heard(setting, None, HEARD, read_limit("hardness=2 GPa", setting), worn="worn"),
-         "--worn says how Sq drifts, and the limit is of hardness_pa"),
-        (lambda setting: forecast_heard(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),
-         "4 recordings at different times or more, got 1"),
+        (
+            lambda _: series_of([recording(1.0)] * 9),
+            "4 recordings at different times or more, got 1",
+        ),
+        (
+            lambda setting: forecast_observations(setting, None, [], limit=("clr", 1.5)),
+            "must lie between 0 and 1",
+        ),
+        (
+            lambda setting: forecast_observations(
+                setting, None, [], limit=("sq_m", 1e-6), drifting="oil_alpha_1_pa"
+            ),
+            "a limit must be of clr or oil_alpha_1_pa",
+        ),
+        (
+            lambda setting: forecast_observations(setting, None, [], limit=("sq_m", 1e-5)),
+            "a limit of Sq must lie within what .infer. allows, 0.25 µm to 4 µm, got 10 µm",
+        ),
+        (
+            lambda setting: forecast_heard(
+                setting, None, HEARD, read_limit("hardness=2 GPa", setting), worn="worn"
+            ),
+            "--worn says how Sq drifts, and the limit is of hardness_pa",
+        ),
+        (
+            lambda setting: forecast_heard(setting, None, HEARD, Limit("clr", 0.5), worn="worn"),
+            "4 recordings at different times or more, got 1",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_forecast_of_nothing_is_refused(setting, call, said):
     with pytest.raises(BadInput, match=said):
         call(setting)
@@ -326,7 +418,9 @@ def test_what_keeps_the_load_share_low_does_so_in_nineteen_contacts_of_twenty(se
     for bound, expected in ((ways["sq_m"].bound, 0.95), (None, found.now)):
         if bound is not None:
             z[:, 0] = sq.at_share(
-                np.interp(bound, sq.value(sq.at_share(np.linspace(0, 1, 400))), np.linspace(0, 1, 400))
+                np.interp(
+                    bound, sq.value(sq.at_share(np.linspace(0, 1, 400))), np.linspace(0, 1, 400)
+                )
             )
         x = emulator.features(forward.shares(z)[:, 0])
         clr = formula(x[:, len(setting.contact) + 1], sq.value(z[:, 0]))["clr"]
@@ -352,7 +446,9 @@ def test_a_posterior_that_is_hard_to_find_is_drawn_for_longer_unless_it_is_ruled
 
     def found(best=-np.inf, longest=0):
         pool = Pool(lambda z: z, lambda a, b: np.concatenate([a, b]), lambda a, rows: a[rows], 6, 0)
-        return importance(pool, target, rounds=2, best=best, least=200.0, longest=longest), pool.drawn
+        return importance(
+            pool, target, rounds=2, best=best, least=200.0, longest=longest
+        ), pool.drawn
 
     short, drawn = found()
     assert short.effective < 200.0

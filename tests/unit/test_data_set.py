@@ -10,8 +10,8 @@ import pytest
 
 from asperity import Grid
 from asperity.cli import main
+from asperity.monitoring import check_set
 from asperity.surface import gaussian_surface, write_surface
-from asperity.tracking import check_set
 from support.source import ROOT
 
 STATED = """\
@@ -38,7 +38,10 @@ def whole(tmp_path_factory):
     grid = Grid((96, 96), (0.0, 0.0), (0.3e-3, 0.3e-3), periodic=(True, True))
     for number, name in enumerate(("ring-before", "roller-before", "ring-after", "roller-after")):
         rng = np.random.default_rng(number)
-        write_surface(gaussian_surface(grid, sq=1e-6, correlation_length=20e-6, rng=rng), folder / f"maps/{name}.x3p")
+        write_surface(
+            gaussian_surface(grid, sq=1e-6, correlation_length=20e-6, rng=rng),
+            folder / f"maps/{name}.x3p",
+        )
     rows = [(f"run-{i}.csv", i, load, speed, 40 + i) for i, (load, speed) in enumerate(STEPS)]
     write_table(folder, rows)
     for i in range(len(rows)):
@@ -74,7 +77,9 @@ def test_a_whole_set_is_one(whole, capsys):
 
 def without(key):
     def spoil(folder):
-        text = "".join(line for line in STATED.splitlines(keepends=True) if not line.startswith(f"{key} "))
+        text = "".join(
+            line for line in STATED.splitlines(keepends=True) if not line.startswith(f"{key} ")
+        )
         (folder / "set.toml").write_text(text, "utf-8")
 
     return spoil
@@ -90,14 +95,18 @@ def replaced(old, new):
 
 def steps(*rows):
     def spoil(folder):
-        write_table(folder, [(f"run-{i}.csv", i, load, speed, 40) for i, (load, speed) in enumerate(rows)])
+        write_table(
+            folder, [(f"run-{i}.csv", i, load, speed, 40) for i, (load, speed) in enumerate(rows)]
+        )
 
     return spoil
 
 
 def coarse_map(folder):
     grid = Grid((20, 20), (0.0, 0.0), (0.3e-3, 0.3e-3), periodic=(True, True))
-    surface = gaussian_surface(grid, sq=1e-6, correlation_length=60e-6, rng=np.random.default_rng(1))
+    surface = gaussian_surface(
+        grid, sq=1e-6, correlation_length=60e-6, rng=np.random.default_rng(1)
+    )
     write_surface(surface, folder / "maps/ring-after.x3p")
 
 
@@ -109,14 +118,26 @@ SPOILT = {
     "load_n has 2 steps where 3": steps((200, 1.0), (200, 1.5), (500, 2.0), (500, 2.0)),
     "speed_m_s has 1 steps where 3": steps((200, 1.0), (300, 1.0), (500, 1.0), (500, 1.0)),
     "no load and speed were recorded twice": steps((200, 1.0), (300, 1.5), (500, 2.0), (600, 2.0)),
-    "has no column oil_temperature_c": lambda folder: write_table(folder, [("run-0.csv", 0, 1, 1)], HEADS[:-1]),
-    "line 2 of recordings.csv: load_n must": lambda folder: write_table(folder, [("run-0.csv", 0, "", 1, 1)]),
-    "run-1.csv: sampled at 8000 Hz": lambda folder: write_recording(folder / "run-1.csv", rate=8000),
-    "run-2.csv: 3 s long where 10": lambda folder: write_recording(folder / "run-2.csv", seconds=3.0),
-    "run-3.csv: no acceleration (unit V)": lambda folder: write_recording(folder / "run-3.csv", unit="V"),
+    "has no column oil_temperature_c": lambda folder: write_table(
+        folder, [("run-0.csv", 0, 1, 1)], HEADS[:-1]
+    ),
+    "line 2 of recordings.csv: load_n must": lambda folder: write_table(
+        folder, [("run-0.csv", 0, "", 1, 1)]
+    ),
+    "run-1.csv: sampled at 8000 Hz": lambda folder: write_recording(
+        folder / "run-1.csv", rate=8000
+    ),
+    "run-2.csv: 3 s long where 10": lambda folder: write_recording(
+        folder / "run-2.csv", seconds=3.0
+    ),
+    "run-3.csv: no acceleration (unit V)": lambda folder: write_recording(
+        folder / "run-3.csv", unit="V"
+    ),
     "run-0.csv": lambda folder: (folder / "run-0.csv").unlink(),
     "ring-after.x3p: pixels of 15 um, coarser": coarse_map,
-    "the case: ": lambda folder: (folder / "contact.toml").write_text("[contact]\nload = 3\n", "utf-8"),
+    "the case: ": lambda folder: (folder / "contact.toml").write_text(
+        "[contact]\nload = 3\n", "utf-8"
+    ),
 }
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from asperity import BadInput
-from asperity.grid import Grid
-from asperity.wearing.debris import Mark, Ploughing, dragged, stamp
+from asperity.contact.grid import Grid
+from asperity.wear.debris import Mark, Ploughing, dragged, stamp
 from support.passages import hertz_patches, passage, track
 
 FINE = Grid((800, 400), (-100e-6, -50e-6), (100e-6, 50e-6), (False, True))
@@ -28,7 +28,9 @@ def test_volume_and_square_of_a_mark_are_the_closed_forms(length, cutting):
 def test_a_groove_is_two_thirds_of_width_times_depth_across():
     mark = Mark.of(60e-6, 12e-6, 1e-6, 1.0)
     across, _ = mark.heights(np.zeros(1), FINE.y)
-    assert np.trapezoid(across, FINE.y) == pytest.approx(2.0 / 3.0 * 12e-6 * 1e-6, rel=1e-3, abs=0.0)
+    assert np.trapezoid(across, FINE.y) == pytest.approx(
+        2.0 / 3.0 * 12e-6 * 1e-6, rel=1e-3, abs=0.0
+    )
     assert across.max() == pytest.approx(1e-6, rel=1e-3, abs=0.0)
 
 
@@ -46,7 +48,9 @@ def test_a_mark_lies_on_a_coarse_grid_as_on_a_fine_one():
 
 def ploughed(cutting, seed=0, concentration=1e14):
     grid = track((96, 48))
-    ploughing = Ploughing(concentration=concentration, smallest=8e-6, largest=20e-6, cutting=cutting, sinking=0.2)
+    ploughing = Ploughing(
+        concentration=concentration, smallest=8e-6, largest=20e-6, cutting=cutting, sinking=0.2
+    )
     patches = hertz_patches(grid, 50e-6, 1e9, 4)
     jump = passage(grid, patches, jump=20.0, rng=np.random.default_rng(seed))
     return ploughing, jump, ploughing(jump)
@@ -78,16 +82,23 @@ def test_a_ball_is_struck_only_on_its_track():
         grid = Grid((96, cells), (-200e-6, -0.5 * width), (200e-6, 0.5 * width), (False, False))
         wide = hertz_patches(grid, 50e-6, 1e9, 4)
         round_ones = [
-            replace(patch, pressure=patch.pressure * np.sqrt(np.maximum(1.0 - (grid.y / 50e-6) ** 2, 0.0)))
+            replace(
+                patch,
+                pressure=patch.pressure * np.sqrt(np.maximum(1.0 - (grid.y / 50e-6) ** 2, 0.0)),
+            )
             for patch in wide
         ]
         ploughing = Ploughing(concentration=1e14, smallest=8e-6, largest=20e-6, sinking=0.2)
         marks = []
         for seed in range(10):
-            change = ploughing(passage(grid, round_ones, jump=20.0, rng=np.random.default_rng(seed)))
+            change = ploughing(
+                passage(grid, round_ones, jump=20.0, rng=np.random.default_rng(seed))
+            )
             marks.append(change.facts["marks"])
             widest = ploughing.mark(20e-6, 0.5e-6, passage(grid, round_ones)).reach
-            assert not change.heights_change[:, np.abs(grid.y) > 50e-6 + widest + grid.spacing[1]].any()
+            assert not change.heights_change[
+                :, np.abs(grid.y) > 50e-6 + widest + grid.spacing[1]
+            ].any()
         assert np.mean(marks) == pytest.approx(expected, abs=4.0 * np.sqrt(expected / 10))
 
 
@@ -147,9 +158,15 @@ def test_the_next_jump_ends_before_sq_has_risen_much():
     waves = 1e-6 * np.cos(0.2 * np.arange(64.0))[:, None] + np.zeros(grid.cells)
     jump = passage(grid, hertz_patches(grid, 50e-6, 1e9, 4), jump=1e-6, heights=waves)
     mark = ploughing.mark(10e-6, 0.5e-6, jump)
-    assert ploughing(jump).longest == pytest.approx(0.1 * np.var(waves) / (1e12 * 0.5e-6 * mark.square), rel=1e-3)
-    smooth = ploughing(replace(jump, heights=1e-13 * waves)).longest  # not none: as if as rough as the film is thick
-    assert smooth == pytest.approx(0.1 * 0.25e-12 / (1e12 * 0.5e-6 * mark.square), rel=1e-3, abs=0.0)
+    assert ploughing(jump).longest == pytest.approx(
+        0.1 * np.var(waves) / (1e12 * 0.5e-6 * mark.square), rel=1e-3
+    )
+    smooth = ploughing(
+        replace(jump, heights=1e-13 * waves)
+    ).longest  # not none: as if as rough as the film is thick
+    assert smooth == pytest.approx(
+        0.1 * 0.25e-12 / (1e12 * 0.5e-6 * mark.square), rel=1e-3, abs=0.0
+    )
     thick = hertz_patches(grid, 50e-6, 1e9, 4, film=20e-6)
     assert ploughing(replace(jump, patches=thick)).longest == np.inf
 
@@ -158,7 +175,9 @@ def test_without_sliding_a_mark_is_a_dent():
     grid = track()
     patches = hertz_patches(grid, 50e-6, 1e9, 2)
     assert dragged(passage(grid, patches, sliding_speed=0.0)) == 0.0
-    assert dragged(passage(grid, patches, sliding_speed=0.4)) == pytest.approx(2 * 50e-6 * 0.4 / 1.6, rel=1e-9, abs=0.0)
+    assert dragged(passage(grid, patches, sliding_speed=0.4)) == pytest.approx(
+        2 * 50e-6 * 0.4 / 1.6, rel=1e-9, abs=0.0
+    )
 
 
 @pytest.mark.parametrize(

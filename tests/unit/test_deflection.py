@@ -29,16 +29,24 @@ def test_one_loaded_cell_dents_as_the_sum_of_its_images_does(deflection):
 
 
 @pytest.mark.parametrize("cells", [(16, 12), (15, 9), (9, 16)])
-@pytest.mark.parametrize(("spacing", "tolerance"), [((0.05, 0.05), 1e-7), ((0.2, 0.02), 3e-6), ((0.02, 0.2), 1e-7)])
+@pytest.mark.parametrize(
+    ("spacing", "tolerance"), [((0.05, 0.05), 1e-7), ((0.2, 0.02), 3e-6), ((0.02, 0.2), 1e-7)]
+)
 def test_cells_of_any_shape(cells, spacing, tolerance):
     pressure = np.zeros(cells)
     pressure[0, 0] = 1.0
-    x, y = np.meshgrid(*(np.arange(n) * d for n, d in zip(cells, spacing, strict=True)), indexing="ij")
+    x, y = np.meshgrid(
+        *(np.arange(n) * d for n, d in zip(cells, spacing, strict=True)), indexing="ij"
+    )
     expected = periodic_compliance(x, y, spacing, cells[1] * spacing[1])
-    np.testing.assert_allclose(line_deflection(cells, spacing)(pressure), expected, atol=tolerance * np.ptp(expected))
+    np.testing.assert_allclose(
+        line_deflection(cells, spacing)(pressure), expected, atol=tolerance * np.ptp(expected)
+    )
 
 
-def alias_by_alias(cells: tuple[int, int], spacing: tuple[float, float], aliases: int) -> np.ndarray:
+def alias_by_alias(
+    cells: tuple[int, int], spacing: tuple[float, float], aliases: int
+) -> np.ndarray:
     """The transformed kernel with each alias' cells integrated one by one, as far as the sum is told to go."""
     (nx, ny), (dx, dy) = cells, spacing
     kernel = np.zeros((nx, ny // 2 + 1))
@@ -49,7 +57,9 @@ def alias_by_alias(cells: tuple[int, int], spacing: tuple[float, float], aliases
         wavenumber = 2.0 * np.pi * np.abs(number) / (ny * dy)
         argument = np.outer(edges, wavenumber)
         integral = np.where(
-            np.abs(argument) < 40.0, scipy.special.iti0k0(np.minimum(np.abs(argument), 40.0))[1], np.pi / 2.0
+            np.abs(argument) < 40.0,
+            scipy.special.iti0k0(np.minimum(np.abs(argument), 40.0))[1],
+            np.pi / 2.0,
         )
         integral[0] *= -1.0
         kernel[:, wave] = np.diff(integral, axis=0) @ (np.sinc(number / ny) / wavenumber)
@@ -70,7 +80,10 @@ def test_the_sum_over_aliases_is_that_of_four_thousand(cells, aspect):
 def test_what_is_left_of_k0_beyond_an_argument():
     """By quadrature, on both sides of where the polynomial begins."""
     argument = np.array([1e-3, 0.5, 2.999, 3.001, 5.0, 12.0, 20.0, 31.9])
-    expected = [scipy.integrate.quad(scipy.special.k0, z, z + 40.0, epsabs=1e-15, epsrel=1e-11)[0] for z in argument]
+    expected = [
+        scipy.integrate.quad(scipy.special.k0, z, z + 40.0, epsabs=1e-15, epsrel=1e-11)[0]
+        for z in argument
+    ]
     np.testing.assert_allclose(_k0_beyond(argument), expected, rtol=1e-12, atol=1e-13)
 
 
@@ -80,15 +93,21 @@ def test_a_pressure_that_does_not_vary_in_y_meets_the_logarithm(deflection):
     x = np.arange(CELLS[0]) * SPACING[0]
     edge = x[:, None] - x[None, :]
     upper, lower = edge + SPACING[0] / 2.0, edge - SPACING[0] / 2.0
-    expected = -(upper * np.log(np.abs(upper)) - lower * np.log(np.abs(lower)) - SPACING[0]) / np.pi @ line
+    expected = (
+        -(upper * np.log(np.abs(upper)) - lower * np.log(np.abs(lower)) - SPACING[0]) / np.pi @ line
+    )
     found = deflection(np.repeat(line[:, None], CELLS[1], axis=1))
-    np.testing.assert_allclose(found, np.repeat(expected[:, None], CELLS[1], axis=1), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        found, np.repeat(expected[:, None], CELLS[1], axis=1), rtol=1e-12, atol=1e-13
+    )
 
 
 def test_some_lines_deflect_as_among_all(deflection):
     pressure = np.zeros(CELLS)
     pressure[5:9] = np.random.default_rng(2).random((4, CELLS[1]))
-    np.testing.assert_allclose(deflection.among(4)(pressure[5:9]), deflection(pressure)[5:9], rtol=1e-13)
+    np.testing.assert_allclose(
+        deflection.among(4)(pressure[5:9]), deflection(pressure)[5:9], rtol=1e-13
+    )
     single = deflection.among(4)(pressure[5:9].astype(np.float32))
     assert single.dtype == np.float32
     np.testing.assert_allclose(single, deflection(pressure)[5:9], rtol=1e-5)
@@ -100,7 +119,9 @@ def test_a_hertz_pressure_flattens_the_parabola(cells):
     dx = 4.0 / cells
     x = -2.0 + (np.arange(cells) + 0.5) * dx
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - x**2, 0.0))[:, None], 8, axis=1)
-    flat = (line_deflection((cells, 8), (dx, 0.3))(pressure) + (x**2 / 2.0)[:, None])[np.abs(x) < 1.0]
+    flat = (line_deflection((cells, 8), (dx, 0.3))(pressure) + (x**2 / 2.0)[:, None])[
+        np.abs(x) < 1.0
+    ]
     assert np.ptp(flat) < 3.0 * cells**-1.5
     # and the constant: int sqrt(1 - s^2) ln|s| ds = -(pi/2)(ln 2 + 1/2), over -pi
     assert flat.mean() == pytest.approx((np.log(2.0) + 0.5) / 2.0, abs=3.0 * cells**-1.5)
@@ -121,12 +142,18 @@ def test_linear_reciprocal_and_mirrored(deflection):
     rng = np.random.default_rng(2)
     one, other = rng.random(CELLS), rng.random(CELLS)
     np.testing.assert_allclose(
-        deflection(2.0 * one - 3.0 * other), 2.0 * deflection(one) - 3.0 * deflection(other), atol=1e-13
+        deflection(2.0 * one - 3.0 * other),
+        2.0 * deflection(one) - 3.0 * deflection(other),
+        atol=1e-13,
     )
-    assert np.sum(other * deflection(one)) == pytest.approx(np.sum(one * deflection(other)), rel=1e-12)  # Betti
+    assert np.sum(other * deflection(one)) == pytest.approx(
+        np.sum(one * deflection(other)), rel=1e-12
+    )  # Betti
     np.testing.assert_allclose(deflection(one[::-1]), deflection(one)[::-1], atol=1e-13)
     np.testing.assert_allclose(deflection(one[:, ::-1]), deflection(one)[:, ::-1], atol=1e-13)
-    np.testing.assert_allclose(deflection(np.roll(one, 5, 1)), np.roll(deflection(one), 5, 1), atol=1e-13)
+    np.testing.assert_allclose(
+        deflection(np.roll(one, 5, 1)), np.roll(deflection(one), 5, 1), atol=1e-13
+    )
 
 
 def test_every_pressure_costs_work(deflection):
@@ -152,7 +179,10 @@ def test_a_hertz_pressure_on_a_circle_flattens_the_sphere():
         x = -1.5 + (np.arange(cells) + 0.5) * step
         squared = x[:, None] ** 2 + x**2
         pressure = np.sqrt(np.maximum(1.0 - squared, 0.0))
-        bent = half_space((cells, cells), (step, step), 2.0 / np.pi**2, False)(pressure) + squared / 2.0
+        bent = (
+            half_space((cells, cells), (step, step), 2.0 / np.pi**2, False)(pressure)
+            + squared / 2.0
+        )
         errors.append(float(np.abs(bent[squared < 0.8] - 1.0).max()))
     assert errors[-1] < 1e-3
     assert errors[0] / errors[-1] > 4.0**2 / 2.0

@@ -5,10 +5,19 @@ import itertools
 import numpy as np
 import pytest
 
-from asperity.dialect import Dialect, sniff_dialect
+from asperity.core.text_dialect import Dialect, sniff_dialect
 from asperity.surface.text import read_table
 
-ROWS = [[0.5, 1.25], [1.0, -2.5], [2.25, 3e-3], [3.0, 4.0], [4.0, np.nan], [5.5, 7.25], [6.0, 1.0], [7.0, 2.5]]
+ROWS = [
+    [0.5, 1.25],
+    [1.0, -2.5],
+    [2.25, 3e-3],
+    [3.0, 4.0],
+    [4.0, np.nan],
+    [5.5, 7.25],
+    [6.0, 1.0],
+    [7.0, 2.5],
+]
 
 
 @pytest.mark.parametrize("separator", [";", "\t", " ", "  ", ",", ", "])
@@ -26,10 +35,15 @@ def test_rows_are_read_however_they_are_written(separator, comma, tmp_path):
             text = missing if np.isnan(value) else f"{value:g}".replace(".", "," if comma else ".")
             return f'"{text}"' if quoted else text
 
-        lines = [separator.join(map(field, row)) + (separator if trailing and not blank else "") for row in ROWS]
+        lines = [
+            separator.join(map(field, row)) + (separator if trailing and not blank else "")
+            for row in ROWS
+        ]
         (tmp_path / "a.txt").write_text(header + "\n".join(lines) + "\n")
         written = (missing, header, trailing, quoted)
-        np.testing.assert_allclose(read_table(tmp_path / "a.txt"), ROWS, rtol=1e-6, err_msg=str(written))
+        np.testing.assert_allclose(
+            read_table(tmp_path / "a.txt"), ROWS, rtol=1e-6, err_msg=str(written)
+        )
 
 
 def test_one_column_may_have_decimal_commas_two_whole_numbers_may_not():

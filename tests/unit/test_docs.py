@@ -13,7 +13,7 @@ import pytest
 from pint import Quantity
 from pydantic.fields import FieldInfo
 
-from asperity.quantities import catalogue
+from asperity.core.quantities import catalogue
 from support.judging import AMOUNT, block_problems, judged, leads, place, problems
 from support.pages import Line, Page, pages, read
 from support.source import PACKAGE, ROOT, functions, modules, parsed
@@ -68,7 +68,9 @@ OF_JSON = {  # what golden numbers do not show of `--json`
     "traction": "the section is about two commands",
 }
 TABLES_BESIDE = {"study": {"rows"}, "run": {"rows"}}  # golden numbers have the table, too
-PAGES = pytest.mark.parametrize("page", pages(), ids=lambda page: page.path.relative_to(ROOT).as_posix())
+PAGES = pytest.mark.parametrize(
+    "page", pages(), ids=lambda page: page.path.relative_to(ROOT).as_posix()
+)
 
 
 @PAGES
@@ -79,7 +81,9 @@ def test_what_a_page_names_exists(page):
 
 @PAGES
 def test_links_lead_somewhere(page):
-    wrong = [f"{place(page, line)}: {target}" for line, target in page.links() if not leads(page, target)]
+    wrong = [
+        f"{place(page, line)}: {target}" for line, target in page.links() if not leads(page, target)
+    ]
     assert not wrong, "\n".join(wrong)
 
 
@@ -109,7 +113,9 @@ def test_every_command_has_its_section():
 def test_json_keys_are_those_of_the_golden_numbers(command):
     assert unknown_keys(command, sections()[command]) == []
     texts = [line.text for line in sections()[command]]
-    words = names_in(texts) | (set(catalogue()) if any("](quantities.md)" in text for text in texts) else set())
+    words = names_in(texts) | (
+        set(catalogue()) if any("](quantities.md)" in text for text in texts) else set()
+    )
     keys = {key for tree in golden(command) for key in tree} - TABLES_BESIDE.get(command, set())
     assert sorted(key for key in keys if not any(stands_for(word, key) for word in words)) == []
 
@@ -128,7 +134,12 @@ def json_lines(lines: list[Line]) -> Iterator[str]:
 
 def names_in(texts: Iterable[str]) -> set[str]:
     spans = (span for text in texts for span in re.findall(r"`([^`]+)`", text))
-    return {word for span in spans for word in span.split(", ") if re.fullmatch(r"(\.\.\.)?[a-z_]\w*(\.\.\.)?", word)}
+    return {
+        word
+        for span in spans
+        for word in span.split(", ")
+        if re.fullmatch(r"(\.\.\.)?[a-z_]\w*(\.\.\.)?", word)
+    }
 
 
 def stands_for(word: str, key: str) -> bool:
@@ -172,19 +183,27 @@ def case_tables() -> dict[str, dict[str, str]]:
         keys = re.findall(r"`(\w+)`", cells[0])
         stated = cells[columns.index("default")] if "default" in columns else ""
         spans = re.findall(r"`([^`]+)`", stated)
-        table |= dict(zip(keys, spans if len(spans) == len(keys) else [stated] * len(keys), strict=True))
+        table |= dict(
+            zip(keys, spans if len(spans) == len(keys) else [stated] * len(keys), strict=True)
+        )
     return tables
 
 
 @pytest.mark.parametrize("name", case_sections())
 def test_the_case_file_has_every_key_with_its_default(name):
     fields, documented = case_sections()[name].model_fields, case_tables()[IN_STUDY.get(name, name)]
-    values = {key for key in fields if key not in ("kind", "file", "axes") and not is_table(name, key)}
+    values = {
+        key for key in fields if key not in ("kind", "file", "axes") and not is_table(name, key)
+    }
     if name != "[surface]":
         values -= {"second"}  # every surface has it, and the page says so once
     assert set(documented) - {"file", "kind"} == values
     stated = {key: text for key, text in documented.items() if text and text != "as above"}
-    wrong = {key: (text, fields[key].default) for key, text in stated.items() if not is_default(text, fields[key])}
+    wrong = {
+        key: (text, fields[key].default)
+        for key, text in stated.items()
+        if not is_default(text, fields[key])
+    }
     assert wrong == {}
 
 
@@ -201,7 +220,9 @@ def is_default(text: str, field: FieldInfo) -> bool:
     if value is None or default is None:
         return value is None and default is None
     if isinstance(value["value"], str) and AMOUNT.fullmatch(value["value"]):
-        return float(Quantity(value["value"]).to_base_units().magnitude) == pytest.approx(float(default), rel=1e-12)
+        return float(Quantity(value["value"]).to_base_units().magnitude) == pytest.approx(
+            float(default), rel=1e-12
+        )
     return bool(value["value"] == default)
 
 
@@ -209,7 +230,9 @@ def is_default(text: str, field: FieldInfo) -> bool:
 def test_tests_stand_in_the_files_that_are_named_beside_them(page):
     for line in page.prose:
         spans = re.findall(r"`(?:[\w/]*/)?(test_\w+(?:\.py)?)`", line.text)
-        files = [file for name in spans if name.endswith(".py") for file in ROOT.glob(f"tests/*/{name}")]
+        files = [
+            file for name in spans if name.endswith(".py") for file in ROOT.glob(f"tests/*/{name}")
+        ]
         there = {function.name for file in files for function in functions(parsed(file))}
         named = {name for name in spans if not name.endswith(".py")}
         assert not files or named <= there, place(page, line)
@@ -227,10 +250,14 @@ def test_docstrings_name_what_exists():
     wrong = []
     for module, tree in modules():
         for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (
+                text := ast.get_docstring(node)
+            ):
                 own = {name.id for name in ast.walk(node) if isinstance(name, ast.Name)}
                 page = Page(PACKAGE / module, text)
-                wrong += [f"{module}: {line}" for line in problems(page) if line.split("`")[1] not in own]
+                wrong += [
+                    f"{module}: {line}" for line in problems(page) if line.split("`")[1] not in own
+                ]
     assert not wrong, "\n".join(wrong)
 
 
@@ -244,9 +271,13 @@ def recipes() -> dict[str, str]:
 
 
 def test_tables_stand_in_the_files_that_recipes_name_beside_them():
-    rows = [line.text for line in ARCHITECTURE.prose if line.headings[-1:] == ("Where to add things",)]
+    rows = [
+        line.text for line in ARCHITECTURE.prose if line.headings[-1:] == ("Where to add things",)
+    ]
     for text in (*recipes().values(), *rows):
-        files = [file for name in re.findall(r"`([\w/]+\.py)`", text) for file in source_files(name)]
+        files = [
+            file for name in re.findall(r"`([\w/]+\.py)`", text) for file in source_files(name)
+        ]
         tables = set(re.findall(r"`(_?[A-Z]{3}[A-Z_]+)`", text))
         assert not files or tables <= {name for file in files for name in top_level(file)}, text
 
@@ -258,11 +289,18 @@ def test_every_recipe_ends_in_its_proof():
 
 
 def source_files(name: str) -> list[Path]:
-    return [path for folder in (ROOT, PACKAGE, *PACKAGE.iterdir()) if (path := folder / name).is_file()]
+    return [
+        path for folder in (ROOT, PACKAGE, *PACKAGE.iterdir()) if (path := folder / name).is_file()
+    ]
 
 
 def top_level(file: Path) -> set[str]:
-    return {name.id for node in parsed(file).body for name in ast.walk(node) if isinstance(name, ast.Name)}
+    return {
+        name.id
+        for node in parsed(file).body
+        for name in ast.walk(node)
+        if isinstance(name, ast.Name)
+    }
 
 
 def test_the_page_of_quantities_is_that_of_the_catalogue():
@@ -273,20 +311,58 @@ def test_the_page_of_quantities_is_that_of_the_catalogue():
 
 
 MISTAKES = {
-    "a path": ["src/asperity/gone.py", "lubricant/gone.py", "tests/unit/test_gone.py", "never-was.csv", "gone/"],
+    "a path": [
+        "src/asperity/gone.py",
+        "lubricant/gone.py",
+        "tests/unit/test_gone.py",
+        "never-was.csv",
+        "gone/",
+    ],
     "a name": ["solve_contract", "_FIRST_RESORTS", "asp.solve_contract", "test_that_never_was"],
-    "an attribute": ["LoadSharing.clr_sold", "asperity.wear.Stage", "convergence.eror", "ehl.solve_contract", ".gian"],
-    "a call": ["acceleration(way='exact')", 'contact_resonance(method="peek")', "solve_contract(case)"],
-    "elsewhere": ["scipy.signal.freqs_of", "python -m benchmarks.gone", "make tests", "pip install 'asperity[gone]'"],
-    "a key of a case": ["vibration.stiffness_laws", "[vibrations]", 'contact.lod = ["1 N"]', "'grid.z[0]=-4..-1'"],
+    "an attribute": [
+        "LoadSharing.clr_sold",
+        "asperity.wear.Stage",
+        "convergence.eror",
+        "ehl.solve_contract",
+        ".gian",
+    ],
+    "a call": [
+        "acceleration(way='exact')",
+        'contact_resonance(method="peek")',
+        "solve_contract(case)",
+    ],
+    "elsewhere": [
+        "scipy.signal.freqs_of",
+        "python -m benchmarks.gone",
+        "make tests",
+        "pip install 'asperity[gone]'",
+    ],
+    "a key of a case": [
+        "vibration.stiffness_laws",
+        "[vibrations]",
+        'contact.lod = ["1 N"]',
+        "'grid.z[0]=-4..-1'",
+    ],
     "a choice": ['method = "peek"', '"hertz-pont"', '{ law = "barrus", eta0 = "1 Pa s" }'],
-    "a command": ["asperity trace", "asperity track FILE... [--speeds 3]", "trace --json", "asperity solve a b"],
-    "an option": ["--raet", "--set contact.lod=1", "asperity solve --out --json", "asperity solve x --set a=1"],
+    "a command": [
+        "asperity trace",
+        "asperity track FILE... [--speeds 3]",
+        "trace --json",
+        "asperity solve a b",
+    ],
+    "an option": [
+        "--raet",
+        "--set contact.lod=1",
+        "asperity solve --out --json",
+        "asperity solve x --set a=1",
+    ],
     "a list": ["car, carr"],
 }
 
 
-@pytest.mark.parametrize(("kind", "text"), [(kind, text) for kind, texts in MISTAKES.items() for text in texts])
+@pytest.mark.parametrize(
+    ("kind", "text"), [(kind, text) for kind, texts in MISTAKES.items() for text in texts]
+)
 def test_a_mistake_of_each_kind_is_seen(kind, text):
     assert judged(text, ROOT / "docs" / "a.md") is not None, kind
 
@@ -320,6 +396,15 @@ def test_every_exception_is_needed():
     spans = {span.text: (page, span) for page in pages() for span in page.spans()}
     assert sorted(EXCEPTIONS.keys() - spans.keys()) == []
     told = ((text, *spans[text]) for text in EXCEPTIONS)
-    assert [text for text, page, span in told if judged(text, page.path, span.line.headings) is None] == []
-    shown = {word: [name for name in sections() if word in names_in(json_lines(sections()[name]))] for word in OF_JSON}
-    assert [w for w, names in shown.items() if all(w in json_keys(n) | json_texts(n) for n in names if golden(n))] == []
+    assert [
+        text for text, page, span in told if judged(text, page.path, span.line.headings) is None
+    ] == []
+    shown = {
+        word: [name for name in sections() if word in names_in(json_lines(sections()[name]))]
+        for word in OF_JSON
+    }
+    assert [
+        w
+        for w, names in shown.items()
+        if all(w in json_keys(n) | json_texts(n) for n in names if golden(n))
+    ] == []

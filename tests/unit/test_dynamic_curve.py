@@ -9,19 +9,25 @@ import xarray
 
 from asperity.case import load_case
 from asperity.cli import main
-from asperity.ehl import dynamic_stiffness
-from asperity.errors import AsperityError, BadInput
+from asperity.core.errors import AsperityError, BadInput
 from asperity.report import write_report
 from asperity.report.run.stiffness import stiffness_over_frequency
 from asperity.results import dynamic, load_run, solve_case
+from asperity.solution import dynamic_stiffness
 
-SMALL = {"grid.cells": "[64, 32]", "surface.correlation_length": "40 um", "vibration.duration": "0.2 s"}
+SMALL = {
+    "grid.cells": "[64, 32]",
+    "surface.correlation_length": "40 um",
+    "vibration.duration": "0.2 s",
+}
 COUNT = 9
 
 
 @pytest.fixture(scope="module")
 def run():
-    return solve_case(load_case("examples/paper.toml").with_overrides({**SMALL, "solver.dynamic": COUNT}))
+    return solve_case(
+        load_case("examples/paper.toml").with_overrides({**SMALL, "solver.dynamic": COUNT})
+    )
 
 
 def test_the_curve_passes_through_the_reported_resonance(run):
@@ -40,12 +46,16 @@ def test_every_point_is_the_contact_shaken_at_that_frequency_alone(run):
     curve = run.dynamic_curve
     for place in (0, COUNT - 1):
         for yielded, branch in (("elastic", curve.elastic), ("flowing", curve.virgin)):
-            alone = dynamic_stiffness(run.solution, float(curve.frequency_hz[place]), yielded=yielded)
+            alone = dynamic_stiffness(
+                run.solution, float(curve.frequency_hz[place]), yielded=yielded
+            )
             assert branch.stiffness[place] == pytest.approx(alone.stiffness, rel=1e-3)
             assert branch.damping[place] == pytest.approx(
                 alone.damping, rel=2e-2, abs=1e-3 * abs(curve.elastic.damping[0])
             )
-    assert curve.elastic.slow == pytest.approx(dynamic_stiffness(run.solution, 0.0).stiffness, rel=1e-3)
+    assert curve.elastic.slow == pytest.approx(
+        dynamic_stiffness(run.solution, 0.0).stiffness, rel=1e-3
+    )
 
 
 def test_it_stands_in_json_and_file_and_nothing_where_it_was_not_asked_for(run, tmp_path):
@@ -57,10 +67,14 @@ def test_it_stands_in_json_and_file_and_nothing_where_it_was_not_asked_for(run, 
     assert set(said) > {"stiffness_virgin_n_m", "damping_virgin_ns_m", "slow_stiffness_virgin_n_m"}
     with xarray.open_dataset(run.save(tmp_path / "run.nc")) as kept:
         np.testing.assert_array_equal(kept["dynamic_frequency"], run.dynamic_curve.frequency_hz)
-        np.testing.assert_array_equal(kept["dynamic_stiffness"], run.dynamic_curve.elastic.stiffness)
+        np.testing.assert_array_equal(
+            kept["dynamic_stiffness"], run.dynamic_curve.elastic.stiffness
+        )
         assert kept["dynamic_damping"].attrs["units"] == "N s m-1"
     again = load_run(tmp_path / "run.nc")
-    np.testing.assert_allclose(again.dynamic_curve.elastic.stiffness, run.dynamic_curve.elastic.stiffness, rtol=1e-6)
+    np.testing.assert_allclose(
+        again.dynamic_curve.elastic.stiffness, run.dynamic_curve.elastic.stiffness, rtol=1e-6
+    )
     plain = replace(run, case=run.case.with_overrides({"solver.dynamic": 0}))
     assert plain.dynamic_curve is None
     assert "dynamic_curve" not in plain.summary()
@@ -107,7 +121,8 @@ def test_what_cannot_be_shaken_says_why(run):
     conserving = solve_case(run.case.with_overrides({"model": "conserving", "surface": "flat"}))
     assert conserving.dynamic_curve is None
     assert any(
-        "No stiffness over frequency: a dynamic stiffness needs the model" in note for note in conserving.remarks
+        "No stiffness over frequency: a dynamic stiffness needs the model" in note
+        for note in conserving.remarks
     )
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from asperity.ehl import Options, elastic, solve_contact
+from asperity.ehl import Options, solve_contact
 from asperity.ehl import solve as solving
-from asperity.ehl.search import Search
+from asperity.ehl.models import elastic_dry as elastic
+from asperity.ehl.strategies.grid_continuation import Search
 from support.paper import contact, grid, rough
 
 TIGHT = Options(tolerance=1e-9)
@@ -20,9 +21,14 @@ def by_newton(conditions, surface, monkeypatch):
 @pytest.mark.parametrize("sq", [0.2e-6, 1e-6, 4e-6])  # the last touches far outside the Hertz zone
 def test_it_is_newtons_contact_and_one_step_of_newtons_says_so(sq, monkeypatch):
     surface = rough(grid((96, 80)), sq)
-    found, expected = solve_contact(contact(), None, surface, options=TIGHT), by_newton(contact(), surface, monkeypatch)
+    found, expected = (
+        solve_contact(contact(), None, surface, options=TIGHT),
+        by_newton(contact(), surface, monkeypatch),
+    )
     np.testing.assert_array_equal(found.in_contact, expected.in_contact)
-    np.testing.assert_allclose(found.pressure, expected.pressure, atol=1e-7 * expected.pressure.max())
+    np.testing.assert_allclose(
+        found.pressure, expected.pressure, atol=1e-7 * expected.pressure.max()
+    )
     assert found.rigid_approach == pytest.approx(expected.rigid_approach, rel=1e-8)
     assert found.convergence.iterations == 1 < expected.convergence.iterations
 
@@ -46,7 +52,9 @@ def test_yielding_bodies_and_gradients_out_of_steps_are_left_to_newton(monkeypat
     expected = by_newton(contact(), surface, monkeypatch)
     asked = []
     exact = solving.elastic_contact
-    monkeypatch.setattr(solving, "elastic_contact", lambda *given: asked.append(given) or exact(*given))
+    monkeypatch.setattr(
+        solving, "elastic_contact", lambda *given: asked.append(given) or exact(*given)
+    )
     solve_contact(contact(hardness=2e9), None, surface)
     assert asked == []
     monkeypatch.setattr(elastic, "MOST_STEPS", 3)

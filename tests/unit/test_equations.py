@@ -47,16 +47,24 @@ def test_the_tables_are_found():
     assert len({page.path.stem for page, _, _ in ROWS}) >= 6
 
 
-@pytest.mark.parametrize(("page", "line", "row"), NAMED, ids=[row["function"] for _, _, row in NAMED])
+@pytest.mark.parametrize(
+    ("page", "line", "row"), NAMED, ids=[row["function"] for _, _, row in NAMED]
+)
 def test_a_row_names_a_public_function_and_a_test_that_uses_it(page, line, row):
     public = {name for face in faces().values() for name in exported(face)}
     (name,) = re.findall(r"`(?:\w+\.)*(\w+)`", row["function"])
     assert name in public, f"{page.path.name}:{line.number}"
-    files = [path for file in re.findall(r"`(test_\w+\.py)`", row["test"]) for path in ROOT.glob(f"tests/*/{file}")]
+    files = [
+        path
+        for file in re.findall(r"`(test_\w+\.py)`", row["test"])
+        for path in ROOT.glob(f"tests/*/{file}")
+    ]
     known = {function.name for file in files for function in functions(parsed(file))}
     tests = set(re.findall(r"`(test_\w+)`", row["test"]))
     assert files
-    assert tests <= known, f"{page.path.name}:{line.number}: {tests - known} is not in {[file.name for file in files]}"
+    assert tests <= known, (
+        f"{page.path.name}:{line.number}: {tests - known} is not in {[file.name for file in files]}"
+    )
 
 
 def test_every_public_law_stands_in_a_table():
@@ -67,8 +75,12 @@ def test_every_public_law_stands_in_a_table():
         for name, thing in exported(face).items()
         if inspect.isroutine(thing) or inspect.isclass(thing)
         if EQUATION.search((thing.__doc__ or "").split("\n\n")[0])
-        if not (thing.__doc__ or "").startswith(f"{name}(")  # what dataclasses write where nobody did
+        if not (thing.__doc__ or "").startswith(
+            f"{name}("
+        )  # what dataclasses write where nobody did
     }
     assert len(laws) > 30
-    assert sorted(name for name in laws - NO_LAW.keys() if not re.search(rf"\b{name}\b", told)) == []
+    assert (
+        sorted(name for name in laws - NO_LAW.keys() if not re.search(rf"\b{name}\b", told)) == []
+    )
     assert sorted(NO_LAW.keys() - laws) == []

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.grid import Grid
-from asperity.signals import Signal, power_spectrum
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
+from asperity.core.signals import Signal, power_spectrum
 from asperity.surface import Surface, flat_surface, gaussian_surface
 from asperity.vibration import FilteredNoise, PatchAverage, SurfaceTrack
 from asperity.vibration.excitation import synthesised
@@ -18,9 +18,15 @@ def noise(**choices) -> FilteredNoise:
 @pytest.mark.parametrize(("height_as", "rms"), [("rms", 2e-6), ("ra", 2e-6 * np.sqrt(np.pi / 2))])
 def test_density_integrates_to_the_height(filter_name, order, height_as, rms):
     rate = 10e3
-    frequency = np.concatenate([np.linspace(0.0, 500.0, 200_001), np.geomspace(500.01, 5000.0, 20_001)])
-    density = noise(filter=filter_name, filter_order=order, height_as=height_as).density(frequency, rate)
-    beyond = density[-1] * 5000.0 if filter_name == "continuous" and order == 1 else 0.0  # f^-2 from 5 kHz on
+    frequency = np.concatenate(
+        [np.linspace(0.0, 500.0, 200_001), np.geomspace(500.01, 5000.0, 20_001)]
+    )
+    density = noise(filter=filter_name, filter_order=order, height_as=height_as).density(
+        frequency, rate
+    )
+    beyond = (
+        density[-1] * 5000.0 if filter_name == "continuous" and order == 1 else 0.0
+    )  # f^-2 from 5 kHz on
     assert np.trapezoid(density, frequency) + beyond == pytest.approx(rms**2, rel=1e-4)
 
 
@@ -30,7 +36,9 @@ def test_the_papers_filter_is_scipys_butterworth():
     white = noise(filter="bilinear", height_of="noise", height=1e-6)
     frequency = np.linspace(0.0, 4990.0, 300)
     _, response = freqz(*butter(2, 30.0, fs=10e3), worN=frequency, fs=10e3)
-    assert white.density(frequency, 10e3) == pytest.approx(1e-12 * 2 / 10e3 * np.abs(response) ** 2, rel=1e-9)
+    assert white.density(frequency, 10e3) == pytest.approx(
+        1e-12 * 2 / 10e3 * np.abs(response) ** 2, rel=1e-9
+    )
 
 
 def test_height_of_the_record_is_exact_and_of_the_process_scatters():
@@ -52,33 +60,49 @@ def test_noise_of_a_height_before_the_filter_loses_what_the_filter_stops():
 def test_a_kept_coefficient_leaves_the_noise_alone_and_a_readjusted_one_the_height():
     at = np.array([3000.0])
     rate = 100e3
-    kept = [noise(cutoff_hz=fc, reference_cutoff_hz=30.0).density(at, rate)[0] for fc in (20.0, 40.0)]
+    kept = [
+        noise(cutoff_hz=fc, reference_cutoff_hz=30.0).density(at, rate)[0] for fc in (20.0, 40.0)
+    ]
     readjusted = [noise(cutoff_hz=fc).density(at, rate)[0] for fc in (20.0, 40.0)]
     assert kept[1] / kept[0] == pytest.approx(2.0**4, rel=1e-4)
     assert readjusted[1] / readjusted[0] == pytest.approx(2.0**3, rel=1e-4)
     paper = noise(cutoff_hz=40.0, reference_cutoff_hz=30.0, height_of="record", filter="bilinear")
     base = noise(height_of="record", filter="bilinear")
     assert np.std(base.profile(16_384, 10e3, seed=7).values) == pytest.approx(2e-6, rel=1e-12)
-    assert np.std(paper.profile(16_384, 10e3, seed=7).values) == pytest.approx(2e-6 * np.sqrt(4 / 3), rel=0.1)
+    assert np.std(paper.profile(16_384, 10e3, seed=7).values) == pytest.approx(
+        2e-6 * np.sqrt(4 / 3), rel=0.1
+    )
 
 
 @pytest.mark.parametrize(
     "choices",
-    [{}, {"filter_order": 1}, {"filter_order": 4}, {"filter": "bilinear"}, {"filter": "bilinear", "filter_order": 3}],
+    [
+        {},
+        {"filter_order": 1},
+        {"filter_order": 4},
+        {"filter": "bilinear"},
+        {"filter": "bilinear", "filter_order": 3},
+    ],
     ids=str,
 )
 def test_records_have_the_expected_spectrum(choices):
     """Mean ratio over bands below, at and above the cut-off, each to its statistical error, through a strong taper."""
     source = noise(cutoff_hz=400.0, **choices)
     rate, segment = 10e3, 10_000
-    spectrum = power_spectrum(source.profile(2_000_000, rate, seed=5), segment=segment, window="blackmanharris")
+    spectrum = power_spectrum(
+        source.profile(2_000_000, rate, seed=5), segment=segment, window="blackmanharris"
+    )
     expected = source.density(spectrum.frequency_hz, rate)
     if not choices:  # the exactly sampled process folds; what is summed from waves does not
-        expected = sum(source.density(np.abs(spectrum.frequency_hz + k * rate), rate) for k in range(-40, 41))
+        expected = sum(
+            source.density(np.abs(spectrum.frequency_hz + k * rate), rate) for k in range(-40, 41)
+        )
     for low, high in ((20, 300), (300, 600), (600, 2000)):
         band = (spectrum.frequency_hz > low) & (spectrum.frequency_hz < high)
         error = 1.0 / np.sqrt(np.count_nonzero(band) * spectrum.averages)
-        assert np.mean(spectrum.density[band] / expected[band]) == pytest.approx(1.0, abs=4.0 * error + 2e-3)
+        assert np.mean(spectrum.density[band] / expected[band]) == pytest.approx(
+            1.0, abs=4.0 * error + 2e-3
+        )
 
 
 def test_both_ways_of_making_a_record_agree():
@@ -86,18 +110,25 @@ def test_both_ways_of_making_a_record_agree():
     source = noise()
     rate, samples = 4e3, 1_600_000
     a = np.sqrt(2.0) * np.pi * 30.0
-    for heights in (source.profile(samples, rate, seed=1).values, synthesised(source, samples, rate, seed=1)):
+    for heights in (
+        source.profile(samples, rate, seed=1).values,
+        synthesised(source, samples, rate, seed=1),
+    ):
         assert np.std(heights) == pytest.approx(2e-6, rel=0.03)
         for lag in (1, 20, 60):
             t = lag / rate
             expected = 4e-12 * np.exp(-a * t) * (np.cos(a * t) + np.sin(a * t))
-            assert np.mean(heights[lag:] * heights[:-lag]) == pytest.approx(expected, abs=0.05 * 4e-12)
+            assert np.mean(heights[lag:] * heights[:-lag]) == pytest.approx(
+                expected, abs=0.05 * 4e-12
+            )
 
 
 def test_profile_at_the_resonance_has_the_continuous_filters_power():
     """Where a bilinear filter would lack 1.6 % and more: band power against the closed form, to statistical error."""
     source = noise()
-    spectrum = power_spectrum(source.profile(2_000_000, 20e3, seed=1), segment=20_000, window="blackmanharris")
+    spectrum = power_spectrum(
+        source.profile(2_000_000, 20e3, seed=1), segment=20_000, window="blackmanharris"
+    )
     band = (spectrum.frequency_hz > 2500) & (spectrum.frequency_hz < 4000)
     f = spectrum.frequency_hz[band]
     folded = sum(source.density(np.abs(f + k * 20e3), 20e3) for k in range(-3, 4))
@@ -123,7 +154,10 @@ def test_a_generated_surface_has_its_own_spectrum():
     seen = np.mean(
         [
             SurfaceTrack.of(
-                gaussian_surface(GRID, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)), speed
+                gaussian_surface(
+                    GRID, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)
+                ),
+                speed,
             ).density(frequency, 100e3)
             for seed in range(30)
         ],
@@ -136,7 +170,9 @@ def test_a_generated_surface_has_its_own_spectrum():
 
 
 def test_a_tracks_record_has_the_tracks_spectrum_and_nothing_finer_than_two_pixels():
-    surface = gaussian_surface(GRID, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
+    surface = gaussian_surface(
+        GRID, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
+    )
     track = SurfaceTrack.of(surface, 0.42)
     spectrum = power_spectrum(track.profile(1_000_000, 100e3, seed=2), segment=4000)
     band = (spectrum.frequency_hz > 500) & (spectrum.frequency_hz < 10e3)
@@ -174,7 +210,11 @@ def test_a_patch_averages_the_record_it_is_given():
     shifts = x * a / speed * rate
     at = np.arange(100, 3900) + reach
     direct = np.mean(
-        [w * np.interp(at + s, np.arange(raw.size), raw) for w, s in zip(weight, shifts, strict=True)], axis=0
+        [
+            w * np.interp(at + s, np.arange(raw.size), raw)
+            for w, s in zip(weight, shifts, strict=True)
+        ],
+        axis=0,
     )
     direct /= np.mean(weight)
     assert averaged[100:3900] == pytest.approx(direct, abs=0.01 * np.std(raw))
@@ -182,7 +222,10 @@ def test_a_patch_averages_the_record_it_is_given():
 
 def test_a_wide_patch_silences_the_resonance():
     patch = PatchAverage(source=noise(), shape="line", half_width=1e-3, speed=0.42)
-    assert patch.density(np.array([3330.0]), 1e5)[0] < 1e-3 * noise().density(np.array([3330.0]), 1e5)[0]
+    assert (
+        patch.density(np.array([3330.0]), 1e5)[0]
+        < 1e-3 * noise().density(np.array([3330.0]), 1e5)[0]
+    )
 
 
 def test_bad_input_is_named():

@@ -7,7 +7,9 @@ from benchmarks.failures import GROWTH, LENGTHS, PER_TURN, SNAPSHOTS, machine, t
 
 @pytest.mark.parametrize("fault", PER_TURN)
 @pytest.mark.parametrize(("seconds", "rate_hz"), LENGTHS[:2])
-def test_a_failing_bearing_alarms_before_its_end_and_claims_no_contact(fault, seconds, rate_hz, tmp_path):
+def test_a_failing_bearing_alarms_before_its_end_and_claims_no_contact(
+    fault, seconds, rate_hz, tmp_path
+):
     """benchmarks/failures.py has the same of 40 machines a row."""
     one = machine(fault, 200, seconds=seconds, rate_hz=rate_hz)
     track = tracked(one, tmp_path)

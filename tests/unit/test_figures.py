@@ -16,9 +16,13 @@ MADE = "docs/benchmarks.md"  # by the benchmarks
 DATED = "docs/decisions.md"  # a record of what was known at its date, times of a clock included
 NUMBER = r"(?<![\w.^])\d[\d.]*(?:e-?\d+)?"
 SIZES = r"(?:s|ms|minutes|min|hours|MB|MiB|GB|GiB)\b"
-FIGURE = re.compile(rf"{NUMBER}[\s ]?(?:%|{SIZES}|times\b|points?\b|dB\b)|\b\d+ of \d+\b|\b\d+ (?:and|to|or) \d+ %")
+FIGURE = re.compile(
+    rf"{NUMBER}[\s ]?(?:%|{SIZES}|times\b|points?\b|dB\b)|\b\d+ of \d+\b|\b\d+ (?:and|to|or) \d+ %"
+)
 CLOCKED = re.compile(rf"{NUMBER}[\s ]?{SIZES}")
-BY_A_CLOCK = re.compile(r"(?i)\b(?:takes?|took|taken|costs?|median|medians|slowest|longest|processor|by the clock)\b")
+BY_A_CLOCK = re.compile(
+    r"(?i)\b(?:takes?|took|taken|costs?|median|medians|slowest|longest|processor|by the clock)\b"
+)
 OF_TIME = re.compile(r"\[(?:s|ms)\]|\b(?:seconds|processor time)\b")
 FILE = re.compile(r"^:file: (\S+)$", re.MULTILINE)
 TELLING = 3  # numbers of a row
@@ -32,7 +36,9 @@ def plain(text: str) -> str:
 def crowded(page: Page) -> list[str]:
     """Paragraphs with more figures than are read as a sentence."""
     found = ((number, text, FIGURE.findall(plain(text))) for number, text in paragraphs(page))
-    return [f"{number}: {figures}: {text}" for number, text, figures in found if len(figures) > MOST]
+    return [
+        f"{number}: {figures}: {text}" for number, text, figures in found if len(figures) > MOST
+    ]
 
 
 def clocked(page: Page) -> list[str]:
@@ -43,7 +49,9 @@ def clocked(page: Page) -> list[str]:
         for sentence in sentences(plain(text))
         if CLOCKED.search(sentence) and BY_A_CLOCK.search(sentence)
     ]
-    heads = [f"{line.number}: {line.text}" for line in heads_of_tables(page) if OF_TIME.search(line.text)]
+    heads = [
+        f"{line.number}: {line.text}" for line in heads_of_tables(page) if OF_TIME.search(line.text)
+    ]
     rows = [
         f"{line.number}: {cell}"
         for line, cells in page.rows()
@@ -64,13 +72,16 @@ def numbers(cells: list[str]) -> tuple[str, ...]:
     found = tuple(kept.NUMBER.findall(" ".join(cells)))
     return (
         found
-        if len({number for number in found if float(number.replace("−", "-")) not in (0.0, 100.0)}) >= TELLING
+        if len({number for number in found if float(number.replace("−", "-")) not in (0.0, 100.0)})
+        >= TELLING
         else ()
     )
 
 
 def rows_of_benchmarks() -> set[tuple[str, ...]]:
-    return {numbers(row) for path in kept.FOLDER.glob("*.csv") for row in kept.read(path)[1:]} - {()}
+    return {numbers(row) for path in kept.FOLDER.glob("*.csv") for row in kept.read(path)[1:]} - {
+        ()
+    }
 
 
 def typed(page: Page) -> list[str]:
@@ -88,7 +99,9 @@ def typed(page: Page) -> list[str]:
 
 
 WRITTEN = [page for page in pages() if page.path.relative_to(ROOT).as_posix() != MADE]
-PAGES = pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.path.relative_to(ROOT).as_posix())
+PAGES = pytest.mark.parametrize(
+    "page", WRITTEN, ids=lambda page: page.path.relative_to(ROOT).as_posix()
+)
 
 
 @PAGES
@@ -118,8 +131,14 @@ def test_csv_that_pages_include_are_there():
         for file in FILE.findall(block.text)
     ]
     assert len(files) > 30
-    stages = {"../benchmark/certified.csv": ROOT / "benchmark" / "certified.csv"}  # staged beside the pages
-    gone = [(page.path, file) for page, file in files if not stages.get(file, page.path.parent / file).is_file()]
+    stages = {
+        "../benchmark/certified.csv": ROOT / "benchmark" / "certified.csv"
+    }  # staged beside the pages
+    gone = [
+        (page.path, file)
+        for page, file in files
+        if not stages.get(file, page.path.parent / file).is_file()
+    ]
     assert gone == []
 
 
@@ -177,6 +196,8 @@ def test_the_benchmarks_figure_is_drawn_from_its_csv(tmp_path):
 
 def test_every_script_of_the_gallery_was_timed_and_is_short():
     _, *rows = kept.read(kept.FOLDER / "gallery.csv")
-    assert [name for name, _ in rows] == sorted(path.name for path in gallery.SCRIPTS.glob("[0-9]*.py"))
+    assert [name for name, _ in rows] == sorted(
+        path.name for path in gallery.SCRIPTS.glob("[0-9]*.py")
+    )
     assert len(rows) >= 15
     assert max(float(seconds) for _, seconds in rows) < gallery.MOST

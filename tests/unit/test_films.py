@@ -5,9 +5,9 @@ import pytest
 import scipy
 from benchmarks.films import ball
 
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.ehl import film_fits, film_numbers, least_film, lubrication_regime
-from asperity.ehl.films import AT_THE_PRESSURE_PEAK, _asymptotes, central_film, least_films
+from asperity.ehl.film_formulas import AT_THE_PRESSURE_PEAK, _asymptotes, central_film, least_films
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian
 from support.paper import barus, contact
 
@@ -27,7 +27,9 @@ def line(load_number, oil_number, *, alpha=22e-9, eta0=0.04, radius=5.4e-3):
         load=load_number * twice_u**0.5 * modulus * radius * 0.01,
         surface_speeds=(speed, speed),
     )
-    oil = Lubricant(viscosity=Barus(eta0, alpha), density=DowsonHigginson(870.0), rheology=Newtonian())
+    oil = Lubricant(
+        viscosity=Barus(eta0, alpha), density=DowsonHigginson(870.0), rheology=Newtonian()
+    )
     return conditions, oil, radius * twice_u**0.5
 
 
@@ -45,7 +47,9 @@ def rigid_cylinder():
         return scipy.integrate.quad(slope, -np.inf, s, args=(c,))[0]
 
     c = scipy.optimize.brentq(lambda c: pressure(np.sqrt(c - 1.0), c), 1.05, 1.6)
-    load = scipy.integrate.quad(lambda s: pressure(s, c), -400.0, np.sqrt(c - 1.0), limit=500, points=[-40.0, -4.0])[0]
+    load = scipy.integrate.quad(
+        lambda s: pressure(s, c), -400.0, np.sqrt(c - 1.0), limit=500, points=[-40.0, -4.0]
+    )[0]
     return c, pressure(-np.sqrt(c - 1.0), c), load
 
 
@@ -56,13 +60,17 @@ def test_the_rigid_films_of_a_line_contact_are_those_of_reynolds_equation():
     numbers = film_numbers(conditions, oil)
     films = least_films(conditions, oil)
     martin = 24.0 * load * numbers.speed / numbers.load * conditions.radius
-    blok = (12.0 * np.sqrt(2.0) * highest * numbers.material * numbers.speed) ** (2.0 / 3.0) * conditions.radius
+    blok = (12.0 * np.sqrt(2.0) * highest * numbers.material * numbers.speed) ** (
+        2.0 / 3.0
+    ) * conditions.radius
     assert films["isoviscous-rigid"].film == pytest.approx(martin, rel=1e-3)
     assert films["piezoviscous-rigid"].film == pytest.approx(blok, rel=1e-3)
     assert pytest.approx(c, rel=1e-4) == AT_THE_PRESSURE_PEAK
     thin, _, _ = line(0.01, 1e-3)
     assert central_film(thin, oil) == pytest.approx(c * martin_of(thin, oil), rel=0.005)
-    assert _asymptotes(conditions, numbers).piezoviscous_rigid * unit == pytest.approx(c * blok, rel=0.002)
+    assert _asymptotes(conditions, numbers).piezoviscous_rigid * unit == pytest.approx(
+        c * blok, rel=0.002
+    )
 
 
 def martin_of(conditions, oil):
@@ -88,7 +96,9 @@ def test_moes_central_film_is_the_solved_one_at_ambient_density(m, l, solved, rh
 def test_nijenbannings_central_film_is_the_solved_ball(m, l, solved):  # noqa: E741
     """Barus, incompressible, Richardson from 257 and 513 points; it is 11 and 13 % below."""
     conditions, unit = ball(m, l)
-    oil = Lubricant(viscosity=Barus(0.04, 22e-9), density=Incompressible(870.0), rheology=Newtonian())
+    oil = Lubricant(
+        viscosity=Barus(0.04, 22e-9), density=Incompressible(870.0), rheology=Newtonian()
+    )
     assert central_film(conditions, oil) / unit == pytest.approx(solved, rel=0.15)
 
 
@@ -111,7 +121,9 @@ def test_the_papers_contact_keeps_dowsons_film():
     """Its film ratio was Dowson's (1968) before regimes were told apart, and is."""
     conditions, oil = contact(), barus()
     numbers = film_numbers(conditions, oil)
-    dowson = 2.65 * numbers.material**0.54 * numbers.speed**0.7 * numbers.load**-0.13 * conditions.radius
+    dowson = (
+        2.65 * numbers.material**0.54 * numbers.speed**0.7 * numbers.load**-0.13 * conditions.radius
+    )
     assert least_film(conditions, oil) == pytest.approx(dowson, rel=1e-12)
     assert (numbers.moes_load, numbers.moes_oil) == pytest.approx(
         (2.342 * (2.0 / 1.91) ** 0.5, 16.97 * (1.91 / 2.0) ** 0.25), rel=1e-3
@@ -128,7 +140,11 @@ def test_the_film_has_no_step_from_regime_to_regime():
 
 
 def test_no_fit_is_said_to_hold_for_a_contact_narrow_across_rolling():
-    narrow = ContactConditions(pair=PAIR, geometry="elliptic", radius=(0.02, 0.01), load=20.0, surface_speeds=(1, 1))
-    wide = ContactConditions(pair=PAIR, geometry="elliptic", radius=(0.01, 0.02), load=20.0, surface_speeds=(1, 1))
+    narrow = ContactConditions(
+        pair=PAIR, geometry="elliptic", radius=(0.02, 0.01), load=20.0, surface_speeds=(1, 1)
+    )
+    wide = ContactConditions(
+        pair=PAIR, geometry="elliptic", radius=(0.01, 0.02), load=20.0, surface_speeds=(1, 1)
+    )
     assert film_fits(narrow, barus()) == ()
     assert len(film_fits(wide, barus())) == 3

@@ -1,15 +1,17 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 
 
 def test_samples_sit_at_cell_centres():
     grid = Grid((8, 10), (-3.0, 0.0), (1.0, 5.0))
     assert grid.spacing == (0.5, 0.5)
     assert grid.extent == (4.0, 5.0)
-    np.testing.assert_allclose(grid.x, [-2.75, -2.25, -1.75, -1.25, -0.75, -0.25, 0.25, 0.75], rtol=1e-15)
+    np.testing.assert_allclose(
+        grid.x, [-2.75, -2.25, -1.75, -1.25, -0.75, -0.25, 0.25, 0.75], rtol=1e-15
+    )
     np.testing.assert_allclose(grid.y, np.linspace(0.25, 4.75, 10), rtol=1e-15)
     assert grid.periodic == (False, True)
 

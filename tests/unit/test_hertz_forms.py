@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import elliprd, elliprf
 
-from asperity.hertz import (
+from asperity.contact.hertz import (
     elliptic_contact,
     line_contact,
     line_gap,
@@ -22,7 +22,9 @@ def test_line_pressure_carries_the_load_and_flattens_the_curve():
     """p = p_h sqrt(1 - X^2) integrates to the load; inside, deflection has the curvature p_h 2/(E* a) = 1/R."""
     hertz = line_contact(LOAD, LENGTH, RADIUS, MODULUS)
     a, p_h = hertz.half_widths[0], hertz.p_max
-    angle = (np.arange(40) + 0.5) * np.pi / 40.0  # Chebyshev's nodes integrate sqrt(1 - X^2) exactly
+    angle = (
+        (np.arange(40) + 0.5) * np.pi / 40.0
+    )  # Chebyshev's nodes integrate sqrt(1 - X^2) exactly
     carried = np.sum(line_pressure(a * np.cos(angle), a, p_h) * np.sin(angle)) * a * np.pi / 40.0
     assert carried * LENGTH == pytest.approx(LOAD, rel=1e-12)
     assert 2.0 * p_h / (MODULUS * a) == pytest.approx(1.0 / RADIUS, rel=1e-12)
@@ -31,7 +33,9 @@ def test_line_pressure_carries_the_load_and_flattens_the_curve():
 
 
 def test_line_pressure_ends_at_the_half_width():
-    np.testing.assert_array_equal(line_pressure(np.array([-2.0, -1.0, 0.0, 1.0, 5.0]), 1.0, 3.0), [0, 0, 3, 0, 0])
+    np.testing.assert_array_equal(
+        line_pressure(np.array([-2.0, -1.0, 0.0, 1.0, 5.0]), 1.0, 3.0), [0, 0, 3, 0, 0]
+    )
 
 
 @pytest.mark.parametrize("x", [1.0001, 1.3, -2.0, 6.0])
@@ -42,24 +46,35 @@ def test_line_gap_is_what_the_pressure_leaves_open(x):
         return np.sin(t) ** 2 * np.log(np.abs((x - np.cos(t)) / (1.0 - np.cos(t))))
 
     integral, _ = quad(displaced, 0.0, np.pi, epsabs=1e-13, epsrel=1e-13, limit=400)
-    assert line_gap(np.array([3.0 * x]), 3.0, 9.0)[0] == pytest.approx(x**2 / 2.0 - 0.5 - integral / np.pi, abs=1e-11)
+    assert line_gap(np.array([3.0 * x]), 3.0, 9.0)[0] == pytest.approx(
+        x**2 / 2.0 - 0.5 - integral / np.pi, abs=1e-11
+    )
     assert line_gap(np.array([0.3]), 3.0, 9.0)[0] == 0.0
 
 
 def test_line_gap_opens_as_its_slope_says():
     """dh/dX = sqrt(X^2 - 1) a^2/R, integrated numerically."""
     x = np.array([1.0 + 1e-6, 1.5, 4.0])
-    expected = [quad(lambda s: np.sqrt((s - 1.0) * (s + 1.0)), 1.0, one, epsrel=1e-13, epsabs=0.0)[0] for one in x]
+    expected = [
+        quad(lambda s: np.sqrt((s - 1.0) * (s + 1.0)), 1.0, one, epsrel=1e-13, epsabs=0.0)[0]
+        for one in x
+    ]
     np.testing.assert_allclose(line_gap(x, 1.0, 1.0), expected, rtol=1e-12, atol=1e-15)
 
 
 def test_point_contact_is_johnsons():
     """p0 = (6 F E*^2 / (pi^3 R^2))^(1/3) and approach (9 F^2 / (16 R E*^2))^(1/3): Johnson eqs 4.23, 4.24."""
     hertz = point_contact(LOAD, RADIUS, MODULUS)
-    assert hertz.p_max == pytest.approx((6.0 * LOAD * MODULUS**2 / (np.pi**3 * RADIUS**2)) ** (1 / 3), rel=1e-12)
-    assert hertz.approach == pytest.approx((9.0 * LOAD**2 / (16.0 * RADIUS * MODULUS**2)) ** (1 / 3), rel=1e-12)
+    assert hertz.p_max == pytest.approx(
+        (6.0 * LOAD * MODULUS**2 / (np.pi**3 * RADIUS**2)) ** (1 / 3), rel=1e-12
+    )
+    assert hertz.approach == pytest.approx(
+        (9.0 * LOAD**2 / (16.0 * RADIUS * MODULUS**2)) ** (1 / 3), rel=1e-12
+    )
     a = hertz.half_widths[0]
-    carried, _ = quad(lambda c: 2.0 * np.pi * a**2 * hertz.p_max * c**2, 0.0, 1.0)  # c = sqrt(1 - r^2/a^2)
+    carried, _ = quad(
+        lambda c: 2.0 * np.pi * a**2 * hertz.p_max * c**2, 0.0, 1.0
+    )  # c = sqrt(1 - r^2/a^2)
     assert carried == pytest.approx(LOAD, rel=1e-12)
     assert hertz.p_mean * hertz.area == pytest.approx(LOAD, rel=1e-12)
 
@@ -93,14 +108,19 @@ def test_elliptic_contact_meets_both_curvatures(ratio, swapped):
     m, n = 2.0 / 3.0 * elliprd(0.0, b**2, a**2), 2.0 / 3.0 * elliprd(0.0, a**2, b**2)
     assert strength * m / (np.pi * MODULUS) == pytest.approx(0.5 / radii[0], rel=1e-12)
     assert strength * n / (np.pi * MODULUS) == pytest.approx(0.5 / radii[1], rel=1e-12)
-    assert strength * 2.0 * elliprf(0.0, a**2, b**2) / (np.pi * MODULUS) == pytest.approx(hertz.approach, rel=1e-12)
+    assert strength * 2.0 * elliprf(0.0, a**2, b**2) / (np.pi * MODULUS) == pytest.approx(
+        hertz.approach, rel=1e-12
+    )
     assert 2.0 / 3.0 * np.pi * a * b * hertz.p_max == pytest.approx(LOAD, rel=1e-12)
     assert hertz.p_mean * hertz.area == pytest.approx(LOAD, rel=1e-12)
 
 
 def test_a_contact_of_nanometres_is_the_same_contact_in_small():
     """Lengths scale with R when the load scales with R^2, pressures stay."""
-    tip, ring = elliptic_contact(1e-9, (5e-9, 10e-9), MODULUS), elliptic_contact(1e3, (5e-3, 10e-3), MODULUS)
+    tip, ring = (
+        elliptic_contact(1e-9, (5e-9, 10e-9), MODULUS),
+        elliptic_contact(1e3, (5e-3, 10e-3), MODULUS),
+    )
     assert tip.half_widths == pytest.approx([1e-6 * width for width in ring.half_widths], rel=1e-12)
     assert tip.p_max == pytest.approx(ring.p_max, rel=1e-12)
 

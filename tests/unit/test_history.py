@@ -15,13 +15,21 @@ import pytest
 
 from asperity.case import load_case
 from asperity.cli import main
-from asperity.ehl import SolveStatus, moving_contact
-from asperity.errors import BadInput, NotConverged, UnreadableFile
-from asperity.grid import Grid
-from asperity.history import load_history, run_history
-from asperity.history.run import MODELS
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput, NotConverged, UnreadableFile
+from asperity.ehl import SolveStatus
 from asperity.report.motion.page import render_motion_page
-from asperity.surface import CompositeSurface, MovingSurfaces, Surface, flat_surface, gaussian_surface, track_grid
+from asperity.simulation import load_history, run_history
+from asperity.simulation.motion.run import MODELS
+from asperity.surface import (
+    CompositeSurface,
+    MovingSurfaces,
+    Surface,
+    flat_surface,
+    gaussian_surface,
+    track_grid,
+)
+from asperity.transient import moving_contact
 
 GRID = Grid((32, 16), (0.0, 0.0), (64e-6, 16e-6))
 SMALL = {"grid.cells": "[48, 32]", "surface.correlation_length": "40 um", "grid.x": "[-3, 1.8]"}
@@ -47,7 +55,10 @@ def test_the_second_surface_moves_at_its_own_speed_face_down():
     composite = CompositeSurface(rough(seed=1), rough(seed=2), (4.0, 2.0))
     surfaces = MovingSurfaces.of(composite)
     np.testing.assert_allclose(surfaces.at(0.0).heights, composite.surface.heights)
-    moved = np.roll(composite.first.heights, 4, axis=0) + np.roll(composite.second.heights, 2, axis=0)[:, ::-1]
+    moved = (
+        np.roll(composite.first.heights, 4, axis=0)
+        + np.roll(composite.second.heights, 2, axis=0)[:, ::-1]
+    )
     np.testing.assert_allclose(surfaces.at(2e-6).heights, moved)
 
 
@@ -66,7 +77,9 @@ def test_parts_of_a_cell_move_every_wave_exactly():
 def test_a_surface_neither_fades_nor_strays_however_long_it_runs():
     surfaces = MovingSurfaces.one_rough(rough(), (1.0, 0.0))
     assert surfaces.at(123.4567e-3).sq == pytest.approx(surfaces.at(0.0).sq, rel=1e-6)
-    np.testing.assert_allclose(surfaces.at(1000 * 64e-6).heights, surfaces.at(0.0).heights, atol=1e-15)
+    np.testing.assert_allclose(
+        surfaces.at(1000 * 64e-6).heights, surfaces.at(0.0).heights, atol=1e-15
+    )
 
 
 def test_a_track_may_be_longer_than_the_contact():
@@ -121,12 +134,16 @@ def measured(tmp_path):
 
     for name, seed in (("ring.x3p", 1), ("roller.x3p", 2)):
         heights = np.random.default_rng(seed).standard_normal((200, 220)).cumsum(0).cumsum(1)
-        x3pio.write(tmp_path / name, (heights * (1e-6 / heights.std())).T, x_scale=2e-6, y_scale=2e-6)
+        x3pio.write(
+            tmp_path / name, (heights * (1e-6 / heights.std())).T, x_scale=2e-6, y_scale=2e-6
+        )
     return replace(case(), folder=tmp_path)
 
 
 def test_measured_surfaces_run_on_the_bodies_they_lie_on_their_ends_joined(measured):
-    two = measured.with_overrides({"surface": {"file": "ring.x3p", "sq": "1 um", "second": {"file": "roller.x3p"}}})
+    two = measured.with_overrides(
+        {"surface": {"file": "ring.x3p", "sq": "1 um", "second": {"file": "roller.x3p"}}}
+    )
     surfaces = two.moving_surfaces()
     assert surfaces.speeds == two.conditions.surface_speeds
     assert surfaces.first.sq == pytest.approx(1e-6)
@@ -205,7 +222,15 @@ def test_it_begins_with_the_snapshot(history):
 
     alone = solve_case(history.case).scalars()
     first = history.table.iloc[0]
-    for name in ("clr", "car", "car_domain", "h_min_m", "h_mean_m", "p_max_pa", "friction_coefficient"):
+    for name in (
+        "clr",
+        "car",
+        "car_domain",
+        "h_min_m",
+        "h_mean_m",
+        "p_max_pa",
+        "friction_coefficient",
+    ):
         assert first[name] == pytest.approx(alone[name]), name
 
 
@@ -261,7 +286,12 @@ run_history(case, steps=10000, every=5, out=Path({str(folder)!r}))
 
 @pytest.mark.parametrize(
     "change",
-    [{"contact.load": "300 N"}, {"surface.seed": 8}, {"motion.rough": "second"}, {"motion.start": "stationary"}],
+    [
+        {"contact.load": "300 N"},
+        {"surface.seed": 8},
+        {"motion.rough": "second"},
+        {"motion.start": "stationary"},
+    ],
 )
 def test_a_folder_keeps_one_history(tmp_path, change):
     run_history(case(), steps=1, out=tmp_path / "kept")
@@ -291,8 +321,12 @@ def fails_at_three(monkeypatch):
     def steps(*arguments, **options):
         for snapshot in moving_contact(*arguments, **options):
             if snapshot.number == 3:
-                ending = replace(snapshot.solution.convergence, status=SolveStatus.OUT_OF_ITERATIONS)
-                snapshot = replace(snapshot, solution=replace(snapshot.solution, convergence=ending))
+                ending = replace(
+                    snapshot.solution.convergence, status=SolveStatus.OUT_OF_ITERATIONS
+                )
+                snapshot = replace(
+                    snapshot, solution=replace(snapshot.solution, convergence=ending)
+                )
             yield snapshot
 
     monkeypatch.setitem(MODELS, "mixed", steps)
@@ -334,7 +368,9 @@ def test_passes_are_of_the_rough_surface():
 
 
 def test_passes_are_told_apart_where_surfaces_are_flattened():
-    chosen = case(**{"motion.flattening": True, "material.hardness": "0.7 GPa", "contact.slip": 0.0})
+    chosen = case(
+        **{"motion.flattening": True, "material.hardness": "0.7 GPa", "contact.slip": 0.0}
+    )
     done = run_history(chosen, steps=100)
     passes = done.by_pass()
     assert list(passes["pass"]) == [1, 2]
@@ -367,7 +403,7 @@ def test_a_picture_shows_what_the_step_has(history):
 
     from PIL import Image
 
-    from asperity.report.moving import frame_picture, ranges
+    from asperity.report.animated_maps import frame_picture, ranges
     from asperity.report.style import CONTACT_COLOUR
 
     frame = history.frames[1]
@@ -397,7 +433,11 @@ def test_the_command_runs_goes_on_and_makes_the_page(tmp_path, capsys):
 
 
 def test_the_command_says_why_not(capsys, tmp_path):
-    for arguments in (["--steps", "0"], ["--steps", "2", "--passes", "1"], ["--out", str(tmp_path), "--every", "0"]):
+    for arguments in (
+        ["--steps", "0"],
+        ["--steps", "2", "--passes", "1"],
+        ["--out", str(tmp_path), "--every", "0"],
+    ):
         with pytest.raises(SystemExit) as ended:
             main(["run", "examples/paper.toml", *arguments])
         assert ended.value.code == 2

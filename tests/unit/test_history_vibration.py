@@ -10,16 +10,18 @@ import pytest
 
 from asperity.case import load_case
 from asperity.cli import main
+from asperity.core.errors import BadInput
+from asperity.core.quantities import in_print
+from asperity.core.signals import Signal, power_spectrum
 from asperity.coupling import VibrationModel
-from asperity.ehl import moving_contact, own_resonance, solve_contact, tangent_stiffness
-from asperity.errors import BadInput
-from asperity.history import history_vibration, load_history, run_history
-from asperity.history.vibration import repeating, resampled, steady_response
-from asperity.quantities import in_print
-from asperity.signals import Signal, power_spectrum
+from asperity.ehl import solve_contact
+from asperity.resonance import contact_resonance
+from asperity.simulation import history_vibration, load_history, run_history
+from asperity.simulation.motion.vibration import repeating, resampled, steady_response
+from asperity.solution import own_resonance, tangent_stiffness
 from asperity.surface import MovingSurfaces, Surface, track_grid
+from asperity.transient import moving_contact
 from asperity.vibration import ContactOscillator
-from asperity.wear import contact_resonance
 
 SMALL = {"grid.cells": "[48, 16]", "surface.correlation_length": "40 um", "grid.x": "[-3, 1.8]"}
 SPRING = ContactOscillator(mass=0.1, stiffness=2.0e8, damping_ratio=0.02, load=500.0)
@@ -79,7 +81,9 @@ def test_a_finer_rate_keeps_the_waves():
     fine = resampled(coarse, 7.3e6)
     assert fine.rate_hz >= 7.3e6
     assert fine.duration_s == pytest.approx(50e-6, rel=1e-12)
-    np.testing.assert_allclose(fine.values, waves(50e-6, (1, 4, 9), fine.values.size, fine.rate_hz), atol=1e-16)
+    np.testing.assert_allclose(
+        fine.values, waves(50e-6, (1, 4, 9), fine.values.size, fine.rate_hz), atol=1e-16
+    )
 
 
 # The mass on it
@@ -106,7 +110,9 @@ def test_a_slow_wave_is_followed():
 
 
 def test_answers_add_up():
-    one, other = (Signal(waves(200e-6, numbers, 300, 1.5e6), 1.5e6, "m") for numbers in ((1, 2), (5,)))
+    one, other = (
+        Signal(waves(200e-6, numbers, 300, 1.5e6), 1.5e6, "m") for numbers in ((1, 2), (5,))
+    )
     both = steady_response(SPRING, replace(one, values=one.values + 3.0 * other.values)).values
     apart = steady_response(SPRING, one).values + 3.0 * steady_response(SPRING, other).values
     np.testing.assert_allclose(both, apart, rtol=1e-9, atol=1e-9 * np.max(np.abs(both)))
@@ -117,8 +123,12 @@ def test_a_long_track_shows_the_resonance_to_its_own_error():
     rng = np.random.default_rng(3)
     number = np.arange(1, samples // 2 + 1)
     lines = np.zeros(samples // 2 + 1, complex)
-    lines[1:] = rng.standard_normal(2 * number.size).view(complex) / number**2  # white base acceleration
-    profile = resampled(Signal(1e-3 * np.fft.irfft(lines, samples), samples / period, "m"), 60.0 * f0)
+    lines[1:] = (
+        rng.standard_normal(2 * number.size).view(complex) / number**2
+    )  # white base acceleration
+    profile = resampled(
+        Signal(1e-3 * np.fft.irfft(lines, samples), samples / period, "m"), 60.0 * f0
+    )
     spectrum = power_spectrum(steady_response(SPRING, profile), window="boxcar")
     assert spectrum.spacing_hz == pytest.approx(1.0 / period)
     found = contact_resonance(spectrum, band_hz=(f0 / 1.5, 1.5 * f0))
@@ -137,7 +147,11 @@ def test_the_approach_follows_a_wave_much_longer_than_the_contact():
     height = 20e-9 * np.cos(2.0 * np.pi * (track.x - track.lower[0]) / track.extent[0])
     surface = Surface(np.repeat(height[:, None], grid.cells[1], axis=1), track)
     surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds, grid)
-    taken = list(islice(moving_contact(conditions, chosen.lubricant, surfaces, options=chosen.options), 48 + 481))
+    taken = list(
+        islice(
+            moving_contact(conditions, chosen.lubricant, surfaces, options=chosen.options), 48 + 481
+        )
+    )
     rows = taken[49:]
     profile, left, objection = repeating(
         np.array([one.time for one in rows]),
@@ -163,9 +177,13 @@ def test_a_history_is_heard_by_its_own_approach_and_stiffness(history, vibration
     assert vibration.oscillator.stiffness == pytest.approx(np.mean(vibration.stiffness))
     assert vibration.oscillator.damping_ratio == chosen.vibration.damping_ratio
     assert vibration.not_periodic < 0.5
-    assert np.std(vibration.profile.values) == pytest.approx(rows["rigid_approach_m"].std(ddof=0), rel=0.15)
+    assert np.std(vibration.profile.values) == pytest.approx(
+        rows["rigid_approach_m"].std(ddof=0), rel=0.15
+    )
     # the power of the answer is that of the profile's lines by the closed form
-    lines = np.abs(np.fft.rfft(vibration.profile.values)[1:] / vibration.profile.values.size) ** 2 * 2.0
+    lines = (
+        np.abs(np.fft.rfft(vibration.profile.values)[1:] / vibration.profile.values.size) ** 2 * 2.0
+    )
     frequency = np.arange(1, lines.size + 1) * vibration.spacing_hz
     inside = frequency < vibration.profile.rate_hz / 6.0
     power = np.sum(lines[inside] * vibration.oscillator.gain(frequency[inside]))
@@ -208,7 +226,9 @@ def test_the_papers_way_stands_beside_it(history, vibration):
     assert vibration.coupled.oscillator == history.vibration.oscillator
     model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent", rate_hz=2e5)
     other = history_vibration(history, model, moments=1)
-    assert other.coupled.oscillator.stiffness == pytest.approx(vibration.coupled.oscillator.stiffness)
+    assert other.coupled.oscillator.stiffness == pytest.approx(
+        vibration.coupled.oscillator.stiffness
+    )
 
 
 def test_a_kept_history_is_heard_alike(history, vibration):
@@ -247,7 +267,15 @@ def test_without_a_model_or_moments_it_is_refused(history):
 
 
 def test_the_command_listens(history, capsys, tmp_path):
-    arguments = ["run", "examples/paper.toml", "--out", str(history.folder), "--steps", "96", "--listen"]
+    arguments = [
+        "run",
+        "examples/paper.toml",
+        "--out",
+        str(history.folder),
+        "--steps",
+        "96",
+        "--listen",
+    ]
     for key, value in SMALL.items():
         arguments += ["--set", f"{key}={value}"]
     with pytest.raises(SystemExit) as ended:
@@ -256,11 +284,15 @@ def test_the_command_listens(history, capsys, tmp_path):
     scalars = json.loads(capsys.readouterr().out)
     vibration = history_vibration(history)
     assert scalars["computed"] == 0
-    assert scalars["tangent_resonance_hz"] == pytest.approx(vibration.oscillator.natural_frequency_hz)
+    assert scalars["tangent_resonance_hz"] == pytest.approx(
+        vibration.oscillator.natural_frequency_hz
+    )
     assert scalars["coupled_crf_hz"] == pytest.approx(vibration.coupled.resonance.crf_hz)
     assert scalars["history_crf_hz"] is None
     assert "motion.track" in scalars["history_crf_reason"]
     with pytest.raises(SystemExit):
         main([*arguments, "--report", str(tmp_path / "page.html")])
     assert vibration.verdict() in capsys.readouterr().out
-    assert in_print(vibration.verdict()) in html.unescape((tmp_path / "page.html").read_text("utf-8"))
+    assert in_print(vibration.verdict()) in html.unescape(
+        (tmp_path / "page.html").read_text("utf-8")
+    )

@@ -2,7 +2,16 @@
 
 import ast
 
-from support.source import PACKAGE, exported, faces, files, functions, imports_inside_functions, modules, own_types
+from support.source import (
+    PACKAGE,
+    exported,
+    faces,
+    files,
+    functions,
+    imports_inside_functions,
+    modules,
+    own_types,
+)
 
 LONGEST_FILE = 450  # lines
 LONGEST_FUNCTION = 70  # lines, docstring and all
@@ -11,7 +20,10 @@ IMPORTS_INSIDE_FUNCTIONS = 80  # fewer than that, and only where they save start
 
 
 def test_no_file_is_too_long():
-    lines = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8").count("\n") for path in files()}
+    lines = {
+        path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8").count("\n")
+        for path in files()
+    }
     long = [f"{name}: {count} lines" for name, count in lines.items() if count > LONGEST_FILE]
     assert not long, "\n".join(long)
 

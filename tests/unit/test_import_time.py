@@ -12,10 +12,21 @@ import pytest
 import x3pio
 
 import asperity
-from asperity.processes import GARBAGE_FROM, set_up_worker
+from asperity.core.processes import GARBAGE_FROM, set_up_worker
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
-HEAVY = ("numpy", "scipy", "numba", "matplotlib", "xarray", "pandas", "pint", "pydantic", "plotly", "SurfaceTopography")
+HEAVY = (
+    "numpy",
+    "scipy",
+    "numba",
+    "matplotlib",
+    "xarray",
+    "pandas",
+    "pint",
+    "pydantic",
+    "plotly",
+    "SurfaceTopography",
+)
 HEAVY += ("importlib.resources", "importlib.metadata", "multiprocessing")  # of the standard library
 
 
@@ -30,7 +41,12 @@ def loaded_after(statement: str) -> list[str]:
 
 @pytest.mark.parametrize(
     "statement",
-    ["import asperity", "import asperity.cli", "dir(__import__('asperity'))", "import asperity; asperity.BadInput"],
+    [
+        "import asperity",
+        "import asperity.cli",
+        "dir(__import__('asperity'))",
+        "import asperity; asperity.BadInput",
+    ],
 )
 def test_nothing_heavy_is_imported_at_the_start(statement):
     assert loaded_after(statement) == []
@@ -52,18 +68,44 @@ VIBRATED = (
     "--set",
     "vibration.duration=1 s",
 )
-SMALL = ("--set", "grid.cells=[32, 24]", "--set", "surface.correlation_length=40 um", "--set", "vibration=none")
-STATISTICS = {"scipy.signal", "scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.integrate", "scipy.spatial"}
+SMALL = (
+    "--set",
+    "grid.cells=[32, 24]",
+    "--set",
+    "surface.correlation_length=40 um",
+    "--set",
+    "vibration=none",
+)
+STATISTICS = {
+    "scipy.signal",
+    "scipy.stats",
+    "scipy.optimize",
+    "scipy.interpolate",
+    "scipy.integrate",
+    "scipy.spatial",
+}
 COMPUTE = {"numba", *STATISTICS}
 DRAW = {"matplotlib", "plotly", "jinja2"}
 UNITS = {"pint", "dask"}
 STUDY = {"distributed", "SALib", "zarr"}
-READ = {"SurfaceTopography", "soundfile", "nptdms", "pyuff", "idelib"}  # libraries of single formats
+READ = {
+    "SurfaceTopography",
+    "soundfile",
+    "nptdms",
+    "pyuff",
+    "idelib",
+}  # libraries of single formats
 TABLES = {"pandas", "pyarrow", "xarray"}
 NOT_LOADED = {  # a command, and what it must not load
-    ("--version",): {"numpy", "scipy", "pydantic", "pint", "rich"} | COMPUTE | DRAW | STUDY | READ | TABLES,
+    ("--version",): {"numpy", "scipy", "pydantic", "pint", "rich"}
+    | COMPUTE
+    | DRAW
+    | STUDY
+    | READ
+    | TABLES,
     ("solve", "absent.toml"): {"rich"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
-    ("surface", "ring.x3p"): {"rich", "numba", "xarray", "jinja2"} | STUDY,  # SurfaceTopography brings matplotlib
+    ("surface", "ring.x3p"): {"rich", "numba", "xarray", "jinja2"}
+    | STUDY,  # SurfaceTopography brings matplotlib
     ("check", "noise.npy", "--rate", "20000"): {"rich", "scipy.fft", "h5py"}
     | COMPUTE
     | UNITS
@@ -71,14 +113,39 @@ NOT_LOADED = {  # a command, and what it must not load
     | STUDY
     | READ
     | TABLES,
-    ("check", "noise.csv"): {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
-    ("check", str(PAPER)): {"rich", "scipy.fft", "h5py"} | COMPUTE | UNITS | DRAW | STUDY | READ | TABLES,
-    ("track", "noise.npy", "--rate", "20000", "--method", "peak"): {"numba", "rich"} | DRAW | STUDY | READ | TABLES,
-    ("rig", "--out", "rig", "--samples", "1", "--repeats", "1", "--duration", "1 s"): {"rich", "numba"}
+    ("check", "noise.csv"): {"rich", "scipy.fft", "h5py"}
+    | COMPUTE
+    | UNITS
+    | DRAW
+    | STUDY
+    | READ
+    | TABLES,
+    ("check", str(PAPER)): {"rich", "scipy.fft", "h5py"}
+    | COMPUTE
+    | UNITS
+    | DRAW
+    | STUDY
+    | READ
+    | TABLES,
+    ("track", "noise.npy", "--rate", "20000", "--method", "peak"): {"numba", "rich"}
+    | DRAW
+    | STUDY
+    | READ
+    | TABLES,
+    ("rig", "--out", "rig", "--samples", "1", "--repeats", "1", "--duration", "1 s"): {
+        "rich",
+        "numba",
+    }
     | DRAW
     | STUDY
     | TABLES,
-    ("solve", str(PAPER), *SMALL, "--out", "run.nc"): {"rich"} | STATISTICS | UNITS | DRAW | STUDY | READ | TABLES,
+    ("solve", str(PAPER), *SMALL, "--out", "run.nc"): {"rich"}
+    | STATISTICS
+    | UNITS
+    | DRAW
+    | STUDY
+    | READ
+    | TABLES,
     ("solve", str(PAPER), *VIBRATED): {"rich"} | STATISTICS | UNITS | DRAW | STUDY | READ | TABLES,
     ("vibrate", str(PAPER), "--quiet"): {"rich"} | DRAW | STUDY | READ | TABLES,
 }
@@ -90,13 +157,17 @@ def test_a_command_loads_only_what_it_needs(tmp_path, arguments):
     x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=3e-6)
     noise = np.random.default_rng(0).standard_normal(40_000)
     np.save(tmp_path / "noise.npy", noise)
-    np.savetxt(tmp_path / "noise.csv", np.column_stack([np.arange(8000) / 2e4, noise[:8000]]), "%.6g", ",")
+    np.savetxt(
+        tmp_path / "noise.csv", np.column_stack([np.arange(8000) / 2e4, noise[:8000]]), "%.6g", ","
+    )
     names = sorted(NOT_LOADED[arguments])
     probe = (
         f"import atexit, sys\natexit.register(lambda: print('loaded', *[m for m in {names!r} if m in sys.modules]))\n"
         f"from asperity.cli import main\nmain({list(arguments)!r})"
     )
-    done = subprocess.run([sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
@@ -109,7 +180,9 @@ def test_kernels_that_were_compiled_before_load_nothing_that_compiles(tmp_path):
         f"except SystemExit: print('loaded', *[m for m in {sorted(COMPILES)!r} if m in sys.modules])"
     )
     for _ in range(2):  # the first one may have to compile
-        done = subprocess.run([sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-c", probe], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
     assert done.stdout.splitlines()[-1].split() == ["loaded"], done.stderr
 
 
@@ -121,7 +194,9 @@ def test_a_solve_begins_without_a_search_for_garbage():
         f"from asperity.cli import main\nmain(['solve', {str(PAPER)!r}, *{VIBRATED!r}, '--quiet'])"
     )
     for _ in range(2):  # the first one may have to compile
-        done = subprocess.run([sys.executable, "-c", probe], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-c", probe], capture_output=True, text=True, check=False
+        )
     assert done.stdout.splitlines()[-1] == "searched 0", done.stderr
 
 
@@ -135,7 +210,9 @@ def test_a_command_ends_without_a_search_for_garbage():
 
 
 def test_numba_waits_for_a_solve():
-    assert "numba" not in loaded_after("import asperity; asperity.read_surface; asperity.power_spectrum")
+    assert "numba" not in loaded_after(
+        "import asperity; asperity.read_surface; asperity.power_spectrum"
+    )
 
 
 def test_a_case_is_read_without_numba():
@@ -154,18 +231,22 @@ def test_a_name_that_is_not_there_is_named():
         _ = asperity.slove_case
 
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="memory is kept where the C library is glibc")
+@pytest.mark.skipif(
+    platform.libc_ver()[0] != "glibc", reason="memory is kept where the C library is glibc"
+)
 def test_what_is_freed_is_kept():
     """Fields of 16 MB: the system clears 4096 pages of memory that it hands out."""
     probe = (
-        "import resource, numpy as np\nfrom asperity.processes import save_time\nsave_time()\n"
+        "import resource, numpy as np\nfrom asperity.core.processes import save_time\nsave_time()\n"
         "def faults():\n  before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
         "  np.ones(1 << 21) + np.ones(1 << 21)\n"
         "  return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before\n"
         "print(faults(), max(faults() for _ in range(5)))"
     )
     environment = {**os.environ, "NUMPY_MADVISE_HUGEPAGE": "0"}
-    done = subprocess.run([sys.executable, "-c", probe], env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", probe], env=environment, capture_output=True, text=True, check=True
+    )
     first, later = map(int, done.stdout.split())
     assert first > 4096
     assert later < 400

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.signals import Signal, Spectrum, power_spectrum, smooth
+from asperity.core.errors import BadInput
+from asperity.core.signals import Signal, Spectrum, power_spectrum, smooth
+from asperity.resonance import contact_resonance
+from asperity.resonance.resonance import line_and_slopes, line_shape
 from asperity.vibration import ContactOscillator
-from asperity.wear import contact_resonance
-from asperity.wear.resonance import line_and_slopes, line_shape
 
 BAND = (2500.0, 4000.0)
 FREQUENCY = np.arange(0.0, 10_000.0, 1.25)
@@ -39,10 +39,14 @@ def test_slopes_of_the_line_are_its_derivatives():
     _, by_f0, by_damping = line_and_slopes(f, 3300.0, 0.03)
     d = 1e-6
     assert by_f0 == pytest.approx(
-        (line_shape(f, 3300.0 * np.exp(d), 0.03) - line_shape(f, 3300.0 * np.exp(-d), 0.03)) / (2 * d), abs=1e-6
+        (line_shape(f, 3300.0 * np.exp(d), 0.03) - line_shape(f, 3300.0 * np.exp(-d), 0.03))
+        / (2 * d),
+        abs=1e-6,
     )
     assert by_damping == pytest.approx(
-        (line_shape(f, 3300.0, 0.03 * np.exp(d)) - line_shape(f, 3300.0, 0.03 * np.exp(-d))) / (2 * d), abs=1e-6
+        (line_shape(f, 3300.0, 0.03 * np.exp(d)) - line_shape(f, 3300.0, 0.03 * np.exp(-d)))
+        / (2 * d),
+        abs=1e-6,
     )
 
 
@@ -75,7 +79,9 @@ def test_a_line_blurred_by_a_short_hann_window_is_fitted_unblurred():
     frequency = np.fft.fftfreq(segment * finer, 1 / rate)
     density = 0.7 * line_shape(np.abs(frequency), 3210.0, 0.02)
     kernel = np.abs(np.fft.fft(np.hanning(segment + 1)[:-1], segment * finer)) ** 2
-    blurred = np.fft.ifft(np.fft.fft(density) * np.fft.fft(kernel / kernel.sum())).real[: segment * finer // 2 : finer]
+    blurred = np.fft.ifft(np.fft.fft(density) * np.fft.fft(kernel / kernel.sum())).real[
+        : segment * finer // 2 : finer
+    ]
     spectrum = Spectrum(
         frequency_hz=np.arange(blurred.size) * rate / segment,
         density=blurred,
@@ -88,20 +94,29 @@ def test_a_line_blurred_by_a_short_hann_window_is_fitted_unblurred():
     )
     fit = contact_resonance(spectrum, band_hz=BAND)
     assert fit.crf_hz == pytest.approx(3210.0, rel=3e-4)
-    assert fit.crfa == pytest.approx(0.7, rel=0.002)  # a fit that took the blur for damping would be 1.7 % low
+    assert fit.crfa == pytest.approx(
+        0.7, rel=0.002
+    )  # a fit that took the blur for damping would be 1.7 % low
     assert fit.damping_ratio == pytest.approx(0.02, rel=0.002)
 
 
 @pytest.mark.parametrize("damping_ratio", [0.01, 0.02, 0.05])
 def test_the_fit_scatters_as_it_says_and_about_the_truth(damping_ratio):
     density = line_shape(FREQUENCY, 3200.0, damping_ratio) + 0.02
-    fits = [contact_resonance(chance_periodogram(density, seed), band_hz=BAND) for seed in range(150)]
+    fits = [
+        contact_resonance(chance_periodogram(density, seed), band_hz=BAND) for seed in range(150)
+    ]
     assert all(fit.found for fit in fits)
     pulls = {
         "crf": np.array([(fit.crf_hz - 3200.0) / fit.crf_std for fit in fits]),
         "crfa": np.array([(np.log(fit.crfa)) / (fit.crfa_std / fit.crfa) for fit in fits]),
         "damping": np.array(
-            [np.log(fit.damping_ratio / damping_ratio) * fit.damping_ratio / fit.damping_ratio_std for fit in fits]
+            [
+                np.log(fit.damping_ratio / damping_ratio)
+                * fit.damping_ratio
+                / fit.damping_ratio_std
+                for fit in fits
+            ]
         ),
     }
     for name, pull in pulls.items():
@@ -112,7 +127,10 @@ def test_the_fit_scatters_as_it_says_and_about_the_truth(damping_ratio):
 def test_the_stated_deviation_is_the_cramer_rao_bound_of_a_lone_line():
     """sd(f0) = sqrt(zeta f0 / (2 pi T)) for a line without floor in a band much wider than it."""
     density = line_shape(FREQUENCY, 3200.0, 0.01)
-    stated = [contact_resonance(chance_periodogram(density, s), band_hz=(1500.0, 6500.0)).crf_std for s in range(20)]
+    stated = [
+        contact_resonance(chance_periodogram(density, s), band_hz=(1500.0, 6500.0)).crf_std
+        for s in range(20)
+    ]
     assert np.median(stated) == pytest.approx(np.sqrt(0.01 * 3200.0 / (2 * np.pi * 0.8)), rel=0.1)
 
 
@@ -121,7 +139,9 @@ def test_noise_has_no_resonance_and_the_reason_is_given(window, segment):
     false = 0
     for seed in range(60):
         noise = Signal(np.random.default_rng(seed).standard_normal(16_000), 20e3, "m/s^2")
-        seen = contact_resonance(power_spectrum(noise, segment=segment, window=window), band_hz=BAND)
+        seen = contact_resonance(
+            power_spectrum(noise, segment=segment, window=window), band_hz=BAND
+        )
         false += seen.found
         assert seen.found or "stands out" in seen.reason
     assert false == 0
@@ -144,7 +164,9 @@ def test_a_line_outside_the_band_is_not_taken_for_one_inside(f0):
 
 def test_a_tone_is_not_a_resonance():
     time = np.arange(16_000) / 20e3
-    values = np.random.default_rng(0).standard_normal(16_000) + 3.0 * np.sin(2 * np.pi * 3000.7 * time)
+    values = np.random.default_rng(0).standard_normal(16_000) + 3.0 * np.sin(
+        2 * np.pi * 3000.7 * time
+    )
     seen = contact_resonance(power_spectrum(Signal(values, 20e3, "m/s^2")), band_hz=BAND)
     assert not seen.found
     assert "tone" in seen.reason
@@ -175,17 +197,24 @@ def test_bad_input_is_named():
 
 
 def several(lines, seed):
-    density = np.full(FREQUENCY.size, 0.02) + sum(a * line_shape(FREQUENCY, f, z) for a, f, z in lines)
+    density = np.full(FREQUENCY.size, 0.02) + sum(
+        a * line_shape(FREQUENCY, f, z) for a, f, z in lines
+    )
     return chance_periodogram(density, seed)
 
 
 def test_the_strongest_of_several_lines_is_found_and_scatters_as_it_says():
     """0.8 s of three lines; alone, the one-line fit takes them for one wide line or trips over them."""
     lines = [(1.0, 3200.0, 0.02), (0.6, 2800.0, 0.008), (0.5, 3650.0, 0.006)]
-    fits = [contact_resonance(several(lines, seed), band_hz=BAND, method="modes") for seed in range(25)]
+    fits = [
+        contact_resonance(several(lines, seed), band_hz=BAND, method="modes") for seed in range(25)
+    ]
     assert all(fit.found for fit in fits)
     pulls = np.array(
-        [[(fit.crf_hz - 3200.0) / fit.crf_std, np.log(fit.crfa) * fit.crfa / fit.crfa_std] for fit in fits]
+        [
+            [(fit.crf_hz - 3200.0) / fit.crf_std, np.log(fit.crfa) * fit.crfa / fit.crfa_std]
+            for fit in fits
+        ]
     )
     assert np.std(pulls, axis=0) == pytest.approx([1.0, 1.0], abs=0.35)
     assert np.abs(np.mean(pulls, axis=0)) == pytest.approx([0.0, 0.0], abs=0.6)
@@ -195,25 +224,43 @@ def test_the_strongest_of_several_lines_is_found_and_scatters_as_it_says():
 
 
 def test_lines_about_as_strong_are_not_told_apart():
-    seen = contact_resonance(several([(1.0, 3200.0, 0.02), (1.0, 2800.0, 0.02)], 0), band_hz=BAND, method="modes")
+    seen = contact_resonance(
+        several([(1.0, 3200.0, 0.02), (1.0, 2800.0, 0.02)], 0), band_hz=BAND, method="modes"
+    )
     assert not seen.found
     assert "cannot tell" in seen.reason
 
 
 def test_one_line_is_the_same_by_modes_and_noise_has_none():
     spectrum = several([(1.0, 3200.0, 0.02)], 3)
-    one, alone = (contact_resonance(spectrum, band_hz=BAND, method=method) for method in ("modes", "likelihood"))
+    one, alone = (
+        contact_resonance(spectrum, band_hz=BAND, method=method)
+        for method in ("modes", "likelihood")
+    )
     assert one.crf_hz == pytest.approx(alone.crf_hz, abs=0.2 * alone.crf_std)
     assert one.crf_std == pytest.approx(alone.crf_std, rel=0.05)
-    noise = [contact_resonance(several([], seed), band_hz=BAND, method="modes") for seed in range(25)]
+    noise = [
+        contact_resonance(several([], seed), band_hz=BAND, method="modes") for seed in range(25)
+    ]
     assert not any(seen.found for seen in noise)
     assert "nothing stands out" in noise[0].reason
 
 
 def test_sampling_is_for_the_fit_alone():
     spectrum = Spectrum(
-        frequency_hz=np.arange(0.0, 5e3, 2.0), density=np.ones(2500), unit="1/Hz", duration_s=1.0, segment=5000,
-        window="boxcar", resolution_hz=2.0, averages=1.0,
-    )  # fmt: skip
+        frequency_hz=np.arange(0.0, 5e3, 2.0),
+        density=np.ones(2500),
+        unit="1/Hz",
+        duration_s=1.0,
+        segment=5000,
+        window="boxcar",
+        resolution_hz=2.0,
+        averages=1.0,
+    )
     with pytest.raises(BadInput, match="for the method likelihood, got 'peak'"):
-        contact_resonance(spectrum, band_hz=(1e3, 3e3), method="peak", seen=lambda f, f0_hz, damping_ratio: f / f)  # noqa: ARG005
+        contact_resonance(
+            spectrum,
+            band_hz=(1e3, 3e3),
+            method="peak",
+            seen=lambda f, f0_hz, damping_ratio: f / f,  # noqa: ARG005
+        )

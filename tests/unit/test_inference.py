@@ -10,9 +10,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
 from asperity.case import load_case
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.coupling import dry_full_load, excitation, oscillator
-from asperity.errors import BadInput
-from asperity.grid import Grid
 from asperity.inference import (
     Forward,
     Heard,
@@ -29,6 +29,7 @@ from asperity.inference import (
 )
 from asperity.inference import emulator as emulator_module
 from asperity.inference.estimates import bits, estimate
+from asperity.inference.gaussian_process import Process, fit_process
 from asperity.inference.likelihood import (
     ALONG,
     COMMON,
@@ -41,7 +42,6 @@ from asperity.inference.likelihood import (
 )
 from asperity.inference.observations import points_of
 from asperity.inference.outputs import OUTPUTS
-from asperity.inference.process import Process, fit_process
 from asperity.inference.sampling import Pool, importance, nested
 from asperity.surface import MeasuredSurface
 from support.emulated import CASE, formula_emulator, formula_setting
@@ -74,11 +74,16 @@ def heard(setting, emulator, points, *, law="hertz-point", std=1e-3, seed=1):
     crf = np.exp(shown.crf[0] + std * rng.standard_normal(len(points)))
     return [
         Observation(
-            load_n=load, entrainment_m_s=speed, crf_hz=float(hertz), crf_std_hz=float(std * hertz),
-            damping_ratio=float(np.exp(shown.damping[0, number])), damping_std=0.001, name=f"{load:g}-{speed:g}",
+            load_n=load,
+            entrainment_m_s=speed,
+            crf_hz=float(hertz),
+            crf_std_hz=float(std * hertz),
+            damping_ratio=float(np.exp(shown.damping[0, number])),
+            damping_std=0.001,
+            name=f"{load:g}-{speed:g}",
         )
         for number, ((load, speed), hertz) in enumerate(zip(points, crf, strict=True))
-    ]  # fmt: skip
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -101,12 +106,16 @@ def test_a_process_says_what_scikit_learn_says():
     y = np.sin(5.0 * x[:, 0]) + x[:, 1] + np.sqrt(noise) * rng.standard_normal(30)
     process = fit_process(x, y, noise)
     kernel = ConstantKernel(process.level, "fixed") * Matern(process.lengths, "fixed", nu=2.5)
-    twin = GaussianProcessRegressor(kernel + WhiteKernel(process.rough, "fixed"), alpha=noise / process._scale**2)
+    twin = GaussianProcessRegressor(
+        kernel + WhiteKernel(process.rough, "fixed"), alpha=noise / process._scale**2
+    )
     trend = np.hstack([np.ones((30, 1)), x]) @ process._trend
     twin.fit(x, (y - trend) / process._scale)
     mean, std = twin.predict(at, return_std=True)
     ours, deviation = process(at)
-    assert ours == pytest.approx(np.hstack([np.ones((7, 1)), at]) @ process._trend + process._scale * mean, abs=1e-5)
+    assert ours == pytest.approx(
+        np.hstack([np.ones((7, 1)), at]) @ process._trend + process._scale * mean, abs=1e-5
+    )
     assert deviation == pytest.approx(process._scale * std, rel=1e-4)
     assert np.array_equal(process.mean(at), ours)
 
@@ -115,7 +124,9 @@ def test_a_process_says_what_scikit_learn_says():
 def test_a_scale_goes_both_ways_and_knows_its_slope(key):
     output, value = OUTPUTS[key], np.array([1e-3, 0.02, 0.4, 0.97])
     assert output.back(output.forward(value)) == pytest.approx(value, rel=1e-9)
-    by_differences = (output.forward(value * (1 + 1e-6)) - output.forward(value * (1 - 1e-6))) / (2e-6 * value)
+    by_differences = (output.forward(value * (1 + 1e-6)) - output.forward(value * (1 - 1e-6))) / (
+        2e-6 * value
+    )
     assert output.slope(value) == pytest.approx(by_differences, rel=1e-5)
 
 
@@ -126,9 +137,14 @@ def test_priors_have_the_quantiles_that_are_stated():
     known = Unknown.stated("sq_m", "surface.sq", 0.8, 0.1, "um")
     assert 1e6 * known.value(z) == pytest.approx([0.8 - 0.1645, 0.8, 0.8 + 0.1645], abs=1e-4)
     wide = Unknown.stated("sq_m", "surface.sq", 0.8, 0.5, "um")  # normal, it would reach below 0
-    assert 1e6 * wide.value(z) == pytest.approx(0.8 * np.exp(np.sqrt(np.log1p((5 / 8) ** 2)) * z), rel=1e-9)
+    assert 1e6 * wide.value(z) == pytest.approx(
+        0.8 * np.exp(np.sqrt(np.log1p((5 / 8) ** 2)) * z), rel=1e-9
+    )
     for unknown in (span, known, wide):
-        assert np.all((unknown.share(np.array([-9.0, 0.0, 9.0])) >= -1e-12) & (unknown.share(z) <= 1.0 + 1e-12))
+        assert np.all(
+            (unknown.share(np.array([-9.0, 0.0, 9.0])) >= -1e-12)
+            & (unknown.share(z) <= 1.0 + 1e-12)
+        )
 
 
 @pytest.mark.parametrize("discrepancy", [True, False])
@@ -139,7 +155,9 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
     stds = rng.uniform(0.1, 0.3, (3, 3, 4))
     shown = Shown(crf, stds[0], damping, stds[1], crfa, stds[2], lever)
     said = [Heard(0.3, 0.2), Heard(), Heard(-0.1, 0.5), Heard(1.0, 0.1)]
-    points = [Point(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one) for i, one in enumerate(said)]
+    points = [
+        Point(500.0 * 1.01**i, 1.0, crf=one, damping=one, crfa=one) for i, one in enumerate(said)
+    ]
     here = [0, 2, 3]
     near = norm.pdf(np.subtract.outer(here, here) * np.log(1.01) / 0.03) / norm.pdf(0.0)
     sizes = SIZES if discrepancy else (0.0,)
@@ -148,19 +166,25 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
         steep = EXPONENT_STD * discrepancy * (force - force.mean())
         common = {"crf": np.outer(steep, steep), "damping": 0.0, "crfa": GAIN_STD**2}
         beyond = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
-        for number, (channel, weight) in enumerate({"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()):
+        for number, (channel, weight) in enumerate(
+            {"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()
+        ):
             std = np.hypot(stds[number, row, here], beyond[channel])
             known = common[channel] + np.outer(std, std) * (COMMON + (1.0 - COMMON) * near)
             known = known + np.diag([said[i].std ** 2 for i in here])
-            alike = OWN * near + (1.0 - OWN) * norm.pdf(np.subtract.outer(force, force) / ALONG) / norm.pdf(0.0)
+            alike = OWN * near + (1.0 - OWN) * norm.pdf(
+                np.subtract.outer(force, force) / ALONG
+            ) / norm.pdf(0.0)
             densities = [
-                multivariate_normal(getattr(shown, channel)[row, here], known + (weight * size) ** 2 * alike).pdf(
-                    [said[i].value for i in here]
-                )
+                multivariate_normal(
+                    getattr(shown, channel)[row, here], known + (weight * size) ** 2 * alike
+                ).pdf([said[i].value for i in here])
                 for size in sizes
             ]
             expected += np.log(np.mean(densities))
-        assert log_likelihood(shown, points, discrepancy=discrepancy)[row] == pytest.approx(expected, abs=1e-8)
+        assert log_likelihood(shown, points, discrepancy=discrepancy)[row] == pytest.approx(
+            expected, abs=1e-8
+        )
 
 
 def test_importance_and_nested_sampling_find_a_known_posterior():
@@ -174,12 +198,16 @@ def test_importance_and_nested_sampling_find_a_known_posterior():
     mean, evidence = lever * value / variance, norm(0.0, np.sqrt(variance)).logpdf(value)
     pool = Pool(lambda z: z, lambda a, b: np.concatenate([a, b]), lambda a, rows: a[rows], 2, 0)
     for sampled in (importance(pool, target), nested(lambda z: z, target, 2, 0)):
-        assert sampled.log_evidence == pytest.approx(evidence, abs=4.0 * sampled.log_evidence_std + 0.02)
+        assert sampled.log_evidence == pytest.approx(
+            evidence, abs=4.0 * sampled.log_evidence_std + 0.02
+        )
         found = sampled.weights @ sampled.z
         spread = np.sqrt(sampled.weights @ (sampled.z - found) ** 2)
         assert found == pytest.approx(mean, abs=0.12)
         assert spread == pytest.approx(np.sqrt(1.0 - lever**2 / variance), rel=0.12)
-        told = 0.5 * np.log2(variance / noise**2) + 0.5 * (mean @ mean + noise**2 / variance - 1.0) / np.log(2.0)
+        told = 0.5 * np.log2(variance / noise**2) + 0.5 * (
+            mean @ mean + noise**2 / variance - 1.0
+        ) / np.log(2.0)
         assert sampled.information_bits == pytest.approx(told, abs=0.25)
 
 
@@ -208,8 +236,9 @@ def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
         conditions = setting.case.with_overrides({"contact.load": f"{point.load_n} N"}).conditions
         state = replace(
             dry_full_load(conditions, float(setting.unknowns[0].value(z[:, 0])[0])),
-            clr=float(states["clr"][0, place]), car=float(states["car"][0, place]),
-        )  # fmt: skip
+            clr=float(states["clr"][0, place]),
+            car=float(states["car"][0, place]),
+        )
         spring = oscillator(state, conditions, model)
         at = np.array(spring.natural_frequency_hz)
         height = spring.gain(at) * excitation(state, conditions, model).density(at, 1e9)
@@ -217,13 +246,19 @@ def test_crf_and_crfa_are_those_of_the_coupling(setting, emulator):
     crf, damping, height = np.array(expected).T
     assert np.exp(shown.crf[0]) == pytest.approx(crf, rel=1e-9)
     assert np.exp(shown.damping[0]) == pytest.approx(damping, rel=1e-9)
-    assert shown.crfa[0, 1] - shown.crfa[0, 0] == pytest.approx(np.log(height[1] / height[0]), abs=1e-3)
+    assert shown.crfa[0, 1] - shown.crfa[0, 0] == pytest.approx(
+        np.log(height[1] / height[0]), abs=1e-3
+    )
 
 
 def replace_choices(setting, z):
-    values = {unknown.key: float(unknown.value(z[:, i])[0]) for i, unknown in enumerate(setting.unknowns)}
+    values = {
+        unknown.key: float(unknown.value(z[:, i])[0]) for i, unknown in enumerate(setting.unknowns)
+    }
     return setting.case.vibration.with_choices(
-        mass=values["mass_kg"], damping_ratio=values["damping_ratio"], cutoff_exponent=values["cutoff_exponent"]
+        mass=values["mass_kg"],
+        damping_ratio=values["damping_ratio"],
+        cutoff_exponent=values["cutoff_exponent"],
     )
 
 
@@ -234,7 +269,9 @@ def test_the_own_law_hears_stiffness_and_damping(setting, emulator):
     shown = forward.shown(z, "own")
     hertz = np.sqrt(state["contact_stiffness_n_m"][0, 0] / 0.1) / (2.0 * np.pi)
     assert np.exp(shown.crf[0, 0]) == pytest.approx(hertz, rel=1e-9)
-    assert np.exp(shown.damping[0, 0]) == pytest.approx(0.02 + state["contact_damping_ratio"][0, 0], rel=1e-3)
+    assert np.exp(shown.damping[0, 0]) == pytest.approx(
+        0.02 + state["contact_damping_ratio"][0, 0], rel=1e-3
+    )
 
 
 # Inference -----------------------------------------------------------------------------------------------------------
@@ -248,7 +285,9 @@ def test_one_operating_point_leaves_sq_open_and_six_do_not(setting, emulator, of
     assert narrow.information_bits > wide.information_bits + 0.5
     assert narrow.low < sq < narrow.high
     assert of_six.identifiable
-    clr = Forward(setting, emulator, of_six.forward.points[:1]).states(truth(setting), ["clr"])["clr"][0, 0]
+    clr = Forward(setting, emulator, of_six.forward.points[:1]).states(truth(setting), ["clr"])[
+        "clr"
+    ][0, 0]
     told = of_six.posterior()["clr"]
     assert told.low < clr < told.high
     assert told.information_bits > 2.0
@@ -277,16 +316,26 @@ def test_a_wrong_law_widens_the_intervals_and_is_said(setting, emulator, of_six)
     found = infer_observations(setting, emulator, wrong)
     assert found.law_error > 0.05
     assert any("an error of about" in warning for warning in found.warnings())
-    assert found.models[0].log_evidence > found.models[1].log_evidence + 10.0  # with the error against exact
-    assert found.posterior()["clr"].information_bits < of_six.posterior()["clr"].information_bits - 0.5
+    assert (
+        found.models[0].log_evidence > found.models[1].log_evidence + 10.0
+    )  # with the error against exact
+    assert (
+        found.posterior()["clr"].information_bits < of_six.posterior()["clr"].information_bits - 0.5
+    )
     ratio = [one.high / one.low for one in (found.posterior()["sq_m"], of_six.posterior()["sq_m"])]
     assert ratio[0] > 1.1 * ratio[1]  # both allow for an exponent that is off
 
 
 def test_nothing_heard_cannot_be_told(setting, emulator):
-    silent = (("a.wav", "one spectrum cannot tell"), ("b.wav", "too short"), ("c.wav", "one spectrum cannot tell"))
+    silent = (
+        ("a.wav", "one spectrum cannot tell"),
+        ("b.wav", "too short"),
+        ("c.wav", "one spectrum cannot tell"),
+    )
     found = infer_observations(setting, emulator, [], silent=silent)
-    assert found.verdict().startswith("Cannot be told: no recording shows a contact resonance (2 of 3: one spectrum")
+    assert found.verdict().startswith(
+        "Cannot be told: no recording shows a contact resonance (2 of 3: one spectrum"
+    )
     assert not found.identifiable
     assert all(one.information_bits < 0.1 for one in found.posterior().values())
     json.dumps(found.scalars(), allow_nan=False)
@@ -307,7 +356,9 @@ def test_the_same_seed_gives_the_same_numbers(setting, emulator, of_one):
     assert again.scalars() == of_one.scalars()
     other = infer_observations(setting, emulator, of_one.observations, seed=1)
     assert other.posterior()["sq_m"] != of_one.posterior()["sq_m"]
-    assert other.posterior()["sq_m"].median == pytest.approx(of_one.posterior()["sq_m"].median, rel=0.1)
+    assert other.posterior()["sq_m"].median == pytest.approx(
+        of_one.posterior()["sq_m"].median, rel=0.1
+    )
 
 
 def test_one_recording_more_is_what_all_together_are(setting, emulator, of_six):
@@ -315,7 +366,9 @@ def test_one_recording_more_is_what_all_together_are(setting, emulator, of_six):
     added: Inference = with_observation(five, of_six.observations[5])
     for key in ("clr", "sq_m"):
         ours, whole = added.posterior()[key], of_six.posterior()[key]
-        assert [ours.low, ours.median, ours.high] == pytest.approx([whole.low, whole.median, whole.high], rel=0.15)
+        assert [ours.low, ours.median, ours.high] == pytest.approx(
+            [whole.low, whole.median, whole.high], rel=0.15
+        )
     assert [model.log_evidence for model in added.models[:2]] == pytest.approx(
         [model.log_evidence for model in of_six.models[:2]], abs=0.4
     )
@@ -331,9 +384,13 @@ def test_repeats_are_surer_together_and_no_surer_than_their_scatter(setting, emu
 
 
 def test_what_repeats_have_in_common_does_not_average_away():
-    one = Observation(load_n=500.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=5.0, crf_shared_std_hz=3.0)
+    one = Observation(
+        load_n=500.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=5.0, crf_shared_std_hz=3.0
+    )
     for count in (1, 4, 1000):
-        assert 3000.0 * points_of([one] * count)[0].crf.std == pytest.approx(np.hypot(3.0, 4.0 / np.sqrt(count)))
+        assert 3000.0 * points_of([one] * count)[0].crf.std == pytest.approx(
+            np.hypot(3.0, 4.0 / np.sqrt(count))
+        )
 
 
 def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
@@ -343,7 +400,10 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
 
     def width(loads):
         points = [Point(load, 1.0, crf=said) for load in loads]
-        nothing, lever = np.full((len(off), len(loads)), np.nan), np.tile(np.log(loads), (len(off), 1))
+        nothing, lever = (
+            np.full((len(off), len(loads)), np.nan),
+            np.tile(np.log(loads), (len(off), 1)),
+        )
         crf = 8.0 + off + np.zeros_like(nothing)
         shown = Shown(crf, np.full_like(crf, 0.01), nothing, nothing, nothing, nothing, lever)
         weights = np.exp(log_likelihood(shown, points, discrepancy=True))
@@ -351,7 +411,9 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
 
     assert width([200.0]) == pytest.approx(np.sqrt(np.mean(np.square(SIZES)) + 0.01**2), rel=0.02)
     assert width(200.0 + 1e-6 * np.arange(5)) == pytest.approx(width([200.0]), rel=1e-3)
-    assert width([100.0, 150.0, 200.0, 300.0, 400.0]) < 0.5 * width([200.0])  # there agreement tells
+    assert width([100.0, 150.0, 200.0, 300.0, 400.0]) < 0.5 * width(
+        [200.0]
+    )  # there agreement tells
 
 
 # What is refused -----------------------------------------------------------------------------------------------------
@@ -362,9 +424,18 @@ def test_loads_that_differ_in_the_last_digit_make_no_law_surer():
     [
         ({"infer.sq": {"from": "1 um", "to": "0.5 um"}}, "must have a range that goes upwards"),
         ({"infer.sq": {"from": "0.5 um", "to": "2 N"}}, "infer.sq.to must be in um"),
-        ({"infer.radius": {"from": "1 mm", "to": "2 mm"}}, "infer.radius cannot be inferred; what can is"),
-        ({"infer.correlation_length": {"from": "5 um", "to": "40 um"}}, "which the emulator's grid carries"),
-        ({"infer.load": {"value": "500 N", "std": "1 N"}}, "is where the contact may be run; give from and to"),
+        (
+            {"infer.radius": {"from": "1 mm", "to": "2 mm"}},
+            "infer.radius cannot be inferred; what can is",
+        ),
+        (
+            {"infer.correlation_length": {"from": "5 um", "to": "40 um"}},
+            "which the emulator's grid carries",
+        ),
+        (
+            {"infer.load": {"value": "500 N", "std": "1 N"}},
+            "is where the contact may be run; give from and to",
+        ),
         ({"infer.sq": {"value": "1 um", "std": "0 um"}}, "infer.surface.sq.std must be positive"),
         ({"infer.points": 3}, "infer.points must be greater than or equal to 16"),
         ({"vibration": "none"}, "vibration is left out"),
@@ -378,17 +449,31 @@ def test_what_cannot_be_inferred_is_refused(change, said):
 
 
 def test_an_operating_point_beyond_the_emulator_is_refused(setting, emulator):
-    far = Observation(load_n=2000.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=3.0, name="far.wav")
-    with pytest.raises(BadInput, match=r"load of far.wav must lie within 250 to 950 N.*widen infer.load"):
+    far = Observation(
+        load_n=2000.0, entrainment_m_s=1.0, crf_hz=3000.0, crf_std_hz=3.0, name="far.wav"
+    )
+    with pytest.raises(
+        BadInput, match=r"load of far.wav must lie within 250 to 950 N.*widen infer.load"
+    ):
         infer_observations(setting, emulator, [far])
     with pytest.raises(BadInput, match="needs an oil by its data sheet"):
         infer_observations(setting, emulator, [replace(far, load_n=500.0, temperature_k=340.0)])
 
 
-@pytest.mark.parametrize("wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_shared_std_hz": 6.0}])
+@pytest.mark.parametrize(
+    "wrong", [{"load_n": 0.0}, {"crf_std_hz": float("nan")}, {"crf_shared_std_hz": 6.0}]
+)
 def test_an_observation_that_is_none_is_refused(wrong):
     with pytest.raises(BadInput, match=r"must be positive|is a part of crf_std_hz, 3 Hz, got 6 Hz"):
-        Observation(**{"load_n": 500.0, "entrainment_m_s": 1.0, "crf_hz": 3000.0, "crf_std_hz": 3.0, **wrong})
+        Observation(
+            **{
+                "load_n": 500.0,
+                "entrainment_m_s": 1.0,
+                "crf_hz": 3000.0,
+                "crf_std_hz": 3.0,
+                **wrong,
+            }
+        )
 
 
 def test_a_missing_extra_is_said_with_its_remedy(monkeypatch, tmp_path):
@@ -410,8 +495,12 @@ def test_the_height_of_one_line_says_nothing_of_the_contact(setting, emulator):
     """The gain of what excites and hears it is free: any CRFA at all leaves Sq and damping where they are."""
     plain = heard(setting, emulator, SIX[2:3])[0]
     loud = [replace(plain, crfa=height, crfa_std=0.03 * height) for height in (1e-6, 1e6)]
-    quiet, noisy = (infer_observations(setting, emulator, [one]).posterior()["sq_m"] for one in loud)
-    assert [quiet.low, quiet.median, quiet.high] == pytest.approx([noisy.low, noisy.median, noisy.high], rel=0.2)
+    quiet, noisy = (
+        infer_observations(setting, emulator, [one]).posterior()["sq_m"] for one in loud
+    )
+    assert [quiet.low, quiet.median, quiet.high] == pytest.approx(
+        [noisy.low, noisy.median, noisy.high], rel=0.2
+    )
 
 
 def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
@@ -421,7 +510,9 @@ def test_a_measured_surface_is_what_is_known_of_sq(setting, emulator, of_one):
     measured = MeasuredSurface(0.7e-6 * rng.standard_normal((64, 64)), grid, "ring.csv", "text")
     known, said = with_measured(setting, measured)
     z = np.array([-1.0, 0.0, 1.0])
-    assert 1e6 * known.contact[0].value(z) == pytest.approx([0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006)
+    assert 1e6 * known.contact[0].value(z) == pytest.approx(
+        [0.7 - 0.022, 0.7, 0.7 + 0.022], abs=0.006
+    )
     assert known.ranges == setting.ranges  # the emulator's own
     assert said.startswith("Sq is taken as ring.csv shows it, 0.7")
     told = infer_observations(known, emulator, of_one.observations).posterior()["clr"]
@@ -444,6 +535,8 @@ def test_further_points_never_take_a_folder_that_is_there(monkeypatch, tmp_path)
     (tmp_path / "further" / "001" / "shares.json").unlink()
     (tmp_path / "further" / "001").rmdir()
     emulator_module.extend_emulator(formula_setting(), held, np.full((1, 2), 0.25))
-    kept = {path.parent.name: path.read_text() for path in (tmp_path / "further").glob("*/shares.json")}
+    kept = {
+        path.parent.name: path.read_text() for path in (tmp_path / "further").glob("*/shares.json")
+    }
     assert [*sorted(kept)] == ["000", "002", "003"]
     assert "0.5" in kept["002"]

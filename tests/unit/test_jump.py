@@ -8,23 +8,35 @@ import pandas
 import pytest
 
 from asperity import BadInput
-from asperity.ageing.contact import Solved
-from asperity.ageing.history import WearHistory
-from asperity.ageing.jump import Ageing
-from asperity.ageing.notes import of_few_jumps, of_grooves, of_radii, of_standing
-from asperity.ageing.rows import contact_row, of_body, roughness
-from asperity.ageing.run import _row
-from asperity.ageing.worn import Worn
 from asperity.ehl import ContactState
+from asperity.simulation.wear.contact import Solved
+from asperity.simulation.wear.history import WearHistory
+from asperity.simulation.wear.jump import Ageing
+from asperity.simulation.wear.notes import of_few_jumps, of_grooves, of_radii, of_standing
+from asperity.simulation.wear.rows import contact_row, of_body, roughness
+from asperity.simulation.wear.run import _row
+from asperity.simulation.wear.state import Worn
 from asperity.surface import Surface
-from asperity.wearing import Position
-from asperity.wearing.laws import GAS_CONSTANT
+from asperity.wear import Position
+from asperity.wear.laws import GAS_CONSTANT
 from support.wearing import DRY, FEW, POINT, worn_case
 
 STATE = ContactState(
-    clr=0.5, car=0.1, car_domain=0.1, capped_oil_load_ratio=0.0, h_min=0.0, h_central=0.0, h_mean=0.0, p_max=1e9,
-    contact_slope=None, sq=1e-6, lambda_ratio=None, reynolds_residual=0.0, load_error=0.0, mass_flux_imbalance=0.0,
-)  # fmt: skip
+    clr=0.5,
+    car=0.1,
+    car_domain=0.1,
+    capped_oil_load_ratio=0.0,
+    h_min=0.0,
+    h_central=0.0,
+    h_mean=0.0,
+    p_max=1e9,
+    contact_slope=None,
+    sq=1e-6,
+    lambda_ratio=None,
+    reynolds_residual=0.0,
+    load_error=0.0,
+    mass_flux_imbalance=0.0,
+)
 
 
 def ageing(overrides: dict[str, object] | None = None) -> Ageing:
@@ -33,7 +45,9 @@ def ageing(overrides: dict[str, object] | None = None) -> Ageing:
     return Ageing(case, case.wear, case.moving_surfaces())
 
 
-def rubbed(model: Ageing, rise: float = 0.0, touching: float = 1.0) -> list[tuple[Position, Solved]]:
+def rubbed(
+    model: Ageing, rise: float = 0.0, touching: float = 1.0
+) -> list[tuple[Position, Solved]]:
     """Hertz's pressure at one position, borne by asperities to a share, on surfaces hotter than ambient by `rise`."""
     grid, hertz = model.case.grid, model.case.conditions.hertz
     half_widths = [*hertz.half_widths, math.inf][:2]
@@ -67,7 +81,9 @@ def test_a_jump_is_as_long_as_the_coefficient_that_acts_allows():
     rise = hot - film.case.thermal.ambient
     assert film.seconds(new, rubbed(film, rise)) == pytest.approx(1e5 * bare, rel=1e-4, abs=0.0)
     cold = film.exposures()[0].k / 1e-14
-    assert cold == pytest.approx(crossing * math.exp(-4.9e4 / GAS_CONSTANT / film.case.thermal.ambient), rel=1e-4)
+    assert cold == pytest.approx(
+        crossing * math.exp(-4.9e4 / GAS_CONSTANT / film.case.thermal.ambient), rel=1e-4
+    )
 
 
 def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
@@ -76,7 +92,9 @@ def test_what_a_jump_takes_off_is_spread_by_the_coefficient_that_acts():
     new, at = Worn.begin(film.surfaces), rubbed(film, 0.0)
     seconds = 1e-3 * film.seconds(new, at)
     lost = film.jumped(new, at, seconds).worn[0]
-    np.testing.assert_allclose(lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max())
+    np.testing.assert_allclose(
+        lost, film.rate(new, at, 0) * seconds, rtol=0.0, atol=1e-3 * lost.max()
+    )
 
 
 BALL = {**DRY, "contact.load": "10 N", "wear.k": "1e-14 1/Pa", "wear.patches": 1}
@@ -100,22 +118,35 @@ def test_a_balls_track_is_as_wide_as_its_contact_whatever_the_grid():
         for body in (0, 1):
             width = 2.0 * model.case.conditions.hertz.half_widths[1]
             over_all = model.volume(worn.worn[body], body) / model.perimeter(body) / width
-            assert rows[-1][of_body("worn_depth_m", body)] == pytest.approx(over_all, rel=0.15, abs=0.0)
-            assert model.levelled(worn)[body].grid.extent[1] == pytest.approx(width, rel=0.15, abs=0.0)
+            assert rows[-1][of_body("worn_depth_m", body)] == pytest.approx(
+                over_all, rel=0.15, abs=0.0
+            )
+            assert model.levelled(worn)[body].grid.extent[1] == pytest.approx(
+                width, rel=0.15, abs=0.0
+            )
     assert rows[0]["worn_depth_1_m"] == pytest.approx(rows[1]["worn_depth_1_m"], rel=2e-3, abs=0.0)
-    assert rows[0]["worn_depth_max_2_m"] == pytest.approx(rows[1]["worn_depth_max_2_m"], rel=2e-3, abs=0.0)
+    assert rows[0]["worn_depth_max_2_m"] == pytest.approx(
+        rows[1]["worn_depth_max_2_m"], rel=2e-3, abs=0.0
+    )
 
 
 def test_a_track_that_has_grown_beyond_the_hertz_zone_counts_whole():
     model = ball({"surface": "flat"}, 3.6, 48)
     new = Worn.begin(model.surfaces)
     y, a = model.surfaces.grid.y, model.case.conditions.hertz.half_widths[1]
-    groove = np.broadcast_to(1e-6 * np.maximum(1.0 - (y / (2.0 * a)) ** 2, 0.0), model.surfaces.first.grid.cells)
-    for worn in (replace(new, worn=(groove, new.worn[1])), replace(new, worn=(new.worn[0], groove))):
+    groove = np.broadcast_to(
+        1e-6 * np.maximum(1.0 - (y / (2.0 * a)) ** 2, 0.0), model.surfaces.first.grid.cells
+    )
+    for worn in (
+        replace(new, worn=(groove, new.worn[1])),
+        replace(new, worn=(new.worn[0], groove)),
+    ):
         for body in (0, 1):
             along, across = model.track(worn, body)
             assert along == slice(None)
-            np.testing.assert_array_equal(np.abs(y) < 2.0 * a, np.isin(np.arange(48), np.arange(48)[across]))
+            np.testing.assert_array_equal(
+                np.abs(y) < 2.0 * a, np.isin(np.arange(48), np.arange(48)[across])
+            )
 
 
 def test_a_standing_bodys_scar_is_no_roughness():
@@ -131,7 +162,9 @@ def test_a_standing_bodys_scar_is_no_roughness():
     row = _row(model, worn, rubbed(model), 0)
     assert row[of_body("sq_m", still)] == 0.0
     assert row["sq_m"] == 0.0
-    assert row[of_body("worn_depth_m", still)] == pytest.approx(2e-6 * math.pi / 8.0, rel=0.1, abs=0.0)
+    assert row[of_body("worn_depth_m", still)] == pytest.approx(
+        2e-6 * math.pi / 8.0, rel=0.1, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("geometry", ["ball", "roller"])
@@ -140,13 +173,19 @@ def test_a_rough_standing_body_keeps_its_sq_below_a_scar_many_times_deeper(geome
     model = ball(standing | {"grid.cells": [96, 96]}) if geometry == "ball" else ageing(standing)
     (still,) = (body for body in (0, 1) if model.bodies[body].speed == 0.0)
     assert model.surfaces.rough[still]
-    new, grid, half_widths = Worn.begin(model.surfaces), model.surfaces.grid, model.case.conditions.hertz.half_widths
+    new, grid, half_widths = (
+        Worn.begin(model.surfaces),
+        model.surfaces.grid,
+        model.case.conditions.hertz.half_widths,
+    )
     across = (grid.y / half_widths[1]) ** 2 if geometry == "ball" else 0.0 * grid.y
     cap = 5e-6 * np.maximum(1.0 - (grid.x[:, None] / half_widths[0]) ** 2 - across, 0.0)
     maps = [0.0 * cap, 0.0 * cap]
     maps[still] = cap
     before = model.levelled(new)[still].sq
-    assert model.levelled(replace(new, worn=(maps[0], maps[1])))[still].sq == pytest.approx(before, rel=0.05, abs=0.0)
+    assert model.levelled(replace(new, worn=(maps[0], maps[1])))[still].sq == pytest.approx(
+        before, rel=0.05, abs=0.0
+    )
 
 
 @pytest.mark.parametrize("touching", [1.0, 0.6])
@@ -195,7 +234,9 @@ def test_rates_that_make_other_bodies_than_the_contacts_are_said():
 
 
 def test_a_body_shorter_than_the_contact_is_refused():
-    with pytest.raises(BadInput, match=r"overrolling of 1e\+07 Hz at .* is a body .* round, less than the contact"):
+    with pytest.raises(
+        BadInput, match=r"overrolling of 1e\+07 Hz at .* is a body .* round, less than the contact"
+    ):
         ageing({"wear.overrolling": "1e7 Hz"})
 
 
@@ -233,13 +274,17 @@ def test_a_jump_that_differs_too_much_from_the_one_before_going_on_is_shortened(
     model = ageing({"wear.step": 0.5})
     new = Worn.begin(model.surfaces)
     at = rubbed(model)
-    assert model.seconds(new, at) == pytest.approx(0.5 * 10.0 * ageing().seconds(new, at) / 0.5, rel=1e-9, abs=0.0)
+    assert model.seconds(new, at) == pytest.approx(
+        0.5 * 10.0 * ageing().seconds(new, at) / 0.5, rel=1e-9, abs=0.0
+    )
     other = [(Position(20, 20), at[0][1])]
     free = model.seconds(replace(new, number=1), other) / 0.5
     after = model.jumped(new, at, model.seconds(new, at))
     longest = model.seconds(after, other)
     assert longest < 0.99 * free
-    assert model.jumped(after, other, longest).error <= 1e-3 < model.jumped(after, other, free).error
+    assert (
+        model.jumped(after, other, longest).error <= 1e-3 < model.jumped(after, other, free).error
+    )
 
 
 def test_a_law_of_friction_without_friction_is_refused():
@@ -247,11 +292,18 @@ def test_a_law_of_friction_without_friction_is_refused():
         ageing({"wear.law": "energy", "material.boundary_friction": 0.0})
 
 
-def fallen(slope: float, curve: float = 0.0, scatter: float = 0.0, seed: int = 0, scaled: float = 0.5) -> WearHistory:
+def fallen(
+    slope: float, curve: float = 0.0, scatter: float = 0.0, seed: int = 0, scaled: float = 0.5
+) -> WearHistory:
     """A history, made up, of a CLR that falls by so much an hour, over ten hours."""
     model = ageing({"wear.scatter": scaled})
     hours = np.linspace(0.0, 10.0, 41)
-    clr = 0.7 + slope * hours + curve * hours**2 + scatter * np.random.default_rng(seed).standard_normal(hours.size)
+    clr = (
+        0.7
+        + slope * hours
+        + curve * hours**2
+        + scatter * np.random.default_rng(seed).standard_normal(hours.size)
+    )
     table = pandas.DataFrame({"hours": hours, "clr": clr})
     return WearHistory(ageing=model, table=table, worn=Worn.begin(model.surfaces))
 
@@ -260,8 +312,12 @@ def test_the_drift_of_a_line_is_its_slope_with_the_interval_of_k():
     history = fallen(-0.01)
     slow, fast = history.scaled_by
     assert history.drift("clr") == pytest.approx((-0.01, -0.01 * fast, -0.01 * slow), rel=1e-9)
-    assert fallen(-0.01, scaled=0.0).drift("clr", 2.0, 4.0) == pytest.approx((-0.01, -0.01, -0.01), rel=1e-9)
-    with pytest.raises(BadInput, match=r"a drift of clr needs 4 rows that know it, got fewer from 3 to 3\.4 h"):
+    assert fallen(-0.01, scaled=0.0).drift("clr", 2.0, 4.0) == pytest.approx(
+        (-0.01, -0.01, -0.01), rel=1e-9
+    )
+    with pytest.raises(
+        BadInput, match=r"a drift of clr needs 4 rows that know it, got fewer from 3 to 3\.4 h"
+    ):
         history.drift("clr", 3.0, 3.4)
     with pytest.raises(BadInput, match="has no number clear; it has hours, clr"):
         history.drift("clear")
@@ -291,9 +347,13 @@ def test_the_mean_over_positions_has_students_interval():
     model = ageing()
     solved = rubbed(model)[0][1]
     shares = (0.35, 0.45, 0.55, 0.65)
-    row = contact_row(model.case, [replace(solved, state=replace(STATE, clr=share)) for share in shares], 1e-6)
+    row = contact_row(
+        model.case, [replace(solved, state=replace(STATE, clr=share)) for share in shares], 1e-6
+    )
     assert row["clr"] == pytest.approx(0.5)
-    assert (row["clr_mean_low"], row["clr_mean_high"]) == pytest.approx((0.5 - 0.1519, 0.5 + 0.1519), abs=1e-4)
+    assert (row["clr_mean_low"], row["clr_mean_high"]) == pytest.approx(
+        (0.5 - 0.1519, 0.5 + 0.1519), abs=1e-4
+    )
     assert row["crf_mean_low_hz"] < row["crf_hz"] < row["crf_mean_high_hz"]
     alone = contact_row(model.case, [solved], 1e-6)
     assert math.isnan(alone["clr_mean_low"])

@@ -7,9 +7,8 @@ import numpy as np
 import pyarrow
 import pytest
 
-from asperity.errors import UnreadableFile
-from asperity.history import load_history, run_history
-from asperity.kept import (
+from asperity.core.errors import UnreadableFile
+from asperity.core.storage import (
     digest,
     read_json,
     read_sealed,
@@ -20,9 +19,13 @@ from asperity.kept import (
     write_table,
 )
 from asperity.paper import papers_case
+from asperity.simulation import load_history, run_history
 
 TABLE = pyarrow.Table.from_pylist(
-    [{"name": "a", "car": 0.1, "steps": 3, "fine": True}, {"name": "b", "car": None, "steps": 4, "fine": False}]
+    [
+        {"name": "a", "car": 0.1, "steps": 3, "fine": True},
+        {"name": "b", "car": None, "steps": 4, "fine": False},
+    ]
 )
 
 
@@ -106,7 +109,9 @@ def test_another_version_is_said():
 @pytest.fixture(scope="module")
 def histories(tmp_path_factory):
     """Folders of two cases that differ in their load."""
-    case = papers_case().with_overrides({"grid.cells": [32, 32], "surface.correlation_length": "60 um"})
+    case = papers_case().with_overrides(
+        {"grid.cells": [32, 32], "surface.correlation_length": "60 um"}
+    )
     folders = []
     for load in ("500 N", "400 N"):
         folder = tmp_path_factory.mktemp("histories") / load.split()[0]
@@ -115,7 +120,9 @@ def histories(tmp_path_factory):
     return folders
 
 
-@pytest.mark.parametrize("name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"])
+@pytest.mark.parametrize(
+    "name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"]
+)
 def test_files_of_another_case_are_refused(histories, tmp_path, name):
     mine, other = histories
     folder = shutil.copytree(mine, tmp_path / "mixed")
@@ -125,7 +132,9 @@ def test_files_of_another_case_are_refused(histories, tmp_path, name):
         load_history(folder)
 
 
-@pytest.mark.parametrize("name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"])
+@pytest.mark.parametrize(
+    "name", ["memory.npz", "history.parquet", "fields/step-000001.nc", "manifest.json"]
+)
 def test_a_flipped_bit_in_a_history_is_refused_or_changes_nothing(histories, tmp_path, name):
     folder = shutil.copytree(histories[0], tmp_path / "damaged")
     whole, told = (folder / name).read_bytes(), load_history(folder)

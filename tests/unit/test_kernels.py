@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from asperity.ehl import Options, Scales
-from asperity.ehl.linear import Linear, NestedBlocks, five_point_pattern
-from asperity.ehl.posing import contact_problem, first_guess
-from asperity.kernels import nested, relax, reynolds, stencils
+from asperity.ehl.linear_solvers.single_pressure import Linear, NestedBlocks, five_point_pattern
+from asperity.ehl.problem_setup import contact_problem, first_guess
+from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
 from asperity.kernels.stencils import Far, Stencil
 from support import reynolds as twin
@@ -23,7 +23,10 @@ def rng():
 
 @pytest.fixture
 def film(rng):
-    return Film(*(0.1 + rng.random(CELLS) for _ in range(6)), *(0.1 + rng.random((2, CELLS[1])) for _ in range(2)))
+    return Film(
+        *(0.1 + rng.random(CELLS) for _ in range(6)),
+        *(0.1 + rng.random((2, CELLS[1])) for _ in range(2)),
+    )
 
 
 @pytest.fixture
@@ -101,8 +104,12 @@ def outflow(pressure, film, inlet, **scheme):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_net_outflow_is_its_twins(rng, film, scheme):
     pressure, inlet = rng.random(CELLS), rng.random(CELLS[1])
-    expected = twin.net_outflow(pressure, film.content, film.mobility, film.ambient, inlet, DX, DY, **scheme)
-    np.testing.assert_allclose(outflow(pressure, film, inlet, **scheme), expected, rtol=1e-12, atol=1e-12)
+    expected = twin.net_outflow(
+        pressure, film.content, film.mobility, film.ambient, inlet, DX, DY, **scheme
+    )
+    np.testing.assert_allclose(
+        outflow(pressure, film, inlet, **scheme), expected, rtol=1e-12, atol=1e-12
+    )
 
 
 def test_what_leaves_the_cells_leaves_the_grid(rng, film):
@@ -125,8 +132,19 @@ def test_net_outflow_is_second_order(scheme):
         mobility = 1.0 + 0.5 * x * np.sin(wave * y)
         content = 1.0 + x**3
         out = np.empty((cells, cells))
-        film = Film(content, content, content, mobility, mobility, mobility, mobility[[0, -1]], mobility[[0, -1]])
-        reynolds.net_outflow(pressure, content, faces_of(film, **scheme), np.ones(cells), dx, dx, out)
+        film = Film(
+            content,
+            content,
+            content,
+            mobility,
+            mobility,
+            mobility,
+            mobility[[0, -1]],
+            mobility[[0, -1]],
+        )
+        reynolds.net_outflow(
+            pressure, content, faces_of(film, **scheme), np.ones(cells), dx, dx, out
+        )
         p_x = np.pi * np.cos(np.pi * x) * (1.5 + np.cos(wave * y))
         p_y = -wave * np.sin(np.pi * x) * np.sin(wave * y)
         laplace = -(np.pi**2) * pressure - wave**2 * np.sin(np.pi * x) * np.cos(wave * y)
@@ -143,12 +161,18 @@ def test_jacobian_product_is_the_complex_step_of_the_twin(rng, film, rows, stori
     pressure, d_pressure, d_gap = (rng.standard_normal(CELLS) for _ in range(3))
     found = np.empty(CELLS)
     faces = faces_of(film, **scheme)
-    reynolds.jacobian_product(rows, film, faces, pressure, d_pressure, d_gap, (DX, DY), storing, found)
+    reynolds.jacobian_product(
+        rows, film, faces, pressure, d_pressure, d_gap, (DX, DY), storing, found
+    )
     step = 1e-30j
     along_step = twin.net_outflow(
         pressure + step * d_pressure,
         film.content + step * (film.content_by_gap * d_gap + film.content_by_pressure * d_pressure),
-        film.mobility * (1.0 + step * (film.log_mobility_by_gap * d_gap + film.log_mobility_by_pressure * d_pressure)),
+        film.mobility
+        * (
+            1.0
+            + step * (film.log_mobility_by_gap * d_gap + film.log_mobility_by_pressure * d_pressure)
+        ),
         film.ambient + step * film.ambient_by_gap * d_gap[[0, -1]],
         1.0 + step * film.content_by_gap[0] * d_gap[0],
         DX,
@@ -177,9 +201,13 @@ def first_order_rows(film, storing=0.0):
         for j in range(ny):
             for k in range(max(i - 1, 0), min(i + 2, nx)):
                 here = by_gap[i, j] * NEAR[abs(k - i)] + by_pressure[i, j] * (k == i)
-                before = by_gap[i, j] * NEAR[abs(k + 1 - i)]  # the inlet's gap moves with its first cell
+                before = (
+                    by_gap[i, j] * NEAR[abs(k + 1 - i)]
+                )  # the inlet's gap moves with its first cell
                 if i > 0:
-                    before = by_gap[i - 1, j] * NEAR[abs(k + 1 - i)] + by_pressure[i - 1, j] * (k == i - 1)
+                    before = by_gap[i - 1, j] * NEAR[abs(k + 1 - i)] + by_pressure[i - 1, j] * (
+                        k == i - 1
+                    )
                 matrix[i * ny + j, k * ny + j] += (here - before) / DX + storing * here
     return matrix
 
@@ -216,9 +244,13 @@ def test_own_stencil_is_the_complex_step_of_the_twin(rng, film, rows):
         unit[column] = 1.0
         unit = unit.reshape(CELLS)
         mobility = film.mobility * (1.0 + step * slope * unit)
-        ambient = film.ambient - (mobility - film.mobility)[[0, -1]]  # means at both ends do not change
+        ambient = (
+            film.ambient - (mobility - film.mobility)[[0, -1]]
+        )  # means at both ends do not change
         nothing = np.zeros(CELLS, complex)
-        out = twin.net_outflow(pressure + step * unit, nothing, mobility, ambient, nothing[0], DX, DY)
+        out = twin.net_outflow(
+            pressure + step * unit, nothing, mobility, ambient, nothing[0], DX, DY
+        )
         carried = content * unit
         wedge = np.diff(carried, axis=0, prepend=0.0 * carried[:1]) / DX
         expected[:, column] = ((out.imag / 1e-30 + wedge) * rows.fluid_scale).ravel()
@@ -232,7 +264,10 @@ def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
     ny = CELLS[1]
     own, beside = 0.4, 0.15
     pressure, faces = rng.random(CELLS), faces_of(film, **scheme)
-    stencil, far = Stencil(*(np.empty(CELLS) for _ in range(5))), Far(*(np.empty(CELLS) for _ in range(2)))
+    stencil, far = (
+        Stencil(*(np.empty(CELLS) for _ in range(5))),
+        Far(*(np.empty(CELLS) for _ in range(2))),
+    )
     stencils.wedge_stencil(rows, film, faces, pressure, (own, beside), (DX, DY), stencil, far)
     wet, step = rows.state == LUBRICATED, 1e-30j
     expected = np.eye(pressure.size)
@@ -247,7 +282,8 @@ def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
             d_log = film.log_mobility_by_gap * d_gap[along] + film.log_mobility_by_pressure * unit
             out = twin.net_outflow(
                 pressure + step * unit,
-                film.content + step * (film.content_by_gap * d_gap[along] + film.content_by_pressure * unit),
+                film.content
+                + step * (film.content_by_gap * d_gap[along] + film.content_by_pressure * unit),
                 film.mobility * (1.0 + step * d_log),
                 film.ambient + step * film.ambient_by_gap * d_gap[along][[0, -1]],
                 1.0 + step * film.content_by_gap[0] * d_gap[along][0],
@@ -264,7 +300,9 @@ def test_wedge_stencil_is_the_complex_step_of_the_twin(rng, film, rows, scheme):
 def test_leaning_outflow_is_its_twins(rng):
     content, own, upstream, found = (*rng.random((3, *CELLS)), np.empty(CELLS))
     reynolds.leaning_outflow(content, own, upstream, DX, found)
-    through = np.zeros((CELLS[0] + 1, CELLS[1]))  # x faces; the outer two and the first inner one stay as they are
+    through = np.zeros(
+        (CELLS[0] + 1, CELLS[1])
+    )  # x faces; the outer two and the first inner one stay as they are
     through[2:-1] = own[1:-1] * content[1:-1] - upstream[1:-1] * content[:-2]
     np.testing.assert_allclose(found, np.diff(through, axis=0) / DX, rtol=1e-12, atol=1e-12)
 
@@ -274,7 +312,9 @@ def test_a_film_that_leans_by_a_half_has_the_second_order_wedge(rng, film):
     added, half = np.empty(CELLS), np.full(CELLS, 0.5)
     reynolds.leaning_outflow(film.content, half, half, DX, added)
     first = outflow(pressure, film, inlet, wedge=(0.0, 0.0))
-    np.testing.assert_allclose(first + added, outflow(pressure, film, inlet), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        first + added, outflow(pressure, film, inlet), rtol=1e-12, atol=1e-12
+    )
 
 
 def test_fluid_diagonal_is_the_stencils_own_but_never_below_the_stiff_film(film):
@@ -296,15 +336,19 @@ def test_relaxed_lines_leave_no_residual(rng, parity, across, reaching):
     stencil = Stencil(5.0 + rng.random(cells), *(-rng.random(cells) for _ in range(4)))
     far = far_of(cells, rng if reaching else None)
     parts = np.empty((7, CELLS[0], (across + 1 - parity) // 2))
-    lines = relax.Lines(*parts) if reaching else relax.Lines(*parts[:5], *far)
-    relax.factor_lines(stencil, far, parity, 0.02 if reaching else 0.0, lines)
+    lines = line_relaxation.Lines(*parts) if reaching else line_relaxation.Lines(*parts[:5], *far)
+    line_relaxation.factor_lines(stencil, far, parity, 0.02 if reaching else 0.0, lines)
     residual, correction = rng.standard_normal((2, *cells))
     found = np.empty_like(lines.lower)
-    relax.relax_lines(lines, parity, residual[:, parity::2].copy(), correction[:, 1 - parity :: 2].copy(), found)
+    line_relaxation.relax_lines(
+        lines, parity, residual[:, parity::2].copy(), correction[:, 1 - parity :: 2].copy(), found
+    )
     correction[:, parity::2] = found
     if across % 2:
         stencil.north[:, -1] = stencil.south[:, 0] = 0.0
-    left = residual - (dense(stencil, far if reaching else None) @ correction.ravel()).reshape(cells)
+    left = residual - (dense(stencil, far if reaching else None) @ correction.ravel()).reshape(
+        cells
+    )
     np.testing.assert_allclose(left[:, parity::2], 0.0, atol=1e-12)
     assert across == 1 or np.abs(left[:, 1 - parity :: 2]).max() > 0.1
 
@@ -313,8 +357,8 @@ def test_a_pivot_that_vanishes_is_replaced(rng):
     """Lines of five are not dominated by their centres; elimination never divides by nothing."""
     stencil, far = Stencil(*(-rng.random(CELLS) for _ in range(5))), far_of(CELLS, rng)
     stencil.centre[0] = 0.0
-    lines = relax.Lines(*np.empty((7, CELLS[0], CELLS[1] // 2)))
-    relax.factor_lines(stencil, far, 0, 0.02, lines)
+    lines = line_relaxation.Lines(*np.empty((7, CELLS[0], CELLS[1] // 2)))
+    line_relaxation.factor_lines(stencil, far, 0, 0.02, lines)
     least = 0.02 * (np.abs(stencil.west) + np.abs(stencil.centre) + np.abs(stencil.east))[:, ::2]
     assert np.all(1.0 / lines.inverse >= 0.999 * least)
     np.testing.assert_allclose(lines.inverse[0], 1.0 / least[0])
@@ -328,12 +372,14 @@ def test_split_residual_is_the_matrix_product(rng, across, reaching):
     residual, correction = rng.standard_normal((2, *cells))
     even, odd = np.empty((CELLS[0], (across + 1) // 2)), np.empty((CELLS[0], across // 2))
     far = far_of(cells, rng if reaching else None)
-    relax.split_residual(stencil, far, residual, correction, even, odd)
-    expected = residual - (dense(stencil, far if reaching else None) @ correction.ravel()).reshape(cells)
+    line_relaxation.split_residual(stencil, far, residual, correction, even, odd)
+    expected = residual - (dense(stencil, far if reaching else None) @ correction.ravel()).reshape(
+        cells
+    )
     np.testing.assert_allclose(even, expected[:, ::2], atol=1e-12)
     np.testing.assert_allclose(odd, expected[:, 1::2], atol=1e-12)
     whole = np.ones(cells)
-    relax.add_lines(even, odd, whole)
+    line_relaxation.add_lines(even, odd, whole)
     np.testing.assert_allclose(whole, expected + 1.0, atol=1e-12)
 
 
@@ -345,8 +391,10 @@ def test_aggregation_is_a_galerkin_product(rng, stencil, block):
     weight = active * scale
     cells = tuple(-(-n // size) for n, size in zip(CELLS, block, strict=True))
     coarse = Stencil(*(np.empty(cells) for _ in range(5)))
-    relax.aggregate_stencil(stencil, weight, block, coarse)
-    of_block = (np.arange(CELLS[0])[:, None] // block[0]) * cells[1] + np.arange(CELLS[1]) // block[1]
+    line_relaxation.aggregate_stencil(stencil, weight, block, coarse)
+    of_block = (np.arange(CELLS[0])[:, None] // block[0]) * cells[1] + np.arange(CELLS[1]) // block[
+        1
+    ]
     gather = np.zeros((cells[0] * cells[1], active.size))
     gather[of_block.ravel(), np.arange(active.size)] = active.ravel()
     expected = gather @ (scale.ravel()[:, None] * dense(stencil)) @ gather.T
@@ -355,10 +403,10 @@ def test_aggregation_is_a_galerkin_product(rng, stencil, block):
     np.testing.assert_allclose(dense(coarse), expected, atol=1e-12)
 
     residual, restricted = rng.standard_normal(CELLS), np.empty(cells)
-    relax.restrict(residual, weight, block, restricted)
+    line_relaxation.restrict(residual, weight, block, restricted)
     np.testing.assert_allclose(restricted.ravel(), gather @ (scale * residual).ravel(), atol=1e-12)
     spread, back = rng.standard_normal(cells), np.empty(CELLS)
-    relax.prolong(spread, weight, block, back)
+    line_relaxation.prolong(spread, weight, block, back)
     np.testing.assert_allclose(back.ravel(), gather.T @ spread.ravel(), atol=1e-12)
 
 
@@ -380,12 +428,16 @@ def test_nested_blocks_answer_what_the_factored_sum_does(rng, cells):
     stencil = Stencil(east + west + north + south, -west, -east, -north, -south)
     weight = np.where(rng.random(cells) < 0.9, 1.0, 0.0)
     sums = Stencil(*np.empty((5, *(-(-n // 2) for n in cells))))
-    relax.aggregate_stencil(stencil, weight, (2, 2), sums)
+    line_relaxation.aggregate_stencil(stencil, weight, (2, 2), sums)
     residual, wanted = rng.standard_normal(cells), np.empty(sums.centre.shape)
-    relax.restrict(residual, weight, (2, 2), wanted)
-    exact = five_point_pattern(wanted.shape).solve(five_point_pattern(wanted.shape).factored(sums), wanted)
+    line_relaxation.restrict(residual, weight, (2, 2), wanted)
+    exact = five_point_pattern(wanted.shape).solve(
+        five_point_pattern(wanted.shape).factored(sums), wanted
+    )
     found = NestedBlocks(stencil, weight)(residual)
-    expected = np.where(weight > 0.0, np.repeat(np.repeat(exact, 2, 0), 2, 1)[: cells[0], : cells[1]], 0.0)
+    expected = np.where(
+        weight > 0.0, np.repeat(np.repeat(exact, 2, 0), 2, 1)[: cells[0], : cells[1]], 0.0
+    )
     assert np.linalg.norm(found - expected) < 0.2 * np.linalg.norm(expected)
     assert (found[weight == 0.0] == 0.0).all()
 
@@ -395,31 +447,38 @@ def test_the_last_of_nested_grids_is_inverted(rng):
     cells = 3, 4
     parts = Stencil(*rng.standard_normal((5, *cells)))
     inverse = np.empty((12, 12))
-    assert nested.invert(parts, inverse)
+    assert multigrid.invert(parts, inverse)
     np.testing.assert_allclose(inverse @ dense(parts), np.eye(12), atol=1e-9)
-    assert not nested.invert(Stencil(*np.zeros((5, *cells))), inverse)
+    assert not multigrid.invert(Stencil(*np.zeros((5, *cells))), inverse)
 
 
 @pytest.mark.parametrize("cells", [(7, 9), (6, 4), (5, 6)])
 def test_sums_over_pairs_and_back(rng, cells):
-    fine, weight = rng.standard_normal(cells), np.where(rng.random(cells) < 0.7, rng.random(cells), 0.0)
+    fine, weight = (
+        rng.standard_normal(cells),
+        np.where(rng.random(cells) < 0.7, rng.random(cells), 0.0),
+    )
     for halved in ((True, True), (True, False), (False, True)):
         coarse = tuple(-(-n // 2) if half else n for n, half in zip(cells, halved, strict=True))
         where = [np.arange(n) // (2 if half else 1) for n, half in zip(cells, halved, strict=True)]
         over, sums, expected = rng.random(coarse), np.empty(coarse), np.zeros(coarse)
-        nested.summed(fine, weight, over, sums)
+        multigrid.summed(fine, weight, over, sums)
         np.add.at(expected, np.ix_(*where), fine * weight)
         np.testing.assert_allclose(sums, expected * over, rtol=1e-12, atol=1e-12)
         back = fine.copy()
-        nested.handed_on(sums, weight, back)
-        np.testing.assert_allclose(back, fine + np.where(weight > 0.0, sums[np.ix_(*where)], 0.0), rtol=1e-12)
+        multigrid.handed_on(sums, weight, back)
+        np.testing.assert_allclose(
+            back, fine + np.where(weight > 0.0, sums[np.ix_(*where)], 0.0), rtol=1e-12
+        )
 
 
 @pytest.fixture(scope="module")
 def balance():
     """A rough contact half way to its solution: all four states occur, nothing balances."""
     conditions, oil, on = contact(hardness=0.9e9), barus(), grid((32, 16))
-    problem = contact_problem(conditions, oil, rough(on, 0.7e-6, correlation_length=40e-6), Options())
+    problem = contact_problem(
+        conditions, oil, rough(on, 0.7e-6, correlation_length=40e-6), Options()
+    )
     pressure, approach = first_guess(problem, conditions, oil, Scales.of(conditions, oil))
     uneven = 1.0 + 0.3 * np.sin(np.arange(problem.cells[1]) * np.pi / 8.0)
     pressure = np.maximum(pressure * uneven + 0.02 * np.exp(-(problem.x**2) / 9.0)[:, None], 0.0)
@@ -440,9 +499,13 @@ def test_the_linearisation_is_the_derivative_of_the_equations(balance):
     problem, rng = balance.problem, np.random.default_rng(9)
     step = 1e-6
     d_pressure, d_approach = rng.standard_normal(problem.cells), 0.7
-    approach = float(np.mean(balance.gap - problem.undeformed - problem.deflection(balance.pressure)))
+    approach = float(
+        np.mean(balance.gap - problem.undeformed - problem.deflection(balance.pressure))
+    )
     ahead, behind = (
-        problem.evaluate(balance.pressure + sign * step * d_pressure, approach + sign * step * d_approach)
+        problem.evaluate(
+            balance.pressure + sign * step * d_pressure, approach + sign * step * d_approach
+        )
         for sign in (1.0, -1.0)
     )
     found = Linear(balance, dtype=np.float64).product(d_pressure, d_approach)
@@ -465,10 +528,17 @@ def test_film_slopes_are_derivatives(balance):
         (c1, e1), (c0, e0) = (
             (
                 oil.density(q) / 880.0 * h,
-                oil.density(q) / 880.0 * h**3 * oil.viscosity.eta0 / (problem.speed * oil.viscosity(q)),
+                oil.density(q)
+                / 880.0
+                * h**3
+                * oil.viscosity.eta0
+                / (problem.speed * oil.viscosity(q)),
             )
             for q, h in (
-                ((balance.pressure + sign * change[0]) * problem.p_scale, balance.gap + sign * change[1])
+                (
+                    (balance.pressure + sign * change[0]) * problem.p_scale,
+                    balance.gap + sign * change[1],
+                )
                 for sign in (1.0, -1.0)
             )
         )
@@ -482,8 +552,12 @@ def test_film_slopes_are_derivatives(balance):
 
 def test_the_approximate_inverse_is_linear_and_leaves_known_cells_alone(balance):
     inverse = Linear(balance, dtype=np.float64)
-    one, other = np.random.default_rng(10).standard_normal((2, *balance.problem.cells)) * balance.unknown
-    np.testing.assert_allclose(inverse(one + 2.0 * other), inverse(one) + 2.0 * inverse(other), atol=1e-9)
+    one, other = (
+        np.random.default_rng(10).standard_normal((2, *balance.problem.cells)) * balance.unknown
+    )
+    np.testing.assert_allclose(
+        inverse(one + 2.0 * other), inverse(one) + 2.0 * inverse(other), atol=1e-9
+    )
     assert not inverse(one)[~balance.unknown].any()
 
 
@@ -504,10 +578,16 @@ def test_coarser_is_the_same_contact(balance):
     coarse = fine.coarsened((16, 8))
     assert coarse.cells == (16, 8)
     for axis in (0, 1):
-        assert coarse.spacing[axis] * coarse.cells[axis] == pytest.approx(fine.spacing[axis] * fine.cells[axis])
+        assert coarse.spacing[axis] * coarse.cells[axis] == pytest.approx(
+            fine.spacing[axis] * fine.cells[axis]
+        )
     np.testing.assert_allclose(coarse.x, (fine.x[::2] + fine.x[1::2]) / 2.0, rtol=1e-12)
     heights = (fine.x**2 / 2.0)[:, None] - fine.undeformed
-    expected = (heights[::2, ::2] + heights[1::2, ::2] + heights[::2, 1::2] + heights[1::2, 1::2]) / 4.0
-    np.testing.assert_allclose((coarse.x**2 / 2.0)[:, None] - coarse.undeformed, expected, atol=1e-12)
+    expected = (
+        heights[::2, ::2] + heights[1::2, ::2] + heights[::2, 1::2] + heights[1::2, 1::2]
+    ) / 4.0
+    np.testing.assert_allclose(
+        (coarse.x**2 / 2.0)[:, None] - coarse.undeformed, expected, atol=1e-12
+    )
     for name in ("load", "p_cap", "contact_gap", "speed", "p_scale", "lubricant", "lower"):
         assert getattr(coarse, name) == getattr(fine, name)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from asperity.ehl.krylov import Shifted, gmres
+from asperity.ehl.linear_solvers.gmres import Shifted, gmres
 
 
 @pytest.fixture
@@ -25,7 +25,9 @@ def test_it_solves_what_a_direct_solver_solves(system):
 def test_it_stops_on_the_true_residual_whatever_the_preconditioner(system, tolerance):
     matrix, wanted = system
     scale = np.geomspace(1e-3, 1e3, 60)
-    found = gmres(matrix.__matmul__, lambda v: v * scale, wanted, tolerance=tolerance, most_steps=60)
+    found = gmres(
+        matrix.__matmul__, lambda v: v * scale, wanted, tolerance=tolerance, most_steps=60
+    )
     assert np.linalg.norm(matrix @ found - wanted) < tolerance * np.linalg.norm(wanted)
 
 
@@ -62,7 +64,9 @@ def test_complex_systems_too(system, dtype):
         left = np.linalg.norm(matrix @ found - wanted) / np.linalg.norm(wanted)
         assert 0.05 * tolerance < left < 1.001 * tolerance
     exact = np.linalg.solve(matrix.astype(complex), wanted)
-    np.testing.assert_allclose(gmres(matrix.__matmul__, same, wanted, tolerance=1e-6, most_steps=60), exact, atol=1e-5)
+    np.testing.assert_allclose(
+        gmres(matrix.__matmul__, same, wanted, tolerance=1e-6, most_steps=60), exact, atol=1e-5
+    )
 
 
 def test_nothing_wanted_is_nothing_done(system):
@@ -77,8 +81,13 @@ def shifted(kind, spread=1.0):
     wanted, bearing = rng.standard_normal((2, 60)), rng.standard_normal(60)
     matrices = a.astype(kind), b.astype(kind)
     sweep = Shifted(
-        lambda v: (matrices[0] @ v, matrices[1] @ v), same, tuple(wanted.astype(kind)), bearing, 1.7, 60
-    )  # fmt: skip
+        lambda v: (matrices[0] @ v, matrices[1] @ v),
+        same,
+        tuple(wanted.astype(kind)),
+        bearing,
+        1.7,
+        60,
+    )
     return sweep, bearing, lambda at: (a + 1j * at * b, wanted[0] + 1j * at * wanted[1])
 
 
@@ -121,7 +130,9 @@ def test_a_sweep_in_single_precision_comes_as_far_as_that_tells(spread):
 def test_a_sweep_goes_on_where_nothing_falls_until_the_end():
     """Each cell of a ring hands on to the next: no step but the last one meets anything."""
     wanted = np.eye(8, dtype=complex)[0]
-    sweep = Shifted(lambda v: (np.roll(v, 1), 0.0 * v), same, (wanted, 0.0 * wanted), np.ones(8), 1.0, 8)
+    sweep = Shifted(
+        lambda v: (np.roll(v, 1), 0.0 * v), same, (wanted, 0.0 * wanted), np.ones(8), 1.0, 8
+    )
     for _ in range(7):
         assert sweep.step()
     assert sweep.left == pytest.approx(1.0)

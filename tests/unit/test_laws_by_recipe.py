@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
-from asperity.errors import BadInput
-from asperity.lubricant import FRICTION_LAWS, LAWS, VISCOSITY_LAWS, WARMTH_LAWS, LawFamily, NewtonianShear, law_name
-from asperity.quantities import Parameter
+from asperity.core.errors import BadInput
+from asperity.core.quantities import Parameter
+from asperity.lubricant import (
+    FRICTION_LAWS,
+    LAWS,
+    VISCOSITY_LAWS,
+    WARMTH_LAWS,
+    LawFamily,
+    NewtonianShear,
+    law_name,
+)
 from asperity.report import write_report
 from asperity.results import load_run, solve_case
 
@@ -53,7 +61,12 @@ class MadeUp:
         return self.eta0 * np.exp(scale * ((1.0 + pressure / self.p_ref) ** self.z - 1.0))
 
     def log_slope(self, pressure):
-        return (np.log(self.eta0) + 9.67) * self.z / self.p_ref * (1.0 + pressure / self.p_ref) ** (self.z - 1.0)
+        return (
+            (np.log(self.eta0) + 9.67)
+            * self.z
+            / self.p_ref
+            * (1.0 + pressure / self.p_ref) ** (self.z - 1.0)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +104,14 @@ def test_a_law_by_the_recipe_goes_from_case_to_report(tmp_path):
     ("change", "message"),
     [
         ({"lubricant.viscosity.z": "0.6 m"}, "lubricant.viscosity.z must be a valid number"),
-        ({"lubricant.viscosity.p_ref": 196e6}, 'p_ref must be a pressure such as "2 GPa", got the bare number'),
-        ({"lubricant.viscosity.energy": "3 m"}, 'energy must be a molar energy such as "49 kJ/mol", got "3 m"'),
+        (
+            {"lubricant.viscosity.p_ref": 196e6},
+            'p_ref must be a pressure such as "2 GPa", got the bare number',
+        ),
+        (
+            {"lubricant.viscosity.energy": "3 m"},
+            'energy must be a molar energy such as "49 kJ/mol", got "3 m"',
+        ),
         ({"lubricant.viscosity.law": "made-dawn"}, 'did you mean "made-up"?'),
     ],
 )
@@ -106,5 +125,8 @@ def test_every_has_its_table():
     assert tuple(LAWS) == get_args(LawFamily)
     assert LAWS["viscosity"] is VISCOSITY_LAWS
     assert law_name("warmth", WARMTH_LAWS["exponential"]()) == "exponential"
-    with pytest.raises(BadInput, match="NewtonianShear is not a viscosity law that can be kept; add it to its table"):
+    with pytest.raises(
+        BadInput,
+        match="NewtonianShear is not a viscosity law that can be kept; add it to its table",
+    ):
         law_name("viscosity", NewtonianShear())

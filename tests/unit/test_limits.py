@@ -7,21 +7,26 @@ import pandas
 import pytest
 
 from asperity.case import load_case
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.files import write_csv
+from asperity.core.limits import memory_limit, require_affordable, require_unpacked
 from asperity.coupling import VibrationModel
-from asperity.errors import BadInput, UnreadableFile
-from asperity.files import write_csv
-from asperity.history import run_history
-from asperity.limits import memory_limit, require_affordable, require_unpacked
 from asperity.paper import papers_case, simulate_rig
 from asperity.recording import read_recording
+from asperity.simulation import run_history
 
 
 def test_the_estimate_and_the_remedy_are_said(monkeypatch):
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "2")
-    with pytest.raises(BadInput, match=r"a map would take about 3 GB of memory, where 2 GB may be used; .*MEMORY_GB"):
+    with pytest.raises(
+        BadInput,
+        match=r"a map would take about 3 GB of memory, where 2 GB may be used; .*MEMORY_GB",
+    ):
         require_affordable("a map", memory=3e9)
     monkeypatch.setenv("ASPERITY_DAYS", "1.5")
-    with pytest.raises(BadInput, match=r"a map would take about 2 days, where 1\.5 may be used; .*ASPERITY_DAYS"):
+    with pytest.raises(
+        BadInput, match=r"a map would take about 2 days, where 1\.5 may be used; .*ASPERITY_DAYS"
+    ):
         require_affordable("a map", seconds=2 * 86400.0)
     require_affordable("a map", memory=1.9e9, seconds=86400.0)
     for unknown in (float("nan"), float("inf")):
@@ -45,19 +50,29 @@ def test_a_file_may_unpack_to_what_measured_data_do(tmp_path, monkeypatch):
     path = tmp_path / "x.h5"
     path.write_bytes(bytes(range(256)) * 40000)  # 10 MB
     require_unpacked(path, 5e8, "export it again")
-    with pytest.raises(UnreadableFile, match=r"x\.h5 of 0\.01 GB claims to hold 0\.6 GB, where 0\.51 GB may be"):
+    with pytest.raises(
+        UnreadableFile, match=r"x\.h5 of 0\.01 GB claims to hold 0\.6 GB, where 0\.51 GB may be"
+    ):
         require_unpacked(path, 6e8, "export it again")
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "1")
     require_unpacked(path, 6e8, "export it again")
 
 
 ASKED = {
-    "a grid of 20000 x 20000 cells": lambda: papers_case().with_overrides({"grid.cells": [20000, 20000]}),
-    "a grid of 2560000 x 256 cells": lambda: (
-        papers_case().with_overrides({"motion": {"track": 10000}, "grid.cells": [256, 256]}).moving_surfaces()
+    "a grid of 20000 x 20000 cells": lambda: papers_case().with_overrides(
+        {"grid.cells": [20000, 20000]}
     ),
-    "a vibration record of 1e\\+06 s": lambda: VibrationModel(mass=0.1, damping_ratio=0.02, duration_s=1e6),
-    "a vibration record of 4 s at 1e\\+15 Hz": lambda: papers_case().with_overrides({"vibration.rate": "1e15 Hz"}),
+    "a grid of 2560000 x 256 cells": lambda: (
+        papers_case()
+        .with_overrides({"motion": {"track": 10000}, "grid.cells": [256, 256]})
+        .moving_surfaces()
+    ),
+    "a vibration record of 1e\\+06 s": lambda: VibrationModel(
+        mass=0.1, damping_ratio=0.02, duration_s=1e6
+    ),
+    "a vibration record of 4 s at 1e\\+15 Hz": lambda: papers_case().with_overrides(
+        {"vibration.rate": "1e15 Hz"}
+    ),
     "a history of": lambda: run_history(papers_case(), passes=1e300),
     "a wear test of": lambda: simulate_rig(duration_s=1e6),
 }
@@ -99,7 +114,14 @@ def test_a_long_value_is_shown_by_its_beginning():
 
 def test_no_formula_gets_into_a_spreadsheet(tmp_path):
     table = pandas.DataFrame(
-        {"file": ["=1+1", "a.csv"], "unit": ["@g", None], "rms": [-1.0, np.nan], "fine": [True, False]}
+        {
+            "file": ["=1+1", "a.csv"],
+            "unit": ["@g", None],
+            "rms": [-1.0, np.nan],
+            "fine": [True, False],
+        }
     )
     write_csv(tmp_path / "t.csv", table)
-    assert (tmp_path / "t.csv").read_text() == "file,unit,rms,fine\n'=1+1,'@g,-1.0,True\na.csv,,,False\n"
+    assert (
+        tmp_path / "t.csv"
+    ).read_text() == "file,unit,rms,fine\n'=1+1,'@g,-1.0,True\na.csv,,,False\n"

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.signals import Signal, power_spectrum, smooth
+from asperity.core.errors import BadInput
+from asperity.core.signals import Signal, power_spectrum, smooth
+from asperity.resonance import contact_resonance, remove_lines
 from asperity.vibration import ContactOscillator, acceleration
-from asperity.wear import contact_resonance, remove_lines
 
 RATE, SECONDS = 10e3, 40.0
 TIME = np.arange(round(RATE * SECONDS)) / RATE
@@ -26,36 +26,54 @@ def spectrum(values, segment=40_000, window="hann"):
 
 
 def test_tones_are_taken_out_named_and_measured():
-    clean = remove_lines(spectrum(noise() + tones(SHAFT, range(1, 60, 3), 0.3) + tones(50.0, (1, 2, 3, 5, 7), 0.2)))
+    clean = remove_lines(
+        spectrum(noise() + tones(SHAFT, range(1, 60, 3), 0.3) + tones(50.0, (1, 2, 3, 5, 7), 0.2))
+    )
     assert len(clean.removed) == 25
-    assert [line.frequency_hz for line in clean.removed] == sorted(line.frequency_hz for line in clean.removed)
+    assert [line.frequency_hz for line in clean.removed] == sorted(
+        line.frequency_hz for line in clean.removed
+    )
     shaft = [line for line in clean.removed if "29.37" in line.source]
     assert [line.source.split()[0] for line in shaft] == [str(order) for order in range(1, 60, 3)]
-    assert [line.frequency_hz for line in shaft] == pytest.approx(SHAFT * np.arange(1, 60, 3), abs=0.03)
+    assert [line.frequency_hz for line in shaft] == pytest.approx(
+        SHAFT * np.arange(1, 60, 3), abs=0.03
+    )
     assert [line.mean_square for line in shaft] == pytest.approx(np.full(20, 0.3**2 / 2), rel=0.15)
     assert sum("50 Hz" in line.source for line in clean.removed) == 5
     assert clean.speeds_hz == pytest.approx((SHAFT, 50.0), abs=0.005)
 
 
 def test_what_is_left_is_the_noise_beside_them():
-    before, clean = spectrum(noise()), remove_lines(spectrum(noise() + tones(SHAFT, range(1, 60, 3), 0.3)))
-    assert np.array_equal(clean.spectrum.density[clean.kept], remove_lines(clean.spectrum).spectrum.density[clean.kept])
+    before, clean = (
+        spectrum(noise()),
+        remove_lines(spectrum(noise() + tones(SHAFT, range(1, 60, 3), 0.3))),
+    )
+    assert np.array_equal(
+        clean.spectrum.density[clean.kept],
+        remove_lines(clean.spectrum).spectrum.density[clean.kept],
+    )
     # Parseval: all that the tones brought is gone
     power = [np.sum(one.density) * one.spacing_hz for one in (before, clean.spectrum)]
     assert power[1] == pytest.approx(power[0], rel=0.005)
-    far = clean.kept & (np.abs(before.frequency_hz[:, None] - SHAFT * np.arange(1, 60, 3)).min(axis=1) > 5.0)
+    far = clean.kept & (
+        np.abs(before.frequency_hz[:, None] - SHAFT * np.arange(1, 60, 3)).min(axis=1) > 5.0
+    )
     assert clean.spectrum.density[far] == pytest.approx(before.density[far], rel=0.05)
 
 
 def test_noise_alone_loses_nothing():
     for window, segment in (("hann", 40_000), ("hann", None), ("boxcar", None)):
-        lost = sum(len(remove_lines(spectrum(noise(seed), segment, window)).removed) for seed in range(10))
+        lost = sum(
+            len(remove_lines(spectrum(noise(seed), segment, window)).removed) for seed in range(10)
+        )
         assert lost <= 1  # 0.1 expected
 
 
 @pytest.mark.parametrize("damping_ratio", [0.0005, 0.003])  # 8 and 48 spectral lines wide
 def test_a_resonance_is_no_tone(damping_ratio):
-    spring = ContactOscillator(mass=0.1, stiffness=0.1 * (2 * np.pi * 2000.0) ** 2, damping_ratio=damping_ratio)
+    spring = ContactOscillator(
+        mass=0.1, stiffness=0.1 * (2 * np.pi * 2000.0) ** 2, damping_ratio=damping_ratio
+    )
     ridden = acceleration(spring, Signal(np.cumsum(np.cumsum(noise())) * 1e-9, RATE, "m")).values
     ridden = ridden / np.std(ridden)
     seen = spectrum(ridden + 0.01 * noise(1) + tones(SHAFT, range(60, 76), 0.05))
@@ -71,7 +89,11 @@ def test_known_speeds_show_weaker_tones():
     found, given = remove_lines(spectrum(values)), remove_lines(spectrum(values), shaft_hz=[29.36])
     assert len(given.removed) > 3 * len(found.removed)
     assert given.speeds_hz[0] == pytest.approx(SHAFT, abs=0.01)  # put right
-    false = [line for line in given.removed if abs(line.frequency_hz / SHAFT - round(line.frequency_hz / SHAFT)) > 0.02]
+    false = [
+        line
+        for line in given.removed
+        if abs(line.frequency_hz / SHAFT - round(line.frequency_hz / SHAFT)) > 0.02
+    ]
     assert len(false) <= 1
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Roelands
 
 PRESSURES = np.array([0.0, 1e5, 3e7, 2e8, 1e9, 2e9])
@@ -12,9 +12,13 @@ def complex_step(law, pressures):
     return np.imag(law(pressures + 1j * step)) / step
 
 
-@pytest.mark.parametrize("law", [Barus(0.096, 18.2e-9), Roelands(0.04, 22e-9), Roelands(0.096, 18.2e-9, 1.5e8)])
+@pytest.mark.parametrize(
+    "law", [Barus(0.096, 18.2e-9), Roelands(0.04, 22e-9), Roelands(0.096, 18.2e-9, 1.5e8)]
+)
 def test_log_slope_is_the_derivative_of_the_logarithm(law):
-    np.testing.assert_allclose(law.log_slope(PRESSURES), complex_step(law, PRESSURES) / law(PRESSURES), rtol=1e-12)
+    np.testing.assert_allclose(
+        law.log_slope(PRESSURES), complex_step(law, PRESSURES) / law(PRESSURES), rtol=1e-12
+    )
 
 
 def test_density_slope_is_the_derivative():
@@ -27,7 +31,9 @@ def test_density_slope_is_the_derivative():
 def test_barus_decades():
     """Viscosity grows tenfold every ln(10)/alpha."""
     law = Barus(0.05, 20e-9)
-    np.testing.assert_allclose(law(np.array([0.0, 1.0, 2.0]) * np.log(10.0) / 20e-9), [0.05, 0.5, 5.0], rtol=1e-12)
+    np.testing.assert_allclose(
+        law(np.array([0.0, 1.0, 2.0]) * np.log(10.0) / 20e-9), [0.05, 0.5, 5.0], rtol=1e-12
+    )
 
 
 def test_roelands_is_the_formula_as_textbooks_print_it():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy
 
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput
+from asperity.contact.conditions import ElasticPair
+from asperity.core.errors import BadInput
 from asperity.machine import (
     BallBearing,
     CamPoint,
@@ -106,7 +106,9 @@ def test_the_fzg_gears_along_their_path(gears, table):
         assert contact.slide_to_roll == pytest.approx(sliding, abs=6e-5)
         assert contact.load / pair.normal_force == pytest.approx(share, abs=6e-5)
         assert contact.hertz(STEEL).p_max / 1e6 == pytest.approx(pressure, rel=1e-4)
-    assert [contact.position for contact in found.values()] == sorted(c.position for c in found.values())
+    assert [contact.position for contact in found.values()] == sorted(
+        c.position for c in found.values()
+    )
 
 
 def test_the_fzg_c_profile_without_tip_shortening_is_gearpies():
@@ -144,9 +146,13 @@ def test_a_path_by_its_definition():
         return float(np.linalg.norm(place(s) - [centres, 0.0]))
 
     start = scipy.optimize.brentq(lambda s: to_wheel(s) - tip_2, 0.0, pair.line_of_action)
-    end = scipy.optimize.brentq(lambda s: float(np.linalg.norm(place(s))) - tip_1, 0.0, pair.line_of_action)
+    end = scipy.optimize.brentq(
+        lambda s: float(np.linalg.norm(place(s))) - tip_1, 0.0, pair.line_of_action
+    )
     pitch = scipy.optimize.brentq(lambda s: place(s)[1], 0.0, pair.line_of_action)
-    assert (pair.path["A"], pair.path["E"], pair.path["C"]) == pytest.approx((start, end, pitch), rel=1e-9)
+    assert (pair.path["A"], pair.path["E"], pair.path["C"]) == pytest.approx(
+        (start, end, pitch), rel=1e-9
+    )
 
 
 def test_gears_without_a_centre_distance_have_no_backlash():
@@ -171,7 +177,10 @@ def test_the_frequencies_of_gears():
         ({"centre_distance": 90.6e-3}, "jams the teeth"),
         ({"tip_diameters": (76e-3, 112e-3)}, "lose contact"),
         ({"tip_diameters": (82e-3, 125e-3)}, "reaches below the pinion's base circle"),
-        ({"profile_shift": (1.2, -0.85), "tip_diameters": (91.5e-3, 112e-3)}, "pinion's teeth end in a point"),
+        (
+            {"profile_shift": (1.2, -0.85), "tip_diameters": (91.5e-3, 112e-3)},
+            "pinion's teeth end in a point",
+        ),
         ({"teeth": (16, 4)}, "at least 5"),
         ({"pressure_angle": math.radians(5.0)}, "pressure_angle"),
         ({"torque": -1.0}, "torque must be positive"),
@@ -191,7 +200,10 @@ def cut_away_up_to(count, module, angle):
         inside = math.acos(min(pitch * math.cos(angle) / radius, 1.0))
         polar = (math.tan(angle) - angle) - (math.tan(inside) - inside) + travel / pitch
         depth = pitch - radius * np.cos(polar)
-        if np.any((depth < module) & (radius * np.sin(polar) > travel + depth * math.tan(angle) + 1e-6 * module)):
+        if np.any(
+            (depth < module)
+            & (radius * np.sin(polar) > travel + depth * math.tan(angle) + 1e-6 * module)
+        ):
             cut = radius
     return cut
 
@@ -203,13 +215,22 @@ def test_teeth_undercut_where_they_bear_are_refused():
         SpurGear(**(nine | {"tip_diameters": (49.5e-3, 184e-3)}))
     said = float(str(refused.value).split("radius of ")[1].split(" mm")[0])
     assert said == pytest.approx(limit, abs=2e-3)
-    assert SpurGear(**(nine | {"tip_diameters": (49.5e-3, 183.2e-3)})).contact_ratio > 1.0  # bears further out
-    assert SpurGear(**(nine | {"profile_shift": (0.48, 0.0), "tip_diameters": (53.8e-3, 187e-3)})).contact_ratio > 1.0
+    assert (
+        SpurGear(**(nine | {"tip_diameters": (49.5e-3, 183.2e-3)})).contact_ratio > 1.0
+    )  # bears further out
+    assert (
+        SpurGear(
+            **(nine | {"profile_shift": (0.48, 0.0), "tip_diameters": (53.8e-3, 187e-3)})
+        ).contact_ratio
+        > 1.0
+    )
 
 
 def test_an_undercut_below_the_bearing_flank_is_no_harm():
     wheel, shift = A_GEAR["teeth"][1], A_GEAR["profile_shift"][1]
-    assert shift < 1.0 - wheel * math.sin(FZG["pressure_angle"]) ** 2 / 2.0  # the A wheel is undercut, and serves
+    assert (
+        shift < 1.0 - wheel * math.sin(FZG["pressure_angle"]) ** 2 / 2.0
+    )  # the A wheel is undercut, and serves
     assert SpurGear(**A_GEAR).contact_ratio > 1.0
 
 
@@ -224,8 +245,12 @@ def test_an_undercut_below_the_bearing_flank_is_no_harm():
     ],
 )
 def test_characteristic_frequencies(count, diameter, pitch, factors, within):
-    found = RollingKinematics(count=count, diameter=diameter, pitch_diameter=pitch, speed=2.0 * math.pi).frequencies
-    assert [found[name] for name in ("bpfo_hz", "bpfi_hz", "bsf_hz", "ftf_hz")] == pytest.approx(factors, rel=within)
+    found = RollingKinematics(
+        count=count, diameter=diameter, pitch_diameter=pitch, speed=2.0 * math.pi
+    ).frequencies
+    assert [found[name] for name in ("bpfo_hz", "bpfi_hz", "bsf_hz", "ftf_hz")] == pytest.approx(
+        factors, rel=within
+    )
 
 
 def test_speeds_are_those_of_the_cages_frame():
@@ -233,11 +258,17 @@ def test_speeds_are_those_of_the_cages_frame():
     kinematics = CylindricalRollerBearing(**NU206).kinematics
     inner = (46.5e-3 - 9e-3) / 2.0 * (kinematics.speed - kinematics.cage_speed)
     outer = (46.5e-3 + 9e-3) / 2.0 * kinematics.cage_speed
-    assert kinematics.surface_speed == pytest.approx(inner, rel=1e-12) == pytest.approx(outer, rel=1e-12)
+    assert (
+        kinematics.surface_speed
+        == pytest.approx(inner, rel=1e-12)
+        == pytest.approx(outer, rel=1e-12)
+    )
     assert kinematics.surface_speed == pytest.approx(3.51529, rel=1e-5)
     assert kinematics.cage_speed / RPM == pytest.approx(1209.677, rel=1e-6)
     assert kinematics.spin / RPM == pytest.approx(7459.677, rel=1e-6)
-    assert [1e3 * radius for radius in kinematics.radii] == pytest.approx([3.62903, 5.37097], rel=1e-5)
+    assert [1e3 * radius for radius in kinematics.radii] == pytest.approx(
+        [3.62903, 5.37097], rel=1e-5
+    )
     ball = RollingKinematics(count=9, diameter=9.525e-3, pitch_diameter=46e-3, speed=3000.0 * RPM)
     assert (ball.cage_speed / RPM, ball.spin / RPM) == pytest.approx((1189.402, 6933.50), rel=1e-6)
     assert ball.surface_speed == pytest.approx(3.45793, rel=1e-5)
@@ -263,7 +294,13 @@ def test_slices_of_iso_16281(clearance, profile, shift, loads):
 
 def test_slices_against_a_twin():
     """The same balance, slice by slice in plain loops and by bisection."""
-    length, diameter, slices, clearance, load = 22.0, 8.0, 31, 0.012, 9000.0  # N, mm; longer than 2.5 diameters
+    length, diameter, slices, clearance, load = (
+        22.0,
+        8.0,
+        31,
+        0.012,
+        9000.0,
+    )  # N, mm; longer than 2.5 diameters
     places = [length * ((k + 0.5) / slices - 0.5) for k in range(slices)]
     ends = 2.5 * diameter
 
@@ -302,7 +339,9 @@ def sjovall(eps, exponent):
     """J_r(ε) = (1/π) ∫ [1 - (1 - cos ψ)/(2ε)]^n cos ψ dψ over the load zone's half."""
     end = math.pi if eps > 1.0 else math.acos(1.0 - 2.0 * eps)
     whole = scipy.integrate.quad(
-        lambda psi: max(1.0 - (1.0 - math.cos(psi)) / (2.0 * eps), 0.0) ** exponent * math.cos(psi), 0.0, end
+        lambda psi: max(1.0 - (1.0 - math.cos(psi)) / (2.0 * eps), 0.0) ** exponent * math.cos(psi),
+        0.0,
+        end,
     )
     return whole[0] / math.pi
 
@@ -322,7 +361,9 @@ def test_the_load_zone_is_sjovalls_with_many_rollers(clearance):
 
 
 def test_the_load_zone_with_few_elements():
-    assert CylindricalRollerBearing(**NU206).loads[0] * 13 / 4000.0 == pytest.approx(4.093, rel=1e-4)
+    assert CylindricalRollerBearing(**NU206).loads[0] * 13 / 4000.0 == pytest.approx(
+        4.093, rel=1e-4
+    )
     loads, _ = BallBearing(**BALLS_6206, radial_load=2000.0).loads(STEEL)
     assert loads[0] * 9 / 2000.0 == pytest.approx(4.385, rel=1e-4)
 
@@ -362,15 +403,23 @@ def test_a_profiled_roller_is_solved_for_its_heaviest_slice():
 )
 def test_ball_bearings_move_as_iso_16281_has_it(radial, axial, clearance, shifts):
     pair = ElasticPair((210e9, 210e9), (0.3, 0.3))
-    bearing = BallBearing(**BALLS, radial_load=radial, axial_load=axial, clearance=clearance, tilt=None)
+    bearing = BallBearing(
+        **BALLS, radial_load=radial, axial_load=axial, clearance=clearance, tilt=None
+    )
     assert bearing.stiffness(pair) * 1e-3**1.5 == pytest.approx(333592.0, rel=1e-4)
     assert [1e6 * shift for shift in bearing.shifts(pair)[:2]] == pytest.approx(shifts, rel=1e-4)
     loads, angles = bearing.loads(pair)
-    assert float(loads * np.cos(angles) @ np.cos(bearing.angles)) == pytest.approx(radial, rel=1e-6, abs=1e-6)
+    assert float(loads * np.cos(angles) @ np.cos(bearing.angles)) == pytest.approx(
+        radial, rel=1e-6, abs=1e-6
+    )
     assert float(loads @ np.sin(angles)) == pytest.approx(axial, rel=1e-6, abs=1e-6)
-    assert float(loads * np.sin(angles) @ np.cos(bearing.angles)) == pytest.approx(0.0, abs=1e-5 * (radial + axial))
+    assert float(loads * np.sin(angles) @ np.cos(bearing.angles)) == pytest.approx(
+        0.0, abs=1e-5 * (radial + axial)
+    )
     if radial == 0.0:
-        assert math.degrees(angles[0]) == pytest.approx(13.07 if clearance == 0.0 else 14.67, abs=6e-3)
+        assert math.degrees(angles[0]) == pytest.approx(
+            13.07 if clearance == 0.0 else 14.67, abs=6e-3
+        )
 
 
 def test_thrust_alone_meets_the_closed_form():
@@ -381,7 +430,10 @@ def test_thrust_alone_meets_the_closed_form():
     scale = 7 * bearing.stiffness(STEEL) * bearing.groove_distance**1.5
     right = math.sin(angles[0]) * (math.cos(free) / math.cos(angles[0]) - 1.0) ** 1.5
     assert load / scale == pytest.approx(right, rel=1e-9)
-    assert bearing.frequencies["bpfo_hz"] > BallBearing(**BALLS, axial_load=load).frequencies["bpfo_hz"]
+    assert (
+        bearing.frequencies["bpfo_hz"]
+        > BallBearing(**BALLS, axial_load=load).frequencies["bpfo_hz"]
+    )
 
 
 def random_bearing(rng, *, tilt, thrusts):
@@ -413,7 +465,9 @@ def test_every_angular_contact_bearing_finds_its_balance(tilt):
         bearing = random_bearing(rng, tilt=tilt, thrusts=(-5.0, 1.0))
         force = max(bearing.radial_load, bearing.axial_load)
         found = carried(bearing)
-        assert found[:2] == pytest.approx([bearing.radial_load, bearing.axial_load], abs=1e-7 * force)
+        assert found[:2] == pytest.approx(
+            [bearing.radial_load, bearing.axial_load], abs=1e-7 * force
+        )
         if tilt is None:
             assert found[2] == pytest.approx(0.0, abs=1e-7 * force)
         if bearing.axial_load > bearing.radial_load * math.tan(bearing.contact_angle):
@@ -423,7 +477,9 @@ def test_every_angular_contact_bearing_finds_its_balance(tilt):
 
 def test_an_angular_contact_bearing_that_comes_apart_says_so():
     loose = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=5.0, tilt=None)
-    with pytest.raises(BadInput, match=r"comes apart under a thrust of 5 N beside 1000 N.* from about 1.02e.03 N"):
+    with pytest.raises(
+        BadInput, match=r"comes apart under a thrust of 5 N beside 1000 N.* from about 1.02e.03 N"
+    ):
         loose.loads(STEEL)
 
 
@@ -433,7 +489,8 @@ def test_an_angular_contact_bearing_bears_as_its_catalogue_supposes():
     C 15.6 kN, P the radial load. Free to tilt it would bear at 20 degrees, on balls opposite the load too.
     """
     upright, free = (
-        BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=1140.0, tilt=tilt) for tilt in (0.0, None)
+        BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=1140.0, tilt=tilt)
+        for tilt in (0.0, None)
     )
     loads, angles = upright.loads(STEEL)
     assert np.count_nonzero(loads) == 7
@@ -463,7 +520,9 @@ def test_the_moment_of_a_held_ring_is_what_the_energy_asks_for():
 
     held = BallBearing(**BALLS_7205, radial_load=1000.0, axial_load=900.0, tilt=-1e-3)
     step = 1e-5
-    assert held.moment(STEEL) == pytest.approx((energy(-1e-3 + step) - energy(-1e-3 - step)) / (2.0 * step), rel=1e-5)
+    assert held.moment(STEEL) == pytest.approx(
+        (energy(-1e-3 + step) - energy(-1e-3 - step)) / (2.0 * step), rel=1e-5
+    )
 
 
 def test_preload_alone_bears_on_every_ball():
@@ -477,7 +536,8 @@ def test_preload_alone_bears_on_every_ball():
 def test_a_clearance_sets_the_angle_that_frequencies_are_for():
     """6206, 20 um: arccos(1 - s/(2 A)) is 11.76 deg; without thrust the balls bear upright."""
     thrust, across = (
-        BallBearing(**BALLS_6206, clearance=20e-6, **load) for load in ({"axial_load": 500.0}, {"radial_load": 500.0})
+        BallBearing(**BALLS_6206, clearance=20e-6, **load)
+        for load in ({"axial_load": 500.0}, {"radial_load": 500.0})
     )
     assert math.degrees(thrust.free_angle) == pytest.approx(11.76, abs=0.01)
     assert across.free_angle == 0.0
@@ -489,8 +549,12 @@ def test_a_6206_under_two_kilonewtons():
     assert bearing.loads(STEEL)[0][:4] == pytest.approx([974.49, 653.37, 70.52, 0.0], rel=1e-4)
     inner, outer = (contact.hertz(STEEL) for contact in bearing.contacts(STEEL)[:2])
     assert (inner.p_max / 1e6, outer.p_max / 1e6) == pytest.approx((2252.86, 2026.35), rel=1e-5)
-    assert [1e3 * half for half in inner.half_widths] == pytest.approx([0.148485, 1.39092], rel=1e-5)
-    assert [1e3 * half for half in outer.half_widths] == pytest.approx([0.200502, 1.14522], rel=1e-5)
+    assert [1e3 * half for half in inner.half_widths] == pytest.approx(
+        [0.148485, 1.39092], rel=1e-5
+    )
+    assert [1e3 * half for half in outer.half_widths] == pytest.approx(
+        [0.200502, 1.14522], rel=1e-5
+    )
     assert len(bearing.contacts(STEEL)) == 10
     assert "not covered" in bearing.notes(STEEL)[0]
 
@@ -498,18 +562,38 @@ def test_a_6206_under_two_kilonewtons():
 @pytest.mark.parametrize(
     ("machine", "given", "words"),
     [
-        (CylindricalRollerBearing, NU206 | {"radial_load": 0.0, "clearance": 10e-6}, "unloads every roller"),
+        (
+            CylindricalRollerBearing,
+            NU206 | {"radial_load": 0.0, "clearance": 10e-6},
+            "unloads every roller",
+        ),
         (CylindricalRollerBearing, NU206 | {"clearance": 1e-3}, "holds no roller in place"),
         (CylindricalRollerBearing, NU206 | {"rollers": 20}, "do not fit"),
         (CylindricalRollerBearing, NU206 | {"slices": 10}, "at least 30"),
         (CylindricalRollerBearing, NU206 | {"radial_load": -5.0}, "negative"),
         (BallBearing, BALLS, "no ball carries"),
         (BallBearing, BALLS | {"radial_load": 10.0, "clearance": -1e-3}, "holds no ball in place"),
-        (BallBearing, BALLS | {"radial_load": 10.0, "clearance": 6e-4}, "bear at more than 60 deg; it must be at most"),
-        (BallBearing, BALLS_6206 | {"axial_load": 500.0, "osculation": (0.505, 0.505), "clearance": 4e-4}, "60 deg"),
-        (BallBearing, BALLS_6206 | {"axial_load": 500.0, "osculation": (0.51, 0.51), "clearance": 4e-4}, "60 deg"),
+        (
+            BallBearing,
+            BALLS | {"radial_load": 10.0, "clearance": 6e-4},
+            "bear at more than 60 deg; it must be at most",
+        ),
+        (
+            BallBearing,
+            BALLS_6206 | {"axial_load": 500.0, "osculation": (0.505, 0.505), "clearance": 4e-4},
+            "60 deg",
+        ),
+        (
+            BallBearing,
+            BALLS_6206 | {"axial_load": 500.0, "osculation": (0.51, 0.51), "clearance": 4e-4},
+            "60 deg",
+        ),
         (BallBearing, BALLS | {"radial_load": 10.0, "tilt": 0.05}, "between -20 and 20 mrad"),
-        (BallBearing, BALLS_7205 | {"radial_load": 1000.0}, "comes apart under a radial_load of 1000 N alone"),
+        (
+            BallBearing,
+            BALLS_7205 | {"radial_load": 1000.0},
+            "comes apart under a radial_load of 1000 N alone",
+        ),
         (BallBearing, BALLS | {"radial_load": 10.0, "osculation": (0.49, 0.53)}, "osculation"),
         (
             BallBearing,
@@ -526,7 +610,9 @@ def test_bearings_that_cannot_be_are_refused(machine, given, words):
 
 def test_what_is_left_out_of_a_bearing_is_said():
     fast = CylindricalRollerBearing(**(NU206 | {"speed": 20000.0 * RPM}))
-    assert any("centrifugal load of 82" in note for note in fast.notes(STEEL))  # 1.85 N at 3000 r/min, by its square
+    assert any(
+        "centrifugal load of 82" in note for note in fast.notes(STEEL)
+    )  # 1.85 N at 3000 r/min, by its square
     assert not any("centrifugal" in note for note in CylindricalRollerBearing(**NU206).notes(STEEL))
     loose = CylindricalRollerBearing(**(NU206 | {"clearance": 200e-6, "radial_load": 100.0}))
     assert any("One roller alone" in note for note in loose.notes(STEEL))
@@ -543,10 +629,18 @@ def test_discs_keep_the_sign_of_their_sliding():
     assert contact.radius == pytest.approx(0.012)
     assert contact.surface_speeds == pytest.approx((2.0, 1.5))
     assert contact.slide_to_roll == pytest.approx(0.5 / 1.75)
-    (turned,) = TwinDisc(radii=(0.03, 0.02), speeds=(50.0, 100.0), load=500.0, length=5e-3).contacts(STEEL)
+    (turned,) = TwinDisc(
+        radii=(0.03, 0.02), speeds=(50.0, 100.0), load=500.0, length=5e-3
+    ).contacts(STEEL)
     assert turned.slide_to_roll == pytest.approx(-0.5 / 1.75)
-    (crowned,) = TwinDisc(radii=(0.02, 0.03), speeds=(100.0, 50.0), load=5.0, crown_radius=0.1).contacts(STEEL)
-    assert (crowned.geometry, crowned.radius, crowned.line_load) == ("elliptic", pytest.approx((0.012, 0.1)), None)
+    (crowned,) = TwinDisc(
+        radii=(0.02, 0.03), speeds=(100.0, 50.0), load=5.0, crown_radius=0.1
+    ).contacts(STEEL)
+    assert (crowned.geometry, crowned.radius, crowned.line_load) == (
+        "elliptic",
+        pytest.approx((0.012, 0.1)),
+        None,
+    )
     for wrong in ({}, {"length": 1e-3, "crown_radius": 0.1}):
         with pytest.raises(BadInput, match=r"length .* or crown_radius"):
             TwinDisc(radii=(0.02, 0.03), speeds=(100.0, 50.0), load=500.0, **wrong)
@@ -556,7 +650,9 @@ def test_an_eccentric_disc_under_a_flat_follower():
     contacts = FlatCam(**CAM).contacts(STEEL)
     assert [contact.radius for contact in contacts] == pytest.approx([0.02] * 9, rel=1e-9)
     assert [contact.surface_speeds[0] for contact in contacts] == pytest.approx([2.0] * 9, rel=1e-9)
-    assert [contacts[at].entrainment_speed for at in (8, 4, 0)] == pytest.approx([1.25, 1.0, 0.75], rel=1e-9)
+    assert [contacts[at].entrainment_speed for at in (8, 4, 0)] == pytest.approx(
+        [1.25, 1.0, 0.75], rel=1e-9
+    )
     assert contacts[0].slide_to_roll > 2.0  # the nose runs against the follower
     assert any("run against each other" in note for note in FlatCam(**CAM).notes(STEEL))
 
@@ -567,12 +663,16 @@ def test_where_a_cam_entrains_backwards_the_solver_sees_it_from_the_other_side()
     nose, flank = contacts[0], contacts[-1]
     assert nose.entrainment_speed < 0.0 < flank.entrainment_speed
     assert nose.conditions(STEEL).entrainment_speed == pytest.approx(-nose.entrainment_speed)
-    assert nose.conditions(STEEL).surface_speeds == pytest.approx(tuple(-u for u in nose.surface_speeds))
+    assert nose.conditions(STEEL).surface_speeds == pytest.approx(
+        tuple(-u for u in nose.surface_speeds)
+    )
     assert any("passes zero" in note for note in cam.notes(STEEL))
 
 
 def test_a_contact_that_draws_no_oil_in_is_not_solved_but_pressed():
-    balanced = TwinDisc(radii=(0.02, 0.02), speeds=(1.0, 1.0), load=10.0, length=1e-3).contacts(STEEL)[0]
+    balanced = TwinDisc(radii=(0.02, 0.02), speeds=(1.0, 1.0), load=10.0, length=1e-3).contacts(
+        STEEL
+    )[0]
     against = type(balanced)(**{**vars(balanced), "surface_speeds": (1.0, -1.0)})
     assert against.stands_still
     assert against.slide_to_roll is None
@@ -614,7 +714,9 @@ def test_an_eccentric_disc_under_a_roller(angle):
     disc, off, roller = 20e-3, 6e-3, 8e-3
 
     def reach(theta):
-        return off * math.cos(theta) + math.sqrt((disc + roller) ** 2 - (off * math.sin(theta)) ** 2)
+        return off * math.cos(theta) + math.sqrt(
+            (disc + roller) ** 2 - (off * math.sin(theta)) ** 2
+        )
 
     step = 1e-4
     slope = (reach(angle + step) - reach(angle - step)) / (2.0 * step)
@@ -638,7 +740,11 @@ def test_a_roller_cam_by_its_outline():
     """A twin: the cam as the envelope of the roller's places, its curvature and path by differences."""
     cam = RollerCam(**ROLLER_CAM)
     angles = np.linspace(0.02, cam.half_angle - 0.02, 4001)
-    reach = cam.base_radius + cam.roller_radius + 0.5 * cam.lift * (1.0 + np.cos(math.pi * angles / cam.half_angle))
+    reach = (
+        cam.base_radius
+        + cam.roller_radius
+        + 0.5 * cam.lift * (1.0 + np.cos(math.pi * angles / cam.half_angle))
+    )
     centres = reach * np.exp(1j * (0.5 * math.pi - angles))
     way = np.gradient(centres, angles, edge_order=2)
     outline = centres + cam.roller_radius * way / np.abs(way) * -1j
@@ -656,16 +762,27 @@ def test_a_roller_cams_contacts():
     nose, last = contacts[0], contacts[-1]
     assert nose.load == pytest.approx(600.0 + 20e3 * 9e-3)  # the pressure angle is 0
     rate = math.pi / cam.half_angle
-    sharp = 36e-3**2 / (36e-3 + 4.5e-3 * rate**2)  # ρ0 = 18 + 9 + 9 mm at the nose, ρ0'' = -(L/2)(π/β)²
+    sharp = 36e-3**2 / (
+        36e-3 + 4.5e-3 * rate**2
+    )  # ρ0 = 18 + 9 + 9 mm at the nose, ρ0'' = -(L/2)(π/β)²
     assert nose.radius == pytest.approx(1.0 / (1.0 / (sharp - 9e-3) + 1.0 / 9e-3), rel=1e-12)
-    assert nose.surface_speeds[0] == pytest.approx(150.0 * 36e-3 * (1.0 - 9e-3 / sharp), rel=1e-12)  # slip or none
+    assert nose.surface_speeds[0] == pytest.approx(
+        150.0 * 36e-3 * (1.0 - 9e-3 / sharp), rel=1e-12
+    )  # slip or none
     assert last.load == pytest.approx(600.0)
     assert [contact.slide_to_roll for contact in contacts] == pytest.approx([0.1] * len(contacts))
     middle = contacts[4]
     point = cam.at(middle.position)
-    assert math.tan(point.pressure_angle) == pytest.approx(-4.5e-3 * rate / (18e-3 + 9e-3 + 4.5e-3), rel=1e-9)
-    assert middle.load == pytest.approx(cam.follower_force(middle.position) / math.cos(point.pressure_angle))
-    assert any("pressure angle" in note for note in RollerCam(**(ROLLER_CAM | {"lift": 16e-3})).notes(STEEL))
+    assert math.tan(point.pressure_angle) == pytest.approx(
+        -4.5e-3 * rate / (18e-3 + 9e-3 + 4.5e-3), rel=1e-9
+    )
+    assert middle.load == pytest.approx(
+        cam.follower_force(middle.position) / math.cos(point.pressure_angle)
+    )
+    assert any(
+        "pressure angle" in note
+        for note in RollerCam(**(ROLLER_CAM | {"lift": 16e-3})).notes(STEEL)
+    )
     around = RollerCam(**ROLLER_CAM).frequencies
     assert around["roller_hz"] / around["cam_hz"] == pytest.approx(
         _perimeter(RollerCam(**ROLLER_CAM)) / (2.0 * math.pi * 9e-3), rel=1e-4
@@ -677,20 +794,28 @@ def test_a_roller_that_slips_changes_its_own_speed_and_not_the_cams(slip):
     """What it turns in a turn of the cam is its surface speed, by the contacts' ratio, over the cam's outline."""
     cam = RollerCam(**ROLLER_CAM, slip=slip)
     contacts = cam.contacts(STEEL)
-    cams, rollers = (np.array([contact.surface_speeds[body] for contact in contacts]) for body in (0, 1))
+    cams, rollers = (
+        np.array([contact.surface_speeds[body] for contact in contacts]) for body in (0, 1)
+    )
     assert cams == pytest.approx([cam.speed * cam.at(angle).path for angle in cam.angles])
     assert [contact.slide_to_roll for contact in contacts] == pytest.approx([slip] * len(contacts))
     ratios = rollers / cams
     assert ratios == pytest.approx([ratios[0]] * len(ratios))
     turned = ratios[0] * _perimeter(cam) / (2.0 * math.pi * cam.roller_radius)
-    assert turned == pytest.approx(cam.frequencies["roller_hz"] / cam.frequencies["cam_hz"], rel=1e-4)
+    assert turned == pytest.approx(
+        cam.frequencies["roller_hz"] / cam.frequencies["cam_hz"], rel=1e-4
+    )
 
 
 def _perimeter(cam):
     """Of the cam, summed over its outline's places."""
     angles = np.linspace(-math.pi, math.pi, 20001)
     near = np.minimum(np.abs(angles), cam.half_angle)
-    reach = cam.base_radius + cam.roller_radius + 0.5 * cam.lift * (1.0 + np.cos(math.pi * near / cam.half_angle))
+    reach = (
+        cam.base_radius
+        + cam.roller_radius
+        + 0.5 * cam.lift * (1.0 + np.cos(math.pi * near / cam.half_angle))
+    )
     centres = reach * np.exp(1j * angles)
     way = np.gradient(centres, angles)
     return float(np.abs(np.diff(centres + 1j * cam.roller_radius * way / np.abs(way))).sum())
@@ -716,4 +841,6 @@ def test_discs_by_entrainment_and_slide_to_roll():
         length=5e-3,
     )
     assert stated.turning == pytest.approx((105.0, 49.0), rel=1e-12)
-    assert stated.contacts(STEEL)[0].surface_speeds == pytest.approx(given.surface_speeds, rel=1e-12)
+    assert stated.contacts(STEEL)[0].surface_speeds == pytest.approx(
+        given.surface_speeds, rel=1e-12
+    )

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from asperity.case import load_machine
+from asperity.core.quantities import catalogue
 from asperity.lubricant import ESTIMATORS, OilSheet
-from asperity.quantities import catalogue
+from asperity.machines import machine_conditions
+from asperity.machines import ratings as rated
+from asperity.machines.rating_facts import FACTS
 from asperity.rating import GearOil, Mesh, MeshPoint, life_factor, specific_film
 from asperity.results import solve_case
-from asperity.study import machine_conditions, rated
-from asperity.study.rating_facts import FACTS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LIMITS = {"rating.fatigue_limits": ["350 MPa", "600 MPa"]}
@@ -32,20 +33,26 @@ def test_every_rating_is_a_quantity_and_says_where_it_is_from():
 def test_a_roller_bearings_viscosity_ratio_and_life():
     case = load_machine(EXAMPLES / "nu206.toml")
     few = by_key(case)
-    assert few["viscosity_ratio"].alone == pytest.approx(1.648, rel=1e-3)  # VG 68 of index 95 at 70 degC, 3000 r/min
+    assert few["viscosity_ratio"].alone == pytest.approx(
+        1.648, rel=1e-3
+    )  # VG 68 of index 95 at 70 degC, 3000 r/min
     assert few["reference_viscosity_m2_s"].alone * 1e6 == pytest.approx(12.048, rel=1e-4)
     assert few["life_factor"].alone is None
     assert few["life_factor"].reason == "[rating] has no dynamic_load_rating"
     whole = {"dynamic_load_rating": "44 kN", "fatigue_load_limit": "4.5 kN", "contamination": 0.5}
     found = by_key(case.with_overrides({"rating": whole}))
-    assert found["equivalent_load_n"].alone == pytest.approx(4000.0, rel=0.12)  # half a load zone would give 4000 N
+    assert found["equivalent_load_n"].alone == pytest.approx(
+        4000.0, rel=0.12
+    )  # half a load zone would give 4000 N
     factor = found["life_factor"].alone
     turns = found["reference_life"].alone * factor
     assert found["modified_life_s"].alone == pytest.approx(turns / 50.0, rel=1e-9)
     assert by_key(case.with_overrides({"rating": whole | {"contamination": 0.0}}))[
         "life_factor"
     ].alone == pytest.approx(0.1)
-    missing = by_key(case.with_overrides({"rating": {"dynamic_load_rating": "44 kN"}}))["life_factor"]
+    missing = by_key(case.with_overrides({"rating": {"dynamic_load_rating": "44 kN"}}))[
+        "life_factor"
+    ]
     assert missing.reason == "[rating] has no fatigue_load_limit and no contamination"
     cold = by_key(case.with_overrides({"rating": whole, "machine.speed": "10 r/min"}))
     assert "below 0.1" in cold["life_factor"].reason
@@ -74,7 +81,9 @@ def test_a_ball_bearings_life_is_a_commercial_programs():
 def test_gears_get_their_own_numbers():
     """Against the formulas called by hand, with Ra and the bulk temperature given and by the roughness."""
     case = load_machine(EXAMPLES / "fzg-c.toml")
-    given = case.with_overrides({"rating": {"roughness_ra": "0.5 um", "bulk_temperature": "100 degC"}})
+    given = case.with_overrides(
+        {"rating": {"roughness_ra": "0.5 um", "bulk_temperature": "100 degC"}}
+    )
     found = by_key(given)
     assert found["rated_bulk_k"].alone == 373.15
     sheet = OilSheet(grade="VG 220")
@@ -90,14 +99,18 @@ def test_gears_get_their_own_numbers():
     mesh = Mesh(0.5e-6, case.pair.effective_modulus, (effusivity, effusivity))
     contact = next(one for one in case.contacts if one.name == "D")
     hertz = contact.hertz(case.pair)
-    point = MeshPoint(contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds)
+    point = MeshPoint(
+        contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds
+    )
     film, rise = specific_film(point, mesh, oil, found["mesh_friction"].alone, 373.15)
     assert found["rated_film"].values["D"] == pytest.approx(film, rel=1e-9)
     assert found["rated_flash_k"].values["D"] == pytest.approx(rise, rel=1e-9)
     assert found["rated_flash_k"].values["C"] == pytest.approx(0.0, abs=1e-9)
     assert found["rated_film"].alone is None
     smoother = by_key(case.with_overrides({"surface.sq": "0.25 um"}))["rated_film"].values["A"]
-    assert smoother > 2.0 * by_key(case)["rated_film"].values["A"]  # of Ra itself, and of a cooler mesh
+    assert (
+        smoother > 2.0 * by_key(case)["rated_film"].values["A"]
+    )  # of Ra itself, and of a cooler mesh
 
 
 def test_ra_of_both_flanks():
@@ -105,7 +118,9 @@ def test_ra_of_both_flanks():
     composite = case.case(case.contacts[0])
     assert rated._mean_ra(composite) == pytest.approx(0.5e-6 / math.sqrt(math.pi), rel=1e-6)
     kind = {"kind": "gaussian", "correlation_length": "30 um"}
-    apart = composite.with_overrides({"surface": kind | {"sq": "0.6 um", "second": kind | {"sq": "0.2 um"}}})
+    apart = composite.with_overrides(
+        {"surface": kind | {"sq": "0.6 um", "second": kind | {"sq": "0.2 um"}}}
+    )
     assert rated._mean_ra(apart) == pytest.approx(math.sqrt(2.0 / math.pi) * 0.4e-6, rel=1e-6)
 
 
@@ -118,7 +133,9 @@ def test_limits_of_gears_are_given_or_missing():
     films = found["rated_film"].values
     assert found["micropitting_safety"].alone == pytest.approx(min(films.values()) / 0.5)
     hottest = found["rated_bulk_k"].alone + max(found["rated_flash_k"].values.values())
-    assert found["scuffing_margin_k"].alone == pytest.approx(found["scuffing_limit_k"].alone - hottest)
+    assert found["scuffing_margin_k"].alone == pytest.approx(
+        found["scuffing_limit_k"].alone - hottest
+    )
     assert found["scuffing_limit_k"].alone - 353.15 == pytest.approx(
         2.25 * (1e3 * OilSheet(grade="VG 220").viscosity(363.15)) ** -0.05 * 144.0, rel=1e-9
     )
@@ -214,7 +231,11 @@ def test_the_life_factor_of_rollers_is_of_the_bearings_load_at_least():
                 "radial_load": "10 kN",
                 "speed": "1500 r/min",
             },
-            "rating": {"dynamic_load_rating": "62 kN", "fatigue_load_limit": "6.7 kN", "contamination": 0.5},
+            "rating": {
+                "dynamic_load_rating": "62 kN",
+                "fatigue_load_limit": "6.7 kN",
+                "contamination": 0.5,
+            },
         }
     )
     found = by_key(case)
@@ -235,8 +256,13 @@ def test_teeth_that_are_warmer_than_their_oil_are_said():
 
 def test_a_pressure_that_no_bearing_bears_is_said():
     case = load_machine(EXAMPLES / "6206.toml", {"machine.clearance": "-450 um"})
-    assert any("above 4.2000 GPa, the static limit" in note for note in machine_conditions(case).notes)
-    assert not any("static limit" in note for note in machine_conditions(load_machine(EXAMPLES / "6206.toml")).notes)
+    assert any(
+        "above 4.2000 GPa, the static limit" in note for note in machine_conditions(case).notes
+    )
+    assert not any(
+        "static limit" in note
+        for note in machine_conditions(load_machine(EXAMPLES / "6206.toml")).notes
+    )
 
 
 def test_machines_without_a_standard_have_no_ratings():
@@ -257,7 +283,9 @@ def test_fatigue_below_a_smooth_contact_is_hertz():
     assert found.solved[core] == pytest.approx(found.smooth[core], rel=0.02)
     assert found.slope == pytest.approx(0.25)
     p_max = run.solution.conditions.hertz.p_max
-    assert found.smooth.max() / p_max == pytest.approx(0.182, rel=0.03)  # between 0.1935 (a 0.2) and 0.1702 (a 0.3)
+    assert found.smooth.max() / p_max == pytest.approx(
+        0.182, rel=0.03
+    )  # between 0.1935 (a 0.2) and 0.1702 (a 0.3)
     ratings = {rating.key: rating.alone for rating in found.ratings()}
     assert ratings["dang_van_safety"] == pytest.approx(350e6 / found.solved[core].max())
     result = replace(machine_conditions(case), run=run)

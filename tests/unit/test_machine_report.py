@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 
 from asperity.case import load_machine
 from asperity.machine import RollerCam, SpurGear
+from asperity.machines import MachineResult, machine_conditions
 from asperity.report import write_machine_report
 from asperity.report.machine import sketch
-from asperity.report.machine.path import along_path
+from asperity.report.machine.contact_path import along_path
 from asperity.results import solve_case
-from asperity.study import MachineResult, machine_conditions
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CAM = """
@@ -55,19 +55,33 @@ def solved(case, failed=(), run=None):
 
 
 def page(result, tmp_path, **about):
-    return unescape(write_machine_report(result, tmp_path / "page.html", **about).read_text("utf-8"))
+    return unescape(
+        write_machine_report(result, tmp_path / "page.html", **about).read_text("utf-8")
+    )
 
 
 def test_the_first_thing_on_the_page_is_what_is_concluded(tmp_path):
     gears = load_machine(EXAMPLES / "fzg-c.toml")
-    run = solve_case(gears.case(gears.contacts[4]).with_overrides({"grid.cells": [96, 48]}), strict=False)
+    run = solve_case(
+        gears.case(gears.contacts[4]).with_overrides({"grid.cells": [96, 48]}), strict=False
+    )
     text = page(solved(gears, run=run), tmp_path, opened="worst.html")
     body = text.split("<main>")[1]
     assert body.index("mixed lubrication; worst is") < body.index("<h2 id=")
-    assert "asperities carry 8.0 % (5.0 to 13.0 %) of the load".replace(" %", "\N{NO-BREAK SPACE}%") in body
+    assert (
+        "asperities carry 8.0 % (5.0 to 13.0 %) of the load".replace(" %", "\N{NO-BREAK SPACE}%")
+        in body
+    )
     assert 'href="worst.html"' in body
-    assert body.count("<img ") == 8  # the machine, its path, and six of the worst contact, which slides
-    for words in ("ISO/TR 15144-1:2014", "not rated: [rating] has no scuffing_stage", 'kind = "spur-gear"', "mesh"):
+    assert (
+        body.count("<img ") == 8
+    )  # the machine, its path, and six of the worst contact, which slides
+    for words in (
+        "ISO/TR 15144-1:2014",
+        "not rated: [rating] has no scuffing_stage",
+        'kind = "spur-gear"',
+        "mesh",
+    ):
         assert words in text
     assert len(re.findall(r'<tr class="worst">', text)) == 1
     assert "8.0 (5.0 to 13.0)" in text
@@ -131,14 +145,20 @@ def test_the_teeth_drawn_meet_where_the_contact_is():
     sketch._gears(pair, result, axes)
     pinion, wheel = (patch.get_xy() for patch in axes.patches[:2])
     met = next(
-        line for line in axes.get_lines() if (line.get_marker(), line.get_markersize()) == ("o", 6.0)
+        line
+        for line in axes.get_lines()
+        if (line.get_marker(), line.get_markersize()) == ("o", 6.0)
     ).get_xydata()[0]
-    assert np.hypot(*met) == pytest.approx(1e3 * math.hypot(pair.base_radii[0], pair.path["B"]), rel=1e-6)
+    assert np.hypot(*met) == pytest.approx(
+        1e3 * math.hypot(pair.base_radii[0], pair.path["B"]), rel=1e-6
+    )
     slopes = []
     for outline in (pinion, wheel):
         start, end = outline[:-1], outline[1:]
         way = end - start
-        share = np.clip(((met - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0)
+        share = np.clip(
+            ((met - start) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12), 0.0, 1.0
+        )
         off = np.hypot(*(start + share[:, None] * way - met).T)
         nearest = int(np.argmin(off))
         assert off[nearest] < 0.01  # mm

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from asperity.case import load_machine
-from asperity.errors import BadInput
-from asperity.study import MachineResult, machine, machine_conditions, solve_machine
+from asperity.core.errors import BadInput
+from asperity.machines import MachineResult, machine_conditions, solve_machine
+from asperity.machines import solve as machine
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -22,7 +23,13 @@ def solved(gears, **changed):
     rows = []
     for row in machine_conditions(gears).rows:
         clr, film_ratio, film = changed.get(row["name"], (0.0, 2.0, 1e-6))
-        numbers = {"clr": clr, "lambda_ratio": film_ratio, "h_central_m": film, "h_min_m": film, "determined": True}
+        numbers = {
+            "clr": clr,
+            "lambda_ratio": film_ratio,
+            "h_central_m": film,
+            "h_min_m": film,
+            "determined": True,
+        }
         why = "did not converge" if clr is None else ""
         rows.append({**row, **numbers, "flash_temperature_max_k": 12.5, "reason": why})
     return MachineResult(gears, tuple(rows), True, 1.0)
@@ -55,13 +62,18 @@ def test_in_full_film_the_worst_has_the_least_film(gears):
     smooth = {row["name"]: (0.0, None, 1e-6) for row in machine_conditions(gears).rows}
     found = solved(gears, **smooth | {"DE": (0.0, None, 4e-7)})
     assert found.worst["name"] == "DE"
-    assert ": full film; worst is DE, where asperities carry 0.0 % of the load on a film of 0.400" in found.verdict()
+    assert (
+        ": full film; worst is DE, where asperities carry 0.0 % of the load on a film of 0.400"
+        in found.verdict()
+    )
 
 
 def test_not_solved_the_worst_is_pressed_hardest(gears):
     found = machine_conditions(gears)
     assert found.worst["p_hertz_pa"] == max(row["p_hertz_pa"] for row in found.rows)
-    assert found.verdict().endswith("B, Hertz pressure 1.6671 GPa, slide-to-roll ratio −46 %; not solved.")
+    assert found.verdict().endswith(
+        "B, Hertz pressure 1.6671 GPa, slide-to-roll ratio −46 %; not solved."
+    )
 
 
 def test_what_failed_is_in_the_verdict(gears):

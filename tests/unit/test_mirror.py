@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from benchmarks.films import BARUS, ROELANDS, ball
 
+from asperity.contact.grid import Grid
 from asperity.ehl import Options, Scales, solve_contact
 from asperity.ehl.deflection import deflection
-from asperity.ehl.mixed import Pressures, evaluate
-from asperity.ehl.mixed_linear import MixedLinear
-from asperity.ehl.posing import contact_problem, first_guess, grid_levels, least_part
-from asperity.ehl.problem import Problem
-from asperity.ehl.transfer import mirrored
-from asperity.grid import Grid
+from asperity.ehl.grid_transfer import mirrored
+from asperity.ehl.linear_solvers.mixed import MixedLinear
+from asperity.ehl.models.mixed import Pressures, evaluate
+from asperity.ehl.models.single_pressure import Problem
+from asperity.ehl.problem_setup import contact_problem, first_guess, grid_levels, least_part
 from asperity.surface import flat_surface
 
 LINES = (24, 25)  # a mirror between two lines of cells, and one through the middle one
@@ -22,7 +22,9 @@ CONDITIONS, UNIT = ball(20, 10)
 
 def surface(cells, across=3.0):
     a = CONDITIONS.hertz.half_widths[0]
-    return flat_surface(Grid(cells, (-4.5 * a, -across * a), (1.5 * a, 3.0 * a), periodic=(False, False)))
+    return flat_surface(
+        Grid(cells, (-4.5 * a, -across * a), (1.5 * a, 3.0 * a), periodic=(False, False))
+    )
 
 
 def posed(lines, **options):
@@ -64,12 +66,22 @@ def test_each_cell_leaves_what_it_leaves_on_all_cells(lines, model):
     everywhere, here = pressed(problem)
     half = part.cells[1]
     if model == "paper":
-        whole, some = (each.evaluate(at.total, at.approach) for each, at in ((problem, everywhere), (part, here)))
+        whole, some = (
+            each.evaluate(at.total, at.approach)
+            for each, at in ((problem, everywhere), (part, here))
+        )
         np.testing.assert_allclose(some.residual, whole.residual[:, :half], rtol=1e-9, atol=1e-12)
     else:
-        whole, some = (evaluate(each, at, second_order=False) for each, at in ((problem, everywhere), (part, here)))
-        np.testing.assert_allclose(some.oil_residual, whole.oil_residual[:, :half], rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(some.outflow[:, 1:], whole.outflow[:, 1:half], rtol=1e-9, atol=1e-9)
+        whole, some = (
+            evaluate(each, at, second_order=False)
+            for each, at in ((problem, everywhere), (part, here))
+        )
+        np.testing.assert_allclose(
+            some.oil_residual, whole.oil_residual[:, :half], rtol=1e-9, atol=1e-12
+        )
+        np.testing.assert_allclose(
+            some.outflow[:, 1:], whole.outflow[:, 1:half], rtol=1e-9, atol=1e-9
+        )
     assert some.load_error == pytest.approx(whole.load_error, rel=1e-12)
 
 
@@ -94,7 +106,9 @@ def test_its_linearisation_is_that_of_all_cells(lines, accurate):
 
     (of_all, _), (stencil, _) = whole._stencil(), some._stencil()
     np.testing.assert_allclose(stencil.west, of_all.west[:, :half], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(stencil.centre[:, :-1], of_all.centre[:, : half - 1], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        stencil.centre[:, :-1], of_all.centre[:, : half - 1], rtol=1e-9, atol=1e-12
+    )
     assert not np.any(stencil.north[:, -1])
     rows = [
         sum(np.sum(coupling[:, half - 1]) for coupling in (each.centre, each.north, each.south))
@@ -114,7 +128,9 @@ def test_coarser_grids_have_their_mirror_in_the_same_place(lines):
     parabola = np.broadcast_to(9.0 - coarse.y**2, coarse.cells)
     inside = (part.y > coarse.y[1]) & (part.y < 0.0)
     expected = np.broadcast_to(9.0 - part.y**2, part.cells)
-    np.testing.assert_allclose(part.brought(parabola, cubic=True)[:, inside], expected[:, inside], atol=1e-12)
+    np.testing.assert_allclose(
+        part.brought(parabola, cubic=True)[:, inside], expected[:, inside], atol=1e-12
+    )
 
 
 def test_what_is_not_the_same_on_both_sides_keeps_all_its_cells():
@@ -126,7 +142,9 @@ def test_what_is_not_the_same_on_both_sides_keeps_all_its_cells():
     rough = replace(posed(24), roughness=np.full((26, 24), 1e-3))
     for problem in (aside, heated, rough):
         assert least_part(problem) is problem
-    even = contact_problem(CONDITIONS, BARUS, surface((26, 24)), Options(), 0.5 * (warm + warm[:, ::-1]))
+    even = contact_problem(
+        CONDITIONS, BARUS, surface((26, 24)), Options(), 0.5 * (warm + warm[:, ::-1])
+    )
     assert least_part(even).mirror
 
 

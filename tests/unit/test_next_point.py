@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 
 from asperity.inference import Forward, Heard, Observation, Point, Shown, infer_observations
-from asperity.inference.likelihood import EXPONENT_STD, SIZES, emulated_errors, foretold, law_errors, log_likelihood
+from asperity.inference.likelihood import (
+    EXPONENT_STD,
+    SIZES,
+    emulated_errors,
+    foretold,
+    law_errors,
+    log_likelihood,
+)
 from asperity.inference.next_point import _information, at_place, expected_information
 from asperity.inference.observations import likeness
 from support.emulated import formula_emulator, formula_setting
 
 HERE = (500.0, 0.8)
-SLOPES = np.array([1.0, 1.0, 0.4])  # of ln CRF with the one unknown of a linear machine, at three points
+SLOPES = np.array(
+    [1.0, 1.0, 0.4]
+)  # of ln CRF with the one unknown of a linear machine, at three points
 LOADS = (500.0, 500.0, 800.0)
 
 
@@ -22,9 +31,13 @@ def heard_once(setting, emulator, times=1):
     shown = forward.shown(np.zeros((1, forward.dims)), "hertz-point")
     crf, damping = (float(np.exp(values[0, 0])) for values in (shown.crf, shown.damping))
     one = Observation(
-        load_n=HERE[0], entrainment_m_s=HERE[1], crf_hz=crf, crf_std_hz=1e-3 * crf,
-        damping_ratio=damping, damping_std=0.03 * damping,
-    )  # fmt: skip
+        load_n=HERE[0],
+        entrainment_m_s=HERE[1],
+        crf_hz=crf,
+        crf_std_hz=1e-3 * crf,
+        damping_ratio=damping,
+        damping_std=0.03 * damping,
+    )
     return [one] * times
 
 
@@ -42,10 +55,13 @@ def test_a_repeat_tells_a_small_part_of_what_the_first_told(setting, emulator):
     """And little where load is stated a little differently, as that is hardly another place."""
     found = infer_observations(setting, emulator, heard_once(setting, emulator))
     nothing = infer_observations(setting, emulator, [])
-    first = expected_information(nothing.forward, nothing.draws, (HERE,), seed=0)[0].information_bits
+    first = expected_information(nothing.forward, nothing.draws, (HERE,), seed=0)[
+        0
+    ].information_bits
     places = (HERE, (1.005 * HERE[0], HERE[1]), (900.0, 2.5))
     repeat, beside, far = (
-        one.information_bits for one in expected_information(found.forward, found.draws, places, seed=0)
+        one.information_bits
+        for one in expected_information(found.forward, found.draws, places, seed=0)
     )
     assert first > 2.0
     assert repeat < 0.05 * first
@@ -66,7 +82,10 @@ def linear(unknown, emulated=0.01):
 
 def points(std, value=8.02):
     """Heard at the first alone."""
-    return [Point(load, 1.0, crf=Heard(value, std) if place == 0 else Heard()) for place, load in enumerate(LOADS)]
+    return [
+        Point(load, 1.0, crf=Heard(value, std) if place == 0 else Heard())
+        for place, load in enumerate(LOADS)
+    ]
 
 
 def covariance(size, emulated=0.01):
@@ -129,7 +148,9 @@ def test_densities_of_what_would_be_heard_make_the_likelihood_of_both():
     first = [same[0], replace(same[1], crf=Heard())]
     rng = np.random.default_rng(3)
     crf, nothing = 8.0 + 0.05 * rng.standard_normal((6, 2)), np.full((6, 2), np.nan)
-    shown = Shown(crf, np.full((6, 2), 0.01), nothing, nothing, nothing, nothing, np.full((6, 2), 6.0))
+    shown = Shown(
+        crf, np.full((6, 2), 0.01), nothing, nothing, nothing, nothing, np.full((6, 2), 6.0)
+    )
     then = foretold(shown, first, "crf").log_density(np.array([np.nan, 7.96]), 2e-3)[:, 1]
     one, both = (log_likelihood(shown, points, discrepancy=True) for points in (first, same))
     assert one + then == pytest.approx(both, abs=1e-9)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.lubricant import ExponentialWarmth, Newtonian, OilSheet, RoelandsWarmth, measured_oils
 from asperity.report import write_report
 from asperity.results import load_run, solve_case
@@ -38,19 +38,28 @@ def test_a_sheet_arrives_in_si_and_comes_back():
     }
     case = PAPER.with_overrides({"lubricant": whole})
     assert case.lubricant.viscosity.eta0 == pytest.approx(
-        OilSheet(viscosity_40=98e-6, viscosity_100=11.2e-6, density_15=880.0).viscosity(343.15), rel=1e-12
+        OilSheet(viscosity_40=98e-6, viscosity_100=11.2e-6, density_15=880.0).viscosity(343.15),
+        rel=1e-12,
     )
     assert case.lubricant.viscosity.alpha == pytest.approx(15e-9)
     assert type(case.lubricant.viscosity).__name__ == "Barus"
     assert case.lubricant.rheology.tau0 == 5e6
     assert load_case(case.text) == case
-    assert case.with_overrides({"lubricant.rheology": "newtonian"}).lubricant.rheology == Newtonian()
+    assert (
+        case.with_overrides({"lubricant.rheology": "newtonian"}).lubricant.rheology == Newtonian()
+    )
 
 
 def test_single_values_are_set_and_left_out():
-    case = EXAMPLE.with_overrides({"lubricant.grade": "none", "lubricant.viscosity_40": "150 mm^2/s"})
-    assert case.lubricant == OilSheet(viscosity_40=150e-6, viscosity_100=11.2e-6, density_15=885.0).lubricant(343.15)
-    assert EXAMPLE.with_overrides({"lubricant.alpha": "20 1/GPa"}).lubricant.viscosity.alpha == pytest.approx(20e-9)
+    case = EXAMPLE.with_overrides(
+        {"lubricant.grade": "none", "lubricant.viscosity_40": "150 mm^2/s"}
+    )
+    assert case.lubricant == OilSheet(
+        viscosity_40=150e-6, viscosity_100=11.2e-6, density_15=885.0
+    ).lubricant(343.15)
+    assert EXAMPLE.with_overrides(
+        {"lubricant.alpha": "20 1/GPa"}
+    ).lubricant.viscosity.alpha == pytest.approx(20e-9)
     gold = EXAMPLE.with_overrides({"lubricant.alpha_estimate": "gold"}).lubricant.viscosity.alpha
     assert gold < 0.85 * EXAMPLE.lubricant.viscosity.alpha
 
@@ -61,10 +70,16 @@ def test_heat_takes_temperature_and_slope_from_the_sheet(celsius):
     case = PAPER.with_overrides(BARE).with_overrides({"lubricant.temperature": f"{celsius} degC"})
     kelvin = celsius + 273.15
     assert case.thermal.ambient == pytest.approx(kelvin)
-    assert case.thermal.warmth == ExponentialWarmth(OilSheet(grade="VG 100").walther.thinning(case.thermal.ambient))
-    warmer = OilSheet(grade="VG 100").viscosity(kelvin + 1.0) / OilSheet(grade="VG 100").viscosity(kelvin)
+    assert case.thermal.warmth == ExponentialWarmth(
+        OilSheet(grade="VG 100").walther.thinning(case.thermal.ambient)
+    )
+    warmer = OilSheet(grade="VG 100").viscosity(kelvin + 1.0) / OilSheet(grade="VG 100").viscosity(
+        kelvin
+    )
     assert case.thermal.warmth.beta == pytest.approx(1.0 - warmer, rel=0.03)
-    assert case.with_overrides({"thermal.ambient": f"{kelvin} K"}).thermal.ambient == pytest.approx(kelvin)
+    assert case.with_overrides({"thermal.ambient": f"{kelvin} K"}).thermal.ambient == pytest.approx(
+        kelvin
+    )
     stated = case.with_overrides({"thermal.warmth": {"law": "roelands", "s0": 1.1}})
     assert stated.thermal.warmth == RoelandsWarmth(1.1)
     assert load_case(stated.text) == stated
@@ -91,22 +106,49 @@ def test_a_measured_oil_by_name():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"lubricant.viscosity": "barus"}, "lubricant has both viscosity, a law, and grade, of a data sheet; keep the"),
-        ({"lubricant.density": {"law": "incompressible", "rho0": "1 g/cm^3"}}, "has both density, a law, and"),
+        (
+            {"lubricant.viscosity": "barus"},
+            "lubricant has both viscosity, a law, and grade, of a data sheet; keep the",
+        ),
+        (
+            {"lubricant.density": {"law": "incompressible", "rho0": "1 g/cm^3"}},
+            "has both density, a law, and",
+        ),
         ({"lubricant": {"grade": "VG 100"}}, "lubricant.temperature is missing; add it"),
-        ({"lubricant": {"grade": "VG 100", "temperature": 70}}, 'temperature must be a temperature such as "40 degC"'),
-        ({"lubricant.viscosity_100": "9 mPa s"}, 'a kinematic viscosity such as "100 mm.2/s", got "9 mPa s", which is'),
+        (
+            {"lubricant": {"grade": "VG 100", "temperature": 70}},
+            'temperature must be a temperature such as "40 degC"',
+        ),
+        (
+            {"lubricant.viscosity_100": "9 mPa s"},
+            'a kinematic viscosity such as "100 mm.2/s", got "9 mPa s", which is',
+        ),
         ({"lubricant.grad": "VG 68"}, "lubricant.grad is not a known key; did you mean grade"),
-        ({"lubricant.temperature": "151 degC"}, "lubricant: temperature must lie between -20 and 150 degC"),
+        (
+            {"lubricant.temperature": "151 degC"},
+            "lubricant: temperature must lie between -20 and 150 degC",
+        ),
         ({"lubricant.base": "pao"}, "lubricant: alpha is missing, which base pao has to state"),
-        ({"lubricant.thickening": "bar"}, 'lubricant.thickening must be "roelands" or "barus", got "bar"'),
-        ({"lubricant.oil": "cylinder low-VI"}, "lubricant: has both oil and grade; keep oil for a measured one"),
-        ({"lubricant": {"oil": "olive", "temperature": "40 degC"}}, 'oil must be one of the measured .* got "olive"'),
+        (
+            {"lubricant.thickening": "bar"},
+            'lubricant.thickening must be "roelands" or "barus", got "bar"',
+        ),
+        (
+            {"lubricant.oil": "cylinder low-VI"},
+            "lubricant: has both oil and grade; keep oil for a measured one",
+        ),
+        (
+            {"lubricant": {"oil": "olive", "temperature": "40 degC"}},
+            'oil must be one of the measured .* got "olive"',
+        ),
         (
             {"lubricant": {"oil": "spindle low-VI", "base": "pao", "temperature": "40 degC"}},
             "lubricant: has both oil and base",
         ),
-        ({"thermal.ambient": "40 degC"}, "thermal: ambient of 40 degC is not the 70 degC of lubricant.temperature"),
+        (
+            {"thermal.ambient": "40 degC"},
+            "thermal: ambient of 40 degC is not the 70 degC of lubricant.temperature",
+        ),
         ({"lubricant": "nun"}, "lubricant must be a table"),
     ],
 )
@@ -128,8 +170,12 @@ def test_a_run_and_its_page_say_what_was_estimated(tmp_path):
     assert kept.case == run.case
     assert kept.solution.lubricant == run.case.lubricant
     said = json.loads(json.dumps(kept.summary()))
-    assert said["oil"]["oil_viscosity_pa_s"] == pytest.approx(OilSheet(grade="VG 100").viscosity(343.15))
-    assert said["oil"]["origins"]["oil_alpha_1_pa"].startswith("estimated: Roelands with Z 0.65, ± 20 %")
+    assert said["oil"]["oil_viscosity_pa_s"] == pytest.approx(
+        OilSheet(grade="VG 100").viscosity(343.15)
+    )
+    assert said["oil"]["origins"]["oil_alpha_1_pa"].startswith(
+        "estimated: Roelands with Z 0.65, ± 20 %"
+    )
     assert said["oil"]["origins"].keys() == said["oil"].keys() - {"origins"}
     assert said["notes"][0].startswith("Oil by its data sheet, given: ")
     assert said["notes"][1].startswith("Oil by its data sheet, estimated: viscosity index 95")
@@ -142,6 +188,8 @@ def test_a_run_and_its_page_say_what_was_estimated(tmp_path):
 def test_a_study_varies_the_temperature_of_an_oil():
     plan = plan_study(EXAMPLE.with_overrides({"study": {"temperature": ["40 degC", "90 degC"]}}))
     cold, hot = (EXAMPLE.with_overrides(point) for point in plan.points)
-    assert cold.lubricant.viscosity.eta0 == pytest.approx(OilSheet(grade="VG 100", density_15=885.0).viscosity(313.15))
+    assert cold.lubricant.viscosity.eta0 == pytest.approx(
+        OilSheet(grade="VG 100", density_15=885.0).viscosity(313.15)
+    )
     assert hot.lubricant.viscosity.eta0 < 0.2 * cold.lubricant.viscosity.eta0
     assert hot.thermal.ambient == pytest.approx(363.15)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.lubricant import (
     ESTIMATORS,
     Barus,
@@ -39,7 +39,9 @@ def test_walther_through_a_vg_220():
 @pytest.mark.parametrize("celsius", [-20.0, 40.0, 90.0, 150.0])
 @pytest.mark.parametrize("thin", [False, True])
 def test_thinning_is_the_slope_of_the_logarithm(celsius, thin):
-    line = OilSheet(viscosity_40=3 * MM2, viscosity_100=1.2 * MM2).walther if thin else VG_220.walther
+    line = (
+        OilSheet(viscosity_40=3 * MM2, viscosity_100=1.2 * MM2).walther if thin else VG_220.walther
+    )
     kelvin, step = celsius + ZERO, 1e-3
     slope = (np.log(line(kelvin - step)) - np.log(line(kelvin + step))) / (2 * step)
     assert line.thinning(kelvin) == pytest.approx(slope, rel=1e-6)
@@ -68,14 +70,18 @@ def test_viscosity_index_of_known_oils(warm, hot, index, tolerance):
 def test_viscosity_index_above_70_is_the_standards_equation():
     high = 0.1684 * 100.0**2 + 11.85 * 100.0 - 97.0
     low = 0.8353 * 100.0**2 + 14.67 * 100.0 - 216.0
-    assert viscosity_index(5000 * MM2, 100 * MM2) == pytest.approx(100 * (low - 5000) / (low - high), rel=1e-3)
+    assert viscosity_index(5000 * MM2, 100 * MM2) == pytest.approx(
+        100 * (low - 5000) / (low - high), rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("index", [-20.0, 60.0, 95.0, 100.0, 150.0, 230.0])
 @pytest.mark.parametrize("warm", [32.0, 100.0, 460.0])
 def test_an_index_is_inverted(index, warm):
     hot = viscosity_100_of(warm * MM2, index)
-    assert viscosity_index(warm * MM2, hot) == pytest.approx(index, abs=0.06)  # L and H have steps of 0.05
+    assert viscosity_index(warm * MM2, hot) == pytest.approx(
+        index, abs=0.06
+    )  # L and H have steps of 0.05
 
 
 MINERAL = {  # viscosity at 100 °C, density at 15 °C, viscosities [mPa s] at 20, 40 ... 120 °C: index 95
@@ -125,17 +131,27 @@ class Stated:
 
 def test_so_and_klaus_own_oil():
     """Measured: 15.8 1/GPa."""
-    assert ESTIMATORS["so-klaus"](Stated(11.011, 826.4, 3.57677), 300.0) == pytest.approx(16.991e-9, rel=1e-4)
+    assert ESTIMATORS["so-klaus"](Stated(11.011, 826.4, 3.57677), 300.0) == pytest.approx(
+        16.991e-9, rel=1e-4
+    )
 
 
 def test_iso_and_gold_and_roelands_and_wooster_as_printed():
-    at_38 = [ESTIMATORS["iso"](OilSheet(grade=f"VG {grade}"), 311.15) * 1e9 for grade in (32, 100, 460)]
+    at_38 = [
+        ESTIMATORS["iso"](OilSheet(grade=f"VG {grade}"), 311.15) * 1e9 for grade in (32, 100, 460)
+    ]
     assert at_38 == pytest.approx([16.55, 19.42, 24.03], rel=1e-3)
-    assert ESTIMATORS["gold"](OilSheet(grade="VG 32"), 60 + ZERO) == pytest.approx(14.4e-9, rel=5e-3)
-    kept = OilSheet(viscosity_40=100 * MM2, viscosity_100=14 * MM2, density_15=850.0, base="pao", alpha=1e-8)
+    assert ESTIMATORS["gold"](OilSheet(grade="VG 32"), 60 + ZERO) == pytest.approx(
+        14.4e-9, rel=5e-3
+    )
+    kept = OilSheet(
+        viscosity_40=100 * MM2, viscosity_100=14 * MM2, density_15=850.0, base="pao", alpha=1e-8
+    )
     assert ESTIMATORS["gold"](kept, 313.15) == pytest.approx(7.382e-9 * 100**0.1335, rel=1e-9)
     oil = Stated(100.0, 1000.0, 3.5)  # 0.1 Pa s
-    assert ESTIMATORS["roelands"](oil, 300.0) == pytest.approx(0.65 * (np.log(0.1) + 9.67) / 0.196e9, rel=1e-6)
+    assert ESTIMATORS["roelands"](oil, 300.0) == pytest.approx(
+        0.65 * (np.log(0.1) + 9.67) / 0.196e9, rel=1e-6
+    )
     assert ESTIMATORS["wooster"](oil, 300.0) == pytest.approx((6.0 + 9.65 * 2.0) * 1e-9, rel=1e-6)
 
 
@@ -149,7 +165,11 @@ def deviations(name, celsius, kinds):
     oils = [oil for oil in measured_oils().values() if oil.index in kinds]
     alphas = [(oil, oil.alphas[(30, 60, 100).index(celsius)]) for oil in oils]
     as_it_was = whole if name == "iso" else lambda oil: exact(oil, celsius)
-    found = [(ESTIMATORS[name](as_it_was(oil), celsius + ZERO) / alpha - 1.0) * 100 for oil, alpha in alphas if alpha]
+    found = [
+        (ESTIMATORS[name](as_it_was(oil), celsius + ZERO) / alpha - 1.0) * 100
+        for oil, alpha in alphas
+        if alpha
+    ]
     return np.array(found)
 
 
@@ -165,7 +185,9 @@ def whole(oil):
     """Through its viscosities at 30 and 100 °C."""
     dense = OilSheet(grade="VG 100")
     for _ in range(8):
-        points = [(t + ZERO, oil.viscosities[i] / dense.density(t + ZERO)) for i, t in ((0, 30), (2, 100))]
+        points = [
+            (t + ZERO, oil.viscosities[i] / dense.density(t + ZERO)) for i, t in ((0, 30), (2, 100))
+        ]
         line = Walther.through(*points)
         dense = OilSheet(viscosity_40=line(313.15), viscosity_100=line(373.15))
     return dense
@@ -195,13 +217,17 @@ def test_estimates_against_measured_oils(name, bias, rms, high):
 
 def test_the_page_has_the_measured_oils():
     rows = re.findall(
-        r"^\| ([a-z ]+ (?:high|medium|low)-VI) \| (.*) \| (.*) \|$", PAGE.read_text("utf-8"), re.MULTILINE
+        r"^\| ([a-z ]+ (?:high|medium|low)-VI) \| (.*) \| (.*) \|$",
+        PAGE.read_text("utf-8"),
+        re.MULTILINE,
     )
     told = {name: (nu.split(", "), alpha.split(", ")) for name, nu, alpha in rows}
     assert list(told) == list(measured_oils())
     for name, oil in measured_oils().items():
         nu, alphas = told[name]
-        assert [float(text) for text in nu] == pytest.approx([1e3 * value for value in oil.viscosities])
+        assert [float(text) for text in nu] == pytest.approx(
+            [1e3 * value for value in oil.viscosities]
+        )
         assert [0.0 if text == "not measured" else float(text) for text in alphas] == pytest.approx(
             [1e9 * (value or 0.0) for value in oil.alphas]
         )
@@ -219,9 +245,16 @@ def test_a_measured_oil_is_as_measured_where_it_was(name, celsius):
 def test_a_measured_oil_between_and_beyond():
     oil = measured_oils()["heavy machine high-VI"]
     assert oil.sheet(45 + ZERO).alpha == pytest.approx(22.1e-9, rel=1e-9)
-    assert [fact.origin for fact in oil_facts(oil.sheet(318.15), 318.15) if "alpha" in fact.key] == ["measured"]
-    for name, celsius, least in (("heavy machine high-VI", 101, 30), ("light machine high-VI", 45, 60)):
-        with pytest.raises(BadInput, match=f"must lie between {least} and 100 degC, .* got {celsius} degC"):
+    assert [
+        fact.origin for fact in oil_facts(oil.sheet(318.15), 318.15) if "alpha" in fact.key
+    ] == ["measured"]
+    for name, celsius, least in (
+        ("heavy machine high-VI", 101, 30),
+        ("light machine high-VI", 45, 60),
+    ):
+        with pytest.raises(
+            BadInput, match=f"must lie between {least} and 100 degC, .* got {celsius} degC"
+        ):
             measured_oils()[name].sheet(celsius + ZERO)
 
 
@@ -229,10 +262,14 @@ def test_a_sheet_becomes_laws_at_a_temperature():
     oil, kelvin = OilSheet(grade="VG 100"), 343.15
     made = oil.lubricant(kelvin)
     assert made.viscosity == Roelands(oil.viscosity(kelvin), oil.pressure_viscosity(kelvin))
-    assert made.viscosity.exponent == pytest.approx(0.65, rel=1e-12)  # alpha and law are one estimate
+    assert made.viscosity.exponent == pytest.approx(
+        0.65, rel=1e-12
+    )  # alpha and law are one estimate
     assert made.density == DowsonHigginson(oil.density(kelvin))
     assert made.rheology == Newtonian()
-    given = OilSheet(grade="VG 100", alpha=21e-9).lubricant(kelvin, thickening="barus", rheology=ReeEyring(5e6))
+    given = OilSheet(grade="VG 100", alpha=21e-9).lubricant(
+        kelvin, thickening="barus", rheology=ReeEyring(5e6)
+    )
     assert given.viscosity == Barus(oil.viscosity(kelvin), 21e-9)
     assert given.rheology == ReeEyring(5e6)
 
@@ -258,12 +295,22 @@ def test_what_is_given_and_what_is_estimated_is_said():
     ("oil", "celsius", "says"),
     [
         (
-            OilSheet(grade="VG 100", viscosity_index=140.0, density_15=850.0, base="pao", alpha_estimate="gold"),
+            OilSheet(
+                grade="VG 100",
+                viscosity_index=140.0,
+                density_15=850.0,
+                base="pao",
+                alpha_estimate="gold",
+            ),
             70,
             "Alpha of base pao is estimated by constants on which sources differ",
         ),
         (OilSheet(grade="VG 460"), 0, "above the 2 Pa s up to which estimates"),
-        (OilSheet(viscosity_40=100 * MM2, viscosity_100=6 * MM2), 70, "viscosity index of -212.* outside 0 to 250"),
+        (
+            OilSheet(viscosity_40=100 * MM2, viscosity_100=6 * MM2),
+            70,
+            "viscosity index of -212.* outside 0 to 250",
+        ),
     ],
 )
 def test_what_is_doubtful_is_noted(oil, celsius, says):
@@ -277,19 +324,46 @@ def test_what_is_doubtful_is_noted(oil, celsius, says):
         ({"grade": "VG 99"}, 'got "VG 99"'),
         ({}, "viscosity_40 is missing; give it, or a grade"),
         ({"viscosity_100": 11e-6}, "viscosity_40 is missing"),
-        ({"grade": "VG 100", "viscosity_40": 120e-6}, "of 120 mm.2/s is not VG 100, which lies within 10 %"),
-        ({"viscosity_40": 11e-6, "viscosity_100": 100e-6}, "viscosity_100 must be below viscosity_40, got 100 mm"),
+        (
+            {"grade": "VG 100", "viscosity_40": 120e-6},
+            "of 120 mm.2/s is not VG 100, which lies within 10 %",
+        ),
+        (
+            {"viscosity_40": 11e-6, "viscosity_100": 100e-6},
+            "viscosity_100 must be below viscosity_40, got 100 mm",
+        ),
         ({"viscosity_40": -11e-6}, "viscosity_40 must be positive"),
         ({"grade": "VG 100", "density_15": float("nan")}, "density_15 must be positive"),
-        ({"grade": "VG 100", "viscosity_100": 11e-6, "viscosity_index": 150.0}, "index of 150 is not that of .* is 94"),
-        ({"grade": "VG 100", "viscosity_index": 9999.0}, "viscosity_index of 9999 belongs to no oil of 100 mm"),
-        ({"grade": "VG 3", "viscosity_index": 95.0}, "viscosity_index of 95 belongs to no oil of 3.2 mm"),
-        ({"grade": "VG 100", "alpha": 2e-8, "alpha_estimate": "gold"}, "alpha and alpha_estimate are both given"),
-        ({"grade": "VG 100", "alpha_estimate": "silver"}, "alpha_estimate must be one of roelands, so-klaus, wooster"),
+        (
+            {"grade": "VG 100", "viscosity_100": 11e-6, "viscosity_index": 150.0},
+            "index of 150 is not that of .* is 94",
+        ),
+        (
+            {"grade": "VG 100", "viscosity_index": 9999.0},
+            "viscosity_index of 9999 belongs to no oil of 100 mm",
+        ),
+        (
+            {"grade": "VG 3", "viscosity_index": 95.0},
+            "viscosity_index of 95 belongs to no oil of 3.2 mm",
+        ),
+        (
+            {"grade": "VG 100", "alpha": 2e-8, "alpha_estimate": "gold"},
+            "alpha and alpha_estimate are both given",
+        ),
+        (
+            {"grade": "VG 100", "alpha_estimate": "silver"},
+            "alpha_estimate must be one of roelands, so-klaus, wooster",
+        ),
         ({"grade": "VG 100", "base": "pao"}, "alpha is missing, which base pao has to state"),
         ({"grade": "VG 100", "base": "pao", "alpha": 1e-8}, "density_15 is missing"),
-        ({"grade": "VG 100", "base": "pao", "alpha": 1e-8, "density_15": 850.0}, "viscosity_100 is missing; .* pao"),
-        ({"grade": "VG 100", "base": "water"}, "base must be one of mineral, pao, ester, polyglycol, got 'water'"),
+        (
+            {"grade": "VG 100", "base": "pao", "alpha": 1e-8, "density_15": 850.0},
+            "viscosity_100 is missing; .* pao",
+        ),
+        (
+            {"grade": "VG 100", "base": "water"},
+            "base must be one of mineral, pao, ester, polyglycol, got 'water'",
+        ),
     ],
 )
 def test_a_sheet_that_cannot_be_is_refused(given, says):
@@ -300,12 +374,30 @@ def test_a_sheet_that_cannot_be_is_refused(given, says):
 @pytest.mark.parametrize(
     ("oil", "celsius", "says"),
     [
-        (OilSheet(grade="VG 100"), 150.1, "temperature must lie between -20 and 150 degC .* got 150.1 degC"),
-        (OilSheet(grade="VG 100"), -21, "got -21 degC"),
-        (OilSheet(viscosity_40=1.2e-6, viscosity_100=0.3e-6), 150, "mm.2/s thick, below the 0.21 mm.2/s where"),
-        (OilSheet(grade="VG 10"), 145, "Roelands with Z 0.65 holds from 2 mm.2/s upwards, and the oil has 1.[0-9]*"),
         (
-            OilSheet(grade="VG 10", viscosity_100=2.6e-6, density_15=950.0, base="ester", alpha_estimate="iso"),
+            OilSheet(grade="VG 100"),
+            150.1,
+            "temperature must lie between -20 and 150 degC .* got 150.1 degC",
+        ),
+        (OilSheet(grade="VG 100"), -21, "got -21 degC"),
+        (
+            OilSheet(viscosity_40=1.2e-6, viscosity_100=0.3e-6),
+            150,
+            "mm.2/s thick, below the 0.21 mm.2/s where",
+        ),
+        (
+            OilSheet(grade="VG 10"),
+            145,
+            "Roelands with Z 0.65 holds from 2 mm.2/s upwards, and the oil has 1.[0-9]*",
+        ),
+        (
+            OilSheet(
+                grade="VG 10",
+                viscosity_100=2.6e-6,
+                density_15=950.0,
+                base="ester",
+                alpha_estimate="iso",
+            ),
             70,
             "ISO/TR 15144-1 has no constants for base 'ester'; give alpha, or take alpha_estimate = gold",
         ),
@@ -331,11 +423,17 @@ def test_alpha_rises_as_oil_cools_or_none_is_given(name, grade):
         assert not refused  # once it falls it stays refused
         last = alpha
     assert bool(refused) == (name == "so-klaus" and grade > 32)
-    assert all("So and Klaus (1980) falls off again in oil as cold and thick as" in said for _, said in refused)
+    assert all(
+        "So and Klaus (1980) falls off again in oil as cold and thick as" in said
+        for _, said in refused
+    )
 
 
 def test_a_thin_grade_says_what_is_missing():
-    with pytest.raises(BadInput, match=r"viscosity_100 is missing; give it: the index of 95 .* 2.2 mm.2/s at 40 degC"):
+    with pytest.raises(
+        BadInput,
+        match=r"viscosity_100 is missing; give it: the index of 95 .* 2.2 mm.2/s at 40 degC",
+    ):
         OilSheet(grade="VG 2")
 
 

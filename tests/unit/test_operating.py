@@ -8,8 +8,8 @@ from scipy.linalg import toeplitz
 
 from asperity.case import load_case
 from asperity.lubricant import OilSheet
-from asperity.tracking import operating
-from asperity.tracking.operating import (
+from asperity.monitoring import operating_point as operating
+from asperity.monitoring.operating_point import (
     ANY_CONTACT,
     CRF,
     LEVEL,
@@ -20,8 +20,8 @@ from asperity.tracking.operating import (
     response_of,
     unstated,
 )
-from asperity.wear import Condition, Sight, Watched, sequential, sequential_alarm
-from asperity.wear.regressors import explained
+from asperity.trend import Condition, Sight, Watched, sequential, sequential_alarm
+from asperity.trend.regressors import explained
 
 NUMBER = np.arange(40.0)
 LOADS = np.where(NUMBER < 18, 500.0, 900.0)
@@ -34,14 +34,21 @@ def scatter(seed, size=0.004):
 def crf(values, follows=CRF, **met):
     """The series as it is watched, beside what it was recorded at, by its keys; nan where nothing is stated."""
     rows = [
-        Operating(**{key: None if np.isnan(value) else value for key, value in zip(met, row, strict=True)})
+        Operating(
+            **{key: None if np.isnan(value) else value for key, value in zip(met, row, strict=True)}
+        )
         for row in zip(*met.values(), strict=True)
     ]
     conditions = conditions_of(rows, follows, ANY_CONTACT.oil)
     return Watched(
-        name="CRF", values=values, least=0.05, contact=True, in_words="by {:.3f}".format, conditions=conditions,
+        name="CRF",
+        values=values,
+        least=0.05,
+        contact=True,
+        in_words="by {:.3f}".format,
+        conditions=conditions,
         relative=True,
-    )  # fmt: skip
+    )
 
 
 def judged(one):
@@ -100,17 +107,24 @@ def test_recordings_without_a_condition_are_left_out_where_most_state_it():
     one = crf(values, load_n=loads)
     assert judged(one).state == "none"
     met = [Operating(load_n=None if np.isnan(load) else load) for load in loads]
-    assert unstated(met) == ["The load is not stated for 2 of 40 recordings; these are left out of trend and alarm."]
+    assert unstated(met) == [
+        "The load is not stated for 2 of 40 recordings; these are left out of trend and alarm."
+    ]
     few = [replace(one, load_n=None) for one in met[5:]] + met[:5]
     assert unstated(few)[0].endswith("36 of 40 recordings; it is not taken into account.")
     spun = [Operating(speed_hz=25.0)] * 30 + [Operating()] * 10
-    assert unstated(spun) == ["The speed is not stated for 10 of 40 recordings; these are left out of trend and alarm."]
+    assert unstated(spun) == [
+        "The speed is not stated for 10 of 40 recordings; these are left out of trend and alarm."
+    ]
     assert conditions_of(few, CRF, ANY_CONTACT.oil) == ()
 
 
 def test_powers_are_found_exactly_where_nothing_scatters_and_held_within_their_bounds():
     speeds = np.random.default_rng(2).uniform(1.0, 3.0, 40)
-    met = [Operating(load_n=load, entrainment_m_s=speed) for load, speed in zip(LOADS, speeds, strict=True)]
+    met = [
+        Operating(load_n=load, entrainment_m_s=speed)
+        for load, speed in zip(LOADS, speeds, strict=True)
+    ]
     conditions = conditions_of(met, LEVEL, ANY_CONTACT.oil)
     values = 0.7 * np.log(LOADS) + 2.5 * np.log(speeds)
     told = explained(values, conditions, least=0.7)
@@ -126,13 +140,20 @@ def test_the_likelihood_beside_conditions_is_that_of_regression_with_a_prior(mem
     values, loads = scatter(6)[:20] + 0.02 * NUMBER[:20], np.log(LOADS[10:30] / 500.0)
     beside = sequential.Beside(loads[None], np.array([3.0]))
     rows = sequential._saturating(NUMBER[:20])[::9]
-    weight = np.linalg.inv(np.pad(toeplitz(memory ** np.arange(20.0)), (0, 1)) + np.diag([*[0.0] * 20, 1.0]))
+    weight = np.linalg.inv(
+        np.pad(toeplitz(memory ** np.arange(20.0)), (0, 1)) + np.diag([*[0.0] * 20, 1.0])
+    )
 
     def likelihood(row):
-        design = np.stack([np.append(np.ones(20), 0.0), np.append(loads, 3.0), np.append(row, 0.0)], axis=1)
+        design = np.stack(
+            [np.append(np.ones(20), 0.0), np.append(loads, 3.0), np.append(row, 0.0)], axis=1
+        )
         told = np.append(values, 0.0)
         off = told - design @ np.linalg.solve(design.T @ weight @ design, design.T @ weight @ told)
-        return -10.0 * np.log(off @ weight @ off) - 0.5 * np.linalg.slogdet(toeplitz(memory ** np.arange(20.0)))[1]
+        return (
+            -10.0 * np.log(off @ weight @ off)
+            - 0.5 * np.linalg.slogdet(toeplitz(memory ** np.arange(20.0)))[1]
+        )
 
     whites = sequential._whites_beside(20, beside)
     own = sequential._gains(values, rows, whites=whites)[list(sequential.MEMORY).index(memory)]
@@ -199,8 +220,18 @@ def test_a_fault_that_heats_its_oil_alarms_all_the_same():
     """A level that grows fourfold while the oil warms from 60 to 85 degC is hardly the oil's doing."""
     warm = np.interp(NUMBER, [15.0, 39.0], [60.0, 85.0])
     louder = np.interp(NUMBER, [15.0, 39.0], [0.0, np.log(4.0)]) + scatter(2, 0.03)
-    assert judged(replace(crf(louder, LEVEL, temperature_degc=warm), contact=False, relative=False)).state == "alarm"
-    assert conditions_of([Operating(temperature_degc=value) for value in warm], PULSES, ANY_CONTACT.oil) == ()
+    assert (
+        judged(
+            replace(crf(louder, LEVEL, temperature_degc=warm), contact=False, relative=False)
+        ).state
+        == "alarm"
+    )
+    assert (
+        conditions_of(
+            [Operating(temperature_degc=value) for value in warm], PULSES, ANY_CONTACT.oil
+        )
+        == ()
+    )
 
 
 def test_the_contact_of_a_case_says_how_crf_follows_and_is_solved_once(tmp_path, monkeypatch):
@@ -219,5 +250,7 @@ def test_a_case_that_is_not_solved_is_said(tmp_path, monkeypatch):
     steady = [Operating(load_n=500.0)] * 2
     coarse = load_case(SMALL.replace("40 um", "4 um") + OIL)
     assert response_of(coarse, met).crf == CRF
-    assert response_of(coarse, met).said.startswith("How CRF follows load and speed is any contact's, as the case's is")
+    assert response_of(coarse, met).said.startswith(
+        "How CRF follows load and speed is any contact's, as the case's is"
+    )
     assert response_of(coarse, steady).said == ""  # nothing to solve it for

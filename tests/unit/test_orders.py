@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.tracking.beside import bands, lines
+from asperity.core.errors import BadInput
+from asperity.monitoring.auxiliary_channels import bands, lines
 from asperity.vibration import Turning, steadied, turning_by_pulses, turning_by_speed
 
 RATE, SECONDS = 20e3, 4.0
@@ -35,7 +35,9 @@ def test_the_angle_by_pulses_is_the_shafts(per_turn):
 
 def test_the_noise_of_a_tacho_makes_no_pulses():
     noise = 0.1 * np.random.default_rng(1).standard_normal(TIME.size)
-    assert turning_by_pulses(np.sin(2.0 * np.pi * ANGLE) + noise, RATE).speed_hz == pytest.approx(MEAN, rel=0.01)
+    assert turning_by_pulses(np.sin(2.0 * np.pi * ANGLE) + noise, RATE).speed_hz == pytest.approx(
+        MEAN, rel=0.01
+    )
 
 
 def test_pulses_of_two_samples_a_turn_are_pulses():
@@ -64,7 +66,9 @@ def test_an_order_is_one_line_again(order):
     assert found == pytest.approx(np.sqrt(0.5), rel=0.01)
     frequency, density = spectrum(even, rate)
     assert frequency[np.argmax(density)] == pytest.approx(order * MEAN, rel=2e-3)
-    assert lines(*spectrum(values, RATE), {"it": order * MEAN})["it"] < 0.5 * found  # as it was recorded
+    assert (
+        lines(*spectrum(values, RATE), {"it": order * MEAN})["it"] < 0.5 * found
+    )  # as it was recorded
 
 
 def test_a_shaft_that_turns_evenly_leaves_a_vibration_as_it_is():

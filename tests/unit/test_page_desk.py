@@ -10,19 +10,28 @@ import numpy as np
 import pytest
 import x3pio
 
+from asperity.app import contact_jobs as work
+from asperity.app import export as take
+from asperity.app.contact_jobs import Refused, Ticket, told
+from asperity.app.contact_result import (
+    NOT_DETERMINED,
+    RUPTURED,
+    TILES,
+    TOUCHING,
+    answer_of,
+    difference,
+)
+from asperity.app.opening import open_page
+from asperity.app.session import Desk
+from asperity.app.settings import Settings, held_in
+from asperity.app.surface_store import Shelf
 from asperity.case import load_case
-from asperity.ehl import Options, contact_state, solve_contact
-from asperity.hertz import ellipse_pressure, line_pressure
-from asperity.page import take, work
-from asperity.page.answer import NOT_DETERMINED, RUPTURED, TILES, TOUCHING, answer_of, difference
-from asperity.page.desk import Desk
-from asperity.page.opening import open_page
-from asperity.page.settings import Settings, held_in
-from asperity.page.shelf import Shelf
-from asperity.page.work import Refused, Ticket, told
+from asperity.contact.hertz import ellipse_pressure, line_pressure
+from asperity.ehl import Options, solve_contact
 from asperity.paper import papers_case
 from asperity.report import write_report
 from asperity.results import solve_case
+from asperity.solution import contact_state
 from asperity.surface import Surface
 
 NOBODY = Ticket(-1, 0)
@@ -68,7 +77,9 @@ def answer(run):
 def desk_of(overrides=MUTE):
     drawn = []
     queue = AtOnce()
-    desk = Desk(Settings(papers_case().with_overrides(overrides)), queue, lambda: drawn.append(desk.answer))
+    desk = Desk(
+        Settings(papers_case().with_overrides(overrides)), queue, lambda: drawn.append(desk.answer)
+    )
     return desk, queue, drawn
 
 
@@ -92,11 +103,15 @@ def test_tiles_have_the_intervals_that_the_verdict_has(run, answer):
 
 
 def test_a_grid_that_cannot_tell_says_so_in_the_tiles(answer):
-    assert {tile.key: tile.doubt for tile in replace(answer, determined=False).tiles}["clr"] == NOT_DETERMINED
+    assert {tile.key: tile.doubt for tile in replace(answer, determined=False).tiles}[
+        "clr"
+    ] == NOT_DETERMINED
     unknown = replace(answer, row={**answer.row, "clr_low": None})
     assert {tile.key: tile.doubt for tile in unknown.tiles}["clr"] == NOT_DETERMINED
     wide = replace(answer, row={**answer.row, "car": 0.002, "car_error": 0.069})
-    assert {tile.key: tile.doubt for tile in wide.tiles}["car"] == "0.0 to 7.1 %"  # and nothing below
+    assert {tile.key: tile.doubt for tile in wide.tiles}[
+        "car"
+    ] == "0.0 to 7.1 %"  # and nothing below
     silent = replace(answer, row={**answer.row, "crf_hz": None})
     assert {tile.key: (tile.value, tile.doubt) for tile in silent.tiles}["crf_hz"] == ("–", "")
 
@@ -105,7 +120,9 @@ def test_the_spectrum_is_the_runs_near_its_band(run, answer):
     sound, spectrum = answer.sound, run.vibration.spectrum
     assert sound.crf_hz == run.vibration.resonance.crf_hz
     assert sound.frequency.size <= 500
-    near = (spectrum.frequency_hz >= sound.frequency[0]) & (spectrum.frequency_hz <= sound.frequency[-1])
+    near = (spectrum.frequency_hz >= sound.frequency[0]) & (
+        spectrum.frequency_hz <= sound.frequency[-1]
+    )
     assert sound.density.mean() == pytest.approx(spectrum.density[near].mean(), rel=0.02)
     peak = sound.frequency[np.argmax(sound.curve)]
     assert peak == pytest.approx(sound.crf_hz, abs=2.0 * float(np.diff(sound.frequency[:2])[0]))
@@ -113,8 +130,8 @@ def test_the_spectrum_is_the_runs_near_its_band(run, answer):
 
 def test_titles_that_follow_what_is_tried_have_room_on_a_phone(answer):
     pytest.importorskip("panel")
-    from asperity.page.contact import _heard
-    from asperity.page.figures import Trail
+    from asperity.app.contact_page import _heard
+    from asperity.app.figures import Trail
 
     trail = Trail(lambda _: None)
     titles = [_heard(answer), trail.share.title.text, trail.pitch.title.text]
@@ -127,15 +144,20 @@ def test_hertzs_pressure_carries_the_load():
     x = np.linspace(-1.2, 1.2, 1201)
     y = np.linspace(-2.4, 2.4, 1201)
     pressure = np.array([ellipse_pressure(x, float(at), (1.0, 2.0), 3.0) for at in y])
-    assert pressure.sum() * (x[1] - x[0]) * (y[1] - y[0]) == pytest.approx(2.0 / 3.0 * np.pi * 2.0 * 3.0, rel=1e-4)
-    np.testing.assert_allclose(ellipse_pressure(x, 0.0, (1.0, 2.0), 3.0), line_pressure(x, 1.0, 3.0))
+    assert pressure.sum() * (x[1] - x[0]) * (y[1] - y[0]) == pytest.approx(
+        2.0 / 3.0 * np.pi * 2.0 * 3.0, rel=1e-4
+    )
+    np.testing.assert_allclose(
+        ellipse_pressure(x, 0.0, (1.0, 2.0), 3.0), line_pressure(x, 1.0, 3.0)
+    )
     assert not ellipse_pressure(x, 2.0, (1.0, 2.0), 3.0).any()
 
 
 def test_a_line_contacts_profile_is_one_all_along(answer):
     conditions = papers_case().conditions
     np.testing.assert_allclose(
-        answer.hertz(0), line_pressure(answer.x, conditions.hertz.half_widths[0], conditions.hertz.p_max)
+        answer.hertz(0),
+        line_pressure(answer.x, conditions.hertz.half_widths[0], conditions.hertz.p_max),
     )
 
 
@@ -197,7 +219,9 @@ def test_cells_that_are_too_few_only_for_a_coarse_answer_refuse_nothing():
 
 
 def test_a_contact_on_few_cells_has_no_coarse_answer():
-    coarse = work.solve_coarsely(NOBODY, papers_case().with_overrides({**MUTE, "grid.cells": [64, 64]}), None)
+    coarse = work.solve_coarsely(
+        NOBODY, papers_case().with_overrides({**MUTE, "grid.cells": [64, 64]}), None
+    )
     assert coarse == work.Coarse(None, None)
 
 
@@ -295,7 +319,9 @@ def test_values_beyond_all_reckoning_are_a_sentence():
 
     refused = told(divided, NOBODY)
     assert isinstance(refused, Refused)
-    assert refused.sentence.startswith("The values lie too far from any contact to be reckoned with (division by zero)")
+    assert refused.sentence.startswith(
+        "The values lie too far from any contact to be reckoned with (division by zero)"
+    )
 
 
 def test_a_contact_that_its_grid_cannot_carry_says_so():
@@ -313,7 +339,9 @@ def test_what_is_pinned_stays_to_compare_with():
     desk.turn("contact.load", "900 N")
     assert desk.pinned is pinned
     change = desk.answer.row["clr"] - pinned.row["clr"]
-    assert difference("clr", desk.answer.row["clr"], pinned.row["clr"]).startswith("+" if change >= 0 else "−")
+    assert difference("clr", desk.answer.row["clr"], pinned.row["clr"]).startswith(
+        "+" if change >= 0 else "−"
+    )
     assert difference("crf_hz", None, 3.0) == "–"
     queue.held = True
     desk.turn("contact.load", "800 N")
@@ -354,7 +382,9 @@ def test_a_desk_that_closes_holds_nothing():
 def test_a_dropped_surface_takes_the_place_of_the_cases_own(tmp_path):
     heights = np.random.default_rng(5).standard_normal((400, 400)) * 1e-6
     x3pio.write(str(tmp_path / "ring.x3p"), heights, x_scale=2e-6, y_scale=2e-6)
-    case, held, steps = work.open_surface(NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p")
+    case, held, steps = work.open_surface(
+        NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
+    )
     assert case.contents.surface.name == "ring.x3p"
     assert steps[0] == "Measured surface ring.x3p:"
     assert held_in(f"held={held}") == held
@@ -373,10 +403,17 @@ def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monke
     for number in range(3):
         folder = session / str(number)
         folder.mkdir()
-        x3pio.write(str(folder / "ring.x3p"), rng.standard_normal((300, 300)) * 1e-6, x_scale=2e-6, y_scale=2e-6)
-        case, key, _ = work.open_surface(NOBODY, papers_case().with_overrides(MUTE), folder / "ring.x3p")
+        x3pio.write(
+            str(folder / "ring.x3p"),
+            rng.standard_normal((300, 300)) * 1e-6,
+            x_scale=2e-6,
+            y_scale=2e-6,
+        )
+        case, key, _ = work.open_surface(
+            NOBODY, papers_case().with_overrides(MUTE), folder / "ring.x3p"
+        )
         keys.append(key)
-        monkeypatch.setattr("asperity.page.shelf.MOST_HELD", 2)
+        monkeypatch.setattr("asperity.app.surface_store.MOST_HELD", 2)
         shelf.put(key, case)
     assert len(set(keys)) == 3
     assert shelf.lend(keys[0], other) is None
@@ -389,10 +426,14 @@ def test_a_dropped_surface_is_held_for_links_and_the_oldest_goes(tmp_path, monke
     assert shelf.lend(keys[2], other) is None
 
 
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"<script>", bytes(range(256)) * 20])
+@pytest.mark.parametrize(
+    "content", [b"", b"PK\x03\x04 cut short", b"<script>", bytes(range(256)) * 20]
+)
 def test_a_damaged_surface_is_a_sentence(tmp_path, content):
     (tmp_path / "ring.x3p").write_bytes(content)
-    refused = told(work.open_surface, NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p")
+    refused = told(
+        work.open_surface, NOBODY, papers_case().with_overrides(MUTE), tmp_path / "ring.x3p"
+    )
     assert isinstance(refused, Refused)
     assert "ring.x3p" in refused.sentence
 
@@ -401,7 +442,9 @@ def test_what_is_taken_away_solves_to_the_same_numbers(tmp_path):
     case = papers_case().with_overrides(MUTE)
     (tmp_path / take.CASE_FILE).write_text(take.case_text(case), "utf-8")
     (tmp_path / take.SCRIPT).write_text(take.python_lines(), "utf-8")
-    said = subprocess.run([sys.executable, take.SCRIPT], cwd=tmp_path, capture_output=True, text=True, check=True)
+    said = subprocess.run(
+        [sys.executable, take.SCRIPT], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     state = solve_case(case).state
     assert f"CLR {state.clr:.4f}, CAR {state.car:.4f}, film {state.h_central:.4g} m" in said.stdout
 

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from asperity.errors import BadInput
-from asperity.page import work
-from asperity.page.jobs import Queue, Workshop, outcome, wait_until_warm
-from asperity.page.work import Refused, Superseded, Ticket, told
+from asperity.app import contact_jobs as work
+from asperity.app.contact_jobs import Refused, Superseded, Ticket, told
+from asperity.app.jobs import Queue, Workshop, outcome, wait_until_warm
+from asperity.core.errors import BadInput
 from asperity.paper import papers_case
 
 SMALL = {"grid.cells": [48, 32], "surface.correlation_length": "40 um", "vibration": "none"}
@@ -40,7 +40,9 @@ class Bench:
 def test_a_workshop_has_room_while_a_worker_has_nothing_to_do(monkeypatch, running):
     workshop, futures = Workshop(workers=2), [Future() for _ in range(running)]
     waiting = iter(futures)
-    monkeypatch.setattr(workshop, "_pool", SimpleNamespace(submit=lambda *_arguments: next(waiting)))
+    monkeypatch.setattr(
+        workshop, "_pool", SimpleNamespace(submit=lambda *_arguments: next(waiting))
+    )
     for _ in futures:
         workshop.submit(str)
     assert workshop.has_room == (running < 2)
@@ -100,7 +102,9 @@ def test_without_a_free_place_work_is_done_all_the_same():
 def test_what_arrives_may_ask_for_more():
     bench, came = Bench(), []
     line = Queue(bench, at_once)
-    line.ask((str, ("a",)), lambda result: (came.append(result), line.ask((str, ("b",)), came.append)))
+    line.ask(
+        (str, ("a",)), lambda result: (came.append(result), line.ask((str, ("b",)), came.append))
+    )
     bench.begun[0][2].set_result(1)
     bench.begun[1][2].set_result(2)
     assert came == [1, 2]
@@ -139,7 +143,7 @@ def test_a_solve_is_given_up_after_its_time(monkeypatch):
 
 
 def test_more_cells_than_the_page_solves_are_refused_where_the_case_chooses_them(monkeypatch):
-    monkeypatch.setattr("asperity.page.settings.MOST_CELLS", 100)
+    monkeypatch.setattr("asperity.app.settings.MOST_CELLS", 100)
     case = papers_case().with_overrides({**SMALL, "grid.cells": "auto"})
     assert "at most 100 in all" in told(work.solve_fully, Ticket(-1, 0), case).sentence
 

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
-from asperity.page.leaving import GONE_MS, Sweeper
+from asperity.app.session_cleanup import GONE_MS, Sweeper
 
 
 class Session:

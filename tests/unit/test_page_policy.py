@@ -6,10 +6,10 @@ from hashlib import sha256
 
 import pytest
 
-from asperity.history import run_history
 from asperity.paper import papers_case
 from asperity.report import write_motion_report, write_report
 from asperity.results import solve_case
+from asperity.simulation import run_history
 
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"]+)">')
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um", "vibration": "none"}

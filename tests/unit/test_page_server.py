@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
-from asperity.page import open_page
-from asperity.page.server import PASSWORD, origins, password_for, require_free
-from asperity.page.uploads import Drop, safe_name
-from asperity.page.widgets import sentences, tiles
+from asperity.app import open_page
+from asperity.app.server import PASSWORD, origins, password_for, require_free
+from asperity.app.uploads import Drop, safe_name
+from asperity.app.widgets import sentences, tiles
 
 NAMES = {
     "ring.x3p": "ring.x3p",
@@ -62,7 +62,9 @@ def test_a_port_that_is_taken_is_named():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(BadInput, match=f"cannot listen on 127.0.0.1, port {port}: address already in use"):
+        with pytest.raises(
+            BadInput, match=f"cannot listen on 127.0.0.1, port {port}: address already in use"
+        ):
             require_free("127.0.0.1", port)
     assert 0 < require_free("127.0.0.1", 0) < 65536
     with pytest.raises(BadInput, match=r"cannot listen on 192\.0\.2\.7"):
@@ -142,6 +144,8 @@ def test_the_page_is_opened_with_what_is_named(tmp_path):
 
 def test_without_panel_the_extra_is_named():
     without = "import sys; sys.modules['panel'] = None; from asperity.cli import main; main(['page', '--port', '0'])"
-    done = subprocess.run([sys.executable, "-c", without], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", without], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2
     assert done.stderr == "error: the live page needs Panel; pip install 'asperity[page]'\n"

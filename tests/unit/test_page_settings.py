@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from asperity.app.inputs import TURNED, knobs_of, overrides
+from asperity.app.settings import Refusal, Settings, held_in
 from asperity.case import load_case
+from asperity.core.quantities import catalogue
 from asperity.lubricant import Roelands
-from asperity.page.knobs import TURNED, knobs_of, overrides
-from asperity.page.settings import Refusal, Settings, held_in
 from asperity.paper import papers_case
-from asperity.quantities import catalogue
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CONTACTS = ("paper", "ball-on-disc", "data-sheet-oil", "roller")
@@ -63,7 +63,11 @@ def test_every_position_of_every_slider_is_a_value_of_its_knob(name):
 
 def test_a_slider_goes_a_decade_up_and_down_from_the_cases_own_value(settings):
     load = settings.knobs["contact.load"]
-    assert [load.at(place) for place in (load.positions[0], 0, load.positions[1])] == ["50 N", "500 N", "5000 N"]
+    assert [load.at(place) for place in (load.positions[0], 0, load.positions[1])] == [
+        "50 N",
+        "500 N",
+        "5000 N",
+    ]
     assert load.position("5 kN") == load.positions[1]
     assert load.position("1 MN") == load.positions[1]
     assert load.position("5 m") is None
@@ -83,11 +87,19 @@ def test_cells_are_typed_as_people_write_them(settings):
 @pytest.mark.parametrize(
     ("key", "text", "says"),
     [
-        ("contact.load", "800", 'contact.load must be a force such as "500 N", got the bare number 800'),
+        (
+            "contact.load",
+            "800",
+            'contact.load must be a force such as "500 N", got the bare number 800',
+        ),
         ("contact.load", "-5 N", "contact.load must be positive and finite"),
         ("surface.sq", "2 mm2", "surface.sq must be a length"),
         ("surface.correlation_length.0", "x", "surface.correlation_length[0] must be a length"),
-        ("material.boundary_friction", "5", "material.boundary_friction must be less than or equal to 2, got 5"),
+        (
+            "material.boundary_friction",
+            "5",
+            "material.boundary_friction must be less than or equal to 2, got 5",
+        ),
         ("grid.cells", "1024 x 1024", "grid.cells must be at most 262144 in all on this page"),
         ("contact.load", "1" * 300, "is 300 characters long"),
     ],
@@ -102,8 +114,11 @@ def test_a_wrong_value_is_refused_in_the_case_files_own_sentence(settings, key, 
 def test_an_address_brings_the_settings_back(settings):
     turned = settings
     for key, text in {
-        "contact.load": "0.8 kN", "surface.correlation_length.0": "30 um", "contact.slip": "-0.5", "surface.seed": "3",
-    }.items():  # fmt: skip
+        "contact.load": "0.8 kN",
+        "surface.correlation_length.0": "30 um",
+        "contact.slip": "-0.5",
+        "surface.seed": "3",
+    }.items():
         turned = turned.turned(key, text)
     back, notes = settings.from_address(turned.address)
     assert notes == []
@@ -127,12 +142,18 @@ def test_a_link_of_another_case_says_so(settings):
 def test_a_link_of_a_dropped_surface_is_of_one_that_is_held(settings):
     dropped = Settings(settings.opened, dropped="ring.x3p", held="0" * 32)
     _, notes = settings.from_address(dropped.address)
-    assert notes == ["The link was made with the dropped surface ring.x3p, held no more; drop it again."]
+    assert notes == [
+        "The link was made with the dropped surface ring.x3p, held no more; drop it again."
+    ]
     _, notes = settings.from_address("dropped=x&held=../../../etc")
     assert notes == ["The link was made with the dropped surface x, held no more; drop it again."]
     back, notes = dropped.from_address(dropped.turned("contact.load", "700 N").address)
     assert notes == []
-    assert (back.dropped, back.held, back.changes) == ("ring.x3p", "0" * 32, {"contact.load": "700 N"})
+    assert (back.dropped, back.held, back.changes) == (
+        "ring.x3p",
+        "0" * 32,
+        {"contact.load": "700 N"},
+    )
     for text in ("../../etc", "0" * 31, "G" * 32, "%00" * 32, "0" * 33):
         assert held_in(f"held={text}") == ""
 
@@ -152,17 +173,31 @@ def test_every_law_that_is_offered_can_be_had_and_taken_back(name):
 
 
 def test_a_law_takes_the_parameters_along_that_it_knows(settings):
-    turned = settings.turned("lubricant.viscosity.law", "roelands").turned("lubricant.viscosity.eta0", "0.2 Pa s")
+    turned = settings.turned("lubricant.viscosity.law", "roelands").turned(
+        "lubricant.viscosity.eta0", "0.2 Pa s"
+    )
     assert turned.case.lubricant.viscosity == Roelands(eta0=0.2, alpha=18.2e-9)
     newtonian = settings.turned("lubricant.friction.law", "newtonian")
-    assert "floor" not in newtonian.case.text.partition("[lubricant.friction]")[2].partition("[surface]")[0]
-    assert "lubricant.rheology.law" not in settings.knobs  # Ree and Eyring's needs a stress that this case has not
+    assert (
+        "floor"
+        not in newtonian.case.text.partition("[lubricant.friction]")[2].partition("[surface]")[0]
+    )
+    assert (
+        "lubricant.rheology.law" not in settings.knobs
+    )  # Ree and Eyring's needs a stress that this case has not
 
 
 def test_both_rough_bodies_have_knobs():
-    second = {"kind": "gaussian", "sq": "0.4 um", "correlation_length": ["30 um", "10 um"], "seed": 4}
+    second = {
+        "kind": "gaussian",
+        "sq": "0.4 um",
+        "correlation_length": ["30 um", "10 um"],
+        "seed": 4,
+    }
     settings = Settings(papers_case().with_overrides({"surface.second": second}))
-    turned = settings.turned("surface.second.sq", "0.6 um").turned("surface.second.correlation_length.1", "20 um")
+    turned = settings.turned("surface.second.sq", "0.6 um").turned(
+        "surface.second.correlation_length.1", "20 um"
+    )
     assert turned.case.contents.surface.second.sq == 0.6e-6
     assert turned.case.contents.surface.second.correlation_length == (30e-6, 20e-6)
     assert turned.case.contents.surface.sq == settings.case.contents.surface.sq
@@ -180,6 +215,8 @@ def test_nothing_but_values_of_knobs_comes_in_by_an_address(settings, query):
 
 
 def test_an_address_may_be_as_long_as_anybody_likes(settings):
-    back, notes = settings.from_address("&".join(f"contact.load={load} N" for load in range(1, 5000)))
+    back, notes = settings.from_address(
+        "&".join(f"contact.load={load} N" for load in range(1, 5000))
+    )
     assert notes == []
     assert back.case.conditions.load == 100.0

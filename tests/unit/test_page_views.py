@@ -5,17 +5,16 @@ import os
 import numpy as np
 import pytest
 
-from asperity.ageing import run_wear
-from asperity.history import run_history
-from asperity.page.answer import RUPTURED, TOUCHING
-from asperity.page.hearing import Stated, hear_files, hear_folder
-from asperity.page.looking import open_history, open_study, solve_row
-from asperity.page.opening import open_page
-from asperity.page.work import Refused, Ticket, told
+from asperity.app.contact_jobs import Refused, Ticket, told
+from asperity.app.contact_result import RUPTURED, TOUCHING
+from asperity.app.folder_jobs import open_history, open_study, solve_row
+from asperity.app.opening import open_page
+from asperity.app.recording_jobs import Stated, hear_files, hear_folder
+from asperity.core.signals import Signal
+from asperity.monitoring import track_recordings
 from asperity.paper import papers_case
-from asperity.signals import Signal
+from asperity.simulation import run_history, run_wear
 from asperity.study import load_study, plan_study, run_study
-from asperity.tracking import track_recordings
 from asperity.vibration import ContactOscillator, acceleration, white_noise
 from support.wearing import FEW, worn_case
 
@@ -31,9 +30,14 @@ def rig(tmp_path_factory):
 def recordings(folder):
     """A series whose resonance rises, as npy files at 20 kHz."""
     for number, crf in enumerate((2600.0, 2800.0, 3000.0, 3200.0, 3400.0, 3600.0, 3700.0)):
-        spring = ContactOscillator(mass=0.1, stiffness=0.1 * (2 * np.pi * crf) ** 2, damping_ratio=0.02, load=500.0)
+        spring = ContactOscillator(
+            mass=0.1, stiffness=0.1 * (2 * np.pi * crf) ** 2, damping_ratio=0.02, load=500.0
+        )
         noise = Signal(white_noise(40_000, number) * 1e-7, 2e4, "m")
-        values = acceleration(spring, noise).values + np.random.default_rng(number).standard_normal(40_000) * 1e-3
+        values = (
+            acceleration(spring, noise).values
+            + np.random.default_rng(number).standard_normal(40_000) * 1e-3
+        )
         np.save(folder / f"hour-{number}.npy", values)
     return folder
 
@@ -43,10 +47,14 @@ def test_dropped_recordings_are_heard_as_track_hears_them(rig):
     heard = hear_files(NOBODY, paths, Stated(rate_hz=2e4, unit="m/s^2"), None)
     track = track_recordings(paths, rate_hz=2e4, unit="m/s^2")
     assert heard.verdict == track.verdict()
-    assert [row["crf_hz"] for row in heard.rows] == [row.row()["crf_hz"] for row in track.recordings]
+    assert [row["crf_hz"] for row in heard.rows] == [
+        row.row()["crf_hz"] for row in track.recordings
+    ]
     assert [row["file"] for row in heard.rows] == [path.name for path in paths]
     assert heard.levels.shape == (7, heard.frequency.size)
-    loudest = heard.frequency[np.argmax(np.where(heard.frequency > 2e3, heard.levels, -np.inf), axis=1)]
+    loudest = heard.frequency[
+        np.argmax(np.where(heard.frequency > 2e3, heard.levels, -np.inf), axis=1)
+    ]
     np.testing.assert_allclose(loudest, [row["crf_hz"] for row in heard.rows], atol=60.0)
 
 
@@ -74,7 +82,9 @@ def test_a_folder_is_read_once_and_grows(rig, tmp_path):
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study") / "wear"
-    case = papers_case().with_overrides({**SMALL, "study": {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}})
+    case = papers_case().with_overrides(
+        {**SMALL, "study": {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}}
+    )
     run_study(plan_study(case), out=folder, workers=1)
     return folder
 
@@ -126,6 +136,8 @@ def test_a_contact_that_wears_is_shown_by_its_hours_and_maps(tmp_path):
 
 
 def test_a_folder_that_is_damaged_is_a_sentence(study, tmp_path):
-    (tmp_path / "manifest.json").write_text((study / "manifest.json").read_text("utf-8")[:200], "utf-8")
+    (tmp_path / "manifest.json").write_text(
+        (study / "manifest.json").read_text("utf-8")[:200], "utf-8"
+    )
     assert isinstance(told(open_study, NOBODY, tmp_path), Refused)
     assert isinstance(told(open_history, NOBODY, tmp_path), Refused)

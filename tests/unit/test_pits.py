@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 
 from asperity import BadInput
-from asperity.ehl import stress_below
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
 from asperity.rating import dang_van, dang_van_of_each
-from asperity.wearing.fatigue import DangVanPits, VonMisesPits, broken_out, layers, soon, stress_path, sunk
+from asperity.solution import stress_below
+from asperity.wear.fatigue import (
+    DangVanPits,
+    VonMisesPits,
+    broken_out,
+    layers,
+    soon,
+    stress_path,
+    sunk,
+)
 from support.passages import hertz_patches, passage, track
 
 P_MAX, WIDTH = 1e9, 50e-6
@@ -28,7 +36,9 @@ def test_pulsating_tension_and_torsion_have_their_closed_measures(slope):
     """S/4 + a S/3 and T/2, from the unloaded state and one loaded one."""
     stresses = np.zeros((6, 2, 2))
     stresses[0, 0, 1] = stresses[3, 1, 1] = 1.0
-    np.testing.assert_allclose(dang_van_of_each(stresses, slope), [0.25 + slope / 3.0, 0.5], rtol=1e-9)
+    np.testing.assert_allclose(
+        dang_van_of_each(stresses, slope), [0.25 + slope / 3.0, 0.5], rtol=1e-9
+    )
 
 
 def test_a_path_that_stays_below_is_given_a_bound_that_does_too():
@@ -57,10 +67,19 @@ def test_the_ends_of_a_track_are_one_place():
     grid = track((65, 16))
     (middle,) = hertz_patches(grid, WIDTH, P_MAX, 1)
     turn = 30
-    ends = replace(middle, pressure=np.roll(middle.pressure, turn, axis=0), shear=np.roll(middle.shear, turn, axis=0))
-    one, other = (stress_path((patch,), grid, 20e-6, 0.3).reshape(6, *grid.cells, 2) for patch in (middle, ends))
+    ends = replace(
+        middle,
+        pressure=np.roll(middle.pressure, turn, axis=0),
+        shear=np.roll(middle.shear, turn, axis=0),
+    )
+    one, other = (
+        stress_path((patch,), grid, 20e-6, 0.3).reshape(6, *grid.cells, 2)
+        for patch in (middle, ends)
+    )
     np.testing.assert_allclose(np.roll(one, turn, axis=1), other, atol=1e-6 * P_MAX)
-    below = stress_below(middle.pressure, None, grid, np.array([20e-6]), poisson_ratio=0.3).at(20e-6)
+    below = stress_below(middle.pressure, None, grid, np.array([20e-6]), poisson_ratio=0.3).at(
+        20e-6
+    )
     np.testing.assert_allclose(one[2, ..., 1], below.zz, atol=1e-6 * P_MAX)
     assert not one[..., 0].any()
 
@@ -80,7 +99,9 @@ def test_miners_sum_of_a_constant_amplitude_is_cycles_over_life():
     changes = miner(3, 20.0)
     measure = changes[0].facts["measure_pa"]
     life = 1e7 * (150e6 / measure) ** 9.0
-    assert 0.5 * P_MAX < measure < 0.56 * P_MAX  # von Mises below a line contact: 0.5575 p_h at most
+    assert (
+        0.5 * P_MAX < measure < 0.56 * P_MAX
+    )  # von Mises below a line contact: 0.5575 p_h at most
     for number, change in enumerate(changes, start=1):
         assert change.facts["sum"] == pytest.approx(20.0 * number / life, rel=1e-12, abs=0.0)
         assert not change.heights_change.any()
@@ -141,7 +162,9 @@ def test_a_pit_has_the_volume_of_its_bowl_and_is_booked():
     pits, left = broken_out(damage, depths, failed, grid, 3.0)
     deep = depths[6]
     assert pits.max() == pytest.approx(deep, rel=1e-3, abs=0.0)
-    assert pits.sum() * 0.5e-6**2 == pytest.approx(np.pi / 8.0 * (3.0 * deep) ** 2 * deep, rel=1e-9, abs=0.0)
+    assert pits.sum() * 0.5e-6**2 == pytest.approx(
+        np.pi / 8.0 * (3.0 * deep) ** 2 * deep, rel=1e-9, abs=0.0
+    )
     assert left.max() < 1.0
     change = miner(1, 1e9)[0]
     volume = -change.heights_change.sum() * float(np.prod(track((64, 8)).spacing))
@@ -182,7 +205,9 @@ def test_wear_that_is_fast_enough_leaves_no_pits():
     def pitted(removed):
         state, taken = {}, 0.0
         for _ in range(60):
-            one = fatigue(passage(grid, patches, jump=jump, state=state, removed=np.full(grid.cells, removed)))
+            one = fatigue(
+                passage(grid, patches, jump=jump, state=state, removed=np.full(grid.cells, removed))
+            )
             state, taken = one.state, taken + one.facts["volume_m3"]
         return taken, float(state["damage"].max())
 
@@ -198,7 +223,9 @@ def test_the_same_strengths_stand_behind_every_jump():
     patches = hertz_patches(grid, WIDTH, P_MAX, 4)
     fatigue = VonMisesPits(limit=300e6, scatter=0.1)
     first = fatigue(passage(grid, patches, jump=10.0, rng=np.random.default_rng(5)))
-    second = fatigue(passage(grid, patches, jump=10.0, rng=np.random.default_rng(6), state=first.state))
+    second = fatigue(
+        passage(grid, patches, jump=10.0, rng=np.random.default_rng(6), state=first.state)
+    )
     np.testing.assert_allclose(second.state["damage"], 2.0 * first.state["damage"])
     assert np.ptp(first.state["strength"]) > 0.3
 

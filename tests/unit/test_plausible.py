@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.conditions import ElasticPair
-from asperity.ehl import Options, inlet_notes, plausibility_notes, solution_notes, solve_contact
-from asperity.ehl.plausible import ridge_radii
-from asperity.grid import Grid
+from asperity.contact.conditions import ElasticPair
+from asperity.contact.grid import Grid
+from asperity.ehl import Options, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.solution import inlet_notes, plausibility_notes, solution_notes
+from asperity.solution.plausibility import ridge_radii
 from asperity.surface import Surface, flat_surface, gaussian_surface, ground_surface
 from support.paper import barus, contact, grid, rough
 
@@ -17,7 +18,9 @@ HARD = {"load": 20000.0, "hardness": 7e9}
 
 
 def roelands(eta0, alpha):
-    return Lubricant(viscosity=Roelands(eta0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian())
+    return Lubricant(
+        viscosity=Roelands(eta0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian()
+    )
 
 
 def test_the_papers_contact_is_plausible():
@@ -29,9 +32,21 @@ def test_the_papers_contact_is_plausible():
     [
         (contact(), barus(4e-9), "4 1/GPa lies outside 5 to 40"),
         (contact(), barus(18.2e-6), "1.82e+04 1/GPa lies outside 5 to 40"),
-        (contact(pair=ElasticPair((210e6, 200e9), (0.3, 0.3))), barus(), "Body 1 has a Young's modulus of 210 MPa"),
-        (contact(pair=ElasticPair((200e9, 200e12), (0.3, 0.3))), barus(), "Body 2 has a Young's modulus of 2e+05 GPa"),
-        (contact(hardness=0.5e9), barus(), "hardness of 0.5 GPa lies below Hertz's largest pressure of 0.569 GPa"),
+        (
+            contact(pair=ElasticPair((210e6, 200e9), (0.3, 0.3))),
+            barus(),
+            "Body 1 has a Young's modulus of 210 MPa",
+        ),
+        (
+            contact(pair=ElasticPair((200e9, 200e12), (0.3, 0.3))),
+            barus(),
+            "Body 2 has a Young's modulus of 2e+05 GPa",
+        ),
+        (
+            contact(hardness=0.5e9),
+            barus(),
+            "hardness of 0.5 GPa lies below Hertz's largest pressure of 0.569 GPa",
+        ),
         (contact(**HARD), barus(), "thickens the oil by exp(65.5)"),
         (contact(), roelands(0.001, 22e-9), "Roelands' exponent z is 1.56"),
     ],
@@ -53,7 +68,10 @@ def test_what_can_be_meant_is_not_noted(conditions, oil):
 
 def test_a_light_contact_is_told_that_it_starves_and_a_heavy_one_that_it_need_not_reach_so_far():
     a = contact().hertz.half_widths[0]
-    assert "starves the film by about 5" in inlet_notes(contact(), barus(), grid((256, 8), (-4.5, 1.9)))[0]
+    assert (
+        "starves the film by about 5"
+        in inlet_notes(contact(), barus(), grid((256, 8), (-4.5, 1.9)))[0]
+    )
     assert inlet_notes(contact(), barus(), grid((256, 8), (-12.0, 3.0))) == ()
     heavy = contact(load=50000.0, speed=0.5)
     wide = heavy.hertz.half_widths[0]
@@ -67,7 +85,10 @@ def test_contact_that_runs_into_an_edge_is_told_and_one_inside_is_not():
     rough = {"sq": 1e-6, "correlation_length": 20e-6, "rng": np.random.default_rng(1)}
     soft = contact(hardness=0.36e9)  # cannot carry the load within 1.24 half-widths
     small = gaussian_surface(grid((64, 32), (-4.0, 1.3)), **rough)
-    assert any("runs into the outlet edge of" in note for note in solution_notes(solve_contact(soft, None, small)))
+    assert any(
+        "runs into the outlet edge of" in note
+        for note in solution_notes(solve_contact(soft, None, small))
+    )
     wide = gaussian_surface(grid((128, 32), (-5.0, 5.0)), **rough)
     assert not any("runs into" in note for note in solution_notes(solve_contact(soft, None, wide)))
 
@@ -76,7 +97,8 @@ def test_pressures_that_no_body_stands_and_heights_that_a_grid_does_not_show_are
     small = grid((64, 32), (-2.0, 1.3))
     steep = gaussian_surface(small, sq=3e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
     assert any(
-        "exceeds a twentieth of E' = 219.8 GPa" in n for n in solution_notes(solve_contact(contact(), None, steep))
+        "exceeds a twentieth of E' = 219.8 GPa" in n
+        for n in solution_notes(solve_contact(contact(), None, steep))
     )
     noise = Surface(1e-9 * np.random.default_rng(1).standard_normal(small.cells), small)
     (said,) = solution_notes(solve_contact(contact(), None, noise))
@@ -85,9 +107,14 @@ def test_pressures_that_no_body_stands_and_heights_that_a_grid_does_not_show_are
 
 def test_a_film_far_from_its_fits_is_told_with_the_reason():
     smooth = Surface(np.zeros((64, 8)), grid((64, 8), (-1.3, 1.9)))
-    oil = Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian())
+    oil = Lubricant(
+        viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()
+    )
     starved = solve_contact(contact(), oil, smooth, options=Options())
-    assert any("nearest fit's" in note and "the inlet starves it" in note for note in solution_notes(starved))
+    assert any(
+        "nearest fit's" in note and "the inlet starves it" in note
+        for note in solution_notes(starved)
+    )
     flooded = replace(smooth, grid=grid((256, 8), (-12.0, 2.0)), heights=np.zeros((256, 8)))
     assert solution_notes(solve_contact(contact(), oil, flooded)) == ()
 
@@ -97,7 +124,9 @@ def test_asperities_that_bear_nothing_at_a_small_film_ratio_are_told():
     solved = solve_contact(contact(hardness=2e9), barus(), rough(grid((48, 32)), 2.5e-6))
     assert not any("film ratio" in note for note in solution_notes(solved))
     untouched = replace(solved, in_contact=np.zeros_like(solved.in_contact))
-    assert any("film ratio of 0.2" in note and "asperity run" in note for note in solution_notes(untouched))
+    assert any(
+        "film ratio of 0.2" in note and "asperity run" in note for note in solution_notes(untouched)
+    )
     smooth = replace(untouched, surface=flat_surface(solved.grid))
     assert not any("film ratio" in note for note in solution_notes(smooth))
 
@@ -106,10 +135,19 @@ def test_ridges_without_a_radius_are_told():
     """Grooves that cut one another leave edges; a Gaussian surface's crests have a radius on any grid."""
     conditions, on = contact(speed=0.1), grid((96, 64))
     ground = ground_surface(
-        on, sq=0.5e-6, groove_width=40e-6, groove_length=80e-6, direction=np.pi / 2, rng=np.random.default_rng(1)
+        on,
+        sq=0.5e-6,
+        groove_width=40e-6,
+        groove_length=80e-6,
+        direction=np.pi / 2,
+        rng=np.random.default_rng(1),
     )
-    gaussian = gaussian_surface(on, sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1))
-    of_ground, of_gaussian = (solve_contact(conditions, barus(), surface) for surface in (ground, gaussian))
+    gaussian = gaussian_surface(
+        on, sq=0.5e-6, correlation_length=20e-6, rng=np.random.default_rng(1)
+    )
+    of_ground, of_gaussian = (
+        solve_contact(conditions, barus(), surface) for surface in (ground, gaussian)
+    )
     (said,) = (note for note in solution_notes(of_ground) if "are edges" in note)
     assert "on cells twice as wide" in said
     assert not any("are edges" in note for note in solution_notes(of_gaussian))
@@ -117,7 +155,9 @@ def test_ridges_without_a_radius_are_told():
     assert not any("are edges" in note for note in solution_notes(dry))
 
 
-@pytest.mark.parametrize(("shape", "ratio"), [(lambda t: t**2, 1.0), (lambda t: np.abs(t) * 1e-5, 2.0)])
+@pytest.mark.parametrize(
+    ("shape", "ratio"), [(lambda t: t**2, 1.0), (lambda t: np.abs(t) * 1e-5, 2.0)]
+)
 def test_the_radius_of_ridges_is_that_of_a_parabola_and_an_edge_has_none(shape, ratio):
     """Ten crests of radius 1/2 m along x, in units of the lengths; of edges twice as much on cells twice as wide."""
     on = grid((240, 16))

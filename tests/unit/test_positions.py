@@ -5,18 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity import ehl
-from asperity.ageing import contact
-from asperity.ageing.contact import PositionSolver, Solved
-from asperity.ageing.jump import Ageing
-from asperity.ageing.notes import ENOUGH, WANTED, of_cells
+from asperity import ehl, solution
 from asperity.case import Case
-from asperity.ehl import gridding
+from asperity.ehl import grid_design as gridding
+from asperity.simulation.wear import contact
+from asperity.simulation.wear.contact import PositionSolver, Solved
+from asperity.simulation.wear.jump import Ageing
+from asperity.simulation.wear.notes import ENOUGH, WANTED, of_cells
 from asperity.surface import correlation_lengths
-from asperity.wearing import Position, seen
+from asperity.wear import Position, seen
 from support.wearing import worn_case
 
-ROUGH: dict[str, object] = {"surface.correlation_length": "30 um", "grid.cells": [96, 32], "grid.y": [-1.0, 1.0]}
+ROUGH: dict[str, object] = {
+    "surface.correlation_length": "30 um",
+    "grid.cells": [96, 32],
+    "grid.y": [-1.0, 1.0],
+}
 
 
 def solver_of(case: Case) -> PositionSolver:
@@ -31,21 +35,25 @@ def solved(case: Case) -> Solved:
 
 def test_a_position_is_the_contact_itself_with_its_interval():
     case = worn_case(ROUGH)
-    alone = ehl.contact_state(ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options))
+    alone = solution.contact_state(
+        ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
+    )
     here = solved(case).state
     assert 0.1 < alone.clr < 0.95
     assert here.clr == pytest.approx(alone.clr, rel=0.0, abs=2e-3)
     assert here.reynolds_residual < case.options.tolerance
     assert here.error is not None
     assert alone.error is not None
-    assert here.error.clr.grid == pytest.approx(alone.error.clr.grid, rel=0.1)  # what the coarser grid told is kept
+    assert here.error.clr.grid == pytest.approx(
+        alone.error.clr.grid, rel=0.1
+    )  # what the coarser grid told is kept
 
 
 def test_what_leads_nowhere_at_once_is_solved_from_afar(monkeypatch):
     case, asked = worn_case(ROUGH), []
     alone = ehl.solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     monkeypatch.setattr(contact, "AT_ONCE", 1)
-    thermal = ehl.solve_thermal_contact
+    thermal = solution.solve_thermal_contact
 
     def counted(*arguments, **how):
         asked.append((how["options"], how["start"] is None))
@@ -83,8 +91,12 @@ def test_too_few_cells_of_the_roughness_are_said_with_as_many_as_do(cells, told)
     said = of_cells(model)
     assert (said is not None) is told is (min(along) < ENOUGH * WANTED)
     if said is not None:
-        assert said.startswith(f"The roughness has {along[0]:.2g} by {along[1]:.2g} cells along its correlation")
-        wanted = [int(number) for number in said.split("grid.cells = [")[1].split("]")[0].split(", ")]
+        assert said.startswith(
+            f"The roughness has {along[0]:.2g} by {along[1]:.2g} cells along its correlation"
+        )
+        wanted = [
+            int(number) for number in said.split("grid.cells = [")[1].split("]")[0].split(", ")
+        ]
         assert wanted[0] > cells[0]
         assert of_cells(of({**fine, "grid.cells": wanted})) is None
 

@@ -7,14 +7,14 @@ from time import sleep
 
 import pytest
 
-from asperity.cli import show
+from asperity.cli import output
 from asperity.ehl import Iteration
 
 
 @pytest.mark.parametrize(("number", "announced"), [(0, True), (1, False)])
 def test_the_first_step_ends_the_wait_not_the_start(monkeypatch, capsys, number, announced):
-    monkeypatch.setattr(show, "SILENT_FOR", 0.05)
-    with show.solver_progress("case", quiet=False) as step:
+    monkeypatch.setattr(output, "SILENT_FOR", 0.05)
+    with output.solver_progress("case", quiet=False) as step:
         step(Iteration((8, 8), number, 1.0, 1.0, float("inf")))
         sleep(0.3)
     assert ("compiles the solver" in capsys.readouterr().err) is announced
@@ -22,13 +22,15 @@ def test_the_first_step_ends_the_wait_not_the_start(monkeypatch, capsys, number,
 
 def test_a_file_gets_the_output_while_a_terminal_shows_progress():
     program = (
-        "from asperity.cli.show import progress\n"
+        "from asperity.cli.output import progress\n"
         "with progress('in [brackets/]', quiet=False) as display:\n"
         "    display('2 read', 2, 4)\n"
         "    print('{}')\n"
     )
     terminal, end = os.openpty()
-    done = subprocess.run([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=end, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=end, text=True, check=True
+    )
     os.close(end)
     shown = os.read(terminal, 100_000).decode()
     os.close(terminal)
@@ -38,14 +40,14 @@ def test_a_file_gets_the_output_while_a_terminal_shows_progress():
 
 
 def test_quiet_shows_nothing(capsys):
-    with show.progress("case", quiet=True, compiles=True) as display:
+    with output.progress("case", quiet=True, compiles=True) as display:
         display("step 1")
     assert capsys.readouterr() == ("", "")
 
 
 def test_surfaces_that_are_done_are_counted_beside_the_steps():
     shown = []
-    steps = show.SolverSteps(lambda *told: shown.append(told))
+    steps = output.SolverSteps(lambda *told: shown.append(told))
     steps.step(Iteration((8, 8), 0, 1.0, 1.0, float("inf")))
     steps.step(Iteration((8, 8), 1, 1e-2, 1.0, 1.0))
     steps.surface(2, 5)

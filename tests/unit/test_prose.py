@@ -25,14 +25,19 @@ def paragraphs(page: Page) -> Iterator[tuple[int, str]]:
             yield number, " ".join(parts)
             parts = []
         if not apart:
-            number, parts = (number if parts else line.number), [*parts, ITEM.sub("", text, count=1)]
+            number, parts = (
+                (number if parts else line.number),
+                [*parts, ITEM.sub("", text, count=1)],
+            )
         last = line.number
     if parts:
         yield number, " ".join(parts)
 
 
 def sentences(text: str) -> list[str]:
-    text = re.sub(r"\]\([^)]*\)", "]", SPAN.sub(lambda span: span[0] if span[0] == KEYS else "`", text))
+    text = re.sub(
+        r"\]\([^)]*\)", "]", SPAN.sub(lambda span: span[0] if span[0] == KEYS else "`", text)
+    )
     return END.split(re.sub(r"\$[^$]*\$", "$", text))
 
 
@@ -49,7 +54,9 @@ def long_ones(page: Page) -> list[str]:
     ]
 
 
-PAGES = pytest.mark.parametrize("page", pages(), ids=lambda page: page.path.relative_to(ROOT).as_posix())
+PAGES = pytest.mark.parametrize(
+    "page", pages(), ids=lambda page: page.path.relative_to(ROOT).as_posix()
+)
 
 
 @PAGES

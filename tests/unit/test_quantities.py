@@ -4,7 +4,15 @@ from typing import Annotated
 
 import pytest
 
-from asperity.quantities import NO_VALUE, Parameter, catalogue, parameters, quantity, select, with_deviation
+from asperity.core.quantities import (
+    NO_VALUE,
+    Parameter,
+    catalogue,
+    parameters,
+    quantity,
+    select,
+    with_deviation,
+)
 from asperity.surface import ProfileParameters, SurfaceParameters
 
 SCALED = (
@@ -27,7 +35,13 @@ SCALED = (
 
 
 def test_a_key_stands_in_one_line():
-    keys = [line.split(",")[0] for line in files("asperity").joinpath("quantities.csv").read_text("utf-8").splitlines()]
+    keys = [
+        line.split(",")[0]
+        for line in files("asperity.core")
+        .joinpath("quantities.csv")
+        .read_text("utf-8")
+        .splitlines()
+    ]
     assert len(keys) == len(set(keys))
 
 
@@ -74,7 +88,9 @@ def test_no_deviation_leads_beyond_what_a_share_or_film_can_be():
     assert quantity("car").text_in({"car": 0.2, "car_error": 0.069}) == "20.0 ± 6.9 %"
     film = quantity("h_central_m").text_in({"h_central_m": 1e-8, "h_central_error_m": 4e-8})
     assert film == "0.010 (0.000 to 0.050) µm"
-    assert quantity("car_domain").left(1.2, 0.05) is None  # over the Hertz area, beyond which bodies may touch
+    assert (
+        quantity("car_domain").left(1.2, 0.05) is None
+    )  # over the Hertz area, beyond which bodies may touch
     assert quantity("crfa").number(1.0, 2.0) == "1.0 ± 2.0"  # what only scatters, and is no share
 
 
@@ -104,5 +120,8 @@ def test_a_law_says_unit_and_symbol_beside_its_parameters():
 def test_every_parameter_of_a_surface_is_in_the_catalogue():
     for kind, group in ((SurfaceParameters, "surface"), (ProfileParameters, "profile")):
         names = {entry.name.rstrip("_") for entry in fields(kind)} - {"sq"}  # the contact's Sq too
-        keys = {entry.key.removesuffix("_m") for entry in select(group, detail=True)} - {"pixel", "size"}
+        keys = {entry.key.removesuffix("_m") for entry in select(group, detail=True)} - {
+            "pixel",
+            "size",
+        }
         assert names == keys

@@ -16,12 +16,16 @@ MEASURED = re.compile(r"\d[\d.]* ?%|\b\d+e-\d+|\b\d+ of \d+|\b[\d.]+ times|\b\d+
 PLAIN = re.compile(r"^```.*?^```|`[^`]*`", re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize("page", sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index"))
+@pytest.mark.parametrize(
+    "page", sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
+)
 def test_every_figure_of_a_page_is_listed(page):
     text = PLAIN.sub("", (FOLDER / f"{page}.md").read_text("utf-8"))
     listed = [row["figure"] for row in FIGURES if row["page"] == page]
     for figure in MEASURED.findall(text):
-        assert any(figure in one for one in listed), f"{page}.md says {figure!r}; name in figures.csv what holds it"
+        assert any(figure in one for one in listed), (
+            f"{page}.md says {figure!r}; name in figures.csv what holds it"
+        )
 
 
 @pytest.mark.parametrize("row", FIGURES, ids=lambda row: f"{row['page']}: {row['figure']}")
@@ -42,5 +46,11 @@ def test_the_profiles_named_are_those_of_the_lowest_peaks():
 
 def test_thirty_seven_lines_are_thirty_seven():
     tree = parsed(ROOT / "tests" / "validation" / "test_auto_grid.py")
-    (films,) = (node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "FILMS")
-    assert sum(error is not None for *_, errors in ast.literal_eval(films) for error in errors) == 37
+    (films,) = (
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and node.targets[0].id == "FILMS"
+    )
+    assert (
+        sum(error is not None for *_, errors in ast.literal_eval(films) for error in errors) == 37
+    )

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import scipy
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl.stress import stress_below
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.lubricant import OilSheet
-from asperity.lubricant.estimates import ESTIMATORS
+from asperity.lubricant.pressure_viscosity import ESTIMATORS
 from asperity.machine import BallBearing, SpurGear
 from asperity.rating import (
     BallRaceway,
@@ -34,6 +33,7 @@ from asperity.rating import (
 )
 from asperity.rating.bearing import edge_factors
 from asperity.rating.fatigue import smallest_sphere
+from asperity.solution.stress import stress_below
 
 STEEL = ElasticPair((206e9, 206e9), (0.3, 0.3))
 RPM = 2.0 * math.pi / 60.0
@@ -48,11 +48,15 @@ KAPPAS = (0.2, 0.5, 1.0, 2.0, 4.0)
     [(500, 380, 13.279), (3000, 46.5, 12.048), (3000, 72.5, 9.649), (200, 250, 35.026)],
 )
 def test_the_reference_viscosity(turning, diameter, printed):
-    assert 1e6 * reference_viscosity(turning * RPM, 1e-3 * diameter) == pytest.approx(printed, rel=1e-4)
+    assert 1e6 * reference_viscosity(turning * RPM, 1e-3 * diameter) == pytest.approx(
+        printed, rel=1e-4
+    )
 
 
 def test_the_reference_viscositys_branches_differ_as_printed():
-    below, above = (1e6 * reference_viscosity(turning * RPM, 0.1) for turning in (999.999999, 1000.000001))
+    below, above = (
+        1e6 * reference_viscosity(turning * RPM, 0.1) for turning in (999.999999, 1000.000001)
+    )
     assert (below, above) == pytest.approx((14.56, 14.23), abs=5e-3)
 
 
@@ -91,9 +95,13 @@ def test_the_life_factor_is_whole_at_its_borders(element):
     """A constant misprinted in two public codes breaks this."""
     for border in (0.4, 1.0):
         for share in SHARES[:3]:
-            below, above = (life_factor(element, border * (1.0 + tiny), share) for tiny in (-1e-9, 1e-9))
+            below, above = (
+                life_factor(element, border * (1.0 + tiny), share) for tiny in (-1e-9, 1e-9)
+            )
             assert below == pytest.approx(above, rel=1e-3)
-    assert [life_factor(element, 0.1, share) for share in SHARES] == pytest.approx([0.1] * 5, rel=4e-3)
+    assert [life_factor(element, 0.1, share) for share in SHARES] == pytest.approx(
+        [0.1] * 5, rel=4e-3
+    )
     assert life_factor(element, 0.0999, 0.1) is None
     assert life_factor(element, 40.0, 0.1) == life_factor(element, 4.0, 0.1)
     assert life_factor(element, 1.0, 0.0) == pytest.approx(0.1)
@@ -116,12 +124,19 @@ def test_lives_of_a_ball_bearing_by_a_commercial_program(radial, axial, clearanc
     """As quoted in minzhun/ISO16281: Z 7, D 11.5 mm, d_m 43.5 mm, C 23.4 kN."""
     pair = ElasticPair((210e9, 210e9), (0.3, 0.3))
     bearing = BallBearing(
-        balls=7, ball_diameter=11.5e-3, pitch_diameter=43.5e-3, speed=1.0, radial_load=radial, axial_load=axial,
+        balls=7,
+        ball_diameter=11.5e-3,
+        pitch_diameter=43.5e-3,
+        speed=1.0,
+        radial_load=radial,
+        axial_load=axial,
         tilt=None,
         clearance=clearance,
-    )  # fmt: skip
+    )
     raceway = BallRaceway(11.5 / 43.5, bearing.osculation, 0.0)
-    assert ball_life(bearing.loads(pair)[0], 23400.0, raceway) == pytest.approx(1e6 * millions, rel=2e-4)
+    assert ball_life(bearing.loads(pair)[0], 23400.0, raceway) == pytest.approx(
+        1e6 * millions, rel=2e-4
+    )
 
 
 def zone(count, power, eps=0.5):
@@ -138,21 +153,29 @@ def test_a_roller_bearing_lives_as_its_rating_promises():
     loads, angles = zone(400, 10.0 / 9.0)
     force = float(loads @ np.cos(angles))
     slices = np.tile(loads[:, None] / 30.0, 30)
-    lives = [roller_life(slices, 0.83 * force, ratio, straight=False) for ratio in (0.05, 0.15, 0.25)]
+    lives = [
+        roller_life(slices, 0.83 * force, ratio, straight=False) for ratio in (0.05, 0.15, 0.25)
+    ]
     assert [life / 1e6 for life in lives] == pytest.approx([1.0] * 3, rel=0.03)
-    assert roller_life(2.0 * slices, 0.83 * force, 0.15, straight=False) == pytest.approx(lives[1] / 16.0)
+    assert roller_life(2.0 * slices, 0.83 * force, 0.15, straight=False) == pytest.approx(
+        lives[1] / 16.0
+    )
     assert roller_life(slices, 0.83 * force, 0.15, straight=True) < lives[1]
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.2, 0.35])
 def test_both_rings_of_a_roller_bearing_by_lundberg_and_palmgren(ratio):
     """A ring's capacity goes with (1 - γ)^(29/27)/(1 + γ)^(1/4), of the outer ring with γ negative; here by hand."""
-    inner, outer = ((1.0 - side) ** (29.0 / 27.0) / (1.0 + side) ** 0.25 for side in (ratio, -ratio))
+    inner, outer = (
+        (1.0 - side) ** (29.0 / 27.0) / (1.0 + side) ** 0.25 for side in (ratio, -ratio)
+    )
     both = (1.038 * inner / outer) ** 4.5
     alike = np.full((14, 30), 5.0)  # N on every slice of every roller: 150 N each
     capacity = 20e3 / 0.83 / 14
     worn = (150.0 / capacity) ** 4.5 * (0.378**4.5 / (1.0 + both) + 0.364**4.5 / (1.0 + 1.0 / both))
-    assert roller_life(alike, 20e3, ratio, straight=False) == pytest.approx(1e6 * worn ** (-8.0 / 9.0), rel=1e-9)
+    assert roller_life(alike, 20e3, ratio, straight=False) == pytest.approx(
+        1e6 * worn ** (-8.0 / 9.0), rel=1e-9
+    )
 
 
 def test_a_ball_bearing_lives_as_its_rating_promises():
@@ -173,9 +196,16 @@ def test_the_edge_factors_of_slices():
 # Gears ---------------------------------------------------------------------------------------------------------------
 
 C_GEAR = SpurGear(
-    module=4.5e-3, teeth=(16, 24), pressure_angle=math.radians(20.0), centre_distance=91.5e-3, speed=2170.0 * RPM,
-    profile_shift=(0.1817, 0.1715), face_width=0.014, tip_diameters=(82.46e-3, 118.36e-3), torque=265.1,
-)  # fmt: skip
+    module=4.5e-3,
+    teeth=(16, 24),
+    pressure_angle=math.radians(20.0),
+    centre_distance=91.5e-3,
+    speed=2170.0 * RPM,
+    profile_shift=(0.1817, 0.1715),
+    face_width=0.014,
+    tip_diameters=(82.46e-3, 118.36e-3),
+    torque=265.1,
+)
 VG_220 = OilSheet(grade="VG 220", viscosity_100=18.75e-6)
 
 
@@ -194,15 +224,25 @@ def test_the_specific_film_along_the_fzg_c_path():
     found = {}
     for contact in C_GEAR.contacts(STEEL):
         hertz = contact.hertz(STEEL)
-        point = MeshPoint(contact.radius, hertz.p_max, contact.line_load, hertz.half_widths[0], contact.surface_speeds)
+        point = MeshPoint(
+            contact.radius,
+            hertz.p_max,
+            contact.line_load,
+            hertz.half_widths[0],
+            contact.surface_speeds,
+        )
         found[contact.name] = specific_film(point, mesh, oil, 0.05, bulk)
     films = [film for film, _ in found.values()]
-    assert films == pytest.approx([0.2081, 0.2573, 0.2765, 0.4125, 0.3238, 0.3525, 0.3566], rel=2e-3)
+    assert films == pytest.approx(
+        [0.2081, 0.2573, 0.2765, 0.4125, 0.3238, 0.3525, 0.3566], rel=2e-3
+    )
     rises = [rise for _, rise in found.values()]
     assert rises == pytest.approx([71.8, 57.8, 49.6, 0.0, 46.5, 49.1, 53.3], rel=2e-3, abs=0.01)
     assert oil.alpha(bulk) * STEEL.effective_modulus == pytest.approx(3554.1, rel=1e-3)
     assert 1e9 * oil.alpha(311.15) == pytest.approx(21.68, rel=1e-3)
-    assert 1e3 * oil.viscosity(bulk) == pytest.approx(15.91, rel=2e-3)  # there of a density counted from 289 K
+    assert 1e3 * oil.viscosity(bulk) == pytest.approx(
+        15.91, rel=2e-3
+    )  # there of a density counted from 289 K
 
 
 def test_the_ratings_film_is_dowsons_least_one():
@@ -228,7 +268,9 @@ def test_the_loss_factor_of_the_fzg_c_gears():
 
     assert of(C_GEAR) == pytest.approx(0.1950, rel=1e-3)
     given = {entry.name: getattr(C_GEAR, entry.name) for entry in fields(C_GEAR)}
-    assert of(SpurGear(**(given | {"tip_diameters": None}))) == pytest.approx(0.1986, rel=1e-3)  # GEARpie's report
+    assert of(SpurGear(**(given | {"tip_diameters": None}))) == pytest.approx(
+        0.1986, rel=1e-3
+    )  # GEARpie's report
 
 
 def test_friction_and_bulk_temperature_in_the_standards_units():
@@ -238,7 +280,9 @@ def test_friction_and_bulk_temperature_in_the_standards_units():
     assert bulk_temperature(363.15, 500.0, 0.0915, 0.014) == pytest.approx(
         363.15 + 7400.0 * (0.5 / (91.5 * 14.0)) ** 0.72 / 1.2, rel=1e-12
     )
-    assert bulk_temperature(363.15, 500.0, 0.0915, 0.014, spray=True) > bulk_temperature(363.15, 500.0, 0.0915, 0.014)
+    assert bulk_temperature(363.15, 500.0, 0.0915, 0.014, spray=True) > bulk_temperature(
+        363.15, 500.0, 0.0915, 0.014
+    )
     with pytest.raises(BadInput, match="mineral or pao, got ester"):
         GearOil(lambda _: 0.02, lambda _: 1e-8, "ester")
 
@@ -253,7 +297,9 @@ def heated(shape):
     def rise(x):
         # the heat that has passed over the point at x since -1: T = 1/(B sqrt(π u)) ∫ q(s)/sqrt(x - s) ds
         root = math.sqrt(x + 1.0)
-        inner = scipy.integrate.quad(lambda z: 2.0 * shape(x - z * z), 0.0, root, limit=200, epsabs=1e-12)[0]
+        inner = scipy.integrate.quad(
+            lambda z: 2.0 * shape(x - z * z), 0.0, root, limit=200, epsabs=1e-12
+        )[0]
         return inner / math.sqrt(math.pi) / mean
 
     best = scipy.optimize.minimize_scalar(lambda x: -rise(x), bounds=(0.0, 1.0), method="bounded")
@@ -271,19 +317,29 @@ def test_bloks_constants():
 
 def half_width(line_load, radius):
     conditions = ContactConditions(
-        pair=STEEL, geometry="line", radius=radius, length=1.0, load=line_load, surface_speeds=(1.0, 1.0)
+        pair=STEEL,
+        geometry="line",
+        radius=radius,
+        length=1.0,
+        load=line_load,
+        surface_speeds=(1.0, 1.0),
     )
     return conditions.hertz.half_widths[0]
 
 
 @pytest.mark.parametrize(
     ("friction", "line_load", "radius", "speeds", "printed"),
-    [(0.05, 790004.0, 7.5311e-3, (5.4395, 1.6647), 161.85), (0.1, 2e5, 3.629e-3, (2.0, 1.5), 25.21)],
+    [
+        (0.05, 790004.0, 7.5311e-3, (5.4395, 1.6647), 161.85),
+        (0.1, 2e5, 3.629e-3, (2.0, 1.5), 25.21),
+    ],
 )
 def test_flash_temperatures(friction, line_load, radius, speeds, printed):
     width = half_width(line_load, radius)
     bodies = (12427.0, 12427.0)
-    assert flash_rise(friction, line_load, width, speeds, bodies) == pytest.approx(printed, rel=1e-3)
+    assert flash_rise(friction, line_load, width, speeds, bodies) == pytest.approx(
+        printed, rel=1e-3
+    )
     swapped = flash_rise(friction, line_load, width, speeds[::-1], bodies)
     assert swapped == pytest.approx(printed, rel=1e-3)
     even = flash_rise(friction, line_load, width, speeds, bodies, shape=2.0 / math.sqrt(math.pi))
@@ -294,10 +350,12 @@ def test_flash_temperature_in_the_standards_form():
     """0.62 μ w'^0.75 (E'/R)^0.25 |sqrt u1 - sqrt u2|/B, and X_M = 50.0 of equal steels."""
     width, line_load, radius = half_width(3e5, 8e-3), 3e5, 8e-3
     modulus = STEEL.effective_modulus
-    printed = line_load**0.75 * (modulus / radius) ** 0.25 * (math.sqrt(4.0) - math.sqrt(1.0)) / 12427.0
-    assert flash_rise(1.0, line_load, width, (4.0, 1.0), (12427.0, 12427.0)) / printed == pytest.approx(
-        0.6222, rel=1e-4
+    printed = (
+        line_load**0.75 * (modulus / radius) ** 0.25 * (math.sqrt(4.0) - math.sqrt(1.0)) / 12427.0
     )
+    assert flash_rise(
+        1.0, line_load, width, (4.0, 1.0), (12427.0, 12427.0)
+    ) / printed == pytest.approx(0.6222, rel=1e-4)
     assert 1e3 * (1e-6 * modulus) ** 0.25 / 435.0 == pytest.approx(50.14, rel=1e-3)
     assert flash_rise(0.1, 3e5, width, (2.0, 2.0)) == 0.0
     with pytest.raises(BadInput, match="the same way"):
@@ -344,7 +402,9 @@ def test_dang_van_knows_no_axes():
     tensors = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
     turned = scipy.spatial.transform.Rotation.random(rng=rng).as_matrix()
     seen = turned @ tensors @ turned.T
-    again = np.stack([seen[:, 0, 0], seen[:, 1, 1], seen[:, 2, 2], seen[:, 0, 1], seen[:, 1, 2], seen[:, 0, 2]])
+    again = np.stack(
+        [seen[:, 0, 0], seen[:, 1, 1], seen[:, 2, 2], seen[:, 0, 1], seen[:, 1, 2], seen[:, 0, 2]]
+    )
     assert dang_van(again[:, None, :], A) == pytest.approx(dang_van(stresses, A), rel=1e-10)
 
 
@@ -374,7 +434,9 @@ def test_the_smallest_sphere_is_one():
 def rolled_by(width, p_max, depth):
     """Stresses at a depth as Hertz' line contact passes, from 5 half-widths before it to 5 behind."""
     grid = Grid((480, 24), (-5.0 * width, -width), (5.0 * width, width), (False, True))
-    pressure = p_max * np.sqrt(np.maximum(1.0 - (grid.x[:, None] / width) ** 2, 0.0)) + np.zeros(grid.cells)
+    pressure = p_max * np.sqrt(np.maximum(1.0 - (grid.x[:, None] / width) ** 2, 0.0)) + np.zeros(
+        grid.cells
+    )
     tractions = stress_below(pressure, None, grid, np.array([depth]), poisson_ratio=0.3).tractions
     return tractions.stresses(depth, 0.3)[:, None, :, 0]
 
@@ -385,7 +447,12 @@ def test_dang_van_below_a_rolling_line_contact():
         pair=STEEL, geometry="line", radius=0.01, length=0.01, load=5e3, surface_speeds=(1.0, 1.0)
     )
     (width, _), p_max = conditions.hertz.half_widths, conditions.hertz.p_max
-    for slope, deep, least in ((0.0, 0.5, 0.25), (0.2, 0.55, 0.1935), (0.3, 0.65, 0.1702), (0.5, 0.7, 0.1341)):
+    for slope, deep, least in (
+        (0.0, 0.5, 0.25),
+        (0.2, 0.55, 0.1935),
+        (0.3, 0.65, 0.1702),
+        (0.5, 0.7, 0.1341),
+    ):
         depths = width * np.arange(0.4, 0.85, 0.05)
         measured = [dang_van(rolled_by(width, p_max, float(depth)), slope) for depth in depths]
         assert max(measured) / p_max == pytest.approx(least, rel=0.01)

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.signals import power_spectrum
 from asperity.recording import open_channels, open_recording, read_recording
 from asperity.recording.units import acceleration_scale, name_and_unit
-from asperity.signals import power_spectrum
-from asperity.wear import contact_resonance
+from asperity.resonance import contact_resonance
 from support.recordings import RATE, SHARED, uff_set, vibration, write_all, write_uff
 
 G = 9.80665
@@ -48,7 +48,10 @@ def test_facts_name_their_source(folder):
         "unknown",
         "nobody",
     )
-    assert (facts["started"].value, facts["started"].source) == (datetime(2024, 1, 31, 12), "file name")
+    assert (facts["started"].value, facts["started"].source) == (
+        datetime(2024, 1, 31, 12),
+        "file name",
+    )
     assert read_recording(where / "german.csv").facts["rate"].source == "file (column 'Zeit')"
 
 
@@ -66,20 +69,27 @@ def test_what_no_one_states_is_asked_for(folder, tmp_path):
     where, _ = folder
     with pytest.raises(BadInput, match=r"bare.npy states no sampling rate; give rate_hz"):
         read_recording(where / "bare.npy")
-    (tmp_path / "a.csv").write_text("time,acc\n" + "".join(f"{i / 100:.2f},{i % 7}.5\n" for i in range(50)))
+    (tmp_path / "a.csv").write_text(
+        "time,acc\n" + "".join(f"{i / 100:.2f},{i % 7}.5\n" for i in range(50))
+    )
     with pytest.raises(BadInput, match=r"names no unit; were it seconds, 100 Hz"):
         read_recording(tmp_path / "a.csv")
     np.save(tmp_path / "two.npy", np.ones((100, 2)))
     with pytest.raises(BadInput, match=r"holds 2 channels \(two\[1\], two\[2\]\); give channel"):
         read_recording(tmp_path / "two.npy", rate_hz=1.0)
-    assert read_recording(tmp_path / "two.npy", rate_hz=1.0, channel="2").facts["channel"].value == "two[2]"
+    assert (
+        read_recording(tmp_path / "two.npy", rate_hz=1.0, channel="2").facts["channel"].value
+        == "two[2]"
+    )
     with pytest.raises(BadInput, match="has no channel '²'; it has two"):  # a digit, and no number
         read_recording(tmp_path / "two.npy", rate_hz=1.0, channel="²")
 
 
 def test_contradictions_are_refused(folder):
     where, _ = folder
-    with pytest.raises(BadInput, match=r"states 5000 Hz in its header, the command line says 4000 Hz"):
+    with pytest.raises(
+        BadInput, match=r"states 5000 Hz in its header, the command line says 4000 Hz"
+    ):
         read_recording(where / "float.wav", rate_hz=4000.0)
     with pytest.raises(BadInput, match=r"states its unit as g, the command line says m/s\^2"):
         read_recording(where / "facts.npz", unit="m/s^2")
@@ -116,7 +126,9 @@ def test_sidecars_are_checked(tmp_path):
 def test_a_spectrum_is_refused_in_words(tmp_path):
     path = tmp_path / "psd.uff"
     write_uff(path, uff_set(np.abs(VALUES), func_type=9))
-    with pytest.raises(UnreadableFile, match=r"psd\.uff holds a power spectral density, not a time record"):
+    with pytest.raises(
+        UnreadableFile, match=r"psd\.uff holds a power spectral density, not a time record"
+    ):
         read_recording(path)
 
 
@@ -127,7 +139,9 @@ def test_cut_files_give_what_is_left(folder, tmp_path):
         (tmp_path / name).write_bytes(content[: int(0.6 * len(content))])
         recording = read_recording(tmp_path / name, **said[name])
         assert 0.5 * VALUES.size < recording.values.size < 0.7 * VALUES.size, name
-        known = min(recording.values.size - 1, VALUES.size)  # the last number of a text may be cut, too
+        known = min(
+            recording.values.size - 1, VALUES.size
+        )  # the last number of a text may be cut, too
         assert np.allclose(recording.values[:known] / G, VALUES[:known], atol=1e-6), name
         if name != "comma.csv":  # a text cannot know how long it was to be
             assert "cut short" in " ".join(recording.notes), name
@@ -151,7 +165,9 @@ def test_text_with_holes_has_gaps(tmp_path):
 def test_several_blocks_are_channels_of_their_own(tmp_path):
     block = "Step {0}\nStarted at: 12:00:0{0}.5 12 May 2022\n\nFx,acc,T\ng,g,sec\n\n{1}\n"
     rows = ["\n".join(f"{k + i}.5,{i / 10},{i / 50}" for i in range(20)) for k in (100, 300)]
-    (tmp_path / "a.csv").write_text("".join(block.format(k + 1, text) for k, text in enumerate(rows)))
+    (tmp_path / "a.csv").write_text(
+        "".join(block.format(k + 1, text) for k, text in enumerate(rows))
+    )
     names = [one.channel.name for one in open_channels(tmp_path / "a.csv")]
     assert names == ["1/Fx", "1/acc", "2/Fx", "2/acc"]
     assert read_recording(tmp_path / "a.csv", channel="1/acc").facts["channel"].value == "1/acc"
@@ -164,12 +180,16 @@ def test_several_blocks_are_channels_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "line", ["0,5;1,25;", "0,5\t1,25", "0,5 1,25", '"0,5","1,25"', "0.5,1.25", "0.5;1.25", "5e-1 1.25"]
+    "line",
+    ["0,5;1,25;", "0,5\t1,25", "0,5 1,25", '"0,5","1,25"', "0.5,1.25", "0.5;1.25", "5e-1 1.25"],
 )
 def test_dialects(tmp_path, line):
     (tmp_path / "a.dat").write_text((line + "\n") * 20)
     for channel, value in (("1", 0.5), ("2", 1.25)):
-        assert read_recording(tmp_path / "a.dat", rate_hz=1.0, channel=channel).values.tolist() == [value] * 20
+        assert (
+            read_recording(tmp_path / "a.dat", rate_hz=1.0, channel=channel).values.tolist()
+            == [value] * 20
+        )
 
 
 @pytest.mark.parametrize("label", ["acc [g]", "acc (g)", "# acc [g]"])
@@ -183,9 +203,18 @@ def test_the_label_of_an_only_column_may_hold_a_blank(tmp_path, label):
 
 @pytest.mark.parametrize(
     ("unit", "metres"),
-    [("m/s²", 1.0), ("m/s**2", 1.0), ("m s-2", 1.0), ("[g]", G), ("mg", G / 1000), ("in/s^2", 0.0254), ("kg", None),
-     ("V", None), ("mm/s", None)],
-)  # fmt: skip
+    [
+        ("m/s²", 1.0),
+        ("m/s**2", 1.0),
+        ("m s-2", 1.0),
+        ("[g]", G),
+        ("mg", G / 1000),
+        ("in/s^2", 0.0254),
+        ("kg", None),
+        ("V", None),
+        ("mm/s", None),
+    ],
+)
 def test_units_of_acceleration(unit, metres):
     assert acceleration_scale(unit) == metres
 
@@ -231,24 +260,33 @@ def test_large_text_is_parsed_by_pandas_and_not_line_by_line(tmp_path, monkeypat
 def test_six_copies_of_a_measured_second_are_one_signal():
     folder = SHARED / "vibration" / "mfpt-formats"
     unit = {".wav": "g"}
-    read = {path.suffix: read_recording(path, unit=unit.get(path.suffix)) for path in sorted(folder.iterdir())}
+    read = {
+        path.suffix: read_recording(path, unit=unit.get(path.suffix))
+        for path in sorted(folder.iterdir())
+    }
     assert len(read) == 6
     first = read[".h5"]
     for suffix, recording in read.items():
         assert recording.rate_hz == pytest.approx(first.rate_hz, rel=1e-9), suffix
         assert recording.unit == first.unit == "m/s^2"
-        assert np.abs(recording.values - first.values).max() < 1e-6 * np.abs(first.values).max(), suffix
+        assert np.abs(recording.values - first.values).max() < 1e-6 * np.abs(first.values).max(), (
+            suffix
+        )
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' data are not on this machine")
 def test_every_measured_file_is_read_or_refused_in_words():
     refused = {}
     channels = {}
-    for path in sorted(Path(SHARED, "vibration").rglob("*")) + sorted(Path(SHARED, "tribometer").rglob("*")):
+    for path in sorted(Path(SHARED, "vibration").rglob("*")) + sorted(
+        Path(SHARED, "tribometer").rglob("*")
+    ):
         if not path.is_file():
             continue
         try:
-            channels[path.name] = len(open_channels(path, rate_hz=20e3 if path.parent.name == "ims" else None))
+            channels[path.name] = len(
+                open_channels(path, rate_hz=20e3 if path.parent.name == "ims" else None)
+            )
         except BadInput as reason:
             refused[path.name] = str(reason)
     assert list(refused) == ["trib_c1.csv"]
@@ -271,8 +309,12 @@ def test_arrays_of_several_axes_and_fields(tmp_path):
     second = {"rows.npy": "2", "columns.npy": "2", "fields.npy": "b", "both.npz": "acc[2]"}
     for name, channel in second.items():
         rate = None if name == "both.npz" else RATE
-        assert np.array_equal(read_recording(tmp_path / name, rate_hz=rate, channel=channel).values, -VALUES), name
-    assert np.array_equal(read_recording(tmp_path / "both.npz", channel="columns[1]").values, VALUES)
+        assert np.array_equal(
+            read_recording(tmp_path / name, rate_hz=rate, channel=channel).values, -VALUES
+        ), name
+    assert np.array_equal(
+        read_recording(tmp_path / "both.npz", channel="columns[1]").values, VALUES
+    )
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the developers' data are not on this machine")
@@ -282,7 +324,8 @@ def test_six_copies_of_a_measured_second_have_the_same_indicators():
         recording = read_recording(path, unit="g" if path.suffix == ".wav" else None)
         spectrum = power_spectrum(recording, segment=8192)
         found[path.suffix] = [
-            contact_resonance(spectrum, band_hz=(4e3, 8e3), method=method) for method in ("likelihood", "peak")
+            contact_resonance(spectrum, band_hz=(4e3, 8e3), method=method)
+            for method in ("likelihood", "peak")
         ]
     assert len(found) == 6
     first, highest = found[".h5"]
@@ -290,7 +333,9 @@ def test_six_copies_of_a_measured_second_have_the_same_indicators():
     for suffix, (likeliest, peak) in found.items():
         assert likeliest.crf_hz == pytest.approx(first.crf_hz, rel=1e-6), suffix
         assert likeliest.crfa == pytest.approx(first.crfa, rel=1e-5), suffix
-        assert (peak.crf_hz, peak.crfa) == pytest.approx((highest.crf_hz, highest.crfa), rel=1e-6), suffix
+        assert (peak.crf_hz, peak.crfa) == pytest.approx(
+            (highest.crf_hz, highest.crfa), rel=1e-6
+        ), suffix
 
 
 def test_time_stamps_give_rate_and_start(tmp_path, monkeypatch):

@@ -18,7 +18,12 @@ def checked(tmp_path, values, *, unit="m/s^2", **wanted):
 
 def test_a_sound_recording_has_nothing_wrong(tmp_path):
     found = checked(tmp_path, NOISE + 0.5, width_hz=10.0, band_hz=(50.0, 400.0))
-    assert (found.usable, found.remarks, found.samples, found.duration_s) == (True, (), 20_000, 20.0)
+    assert (found.usable, found.remarks, found.samples, found.duration_s) == (
+        True,
+        (),
+        20_000,
+        20.0,
+    )
     assert found.rms == pytest.approx(NOISE.std(), rel=1e-12)
     assert found.offset == pytest.approx(NOISE.mean() + 0.5, rel=1e-9)
     assert found.peak == pytest.approx(np.abs(NOISE - NOISE.mean()).max(), rel=1e-9)
@@ -34,24 +39,35 @@ def test_statistics_do_not_depend_on_the_blocks(tmp_path):
         pass
     pieces = gauge.quality(opened, width_hz=None, band_hz=None)
     assert pieces.rms == pytest.approx(whole.rms, rel=1e-12)
-    assert (pieces.gaps, pieces.missing, pieces.peak) == (1, 457 / 20_000, pytest.approx(whole.peak))
+    assert (pieces.gaps, pieces.missing, pieces.peak) == (
+        1,
+        457 / 20_000,
+        pytest.approx(whole.peak),
+    )
 
 
 def test_clipping_is_counted(tmp_path):
     sine = 5.0 * np.sin(2.0 * np.pi * 3.0 * np.arange(20_000) / RATE)
     found = checked(tmp_path, np.clip(sine, -4.0, 4.0))
-    assert found.clipped == pytest.approx(2.0 * np.arccos(0.8) / np.pi, rel=0.02)  # share of time beyond 0.8
+    assert found.clipped == pytest.approx(
+        2.0 * np.arccos(0.8) / np.pi, rel=0.02
+    )  # share of time beyond 0.8
     assert any("clipped" in remark and "too low" in remark for remark in found.remarks)
     assert checked(tmp_path, sine).clipped == 0.0
 
 
 @pytest.mark.parametrize(
-    ("drive", "piled"), [(3.0, True), (2.0, True), (0.1, False)], ids=["hard driven", "driven", "not driven"]
+    ("drive", "piled"),
+    [(3.0, True), (2.0, True), (0.1, False)],
+    ids=["hard driven", "driven", "not driven"],
 )
 def test_soft_clipping_is_noticed(tmp_path, drive, piled):
     """tanh of Gaussian noise, as an amplifier at its limit has it; by blocks of any size."""
     found = checked(tmp_path, 5.0 * np.tanh(drive * NOISE / NOISE.std()))
-    assert (found.clipped, any("soft clipping" in remark for remark in found.remarks)) == (0.0, piled)
+    assert (found.clipped, any("soft clipping" in remark for remark in found.remarks)) == (
+        0.0,
+        piled,
+    )
     gauge = Gauge()
     for _ in gauge.watch(np.array_split(5.0 * np.tanh(drive * NOISE / NOISE.std()), 37)):
         pass
@@ -59,7 +75,12 @@ def test_soft_clipping_is_noticed(tmp_path, drive, piled):
 
 
 def test_what_falls_towards_its_extremes_is_not_called_clipped(tmp_path):
-    for values in (NOISE, NOISE**3, np.abs(NOISE) ** 0.5 * np.sign(NOISE), RNG.uniform(-1.0, 1.0, 20_000)):
+    for values in (
+        NOISE,
+        NOISE**3,
+        np.abs(NOISE) ** 0.5 * np.sign(NOISE),
+        RNG.uniform(-1.0, 1.0, 20_000),
+    ):
         assert not any("clip" in remark for remark in checked(tmp_path, values).remarks)
 
 
@@ -107,4 +128,8 @@ def test_the_stopped_machine_of_the_ims_data_is_off_and_the_others_run():
     states = {}
     for path in sorted((SHARED / "vibration" / "ims").iterdir()):
         states[path.name] = {check_recording(one).off for one in open_channels(path, rate_hz=20e3)}
-    assert states == {"2003.10.22.12.06.24": {False}, "2004.02.12.10.32.39": {False}, "2004.02.19.06.22.39": {True}}
+    assert states == {
+        "2003.10.22.12.06.24": {False},
+        "2004.02.12.10.32.39": {False},
+        "2004.02.19.06.22.39": {True},
+    }

@@ -11,20 +11,27 @@ import numpy as np
 import pytest
 import soundfile
 
-from asperity import apart
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core import sandbox as apart
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.recording import check_recording, open_channels, read_recording
 from support.recordings import RATE, SHARED, damaged, vibration, write_all
 
 MANY = 250  # the benchmark takes 500
 
 
-@pytest.mark.filterwarnings("ignore")  # readers that fail leave files open, and say so when they are collected
+@pytest.mark.filterwarnings(
+    "ignore"
+)  # readers that fail leave files open, and say so when they are collected
 def test_damaged_recordings_leave_no_traceback(tmp_path, capfd):
     said = write_all(tmp_path, vibration(1500))
     contents = [(name, (tmp_path / name).read_bytes()) for name in said]
     if SHARED.is_dir():
-        contents.append(("endaq.ide", (SHARED / "vibration" / "endaq" / "ActTest_009.IDE").read_bytes()[:100_000]))
+        contents.append(
+            (
+                "endaq.ide",
+                (SHARED / "vibration" / "endaq" / "ActTest_009.IDE").read_bytes()[:100_000],
+            )
+        )
     rng = np.random.default_rng(8)
     (tmp_path / "bad").mkdir()
     outcomes = []
@@ -85,14 +92,18 @@ def with_text(path, at, *changed):
 
 def test_hdf5_that_crashes_its_library_is_refused_and_the_next_file_read(tmp_path):
     with pytest.raises(UnreadableFile, match="its reader crashed on it"):
-        read_recording(with_text(tmp_path / "bad.h5", (b"\x19\x01", 1), 0x66))  # text of a kind that is none
+        read_recording(
+            with_text(tmp_path / "bad.h5", (b"\x19\x01", 1), 0x66)
+        )  # text of a kind that is none
     assert read_recording(with_text(tmp_path / "good.h5", (b"\x19\x01", 1), 1)).values.size == 100
 
 
 def test_hdf5_that_hangs_its_library_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "SECONDS", 1.0)
     with pytest.raises(UnreadableFile, match="took longer than 1 s"):
-        read_recording(with_text(tmp_path / "bad.h5", (b"GCOL", 24), 0))  # a heap whose next piece is itself
+        read_recording(
+            with_text(tmp_path / "bad.h5", (b"GCOL", 24), 0)
+        )  # a heap whose next piece is itself
 
 
 def test_damaged_flac_is_read_to_its_damage_or_refused(tmp_path):
@@ -117,7 +128,9 @@ def test_threads_that_read_several_files_at_a_time_get_what_one_alone_does(tmp_p
             file.create_dataset("x", data=array).attrs["fs"] = RATE
     opened = [channel for n in range(7) for channel in open_channels(tmp_path / f"{n}.h5")]
     sources = [channel.blocks(10_000) for channel in opened]
-    blocks = [[next(source) for source in sources] for _ in range(4)]  # more files in turn than are kept open
+    blocks = [
+        [next(source) for source in sources] for _ in range(4)
+    ]  # more files in turn than are kept open
     for number in range(14):
         values = np.concatenate([turn[number] for turn in blocks])
         np.testing.assert_array_equal(values, arrays[number // 2][:, number % 2])

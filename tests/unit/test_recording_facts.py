@@ -6,21 +6,25 @@ import h5py
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.monitoring import track_recordings
+from asperity.monitoring.files import read_table
 from asperity.recording import check_recording, open_recording, read_recording
-from asperity.recording.common import parse_time
-from asperity.tracking import track_recordings
-from asperity.tracking.files import read_table
+from asperity.recording.reader import parse_time
 
 
-@pytest.mark.parametrize("packed", [{"scale_factor": 0.01}, {"scale_factor": 0.01, "add_offset": 2.5}, {}])
+@pytest.mark.parametrize(
+    "packed", [{"scale_factor": 0.01}, {"scale_factor": 0.01, "add_offset": 2.5}, {}]
+)
 def test_packed_values_are_unpacked(tmp_path, packed):
     stored = np.random.default_rng(0).integers(-900, 900, 4000).astype(np.int16)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         data = file.create_dataset("acc", data=stored)
         data.attrs.update({"fs_hz": 20e3, "unit": "m/s^2"} | packed)
     read = read_recording(tmp_path / "a.h5")
-    assert read.values == pytest.approx(stored * packed.get("scale_factor", 1.0) + packed.get("add_offset", 0.0))
+    assert read.values == pytest.approx(
+        stored * packed.get("scale_factor", 1.0) + packed.get("add_offset", 0.0)
+    )
 
 
 def test_a_packing_that_is_no_number_is_refused(tmp_path):
@@ -67,23 +71,35 @@ def test_a_file_with_two_rows_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("column", "value", "least"),
-    [("load_n", -5, "0"), ("speed_hz", 0, "0"), ("entrainment_m_s", -1, "0"), ("temperature_degc", -400, "-273.15")],
+    [
+        ("load_n", -5, "0"),
+        ("speed_hz", 0, "0"),
+        ("entrainment_m_s", -1, "0"),
+        ("temperature_degc", -400, "-273.15"),
+    ],
 )
 def test_a_table_says_nothing_impossible(tmp_path, column, value, least):
     table = tmp_path / "table.csv"
     table.write_text(f"file,x,{column}\na.npz,1,{value}\n")
-    with pytest.raises(BadInput, match=rf"line 2: {column} must be above {least}, got {value}; leave it empty"):
+    with pytest.raises(
+        BadInput, match=rf"line 2: {column} must be above {least}, got {value}; leave it empty"
+    ):
         read_table(table)
 
 
 def test_a_header_against_its_own_times_is_said(tmp_path):
     times = np.arange(4000) / 20e3
-    lines = [f"{t:.6f},{v:.5f}" for t, v in zip(times, np.random.default_rng(0).standard_normal(4000), strict=True)]
+    lines = [
+        f"{t:.6f},{v:.5f}"
+        for t, v in zip(times, np.random.default_rng(0).standard_normal(4000), strict=True)
+    ]
     path = tmp_path / "a.csv"
     path.write_text("\n".join(["sampling rate: 25600 Hz", "time [s],acc [m/s^2]", *lines]))
     read = read_recording(path)
     assert read.rate_hz == 20e3
-    assert any("its header states 25600 Hz" in note and "its times 20000 Hz" in note for note in read.notes)
+    assert any(
+        "its header states 25600 Hz" in note and "its times 20000 Hz" in note for note in read.notes
+    )
     path.write_text("\n".join(["sampling rate: 20000 Hz", "time [s],acc [m/s^2]", *lines]))
     assert read_recording(path).notes == ()
 

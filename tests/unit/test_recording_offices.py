@@ -6,10 +6,10 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from asperity.errors import UnreadableFile
+from asperity.core.errors import UnreadableFile
+from asperity.monitoring import recordings_in, search_target, track_recordings
+from asperity.monitoring.reading import read_spectrum
 from asperity.recording import ReadOptions, read_recording
-from asperity.tracking import recordings_in, search_target, track_recordings
-from asperity.tracking.reading import read_spectrum
 
 VALUES = np.round(300.0 * np.random.default_rng(2).standard_normal(60), 2)
 VALUES[[7, 31]] = 1234.5, -2345.25  # with a separator of thousands
@@ -17,7 +17,10 @@ GERMAN, ENGLISH = str.maketrans(",.", ".,"), {}
 
 
 def rows(stamp, separator, swap):
-    return "".join(f"{stamp(k)}{separator}{f'{value:,.2f}'.translate(swap)}\n" for k, value in enumerate(VALUES))
+    return "".join(
+        f"{stamp(k)}{separator}{f'{value:,.2f}'.translate(swap)}\n"
+        for k, value in enumerate(VALUES)
+    )
 
 
 @pytest.mark.parametrize(
@@ -25,21 +28,34 @@ def rows(stamp, separator, swap):
     [
         (
             "german-stamps.csv",
-            "Zeit;Beschleunigung [m/s^2]\n" + rows(lambda k: f"31.01.2025 13:00:00,{4 * k:03}", ";", GERMAN),
+            "Zeit;Beschleunigung [m/s^2]\n"
+            + rows(lambda k: f"31.01.2025 13:00:00,{4 * k:03}", ";", GERMAN),
             250.0,
             datetime(2025, 1, 31, 13),
         ),
         (
             "am-pm.csv",
-            "Time\tacc [m/s^2]\n" + rows(lambda k: f"1/31/2025 1:00:00.{4 * k:03} PM", "\t", ENGLISH),
+            "Time\tacc [m/s^2]\n"
+            + rows(lambda k: f"1/31/2025 1:00:00.{4 * k:03} PM", "\t", ENGLISH),
             250.0,
             datetime(2025, 1, 31, 13),
         ),
-        ("abtastrate.csv", "Abtastrate [Hz];250\nNummer;a [m/s^2]\n" + rows(str, ";", GERMAN), 250.0, None),
-        ("kilohertz.csv", "Abtastfrequenz: 0,25 kHz\nNummer;a [m/s^2]\n" + rows(str, ";", GERMAN), 250.0, None),
+        (
+            "abtastrate.csv",
+            "Abtastrate [Hz];250\nNummer;a [m/s^2]\n" + rows(str, ";", GERMAN),
+            250.0,
+            None,
+        ),
+        (
+            "kilohertz.csv",
+            "Abtastfrequenz: 0,25 kHz\nNummer;a [m/s^2]\n" + rows(str, ";", GERMAN),
+            250.0,
+            None,
+        ),
         (
             "labview.lvm",
-            "LabVIEW Measurement\t\nDelta_X\t0.004000\t0.004000\nX_Value\tacc [m/s^2]\n" + rows(str, "\t", ENGLISH),
+            "LabVIEW Measurement\t\nDelta_X\t0.004000\t0.004000\nX_Value\tacc [m/s^2]\n"
+            + rows(str, "\t", ENGLISH),
             250.0,
             None,
         ),
@@ -58,7 +74,11 @@ def test_a_text_of_another_country_is_read_in_full(tmp_path, name, text, rate, s
 def test_archives_say_what_they_are_and_what_to_do(tmp_path):
     for name, inside, said in (
         ("rec.zip", "a.csv", "rec.zip is a zip archive of 1 files; unpack it"),
-        ("rec.xlsx", "xl/workbook.xml", "is an Excel workbook; save the sheet that holds the recording as csv"),
+        (
+            "rec.xlsx",
+            "xl/workbook.xml",
+            "is an Excel workbook; save the sheet that holds the recording as csv",
+        ),
         ("book.csv", "xl/workbook.xml", "book.csv is an Excel workbook"),
     ):
         with zipfile.ZipFile(tmp_path / name, "w") as packed:
@@ -73,8 +93,18 @@ def test_archives_say_what_they_are_and_what_to_do(tmp_path):
 def test_what_is_no_recording_takes_no_place(tmp_path):
     for number in range(4):
         stamp = f"2024.01.31.{number:02}.00.00"
-        np.savez(tmp_path / f"{stamp}.npz", acc=np.random.default_rng(number).standard_normal(4000), fs=4e3, unit="g")
-    for name in ("readme.txt", "Liesmich.txt", "2024.01.31.09.00.00.npz.filepart", "half.csv.crdownload"):
+        np.savez(
+            tmp_path / f"{stamp}.npz",
+            acc=np.random.default_rng(number).standard_normal(4000),
+            fs=4e3,
+            unit="g",
+        )
+    for name in (
+        "readme.txt",
+        "Liesmich.txt",
+        "2024.01.31.09.00.00.npz.filepart",
+        "half.csv.crdownload",
+    ):
         (tmp_path / name).write_text("1 2 3\n" * 50)
     assert len(recordings_in([tmp_path])) == 4
     (tmp_path / "0-notes.txt").write_text("Sensor 3 was moved on Monday.\n")
@@ -96,10 +126,14 @@ def test_bursts_of_lost_samples_leave_neither_lines_nor_a_slope(tmp_path):
     densities = []
     for name, values in (("whole", whole), ("held", held)):
         np.savez(tmp_path / f"{name}.npz", acc=values, fs=20e3, unit="m/s^2")
-        reading = read_spectrum(tmp_path / f"{name}.npz", ReadOptions(), search_target(None, (2e3, 4e3)), 4.0)
+        reading = read_spectrum(
+            tmp_path / f"{name}.npz", ReadOptions(), search_target(None, (2e3, 4e3)), 4.0
+        )
         assert not reading.reason
         low = (reading.spectrum.frequency_hz > 4.0) & (reading.spectrum.frequency_hz < 100.0)
         densities.append(reading.spectrum.density[low])
     assert np.mean(densities[1]) == pytest.approx(np.mean(densities[0]), rel=0.15)
     assert np.max(densities[1]) < 2.0 * np.mean(densities[0])
-    assert any("4 % of the time: samples lost? Left out" in remark for remark in reading.quality.remarks)
+    assert any(
+        "4 % of the time: samples lost? Left out" in remark for remark in reading.quality.remarks
+    )

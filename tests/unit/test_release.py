@@ -56,23 +56,35 @@ def test_one_version_stands_everywhere():
 
 
 def test_one_date_stands_everywhere_that_of_the_changelogs_heading():
-    versions = re.findall(r"^## \[([\d.]+)\] - (\d{4}-\d{2}-\d{2})$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
+    versions = re.findall(
+        r"^## \[([\d.]+)\] - (\d{4}-\d{2}-\d{2})$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M
+    )
     assert versions[0][0] == PROJECT["version"]
-    assert str(stated("CITATION.cff")["date-released"]) == stated("codemeta.json")["datePublished"] == versions[0][1]
-    assert [version for version, _ in versions] == sorted((version for version, _ in versions), reverse=True)
+    assert (
+        str(stated("CITATION.cff")["date-released"])
+        == stated("codemeta.json")["datePublished"]
+        == versions[0][1]
+    )
+    assert [version for version, _ in versions] == sorted(
+        (version for version, _ in versions), reverse=True
+    )
 
 
 def test_one_paper_and_one_licence():
     doi = stated("CITATION.cff")["preferred-citation"]["doi"]
     assert stated("codemeta.json")["referencePublication"]["@id"] == f"https://doi.org/{doi}"
     assert stated(".zenodo.json")["related_identifiers"][0]["identifier"] == doi
-    assert stated("CITATION.cff")["license"] == stated(".zenodo.json")["license"] == PROJECT["license"]
+    assert (
+        stated("CITATION.cff")["license"] == stated(".zenodo.json")["license"] == PROJECT["license"]
+    )
     assert stated("codemeta.json")["license"].endswith(f"/{PROJECT['license']}")
 
 
 def test_recipe_and_metadata_need_what_the_project_needs():
     assert stated("codemeta.json")["softwareRequirements"] == PROJECT["dependencies"]
-    wanted = {CONDA.get(name, name).lower(): bound for name, bound in map(split, PROJECT["dependencies"])}
+    wanted = {
+        CONDA.get(name, name).lower(): bound for name, bound in map(split, PROJECT["dependencies"])
+    }
     wanted["python"] = PROJECT["requires-python"]
     requirements = stated("recipe/recipe.yaml")["requirements"]
     assert dict(map(split, requirements["run"])) == wanted
@@ -97,7 +109,9 @@ def test_the_recipe_is_one_to_conda_forges_builder(right, wrong):
     assert right in text
 
     def rendered() -> tuple[str, str]:
-        (variant,) = builder.Stage0Recipe.from_yaml(text.replace(right, wrong)).render(builder.VariantConfig())
+        (variant,) = builder.Stage0Recipe.from_yaml(text.replace(right, wrong)).render(
+            builder.VariantConfig()
+        )
         return str(variant.recipe.package.name), str(variant.recipe.package.version)
 
     if not right:
@@ -146,7 +160,9 @@ def test_a_release_states_who_and_where():
 
 def test_what_a_release_leaves_open_is_seen_and_listed():
     text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    rows = dict(re.findall(r"^\| ([\w./-]+\.\w+) \| (.+) \|$", text.partition("## A release")[2], re.M))
+    rows = dict(
+        re.findall(r"^\| ([\w./-]+\.\w+) \| (.+) \|$", text.partition("## A release")[2], re.M)
+    )
     assert set(rows) == set(FILLED)
     whole = copy.deepcopy(metadata())
     person, place = {"name": "Somebody"}, "https://example.org/asperity"
@@ -162,7 +178,8 @@ def test_what_a_release_leaves_open_is_seen_and_listed():
         assert all(one.startswith(f"{file} ") for one in open_ones)
         assert all(one.rpartition(" ")[2].rpartition(".")[2] in rows[file] for one in open_ones)
     assert (
-        "ASPERITY_RELEASE=1" in (ROOT / "Makefile").read_text("utf-8").partition("\nrelease:")[2].partition("\n\n")[0]
+        "ASPERITY_RELEASE=1"
+        in (ROOT / "Makefile").read_text("utf-8").partition("\nrelease:")[2].partition("\n\n")[0]
     )
 
 
@@ -173,13 +190,21 @@ def split(requirement: str) -> tuple[str, str]:
 
 def test_the_package_stays_small():
     """Its files: a folder's own size is the file system's, and one of caches is none of the package."""
-    files = (path for path in PACKAGE.rglob("*") if path.is_file() and path.suffix not in (".pyc", ".nbi", ".nbc"))
+    files = (
+        path
+        for path in PACKAGE.rglob("*")
+        if path.is_file() and path.suffix not in (".pyc", ".nbi", ".nbc")
+    )
     assert sum(path.stat().st_size for path in files) < LARGEST
 
 
 def test_the_pythons_that_are_claimed_are_those_that_were_tested():
     """3.14 is named where it is said that it was not."""
-    claimed = {one.rpartition(" ")[2] for one in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d", one)}
+    claimed = {
+        one.rpartition(" ")[2]
+        for one in PROJECT["classifiers"]
+        if re.search(r"Python :: 3\.\d", one)
+    }
     said = (ROOT / "docs" / "project" / "how-it-was-made.md").read_text("utf-8")
     assert claimed == {"3.11", "3.12", "3.13"}
     assert "tested on 3.11 to 3.13; 3.14 was not" in said
@@ -193,7 +218,8 @@ def test_what_a_bug_report_says_has_versions_and_no_paths():
     assert lines[1].startswith(f"Python {sys.version_info.major}.{sys.version_info.minor}")
     assert sum(line.startswith("numpy ") for line in lines) == 1
     assert all(
-        any(line.lower().startswith(split(need)[0].lower()) for line in lines) for need in PROJECT["dependencies"]
+        any(line.lower().startswith(split(need)[0].lower()) for line in lines)
+        for need in PROJECT["dependencies"]
     )
     assert re.search(r"[/\\~]\w", said) is None
     plain = subprocess.run(command[:-1], capture_output=True, text=True, check=True).stdout

@@ -11,19 +11,33 @@ import pytest
 from matplotlib.colors import to_rgb
 
 from asperity.case import load_case
+from asperity.contact.grid import Grid
+from asperity.contact.hertz import line_gap, line_pressure
+from asperity.core.errors import AsperityError, BadInput
+from asperity.core.quantities import catalogue, quantity
 from asperity.coupling import contact_vibration
-from asperity.ehl import ContactError, ContactSolution, ContactState, Convergence, Iteration, SolveStatus, Uncertainty
+from asperity.ehl import (
+    ContactError,
+    ContactSolution,
+    ContactState,
+    Convergence,
+    Iteration,
+    SolveStatus,
+    Uncertainty,
+)
 from asperity.ehl.outcome import Figures, GridError
-from asperity.errors import AsperityError, BadInput
-from asperity.grid import Grid
-from asperity.hertz import line_gap, line_pressure
-from asperity.quantities import catalogue, quantity
 from asperity.report import base, surface_map, write_report
-from asperity.report.run import contact, page, rubbing, vibration
-from asperity.report.run import several as against_roughness
+from asperity.report.run import contact, friction_maps, page, vibration
+from asperity.report.run import several_runs as against_roughness
 from asperity.report.style import CONTACT_COLOUR, svg
 from asperity.results import Run, whole_error
-from asperity.surface import MeasuredSurface, Surface, SurfaceDescription, flat_surface, surface_parameters
+from asperity.surface import (
+    MeasuredSurface,
+    Surface,
+    SurfaceDescription,
+    flat_surface,
+    surface_parameters,
+)
 
 CASE = """
 [contact]
@@ -56,7 +70,13 @@ damping_ratio = 0.02
 duration = "1 s"
 """
 HISTORY = tuple(
-    Iteration((n, n * 3 // 4), k, 10.0 ** (-k / 2 - 1), 10.0 ** (-k - 1), 10.0 ** (-k / 3 - 1) if k else np.inf)
+    Iteration(
+        (n, n * 3 // 4),
+        k,
+        10.0 ** (-k / 2 - 1),
+        10.0 ** (-k - 1),
+        10.0 ** (-k / 3 - 1) if k else np.inf,
+    )
     for n in (16, 32)
     for k in range(7)
 )
@@ -85,13 +105,29 @@ def solution_like(case, surface=None, status=SolveStatus.CONVERGED):
 
 def run_like(text=CASE, *, status=SolveStatus.CONVERGED, surface=None, notes=(), **numbers):
     case = load_case(text, stored=surface)
-    state = ContactState(**{
-        "car": 0.3712, "car_domain": 0.6034, "clr": 0.5423, "sq": 1.25e-6, "h_min": 4.9e-9, "h_central": 0.512e-6,
-        "capped_oil_load_ratio": 0.0321, "h_mean": 0.634e-6, "lambda_ratio": 0.584, "p_max": 1.987e9,
-        "reynolds_residual": 3.1e-6, "load_error": 2.3e-7, "mass_flux_imbalance": 0.694,
-        **numbers,
-    })  # fmt: skip
-    vibration = None if case.vibration is None else contact_vibration(state, case.conditions, case.vibration)
+    state = ContactState(
+        **{
+            "car": 0.3712,
+            "car_domain": 0.6034,
+            "clr": 0.5423,
+            "sq": 1.25e-6,
+            "h_min": 4.9e-9,
+            "h_central": 0.512e-6,
+            "capped_oil_load_ratio": 0.0321,
+            "h_mean": 0.634e-6,
+            "lambda_ratio": 0.584,
+            "p_max": 1.987e9,
+            "reynolds_residual": 3.1e-6,
+            "load_error": 2.3e-7,
+            "mass_flux_imbalance": 0.694,
+            **numbers,
+        }
+    )
+    vibration = (
+        None
+        if case.vibration is None
+        else contact_vibration(state, case.conditions, case.vibration)
+    )
     solution = solution_like(case, case.stored, status)
     return doubted(Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes))
 
@@ -99,7 +135,9 @@ def run_like(text=CASE, *, status=SolveStatus.CONVERGED, surface=None, notes=(),
 def doubted(run, half=None, others=()):
     """The run with an error bar of its load share, and numbers of further surfaces."""
     sides = None if half is None else (half, half)
-    known = ContactError(clr=Uncertainty(value=run.state.clr, iteration=sides, grid=sides, range=(0.0, 1.0)))
+    known = ContactError(
+        clr=Uncertainty(value=run.state.clr, iteration=sides, grid=sides, range=(0.0, 1.0))
+    )
     state = replace(run.state, error=known)
     rows = (run.crucial, *others)
     error = whole_error(state, rows, run.case.conditions, run.case.vibration, run.vibration)
@@ -154,7 +192,9 @@ def several():
     runs = [
         run_like(sq=0.5e-6, car=0.05, clr=0.11),
         run_like(status=SolveStatus.STALLED),
-        run_like(CASE.replace("500 N", "400 N"), sq=3e-6, car=0.6, clr=0.92, mass_flux_imbalance=0.2),
+        run_like(
+            CASE.replace("500 N", "400 N"), sq=3e-6, car=0.6, clr=0.92, mass_flux_imbalance=0.2
+        ),
     ]
     return Page(page.render_page(runs))
 
@@ -162,17 +202,28 @@ def several():
 @pytest.mark.parametrize("which", ["single", "several"])
 def test_page_loads_nothing(which, request):
     shown = request.getfixturevalue(which)
-    assert not {tag for tag, _ in shown.tags} & {"script", "iframe", "object", "embed", "video", "audio"}
+    assert not {tag for tag, _ in shown.tags} & {
+        "script",
+        "iframe",
+        "object",
+        "embed",
+        "video",
+        "audio",
+    }
     for tag, attributes in shown.tags:
         for name in ("src", "href", "srcset", "data", "poster", "action"):
             target = attributes.get(name, "data:")
-            linked = tag == "a" and target.startswith(("#", "https://doi.org/"))  # a link loads nothing by itself
+            linked = tag == "a" and target.startswith(
+                ("#", "https://doi.org/")
+            )  # a link loads nothing by itself
             assert linked or target.startswith("data:"), (tag, name, target[:80])
     assert "url(" not in re.sub(r'src="data:[^"]*"', "", shown.html)
     assert "@import" not in shown.html
     for image in shown.images():
         drawing = unquote(image["src"])
-        for target in re.findall(r'href="([^"]*)"', drawing) + re.findall(r"url\(([^)]*)\)", drawing):
+        for target in re.findall(r'href="([^"]*)"', drawing) + re.findall(
+            r"url\(([^)]*)\)", drawing
+        ):
             assert target.startswith(("#", "data:image/png;base64,")), target[:80]
 
 
@@ -205,8 +256,12 @@ def test_every_number_is_there_with_its_unit(single, name, value, unit):
 def test_a_new_quantity_of_a_shown_group_is_in_the_table(monkeypatch):
     made_up = replace(quantity("clr"), key="made_up", symbol="", name="made-up share", deviation="")
     known = {**catalogue(), "made_up": made_up}
-    monkeypatch.setattr("asperity.quantities.catalogue", lambda: known)
-    (row,) = [row for row in Page(page.render_page([run_like()])).rows if row[0].startswith("Made-up share")]
+    monkeypatch.setattr("asperity.core.quantities.catalogue", lambda: known)
+    (row,) = [
+        row
+        for row in Page(page.render_page([run_like()])).rows
+        if row[0].startswith("Made-up share")
+    ]
     assert row[1:] == ["54.2", "%"]
 
 
@@ -229,20 +284,35 @@ def test_a_resonance_is_not_given_with_its_record_s_deviation_alone(single):
 def test_conditions_are_those_of_the_paper(single):
     rows = dict(row for row in single.rows if len(row) == 2)
     assert rows["Load"] == "500 N (50 N/mm)"
-    assert rows["Hertz (smooth, dry)"] == "half-width a = 55.93 µm, largest pressure 0.5691 GPa"  # physics of the paper
+    assert (
+        rows["Hertz (smooth, dry)"] == "half-width a = 55.93 µm, largest pressure 0.5691 GPa"
+    )  # physics of the paper
     assert rows["Reduced modulus"] == "E* = 109.89 GPa (E′ = 2 E* = 219.78 GPa)"
     assert rows["Viscosity law"] == "barus, η₀ = 0.096 Pa s, α = 18.2 1/GPa"
-    assert rows["Roughness"].endswith("kind gaussian, sq 1.25 um, correlation length 40 um and 40 um, seed 7")
+    assert rows["Roughness"].endswith(
+        "kind gaussian, sq 1.25 um, correlation length 40 um and 40 um, seed 7"
+    )
     assert rows["Domain"] == "x from −4.50 a to 1.90 a, y from −1.60 a to 1.60 a, repeating in y"
 
 
 def test_only_what_differs_is_told_apart(several):
     rows = several.html.split('<tr class="varies">')[1:]
     names = [re.search(r"<th[^>]*>([^<]*)<", row)[1] for row in rows]
-    fits = ["Fitted central film, Moes", "Fitted least film, Dowson (1968)", "Fitted least film, Blok (1952)"]
-    given = ["Load", "Hertz (smooth, dry)", "Regime", "Dimensionless numbers"]  # at 400 N the bodies count as rigid
+    fits = [
+        "Fitted central film, Moes",
+        "Fitted least film, Dowson (1968)",
+        "Fitted least film, Blok (1952)",
+    ]
+    given = [
+        "Load",
+        "Hertz (smooth, dry)",
+        "Regime",
+        "Dimensionless numbers",
+    ]  # at 400 N the bodies count as rigid
     assert sorted(names) == sorted([*given, *fits, "Grid"])  # the grid is given in half-widths
-    assert next(row for row in several.rows if row[0] == "Load")[1:] == ["500 N (50 N/mm)"] * 2 + ["400 N (40 N/mm)"]
+    assert next(row for row in several.rows if row[0] == "Load")[1:] == ["500 N (50 N/mm)"] * 2 + [
+        "400 N (40 N/mm)"
+    ]
     assert next(row for row in several.rows if row[0] == "Rheology")[1:] == ["newtonian"]
 
 
@@ -251,9 +321,15 @@ def test_unconverged_run_is_loud(several):
     assert "stalled after 12 steps" in several.html.lower()
     header = next(row for row in several.rows if row[0] == "Quantity")
     assert ["not converged" in cell for cell in header[1:4]] == [False, True, False]
-    assert next(row for row in several.rows if row[0].startswith("Converged"))[1:4] == ["yes", "NO", "yes"]
+    assert next(row for row in several.rows if row[0].startswith("Converged"))[1:4] == [
+        "yes",
+        "NO",
+        "yes",
+    ]
     assert any("NOT CONVERGED" in unquote(image["src"]) for image in several.images())
-    verdicts = [a["class"] for tag, a in several.tags if tag == "section" and "verdict" in a["class"]]
+    verdicts = [
+        a["class"] for tag, a in several.tags if tag == "section" and "verdict" in a["class"]
+    ]
     assert verdicts == ["verdict", "verdict unfinished", "verdict"]
 
 
@@ -262,10 +338,16 @@ def test_converged_run_raises_no_alarm(single):
 
 
 def test_text_from_outside_is_escaped():
-    hostile = CASE.replace('kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', "")
+    hostile = CASE.replace(
+        'kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', ""
+    )
     hostile = hostile.replace("[surface]", '[surface]\nfile = "<script>alert(1)</script>.opd"')
     surface = load_case(CASE).surface()
-    shown = Page(page.render_page([run_like(hostile, surface=surface, notes=("<img src=x>",))], title="<b>&</b>"))
+    shown = Page(
+        page.render_page(
+            [run_like(hostile, surface=surface, notes=("<img src=x>",))], title="<b>&</b>"
+        )
+    )
     assert not [tag for tag, _ in shown.tags if tag in ("script", "b")]
     assert all(image["src"].startswith("data:") for image in shown.images())
     assert "<script>alert(1)</script>.opd" in shown.text
@@ -281,7 +363,9 @@ def test_several_runs_are_drawn_against_roughness(single, several):
         assert drawn(single, title) == 0
         assert drawn(several, title) == 1
     assert drawn(several, "Film thickness") == 3
-    assert "20.0 to 69.4 %" in several.text.replace("\N{NO-BREAK SPACE}", " ")  # oil-flow imbalance over the runs
+    assert "20.0 to 69.4 %" in several.text.replace(
+        "\N{NO-BREAK SPACE}", " "
+    )  # oil-flow imbalance over the runs
 
 
 @pytest.mark.usefixtures("unprinted")
@@ -289,20 +373,39 @@ def test_figures_carry_their_error_where_it_shows():
     run = run_like()
     errors = Figures(car=0.0123, clr=0.0456, h_min=1e-12, h_central=7.1e-9)
     none = errors.times(0.0)
-    cells = GridError(car=errors.car, clr=errors.clr, h_min=errors.h_min, h_central=errors.h_central, lean=none)
-    convergence = replace(run.solution.convergence, iteration_error=none, discretisation_error=cells)
+    cells = GridError(
+        car=errors.car, clr=errors.clr, h_min=errors.h_min, h_central=errors.h_central, lean=none
+    )
+    convergence = replace(
+        run.solution.convergence, iteration_error=none, discretisation_error=cells
+    )
     run = replace(run, solution=replace(run.solution, convergence=convergence))
-    rows = {row[0].split(",")[0]: row[1] for row in Page(page.render_page([run])).rows if len(row) > 1}
-    assert next(value for name, value in rows.items() if name.startswith("Load share of asperities")) == "54.2"
-    assert next(value for name, value in rows.items() if name.startswith("Contact area share")) == "37.1 ± 1.2"
-    assert next(value for name, value in rows.items() if name.startswith("Central film")) == "0.512 ± 0.007"
-    assert next(value for name, value in rows.items() if name.startswith("Smallest film")) == "0.005"
+    rows = {
+        row[0].split(",")[0]: row[1] for row in Page(page.render_page([run])).rows if len(row) > 1
+    }
+    assert (
+        next(value for name, value in rows.items() if name.startswith("Load share of asperities"))
+        == "54.2"
+    )
+    assert (
+        next(value for name, value in rows.items() if name.startswith("Contact area share"))
+        == "37.1 ± 1.2"
+    )
+    assert (
+        next(value for name, value in rows.items() if name.startswith("Central film"))
+        == "0.512 ± 0.007"
+    )
+    assert (
+        next(value for name, value in rows.items() if name.startswith("Smallest film")) == "0.005"
+    )
 
 
 @pytest.mark.usefixtures("unprinted")
 def test_runs_of_one_roughness_are_not_drawn_against_it():
     shown = Page(page.render_page([run_like(), run_like()]))
-    assert not any("Load and area share of asperities" in unquote(image["src"]) for image in shown.images())
+    assert not any(
+        "Load and area share of asperities" in unquote(image["src"]) for image in shown.images()
+    )
     assert "2 runs, Sq 1.25 µm" in shown.text
 
 
@@ -336,12 +439,16 @@ def test_what_is_left_out_follows_what_the_run_took():
     thinning = CASE.replace('law = "newtonian"', 'law = "ree-eyring", tau0 = "5 MPa"')
     assert thinning != CASE
     assert "Newtonian." not in Page(page.render_page([run_like(thinning)])).text
-    line = CASE.replace("[vibration]", '[vibration]\nstiffness_law = "hertz-line"\nrate = "150 kHz"')
+    line = CASE.replace(
+        "[vibration]", '[vibration]\nstiffness_law = "hertz-line"\nrate = "150 kHz"'
+    )
     assert "Stiffness of a sphere" not in Page(page.render_page([run_like(line)])).text
 
 
 def test_silent_dry_and_deaf_runs_have_a_page_too():
-    smooth = CASE.replace('kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', 'kind = "flat"')
+    smooth = CASE.replace(
+        'kind = "gaussian"\nsq = "1.25 um"\ncorrelation_length = "40 um"\nseed = 7', 'kind = "flat"'
+    )
     silent = Page(page.render_page([run_like(smooth, sq=0.0, clr=0.0, car=0.0, lambda_ratio=None)]))
     assert "There is no spectrum to show" in silent.text
     assert next(row for row in silent.rows if row[0].startswith("Film ratio"))[1] == "–"
@@ -426,7 +533,12 @@ ROUGH = "composite roughness, Sq [µm]"
 
 def labels_of(exhibit):
     """Every label of its axes."""
-    return [label for axes in exhibit.figure().axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+    return [
+        label
+        for axes in exhibit.figure().axes
+        for label in (axes.get_xlabel(), axes.get_ylabel())
+        if label
+    ]
 
 
 @pytest.mark.parametrize(
@@ -439,9 +551,12 @@ def labels_of(exhibit):
         (contact.centre_line, ["p [GPa]", "x along rolling [µm]", "h [µm]"]),
         (contact.height_distribution, ["height above the mean [µm]", "density [1/µm]"]),
         (contact.convergence_history, ["Newton step", "relative size [-]"]),
-        (rubbing.stress_map, [*MAP, "von Mises stress [GPa]"]),
-        (rubbing.stress_section, ["x along rolling [µm]", "depth [µm]", "von Mises stress [GPa]"]),
-        (rubbing.stress_over_depth, ["depth [µm]", "von Mises stress [GPa]"]),
+        (friction_maps.stress_map, [*MAP, "von Mises stress [GPa]"]),
+        (
+            friction_maps.stress_section,
+            ["x along rolling [µm]", "depth [µm]", "von Mises stress [GPa]"],
+        ),
+        (friction_maps.stress_over_depth, ["depth [µm]", "von Mises stress [GPa]"]),
     ],
 )
 def test_every_axis_has_a_label_with_its_unit(draw, labels):
@@ -450,16 +565,21 @@ def test_every_axis_has_a_label_with_its_unit(draw, labels):
 
 def test_every_axis_of_friction_and_heat_has_a_label_with_its_unit():
     run = run_like()
-    shear = labels_of(rubbing.traction_map(run, run.friction))
+    shear = labels_of(friction_maps.traction_map(run, run.friction))
     assert shear == [*MAP, "traction along rolling on body 1 [MPa]"]
-    hotter = labels_of(rubbing.temperature_map(run, run.friction, run.heat))
+    hotter = labels_of(friction_maps.temperature_map(run, run.friction, run.heat))
     assert hotter == [*MAP, "hotter surface above ambient [K]"]
-    assert labels_of(rubbing.temperature_line(run, run.heat)) == ["x along rolling [µm]", "rise above ambient [K]"]
+    assert labels_of(friction_maps.temperature_line(run, run.heat)) == [
+        "x along rolling [µm]",
+        "rise above ambient [K]",
+    ]
 
 
 def test_resonance_over_roughness_has_its_whole_interval():
     """Not the fit's alone, which leaves out what cells and surfaces do."""
-    points = [{**run_like().scalars(), "crf_hz": 2500.0, "crf_low_hz": 2300.0, "crf_high_hz": 2550.0}]
+    points = [
+        {**run_like().scalars(), "crf_hz": 2500.0, "crf_low_hz": 2300.0, "crf_high_hz": 2550.0}
+    ]
     figure = against_roughness.resonance_against_roughness(points, None).figure()
     (bars,) = [lines for axes in figure.axes for lines in axes.collections]
     (bar,) = bars.get_segments()
@@ -470,7 +590,10 @@ def test_every_axis_over_roughness_and_frequency_has_a_label_with_its_unit():
     run = run_like()
     points = [run.scalars()]
     assert labels_of(against_roughness.shares_against_roughness(points)) == [ROUGH, "share [%]"]
-    assert labels_of(against_roughness.resonance_against_roughness(points, 3800.0)) == [ROUGH, "CRF [Hz]"]
+    assert labels_of(against_roughness.resonance_against_roughness(points, 3800.0)) == [
+        ROUGH,
+        "CRF [Hz]",
+    ]
     assert labels_of(against_roughness.friction_against_roughness(points)) == [ROUGH, "µ"]
     density = labels_of(vibration.spectrum(run.vibration, run.resonance_in_words()))
     assert density == ["frequency [Hz]", "acceleration density [(m/s²)²/Hz]"]
@@ -478,7 +601,7 @@ def test_every_axis_over_roughness_and_frequency_has_a_label_with_its_unit():
 
 def test_the_circle_in_the_section_stands_on_the_largest_stress():
     run = run_like()
-    axes = rubbing.stress_section(run).figure().axes[0]
+    axes = friction_maps.stress_section(run).figure().axes[0]
     (image,), (circle,) = axes.images, axes.get_lines()
     left, right, bottom, top = image.get_extent()
     assert top == 0.0 < bottom  # depth grows downwards
@@ -493,18 +616,20 @@ def test_the_circle_in_the_section_stands_on_the_largest_stress():
 
 def test_stress_over_depth_stands_beside_that_of_hertz():
     run = run_like()
-    axes = rubbing.stress_over_depth(run).figure().axes[0]
+    axes = friction_maps.stress_over_depth(run).figure().axes[0]
     lines = {line.get_label(): line for line in axes.get_lines()}
     depth, smooth = lines["Hertz (smooth, dry, no friction)"].get_data()
     hertz = run.solution.conditions.hertz
     assert smooth.max() == pytest.approx(0.558 * hertz.p_max * 1e-9, rel=0.03)
     assert 0.4 < depth[smooth.argmax()] * 1e-6 / hertz.half_widths[0] < 1.0
-    assert lines["solved"].get_ydata() == pytest.approx(run.stress.von_mises.max(axis=(0, 1))[1:] * 1e-9)
+    assert lines["solved"].get_ydata() == pytest.approx(
+        run.stress.von_mises.max(axis=(0, 1))[1:] * 1e-9
+    )
 
 
 def test_temperatures_are_cut_through_the_hottest_cell():
     run = run_like()
-    axes = rubbing.temperature_line(run, run.heat).figure().axes[0]
+    axes = friction_maps.temperature_line(run, run.heat).figure().axes[0]
     first, second = (line.get_ydata() for line in axes.get_lines()[:2])
     assert max(first.max(), second.max()) == pytest.approx(run.heat.max_k)
 
@@ -515,12 +640,17 @@ def test_friction_heat_and_stress_are_numbers_of_the_page(single):
     assert next(rows[name] for name in rows if name.startswith("Friction coefficient")) == (
         f"{run.friction.coefficient:.4f}"
     )
-    assert next(rows[name] for name in rows if name.startswith("Flash temp")) == f"{run.heat.max_k:.1f}"
+    assert (
+        next(rows[name] for name in rows if name.startswith("Flash temp"))
+        == f"{run.heat.max_k:.1f}"
+    )
     assert next(rows[name] for name in rows if name.startswith("Largest von Mises")) == (
         f"{run.stress.peak.value * 1e-9:.3f}"
     )
     assert next(rows[name] for name in rows if name.startswith("Boundary friction")) == "0.15"
-    assert "bair-winer" in next(rows[name] for name in rows if name.startswith("Friction of the film"))
+    assert "bair-winer" in next(
+        rows[name] for name in rows if name.startswith("Friction of the film")
+    )
 
 
 @pytest.mark.usefixtures("unprinted")
@@ -534,8 +664,13 @@ def test_a_run_in_pure_rolling_and_one_without_friction_say_so(monkeypatch):
 
     monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
     unsettled = Page(page.render_page([run_like()]))
-    assert "There is no friction and no temperature to show: friction and temperature did not" in unsettled.text
-    assert next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
+    assert (
+        "There is no friction and no temperature to show: friction and temperature did not"
+        in unsettled.text
+    )
+    assert (
+        next(row[1] for row in unsettled.rows if row[0].startswith("Friction coefficient")) == "–"
+    )
 
 
 @pytest.mark.usefixtures("unprinted")
@@ -550,15 +685,23 @@ def test_contact_is_drawn_where_it_is():
     solution = run.solution
     touching = np.zeros(solution.grid.cells, dtype=bool)
     touching[3, 20] = True
-    axes = contact.contact_map(replace(run, solution=replace(solution, in_contact=touching))).figure().axes[0]
+    axes = (
+        contact.contact_map(replace(run, solution=replace(solution, in_contact=touching)))
+        .figure()
+        .axes[0]
+    )
     (image,) = axes.images
     left, right, bottom, top = image.get_extent()
     colours = image.get_array()
     rows, columns = colours.shape[:2]
     (spot,) = np.argwhere(np.all(np.isclose(colours, to_rgb(CONTACT_COLOUR)), axis=2))
     assert image.origin == "lower"
-    assert left + (spot[1] + 0.5) / columns * (right - left) == pytest.approx(solution.grid.x[3] * 1e6)
-    assert bottom + (spot[0] + 0.5) / rows * (top - bottom) == pytest.approx(solution.grid.y[20] * 1e6)
+    assert left + (spot[1] + 0.5) / columns * (right - left) == pytest.approx(
+        solution.grid.x[3] * 1e6
+    )
+    assert bottom + (spot[0] + 0.5) / rows * (top - bottom) == pytest.approx(
+        solution.grid.y[20] * 1e6
+    )
 
 
 def test_shares_of_the_map_are_those_of_the_run():
@@ -577,7 +720,9 @@ def test_hertz_is_dashed_beside_the_solved_pressure():
     hertz = next(line for line in upper.lines if "Hertz" in line.get_label())
     assert hertz.get_linestyle() == "--"
     area = np.trapezoid(hertz.get_ydata(), hertz.get_xdata()) * 1e9 * 1e-6
-    assert area == pytest.approx(solution.conditions.line_load, rel=0.05)  # on cells of a fifth of the half-width
+    assert area == pytest.approx(
+        solution.conditions.line_load, rel=0.05
+    )  # on cells of a fifth of the half-width
     row = int(np.argmin(np.abs(solution.grid.y)))
     np.testing.assert_allclose(lower.lines[0].get_ydata(), solution.gap[:, row] * 1e6)
 
@@ -585,7 +730,9 @@ def test_hertz_is_dashed_beside_the_solved_pressure():
 def test_resonance_is_marked_where_it_was_found():
     run = run_like()
     (axes,) = vibration.spectrum(run.vibration, run.resonance_in_words()).figure().axes
-    marks = {line.get_label(): line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2}
+    marks = {
+        line.get_label(): line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2
+    }
     assert marks["CRF ± 2 std"] == run.vibration.resonance.crf_hz
     assert marks["CRF at full load"] == run.vibration.full_load_crf_hz
     fitted = next(line for line in axes.lines if line.get_label() == "fitted resonance")
@@ -606,7 +753,9 @@ def test_surface_map_is_a_png_and_nothing_else(tmp_path):
     heights[5, 7] = np.nan
     grid = Grid((40, 30), (0.0, 0.0), (40e-6, 30e-6), (False, False))
     surface = MeasuredSurface(heights, grid, "ring $1$.x3p", "X3P")
-    described = SurfaceDescription(Path(surface.name), surface, surface, surface_parameters(surface), ())
+    described = SurfaceDescription(
+        Path(surface.name), surface, surface, surface_parameters(surface), ()
+    )
     out = surface_map(described, tmp_path / "map.png")
     assert out.read_bytes().startswith(b"\x89PNG")
     assert out.read_bytes() == surface_map(described, tmp_path / "again.png").read_bytes()

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
+from asperity.core.errors import BadInput
+from asperity.core.signals import power_spectrum
 from asperity.coupling import VibrationModel
-from asperity.ehl import dynamic_stiffness, solve_contact
-from asperity.errors import BadInput
+from asperity.ehl import solve_contact
 from asperity.paper import SAMPLES_SQ_UM, Disturbance, RigRecording, Tones, simulate_rig, write_rig
-from asperity.signals import power_spectrum
+from asperity.resonance import contact_resonance, remove_lines
+from asperity.solution import dynamic_stiffness
 from asperity.vibration import FilteredNoise, acceleration
-from asperity.wear import contact_resonance, remove_lines
 
 SMALL = {"samples": 2, "repeats": 1, "duration_s": 20.0}
 
@@ -22,7 +23,10 @@ def powers(recording: RigRecording, band):
     inside = (recording.frequency_hz >= band[0]) & (recording.frequency_hz <= band[1])
     tonal = (recording.tones.frequency_hz >= band[0]) & (recording.tones.frequency_hz <= band[1])
     step = recording.frequency_hz[1]
-    other = np.sum(recording.other_density[inside]) * step + np.sum(recording.tones.amplitude[tonal] ** 2) / 2
+    other = (
+        np.sum(recording.other_density[inside]) * step
+        + np.sum(recording.tones.amplitude[tonal] ** 2) / 2
+    )
     return np.sum(recording.contact_density[inside]) * step, other
 
 
@@ -64,12 +68,14 @@ def test_the_contact_line_is_the_oscillators_own_response():
     one = simulate_rig(**SMALL).recordings[0]
     model = VibrationModel(mass=0.1, damping_ratio=0.02)
     spring = replace(_spring(one.crf_hz), damping_ratio=one.damping_ratio)
-    ridden = FilteredNoise(height=one.true_sq_m, cutoff_hz=model.excitation.cutoff_reference_hz).profile(
-        4_000_000, 100e3, 3
-    )
+    ridden = FilteredNoise(
+        height=one.true_sq_m, cutoff_hz=model.excitation.cutoff_reference_hz
+    ).profile(4_000_000, 100e3, 3)
     seen = power_spectrum(acceleration(spring, ridden), segment=20_000)
     inside = (seen.frequency_hz > 2500) & (seen.frequency_hz < 3700)
-    ratio = seen.density[inside] / np.interp(seen.frequency_hz[inside], one.frequency_hz, one.contact_density)
+    ratio = seen.density[inside] / np.interp(
+        seen.frequency_hz[inside], one.frequency_hz, one.contact_density
+    )
     # straight lines between samples cost 1.5 % at 100 kHz; the accelerometer adds 1 %; the rest is chance
     assert np.mean(ratio) == pytest.approx(0.98, abs=0.02)
     assert np.std(ratio) < 0.2
@@ -82,15 +88,23 @@ def _spring(f0):
 
 
 def test_a_drawn_spectrum_scatters_as_those_of_records():
-    one = simulate_rig(samples=1, repeats=1, duration_s=40.0, disturbance=Disturbance(modes=0)).recordings[0]
+    one = simulate_rig(
+        samples=1, repeats=1, duration_s=40.0, disturbance=Disturbance(modes=0)
+    ).recordings[0]
     one = replace(one, tones=Tones(np.array([2718.3]), np.array([0.02 * np.sqrt(one.crfa)])))
-    expected = np.interp(np.arange(0, 10e3, 0.5), one.frequency_hz, one.contact_density + one.other_density)
+    expected = np.interp(
+        np.arange(0, 10e3, 0.5), one.frequency_hz, one.contact_density + one.other_density
+    )
     scatters = {}
     for kind in ("drawn", "record"):
         ratios = []
         for seed in range(6):
             again = replace(one, seed=seed)
-            spectrum = again.spectrum(40_000) if kind == "drawn" else power_spectrum(again.signal(), segment=40_000)
+            spectrum = (
+                again.spectrum(40_000)
+                if kind == "drawn"
+                else power_spectrum(again.signal(), segment=40_000)
+            )
             ratios.append(spectrum.density[200:-400] / expected[200 : spectrum.density.size - 400])
         clean = np.delete(np.array(ratios), np.arange(5230, 5245), axis=1)
         tone = np.array(ratios)[:, 5230:5245]
@@ -102,7 +116,9 @@ def test_a_drawn_spectrum_scatters_as_those_of_records():
             np.mean(flat**3) / np.std(clean) ** 3,
             np.mean(np.sum(tone, axis=1)),
         )
-        assert spectrum.averages == pytest.approx(power_spectrum(one.signal(), segment=40_000).averages)
+        assert spectrum.averages == pytest.approx(
+            power_spectrum(one.signal(), segment=40_000).averages
+        )
     assert scatters["drawn"][0] == pytest.approx(1.0, abs=0.01)
     assert scatters["record"][0] == pytest.approx(1.0, abs=0.01)
     assert scatters["drawn"][1] == pytest.approx(scatters["record"][1], rel=0.03)
@@ -126,7 +142,9 @@ def test_a_seed_is_a_rig_and_another_seed_another():
     assert not np.array_equal(first.recordings[1].other_density, other.recordings[1].other_density)
 
 
-@pytest.mark.parametrize(("trend", "knee"), [("knee", 1.8e-6), ("smooth", None), ("constant", None)])
+@pytest.mark.parametrize(
+    ("trend", "knee"), [("knee", 1.8e-6), ("smooth", None), ("constant", None)]
+)
 def test_trends(trend, knee):
     rig = simulate_rig(repeat_std_hz=0.0, duration_s=0.1, trend=trend)
     assert rig.split_sq_m == knee
@@ -136,7 +154,9 @@ def test_trends(trend, knee):
 
 def test_a_case_gives_its_own_load_shares():
     case = load_case(
-        (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8").replace("[256, 256]", "[64, 64]")
+        (Path(__file__).parents[2] / "examples" / "paper.toml")
+        .read_text("utf-8")
+        .replace("[256, 256]", "[64, 64]")
     )
     rig = simulate_rig(samples=2, repeats=1, duration_s=1.0, case=case, repeat_std_hz=0.0)
     smooth, rough = rig.recordings
@@ -152,24 +172,34 @@ def test_a_case_gives_its_contacts_own_damping_and_a_track_finds_it_again():
         {"grid.cells": [64, 64], "vibration.damping_law": "contact"}
     )
     quiet = Disturbance(snr_db=40.0, modes=0)
-    rig = simulate_rig(samples=3, repeats=1, duration_s=10.0, case=case, repeat_std_hz=0.0, disturbance=quiet)
+    rig = simulate_rig(
+        samples=3, repeats=1, duration_s=10.0, case=case, repeat_std_hz=0.0, disturbance=quiet
+    )
     damped = [one.damping_ratio for one in rig.recordings]
     assert damped == sorted(damped, reverse=True)  # less oil, less damping
     for one in rig.recordings:
         again = case.with_overrides({"surface.sq": f"{one.true_sq_m * 1e6!r} um"})
-        solved = solve_contact(again.conditions, again.lubricant, again.surface(), options=again.options)
+        solved = solve_contact(
+            again.conditions, again.lubricant, again.surface(), options=again.options
+        )
         own = dynamic_stiffness(solved, one.crf_hz).damping_ratio
         assert one.damping_ratio == pytest.approx(0.02 + own, rel=1e-3)
         found = contact_resonance(power_spectrum(one.signal(), segment=40_000), band_hz=rig.band_hz)
-        assert found.damping_ratio == pytest.approx(one.damping_ratio, abs=4 * found.damping_ratio_std)
+        assert found.damping_ratio == pytest.approx(
+            one.damping_ratio, abs=4 * found.damping_ratio_std
+        )
 
 
 @pytest.mark.parametrize("file_format", ["h5", "wav"])
 def test_what_is_written_can_be_read(tmp_path, file_format):
     rig = simulate_rig(samples=2, repeats=2, duration_s=0.5)
     told = []
-    paths = write_rig(rig, tmp_path / "rig", file_format=file_format, progress=lambda *step: told.append(step))
-    assert [path.name for path in paths] == [f"sample-0{s}-test-{r}.{file_format}" for s in (1, 2) for r in (1, 2)]
+    paths = write_rig(
+        rig, tmp_path / "rig", file_format=file_format, progress=lambda *step: told.append(step)
+    )
+    assert [path.name for path in paths] == [
+        f"sample-0{s}-test-{r}.{file_format}" for s in (1, 2) for r in (1, 2)
+    ]
     assert told[-1] == (4, 4)
     from asperity.recording import read_recording
 
@@ -179,9 +209,13 @@ def test_what_is_written_can_be_read(tmp_path, file_format):
     assert read.values == pytest.approx(rig.recordings[2].signal().values, rel=1e-6, abs=1e-7)
     with (tmp_path / "rig" / "truth.csv").open() as file:
         truth = list(csv.DictReader(file))
-    assert [float(row["crf_hz"]) for row in truth] == pytest.approx([one.crf_hz for one in rig.recordings], rel=1e-5)
+    assert [float(row["crf_hz"]) for row in truth] == pytest.approx(
+        [one.crf_hz for one in rig.recordings], rel=1e-5
+    )
     with (tmp_path / "rig" / "table.csv").open() as file:
-        assert [float(row["sq_um"]) for row in csv.DictReader(file)] == pytest.approx([0.54, 0.54, 3.49, 3.49])
+        assert [float(row["sq_um"]) for row in csv.DictReader(file)] == pytest.approx(
+            [0.54, 0.54, 3.49, 3.49]
+        )
     assert load_case(tmp_path / "rig" / "rig.toml").conditions.load == 500.0
     with pytest.raises(BadInput, match="not empty"):
         write_rig(rig, tmp_path / "rig")

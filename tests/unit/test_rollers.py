@@ -9,9 +9,10 @@ import pytest
 
 import asperity as asp
 from asperity.case import load_case
-from asperity.ehl import along_roller, auto_grid, hertz_zone, plausibility_notes, solution_notes
-from asperity.hertz import line_contact
-from asperity.rollers import RollerShape, sliced_load
+from asperity.contact.hertz import line_contact
+from asperity.contact.rollers import RollerShape, sliced_load
+from asperity.ehl import auto_grid, hertz_zone
+from asperity.solution import along_roller, plausibility_notes, solution_notes
 
 STEEL = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
 RADIUS, LENGTH, LOAD = 3.629e-3, 10e-3, 2000.0
@@ -22,7 +23,14 @@ def roller(shape: RollerShape | None = None, load: float = LOAD, **given) -> asp
     return asp.ContactConditions(
         pair=STEEL,
         geometry="roller",
-        **{"radius": RADIUS, "length": LENGTH, "load": load, "surface_speeds": (3.5, 3.5), "shape": shape, **given},
+        **{
+            "radius": RADIUS,
+            "length": LENGTH,
+            "load": load,
+            "surface_speeds": (3.5, 3.5),
+            "shape": shape,
+            **given,
+        },
     )
 
 
@@ -36,11 +44,20 @@ def case_text(**changes: str) -> str:
         **changes,
     }
     lines = [f"{key} = {value}" for key, value in contact.items() if value]
-    return "\n".join([
-        'lubricant = "none"', 'surface = "flat"', "[contact]", *lines,
-        "[material]", 'youngs_modulus = "206 GPa"', "poisson_ratio = 0.3",
-        "[grid]", "cells = [32, 66]", "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            'lubricant = "none"',
+            'surface = "flat"',
+            "[contact]",
+            *lines,
+            "[material]",
+            'youngs_modulus = "206 GPa"',
+            "poisson_ratio = 0.3",
+            "[grid]",
+            "cells = [32, 66]",
+            "",
+        ]
+    )
 
 
 def test_johns_and_gohars_drop_is_that_of_the_reference():
@@ -55,7 +72,9 @@ def test_johns_and_gohars_drop_is_that_of_the_reference():
 
 def test_isos_profile_is_the_printed_one():
     y = np.array([0.0, 1e-3, -3e-3, 4.5e-3])
-    assert ISO.drop(y, LENGTH) == pytest.approx(0.00035 * 9e-3 * np.log(1.0 / (1.0 - (2.0 * y / LENGTH) ** 2)))
+    assert ISO.drop(y, LENGTH) == pytest.approx(
+        0.00035 * 9e-3 * np.log(1.0 / (1.0 - (2.0 * y / LENGTH) ** 2))
+    )
     long = RollerShape.iso(3e-3, LENGTH)
     beyond = np.maximum(2.0 * np.abs(y) - (LENGTH - 7.5e-3), 0.0) / 7.5e-3
     assert long.drop(y, LENGTH) == pytest.approx(0.0005 * 3e-3 * np.log(1.0 / (1.0 - beyond**2)))
@@ -81,7 +100,10 @@ def test_crown_flat_chamfer_and_tilt_add_up():
         ({"end_drop": 1e-6}, "belongs to a logarithm"),
         ({"crown_radius": 0.0}, "crown_radius must be positive"),
         ({"tilt": 0.1}, "tilt must lie between -0.05 and 0.05 rad, got 0.1"),
-        ({"chamfer": 1e-3, "chamfer_angle": 2.0}, "chamfer_angle must lie between 0 and 90 degrees"),
+        (
+            {"chamfer": 1e-3, "chamfer_angle": 2.0},
+            "chamfer_angle must lie between 0 and 90 degrees",
+        ),
     ],
 )
 def test_a_shape_that_cannot_be_is_refused(given, said):
@@ -94,7 +116,9 @@ def test_conditions_that_do_not_fit_are_refused():
         roller(length=None)
     with pytest.raises(asp.BadInput, match="no room for chamfers"):
         roller(RollerShape(chamfer=6e-3))
-    with pytest.raises(asp.BadInput, match="shape belongs to a roller contact, got one for a line contact"):
+    with pytest.raises(
+        asp.BadInput, match="shape belongs to a roller contact, got one for a line contact"
+    ):
         replace(roller(ISO), geometry="line")
 
 
@@ -115,7 +139,9 @@ def test_conditions_that_do_not_fit_are_refused():
 )
 def test_what_is_no_roller_contact_is_refused_at_once(given, load, said):
     oil = asp.Lubricant(
-        viscosity=asp.Roelands(0.04, 20e-9), density=asp.DowsonHigginson(870.0), rheology=asp.Newtonian()
+        viscosity=asp.Roelands(0.04, 20e-9),
+        density=asp.DowsonHigginson(870.0),
+        rheology=asp.Newtonian(),
     )
     conditions = roller(None, load, **given)
     with pytest.raises(asp.BadInput, match=said):
@@ -152,7 +178,9 @@ def test_the_chosen_grid_ends_past_the_roller_or_where_no_load_is():
 
 def test_a_grid_that_cuts_the_load_off_is_refused():
     surface = asp.flat_surface(asp.Grid((32, 64), (-2e-4, -4e-3), (2e-4, 4e-3), (False, False)))
-    with pytest.raises(asp.BadInput, match=r"outermost cells along y lie at -3.938 and 3.938 mm, .* widen the grid"):
+    with pytest.raises(
+        asp.BadInput, match=r"outermost cells along y lie at -3.938 and 3.938 mm, .* widen the grid"
+    ):
         asp.solve_contact(roller(ISO), None, surface)
 
 
@@ -169,9 +197,14 @@ def test_a_case_states_a_roller_and_a_run_keeps_it(tmp_path):
     said = json.loads(json.dumps(run.summary()))
     assert said["load_centre_m"] > 0.1e-3
     assert said["tilting_moment_n_m"] == pytest.approx(said["load_centre_m"] * LOAD, rel=1e-6)
-    assert "; edge pressure not determined, pressure at mid-length 1.4" in run.verdict()  # too few lines for its ends
+    assert (
+        "; edge pressure not determined, pressure at mid-length 1.4" in run.verdict()
+    )  # too few lines for its ends
     assert said["edge_pressure_pa"] is said["edge_pressure_error_pa"] is None
-    assert any(note.startswith("The edge pressure is not determined: its lines of cells") for note in said["notes"])
+    assert any(
+        note.startswith("The edge pressure is not determined: its lines of cells")
+        for note in said["notes"]
+    )
 
 
 def test_an_edge_pressure_that_is_determined_is_said_with_its_bar():
@@ -182,14 +215,25 @@ def test_an_edge_pressure_that_is_determined_is_said_with_its_bar():
     )
     assert "times an even load's, loaded length " in run.verdict()
     numbers = run.summary()
-    assert 0.0 < numbers["edge_pressure_error_pa"] < numbers["edge_pressure_pa"] < numbers["middle_pressure_pa"]
+    assert (
+        0.0
+        < numbers["edge_pressure_error_pa"]
+        < numbers["edge_pressure_pa"]
+        < numbers["middle_pressure_pa"]
+    )
     said = run.verdict().partition("; edge pressure ")[2].partition(" GPa, ")[0]
-    assert float(said.partition(" ± ")[0]) == pytest.approx(1e-9 * numbers["edge_pressure_pa"], abs=0.01)
-    assert float(said.partition(" ± ")[2]) == pytest.approx(1e-9 * numbers["edge_pressure_error_pa"], rel=0.1)
+    assert float(said.partition(" ± ")[0]) == pytest.approx(
+        1e-9 * numbers["edge_pressure_pa"], abs=0.01
+    )
+    assert float(said.partition(" ± ")[2]) == pytest.approx(
+        1e-9 * numbers["edge_pressure_error_pa"], rel=0.1
+    )
 
 
 def test_other_contacts_say_nothing_of_ends():
-    case = load_case(case_text(geometry='"line"'), name="case").with_overrides({"grid": {"cells": [32, 8]}})
+    case = load_case(case_text(geometry='"line"'), name="case").with_overrides(
+        {"grid": {"cells": [32, 8]}}
+    )
     run = asp.solve_case(case)
     assert "edge_pressure_pa" not in run.summary()
     assert "edge pressure" not in run.verdict()
@@ -198,11 +242,20 @@ def test_other_contacts_say_nothing_of_ends():
 @pytest.mark.parametrize(
     ("shape", "said"),
     [
-        ('{ design_load = "1 N", amplitude = "1 um" }', "contact.shape has design_load and amplitude, which both make"),
+        (
+            '{ design_load = "1 N", amplitude = "1 um" }',
+            "contact.shape has design_load and amplitude, which both make",
+        ),
         ('{ end_drop = "1 um" }', "contact.shape has an end_drop without an amplitude"),
-        ('{ iso_diameter = "3 mm", flat = "1 mm" }', "contact.shape has a flat and an iso_diameter"),
+        (
+            '{ iso_diameter = "3 mm", flat = "1 mm" }',
+            "contact.shape has a flat and an iso_diameter",
+        ),
         ('{ tilt = "1 um" }', 'contact.shape.tilt must be an angle such as "20 deg"'),
-        ('{ chamfers = "1 mm" }', "contact.shape.chamfers is not a known key; did you mean chamfer"),
+        (
+            '{ chamfers = "1 mm" }',
+            "contact.shape.chamfers is not a known key; did you mean chamfer",
+        ),
         ('{ tilt = "6 deg" }', "contact and material: tilt must lie between -0.05 and 0.05 rad"),
     ],
 )
@@ -238,11 +291,18 @@ def test_readings_are_those_of_a_known_pressure():
     assert along.edge_pressure.on_grid == pytest.approx(1.5e9, rel=0.01)
     assert along.middle_pressure == pytest.approx(1e9)
     assert along.loaded_share == pytest.approx(1.0)
-    short = along_roller(replace(solution, pressure=np.where(np.abs(grid.y) < 0.44 * 9e-3, made, 0.0)))
+    short = along_roller(
+        replace(solution, pressure=np.where(np.abs(grid.y) < 0.44 * 9e-3, made, 0.0))
+    )
     assert (short.edge_pressure.on_grid, short.loaded_share) == (0.0, pytest.approx(0.88, abs=0.01))
-    longer = along_roller(replace(solution, pressure=np.where(np.abs(grid.y) < 0.47 * 9e-3, made, 0.0)))
+    longer = along_roller(
+        replace(solution, pressure=np.where(np.abs(grid.y) < 0.47 * 9e-3, made, 0.0))
+    )
     assert longer.edge_pressure.on_grid > 1.4e9
-    assert along_roller(replace(solution, conditions=replace(conditions, geometry="line", shape=None))) is None
+    assert (
+        along_roller(replace(solution, conditions=replace(conditions, geometry="line", shape=None)))
+        is None
+    )
     assert not any("sides" in note for note in solution_notes(solution))
     assert hertz_zone(conditions, grid)[:, on].any(axis=0).all()
     assert not hertz_zone(conditions, grid)[:, ~on].any()

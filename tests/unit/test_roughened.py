@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from asperity import BadInput
-from asperity.ageing.jump import Ageing
-from asperity.ageing.worn import Worn
-from asperity.wearing import seen
+from asperity.simulation.wear.jump import Ageing
+from asperity.simulation.wear.state import Worn
+from asperity.wear import seen
 from support.wearing import worn_case
 
 GENTLE = {"motion.rough": "second", "wear.k": "1e-17 1/Pa", "wear.patches": 3}
@@ -32,7 +32,9 @@ def solved():
     """The contact at three positions of the new tracks, solved once for all."""
     new = ageing()
     worn = Worn.begin(new.surfaces)
-    return [(place, new.solver(seen(new.worn_surfaces(worn), place))) for place in new.positions(worn)]
+    return [
+        (place, new.solver(seen(new.worn_surfaces(worn), place))) for place in new.positions(worn)
+    ]
 
 
 def jumped(model, solved, jumps=1):
@@ -58,7 +60,10 @@ def test_each_way_acts_and_is_booked(way, solved):
 def test_what_scuffing_hands_over_is_what_the_other_gains(solved):
     model = ageing("scuffing")
     worn = jumped(model, solved)
-    taken = [worn.facts[f"scuffing.{body}.volume_m3"] / float(np.prod(model.surfaces.grid.extent)) for body in (1, 2)]
+    taken = [
+        worn.facts[f"scuffing.{body}.volume_m3"] / float(np.prod(model.surfaces.grid.extent))
+        for body in (1, 2)
+    ]
     assert min(taken) > 0.0
     volumes = [model.volume(np.full((2, 2), depth), body) for body, depth in enumerate(taken)]
     assert worn.mechanical[0] == pytest.approx(volumes[0] - 0.5 * volumes[1], rel=1e-9, abs=0.0)
@@ -73,7 +78,9 @@ def test_what_was_kept_goes_on_to_the_bit(solved):
     one, other = (model.jumped(worn, solved, SECONDS) for worn in (once, again))
     for body in (0, 1):
         np.testing.assert_array_equal(one.changed[body], other.changed[body])
-    np.testing.assert_array_equal(one.states["fatigue.2"]["damage"], other.states["fatigue.2"]["damage"])
+    np.testing.assert_array_equal(
+        one.states["fatigue.2"]["damage"], other.states["fatigue.2"]["damage"]
+    )
     assert one.facts == other.facts
 
 
@@ -91,10 +98,16 @@ def test_a_jump_is_no_longer_than_what_roughens_allows(solved):
 @pytest.mark.parametrize(
     ("way", "said"),
     [
-        ({"law": "tresca", "limit": "1 GPa"}, r"wear\.fatigue\.law must be one of dang-van, von-mises"),
+        (
+            {"law": "tresca", "limit": "1 GPa"},
+            r"wear\.fatigue\.law must be one of dang-van, von-mises",
+        ),
         ({"law": "dang-van"}, r"wear\.fatigue\.limit"),
         ({"law": "dang-van", "limit": "-1 GPa"}, "limit must be positive"),
-        ({"law": "dang-van", "limit": "1 GPa", "scatter": 2.0}, "fatigue scatter must lie between 0 and"),
+        (
+            {"law": "dang-van", "limit": "1 GPa", "scatter": 2.0},
+            "fatigue scatter must lie between 0 and",
+        ),
     ],
 )
 def test_what_a_case_may_not_state(way, said):

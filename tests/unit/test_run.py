@@ -9,11 +9,11 @@ import xarray
 import asperity.results.run as results
 from asperity import AsperityError, BadInput, Run, load_case, load_run, solve_case
 from asperity.cli.contact import run_table
+from asperity.core.quantities import NO_VALUE, catalogue, quantity
 from asperity.coupling import contact_vibration
-from asperity.ehl import OwnResonance, own_resonance
-from asperity.quantities import NO_VALUE, catalogue, quantity
 from asperity.report import write_report
 from asperity.results import SHORT_GROUPS
+from asperity.solution import OwnResonance, own_resonance
 
 MASS = {"mass": "0.5 kg", "damping_ratio": 0.02, "duration": "0.1 s"}
 SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
@@ -22,7 +22,9 @@ SMALL = {"grid.cells": [48, 48], "vibration": "none", "surface.sq": "0.5 um"}
 @pytest.fixture(scope="module")
 def run() -> Run:
     return solve_case(
-        load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8")).with_overrides(SMALL)
+        load_case(files("asperity.paper").joinpath("paper.toml").read_text("utf-8")).with_overrides(
+            SMALL
+        )
     )
 
 
@@ -31,12 +33,18 @@ def test_scalars_state_friction_heat_and_stress(run):
     parts = found["friction_asperity_part"] + found["friction_oil_part"]
     assert found["friction_coefficient"] == pytest.approx(parts)
     assert found["friction_asperity_part"] == pytest.approx(0.15 * found["clr"])
-    assert found["friction_power_w"] == pytest.approx(found["friction_coefficient"] * 500.0 * 0.2 * 1.91)
+    assert found["friction_power_w"] == pytest.approx(
+        found["friction_coefficient"] * 500.0 * 0.2 * 1.91
+    )
     assert 0.0 < found["flash_temperature_max_k"] < 200.0
     assert 0.3 * p_max < found["von_mises_max_pa"] < p_max
     assert 0.0 < found["von_mises_core_pa"] <= found["von_mises_max_pa"]
     assert found["von_mises_core_depth_m"] >= 0.1 * run.case.conditions.hertz.half_widths[0]
-    assert found["von_mises_max_pa"] / 2.0 <= found["shear_stress_max_pa"] <= found["von_mises_max_pa"] / np.sqrt(3.0)
+    assert (
+        found["von_mises_max_pa"] / 2.0
+        <= found["shear_stress_max_pa"]
+        <= found["von_mises_max_pa"] / np.sqrt(3.0)
+    )
 
 
 def test_scalars_state_the_contacts_own_stiffness_and_damping(run):
@@ -46,7 +54,11 @@ def test_scalars_state_the_contacts_own_stiffness_and_damping(run):
         shaken = solve_case(run.case.with_overrides({"vibration": MASS, "model": model}))
         found, own = shaken.scalars(), own_resonance(shaken.solution, 0.5)
         omega = 2.0 * np.pi * found["contact_resonance_hz"]
-        assert found["contact_stiffness_n_m"] == own.elastic.stiffness == pytest.approx(0.5 * omega**2, rel=0.02)
+        assert (
+            found["contact_stiffness_n_m"]
+            == own.elastic.stiffness
+            == pytest.approx(0.5 * omega**2, rel=0.02)
+        )
         assert found["contact_damping_ratio"] == pytest.approx(
             own.elastic.damping * omega / (2.0 * own.elastic.stiffness)
         )
@@ -66,7 +78,10 @@ def test_the_deviation_of_damping_is_of_one_further_surface(run):
     assert scalars["contact_damping_error"] == pytest.approx(
         2.91999 * np.sqrt(4.0 / 3.0) * np.std(found, ddof=1), rel=1e-5
     )
-    assert solve_case(run.case.with_overrides({"vibration": MASS})).scalars()["contact_damping_error"] is None
+    assert (
+        solve_case(run.case.with_overrides({"vibration": MASS})).scalars()["contact_damping_error"]
+        is None
+    )
 
 
 def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
@@ -74,7 +89,9 @@ def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
     case = run.case.with_overrides({"vibration": MASS})
     whole = solve_case(case, surfaces=2)
     with monkeypatch.context() as patched:
-        patched.setattr(OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to")))
+        patched.setattr(
+            OwnResonance, "virgin", property(lambda _: pytest.fail("shaken without being asked to"))
+        )
         short = solve_case(case, surfaces=2, groups=SHORT_GROUPS)
         found = short.scalars()
         least = solve_case(case, surfaces=2, groups=())
@@ -82,10 +99,17 @@ def test_only_what_is_asked_for_is_worked_out(run, tmp_path, monkeypatch):
     assert not {"clr", "crf_hz", "h_mean_m"} & set(least.scalars())
     virgin = {"contact_damping_ratio_virgin", "contact_stiffness_virgin_n_m"}
     assert set(whole.scalars()) - set(found) == virgin
-    assert all(found[key] == value for key, value in whole.scalars().items() if key not in virgin | {"seconds"})
+    assert all(
+        found[key] == value
+        for key, value in whole.scalars().items()
+        if key not in virgin | {"seconds"}
+    )
     back = load_run(short.save(tmp_path / "short.nc"))
     assert back.scalars() | dict.fromkeys(virgin) == back.scalars()
-    assert back.own_scalars["contact_damping_ratio_virgin"] == whole.own_scalars["contact_damping_ratio_virgin"]
+    assert (
+        back.own_scalars["contact_damping_ratio_virgin"]
+        == whole.own_scalars["contact_damping_ratio_virgin"]
+    )
 
 
 def test_where_the_virgin_contact_is_not_known_the_other_limit_stands(run, monkeypatch):
@@ -96,7 +120,10 @@ def test_where_the_virgin_contact_is_not_known_the_other_limit_stands(run, monke
     found = solve_case(run.case.with_overrides({"vibration": MASS})).summary()
     assert found["contact_damping_ratio_virgin"] is None
     assert found["contact_damping_ratio"] > 0.0
-    assert "no stiffness of virgin roughness: dynamic stiffness not found at 3000 Hz." in found["notes"][-1]
+    assert (
+        "no stiffness of virgin roughness: dynamic stiffness not found at 3000 Hz."
+        in found["notes"][-1]
+    )
 
 
 def test_each_surface_vibrates_once(run, monkeypatch):
@@ -109,11 +136,16 @@ def test_each_surface_vibrates_once(run, monkeypatch):
     monkeypatch.setattr(results, "contact_vibration", listening)
     several = solve_case(run.case.with_overrides({"vibration": MASS}), surfaces=3)
     assert len(heard) == 3
-    assert several.vibration.resonance == contact_vibration(*heard[0], solution=several.solution).resonance
+    assert (
+        several.vibration.resonance
+        == contact_vibration(*heard[0], solution=several.solution).resonance
+    )
 
 
 def test_what_cannot_be_shaken_is_said_on_the_page(run, tmp_path):
-    shaken = solve_case(run.case.with_overrides({"vibration": MASS, "model": "conserving", "surface": "flat"}))
+    shaken = solve_case(
+        run.case.with_overrides({"vibration": MASS, "model": "conserving", "surface": "flat"})
+    )
     assert shaken.scalars()["contact_stiffness_n_m"] is None
     page = write_report([shaken], tmp_path / "page.html").read_text("utf-8")
     assert "no stiffness and damping of the contact" in page
@@ -146,9 +178,13 @@ def test_a_kept_run_shows_its_maps_and_does_not_need_them(run, tmp_path):
             "von_mises": run.stress.largest,
             "von_mises_depth": run.stress.depth_of_largest,
         }.items():
-            np.testing.assert_allclose(kept[name], values, rtol=1e-6, atol=1e-6 * np.abs(values).max())
+            np.testing.assert_allclose(
+                kept[name], values, rtol=1e-6, atol=1e-6 * np.abs(values).max()
+            )
             assert kept[name].attrs["units"] in ("Pa", "K", "m")
-        np.testing.assert_allclose(kept["von_mises_section"].max(), run.stress.largest.max(), rtol=1e-6)
+        np.testing.assert_allclose(
+            kept["von_mises_section"].max(), run.stress.largest.max(), rtol=1e-6
+        )
         np.testing.assert_array_equal(kept["depth"], run.stress.depths)
         for key, value in run.scalars().items():
             if isinstance(value, float):
@@ -170,7 +206,9 @@ def test_what_cannot_settle_leaves_friction_out_and_keeps_the_rest(run, monkeypa
     lines = list(run_table(apart))
     assert lines[-1] == "  note: no friction: friction and temperature did not settle"
     title = quantity("friction_coefficient").title
-    assert next(line for line in lines if line.startswith(f"  {title}  ")).split("  ")[-1] == NO_VALUE
+    assert (
+        next(line for line in lines if line.startswith(f"  {title}  ")).split("  ")[-1] == NO_VALUE
+    )
     assert "shear" not in apart.to_dataset()
 
 
@@ -188,7 +226,9 @@ def test_the_command_line_prints_every_number_the_catalogue_has_for_a_table(run)
 def test_one_line_of_the_catalogue_brings_a_number_wherever_numbers_are(run, tmp_path):
     slope, name = run.state.contact_slope, "mean slope of touching cells"
     assert run.scalars()["contact_slope"] == slope
-    assert any(line.split("  ")[1:] and name in line and f"{slope:.3f}" in line for line in run_table(run))
+    assert any(
+        line.split("  ")[1:] and name in line and f"{slope:.3f}" in line for line in run_table(run)
+    )
     kept = run.save(tmp_path / "run.nc")
     with xarray.open_dataset(kept, engine="h5netcdf") as dataset:
         assert float(dataset["contact_slope"]) == slope

@@ -7,7 +7,7 @@ import pytest
 
 from asperity import BadInput
 from asperity.rating import flash_rise
-from asperity.wearing.scuffing import HotScuffing, LoadedScuffing
+from asperity.wear.scuffing import HotScuffing, LoadedScuffing
 from support.passages import hertz_patches, passage, track
 
 P_MAX, MU = 1e9, 0.1
@@ -16,8 +16,12 @@ P_MAX, MU = 1e9, 0.1
 def rubbed(**given):
     grid = track()
     patches = hertz_patches(grid, 50e-6, P_MAX, 4, friction=MU, asperities=1.0)
-    waves = 1e-4 * np.cos(0.1 * np.arange(grid.cells[0]))[:, None] + np.zeros(grid.cells)  # as rough as nothing matters
-    return passage(grid, patches, **({"removed": np.full(grid.cells, 1e-9), "heights": waves} | given))
+    waves = 1e-4 * np.cos(0.1 * np.arange(grid.cells[0]))[:, None] + np.zeros(
+        grid.cells
+    )  # as rough as nothing matters
+    return passage(
+        grid, patches, **({"removed": np.full(grid.cells, 1e-9), "heights": waves} | given)
+    )
 
 
 def test_below_the_limit_is_exactly_nothing():
@@ -40,7 +44,10 @@ def test_removal_jumps_by_the_factor_and_the_volume_is_shared():
     jump = rubbed()
     change = LoadedScuffing(limit=0.25 * MU * P_MAX**2, factor=1000.0, transfer=0.3)(jump)
     load = sum(patch.asperity_pressure for patch in jump.patches)
-    hot = sum(np.where(patch.pressure > 0.5 * P_MAX, patch.asperity_pressure, 0.0) for patch in jump.patches)
+    hot = sum(
+        np.where(patch.pressure > 0.5 * P_MAX, patch.asperity_pressure, 0.0)
+        for patch in jump.patches
+    )
     expected = 999.0 * np.divide(hot, load, out=np.zeros_like(load), where=load > 0.0) * 1e-9
     np.testing.assert_allclose(-change.heights_change, expected, rtol=1e-12)
     np.testing.assert_array_equal(change.transferred, -0.3 * change.heights_change)
@@ -56,7 +63,9 @@ def test_scuffing_takes_a_tenth_of_sq_and_then_the_contact_is_asked_again():
     assert -slow.heights_change.min() < 0.1 * sq
     assert -fast.heights_change.min() == pytest.approx(0.1 * sq, rel=1e-9)
     assert fast.longest == pytest.approx(slow.longest / 1000.0, rel=1e-9)
-    assert fast.longest / 1e5 == pytest.approx(0.1 * sq / (-slow.heights_change.min() * 1000.0), rel=1e-9)
+    assert fast.longest / 1e5 == pytest.approx(
+        0.1 * sq / (-slow.heights_change.min() * 1000.0), rel=1e-9
+    )
     assert LoadedScuffing(limit=1e30)(rubbed()).longest == np.inf
 
 
@@ -65,7 +74,10 @@ def test_a_smooth_bodys_jumps_are_counted_against_the_film():
     scuffing = LoadedScuffing(limit=0.25 * MU * P_MAX**2)
     smooth = rubbed(heights=np.zeros(track().cells), removed=np.full(track().cells, 1e-6))
     assert -scuffing(smooth).heights_change.min() == pytest.approx(0.1 * 0.5e-6, rel=1e-9, abs=0.0)
-    dry = replace(smooth, patches=tuple(replace(patch, film=np.zeros_like(patch.film)) for patch in smooth.patches))
+    dry = replace(
+        smooth,
+        patches=tuple(replace(patch, film=np.zeros_like(patch.film)) for patch in smooth.patches),
+    )
     assert -scuffing(dry).heights_change.min() == pytest.approx(0.1 * 1e-8, rel=1e-9, abs=0.0)
 
 

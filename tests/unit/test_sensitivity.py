@@ -11,11 +11,11 @@ import pytest
 
 from asperity import load_case
 from asperity.cli import main
-from asperity.errors import AsperityError, BadInput
+from asperity.core.errors import AsperityError, BadInput
 from asperity.study import ParameterRange, global_sensitivity, sensitivity
 from asperity.study.global_sensitivity import knee
-from asperity.study.indices import indices, sample_design
 from asperity.study.ranges import LENGTH_KEY, OPEN_RANGES, open_ranges, overrides_at, parse_range
+from asperity.study.sensitivity_indices import indices, sample_design
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 SMALL = {"surface.correlation_length": "60 um", "vibration.duration": "1 s"}
@@ -36,14 +36,20 @@ def test_sobol_indices_of_ishigami():
     """sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1: T. Ishigami, T. Homma, ISUMA '90, in closed form."""
     design = sample_design("sobol", 3, 2048)
     x = np.pi * (2.0 * design.shares - 1.0)
-    found = indices(design, np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0]))
+    found = indices(
+        design, np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+    )
     a, b = 7.0, 0.1
     first = 0.5 * (1.0 + b * np.pi**4 / 5.0) ** 2
     second, mixed = a**2 / 8.0, 8.0 * b**2 * np.pi**8 / 225.0
     whole = first + second + mixed
     assert found["s1"] == pytest.approx([first / whole, second / whole, 0.0], abs=0.02)
-    assert found["st"] == pytest.approx([(first + mixed) / whole, second / whole, mixed / whole], abs=0.02)
-    assert (np.abs(found["s1"] - [first / whole, second / whole, 0.0]) <= 2.0 * found["s1_conf"]).all()
+    assert found["st"] == pytest.approx(
+        [(first + mixed) / whole, second / whole, mixed / whole], abs=0.02
+    )
+    assert (
+        np.abs(found["s1"] - [first / whole, second / whole, 0.0]) <= 2.0 * found["s1_conf"]
+    ).all()
 
 
 def test_morris_effects_of_a_line_are_its_slopes_and_of_a_product_scatter():
@@ -74,7 +80,9 @@ def test_a_failed_point_takes_its_block_with_it_and_no_more(method):
 
 def test_an_outcome_that_nothing_moves_has_no_effects():
     design = sample_design("sobol", 2, 4)
-    assert all((values == 0.0).all() for values in indices(design, np.ones(len(design.shares))).values())
+    assert all(
+        (values == 0.0).all() for values in indices(design, np.ones(len(design.shares))).values()
+    )
 
 
 def test_rounding_is_no_effect_and_counts_for_no_factor(paper, threads):
@@ -88,9 +96,17 @@ def test_rounding_is_no_effect_and_counts_for_no_factor(paper, threads):
         }
     )
     found = sensitivity(
-        dry, vary=["contact.load=200 N..800 N"], size=2, sq=[1e-6], levels=0, cells=24, executor=threads
+        dry,
+        vary=["contact.load=200 N..800 N"],
+        size=2,
+        sq=[1e-6],
+        levels=0,
+        cells=24,
+        executor=threads,
     )
-    assert found.spread("clr at 1 um") == pytest.approx((1.0, 1.0), abs=1e-12)  # all load on asperities, to rounding
+    assert found.spread("clr at 1 um") == pytest.approx(
+        (1.0, 1.0), abs=1e-12
+    )  # all load on asperities, to rounding
     assert (found.ranking("clr at 1 um")["mu_star"] == 0.0).all()
     assert found.overall().sum() == pytest.approx(1.0)  # of CAR alone
     assert "CLR at Sq 1 um from 100 to 100 % (moved by none of them)" in found.verdict()
@@ -148,7 +164,9 @@ def test_only_what_the_case_has_is_varied_and_lengths_fit_its_grid(paper):
     gone = {"lubricant.viscosity.alpha", "vibration.cutoff_exponent", "vibration.cutoff_reference"}
     assert [entry.key for entry in open_ranges(dry)] == [key for key in every if key not in gone]
     small = paper.with_overrides({"grid.cells": [32, 32], "grid.y": [-0.6, 0.6]})
-    lengths = next(entry for entry in open_ranges(small) if entry.key == "surface.correlation_length")
+    lengths = next(
+        entry for entry in open_ranges(small) if entry.key == "surface.correlation_length"
+    )
     for share in (0.0, 1.0):
         for inlet in (-4.5, -1.9):
             small.with_overrides(
@@ -162,7 +180,9 @@ def test_no_length_of_a_carried_range_is_refused_for_its_rounding(cells):
     ranges = open_ranges(case)
     for share in (0.0, 1.0):
         for inlet in np.linspace(0.0, 1.0, 7):
-            shares = [{LENGTH_KEY: share, "grid.x[0]": inlet}.get(entry.key, 0.5) for entry in ranges]
+            shares = [
+                {LENGTH_KEY: share, "grid.x[0]": inlet}.get(entry.key, 0.5) for entry in ranges
+            ]
             case.with_overrides(overrides_at(case, ranges, shares)).surface()
 
 
@@ -171,13 +191,17 @@ def test_an_end_of_a_domain_that_the_case_leaves_to_be_chosen_is_not_varied():
     assert "grid.x[0]" not in [entry.key for entry in open_ranges(case)]
 
 
-def test_ranges_of_which_nothing_would_be_left_are_refused_before_anything_is_solved(paper, monkeypatch):
+def test_ranges_of_which_nothing_would_be_left_are_refused_before_anything_is_solved(
+    paper, monkeypatch
+):
     def never(*_, **__):
         raise AssertionError("solved")
 
     monkeypatch.setattr("asperity.study.global_sensitivity.run_study", never)
     lengths = ParameterRange("surface.correlation_length", 1.0, 1.5, "um")  # on cells of 6 um
-    with pytest.raises(BadInput, match=r"correlation length along x must be at least 2 cells.*; narrow the ranges"):
+    with pytest.raises(
+        BadInput, match=r"correlation length along x must be at least 2 cells.*; narrow the ranges"
+    ):
         sensitivity(paper, vary=[lengths], sq=[1e-6], levels=0, cells=64)
 
 
@@ -192,7 +216,9 @@ def test_why_contacts_failed_is_said_where_too_many_did(paper, threads, monkeypa
     monkeypatch.setattr(global_sensitivity, "run_study", failing)
     hardness = ParameterRange("material.hardness", 1.0, 2.0, "GPa")
     case = paper.with_overrides({**SMALL, "lubricant": "none"})
-    with pytest.raises(AsperityError, match="curves; the first: the roller is square; narrow the ranges"):
+    with pytest.raises(
+        AsperityError, match="curves; the first: the roller is square; narrow the ranges"
+    ):
         sensitivity(case, vary=[hardness], sq=[1e-6], levels=0, cells=32, size=2, executor=threads)
 
 
@@ -200,7 +226,14 @@ def test_the_cutoff_moves_crfa_by_its_cube_and_nothing_else(paper, threads, tmp_
     """Noise of one height behind a second-order low pass far below the resonance: CRFA ~ fc³."""
     case = paper.with_overrides(SMALL)
     ranges = ["vibration.cutoff_reference=10 Hz..40 Hz", "material.hardness=0.7 GPa..3 GPa"]
-    settings = {"vary": ranges, "size": 3, "sq": [1e-6, 3e-6], "levels": 0, "cells": 32, "out": tmp_path / "study"}
+    settings = {
+        "vary": ranges,
+        "size": 3,
+        "sq": [1e-6, 3e-6],
+        "levels": 0,
+        "cells": 32,
+        "out": tmp_path / "study",
+    }
     found = sensitivity(case, **settings, executor=threads)
     assert found.factors == ("vibration.cutoff_reference", "material.hardness", "seed")
     effect = found.effects.set_index(["outcome", "factor"])["mu_star"]
@@ -212,7 +245,9 @@ def test_the_cutoff_moves_crfa_by_its_cube_and_nothing_else(paper, threads, tmp_
         assert effect[f"car at {sq}", "material.hardness"] > 0.02
         assert effect[f"clr at {sq}", "seed"] > 1e-3
     assert found.ranking("car at 3 um")["factor"].iloc[0] != "vibration.cutoff_reference"
-    assert found.effects.groupby("outcome")["share"].sum().to_numpy() == pytest.approx(np.ones(len(found.outcomes)))
+    assert found.effects.groupby("outcome")["share"].sum().to_numpy() == pytest.approx(
+        np.ones(len(found.outcomes))
+    )
     assert "vibration.cutoff_reference" in found.verdict()
     json.dumps(found.scalars(), allow_nan=False)
 
@@ -225,8 +260,13 @@ def test_the_seed_of_a_trajectory_changes_once(paper, threads):
     """Along a trajectory of Morris the surface changes at the seed's step and at no other."""
     found = sensitivity(
         paper.with_overrides({**SMALL, "vibration": "none"}),
-        vary=["material.hardness=1 GPa..3 GPa"], size=4, sq=[2e-6], levels=0, cells=32, executor=threads,
-    )  # fmt: skip
+        vary=["material.hardness=1 GPa..3 GPa"],
+        size=4,
+        sq=[2e-6],
+        levels=0,
+        cells=32,
+        executor=threads,
+    )
     seeds = found.result.table["surface.seed"].to_numpy().reshape(4, 3)
     places = found.values["seed"].to_numpy().reshape(4, 3)
     assert ((np.diff(seeds) != 0) == (np.diff(places) != 0.0)).all()
@@ -283,23 +323,48 @@ def test_without_salib_a_sentence_says_what_to_install(paper, monkeypatch):
 def test_the_command_prints_its_verdict_first_and_draws(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     arguments = [
-        "sensitivity", str(PAPER), "--vary", "material.hardness=1 GPa..3 GPa", "--trajectories", "2", "--sq", "1 um",
-        "--levels", "0", "--cells", "32", "--workers", "1", "--set", "vibration.duration=1 s",
-        "--set", "surface.correlation_length=60 um",
-        "--out", "kept", "--figure", "effects.pdf",
-    ]  # fmt: skip
+        "sensitivity",
+        str(PAPER),
+        "--vary",
+        "material.hardness=1 GPa..3 GPa",
+        "--trajectories",
+        "2",
+        "--sq",
+        "1 um",
+        "--levels",
+        "0",
+        "--cells",
+        "32",
+        "--workers",
+        "1",
+        "--set",
+        "vibration.duration=1 s",
+        "--set",
+        "surface.correlation_length=60 um",
+        "--out",
+        "kept",
+        "--figure",
+        "effects.pdf",
+    ]
     with pytest.raises(SystemExit) as end:
         main(arguments)
     out, err = capsys.readouterr()
     assert (end.value.code or 0, err) == (0, "")
     assert out.splitlines()[0].startswith("Over the ranges")
     assert Path("effects.pdf").read_bytes().startswith(b"%PDF")
-    assert Path("kept/effects.csv").read_text("utf-8").startswith("outcome,quantity,sq_m,factor,mu,mu_star")
+    assert (
+        Path("kept/effects.csv")
+        .read_text("utf-8")
+        .startswith("outcome,quantity,sq_m,factor,mu,mu_star")
+    )
     with pytest.raises(SystemExit):
         main([*arguments, "--json"])
     said = json.loads(capsys.readouterr().out)
     assert said["verdict"] == out.splitlines()[0]
-    assert {row["factor"] for row in said["outcomes"][0]["effects"]} == {"material.hardness", "seed"}
+    assert {row["factor"] for row in said["outcomes"][0]["effects"]} == {
+        "material.hardness",
+        "seed",
+    }
 
 
 @pytest.mark.parametrize(

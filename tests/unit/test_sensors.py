@@ -6,13 +6,23 @@ import numpy as np
 import pytest
 from benchmarks.sensors import BAND, FREQUENCY, NINETY, TRUTH, two_sensors
 
-from asperity.errors import BadInput
-from asperity.wear import DISAGREE, learn_sensors, line_shape, no_resonance, resonances_of_sensors
-from asperity.wear.sensors import _Together
+from asperity.core.errors import BadInput
+from asperity.resonance import (
+    DISAGREE,
+    learn_sensors,
+    line_shape,
+    no_resonance,
+    resonances_of_sensors,
+)
+from asperity.resonance.sensors import _Together
 
 
 def pulls(told):
-    return [(one.crf_hz - true) / one.crf_std for one, true in zip(told.resonances, TRUTH, strict=True) if one.found]
+    return [
+        (one.crf_hz - true) / one.crf_std
+        for one, true in zip(told.resonances, TRUTH, strict=True)
+        if one.found
+    ]
 
 
 def test_a_line_on_both_is_found_and_held_as_often_as_the_interval_says():
@@ -31,8 +41,14 @@ def test_an_interval_narrows_by_what_is_independent_and_not_by_a_copy():
     told = resonances_of_sensors(sensors, band_hz=BAND)
     alone = resonances_of_sensors({"a": sensors["a"]}, band_hz=BAND)
     copied = resonances_of_sensors({"a": sensors["a"], "b": sensors["a"]}, band_hz=BAND)
-    narrower = [one.crf_std / other.crf_std for one, other in zip(told.resonances, alone.resonances, strict=True)]
-    as_wide = [one.crf_std / other.crf_std for one, other in zip(copied.resonances, alone.resonances, strict=True)]
+    narrower = [
+        one.crf_std / other.crf_std
+        for one, other in zip(told.resonances, alone.resonances, strict=True)
+    ]
+    as_wide = [
+        one.crf_std / other.crf_std
+        for one, other in zip(copied.resonances, alone.resonances, strict=True)
+    ]
     assert np.median(narrower) < 0.9
     assert np.median(as_wide) == pytest.approx(1.0, abs=0.02)
     assert told.common < 0.5 < 0.95 < copied.common
@@ -48,7 +64,9 @@ def test_a_line_too_weak_for_either_sensor_is_found_by_both():
 def test_a_mode_that_moves_on_one_sensor_is_never_the_contacts():
     """Three series here, forty in benchmarks/sensors.py."""
     for seed in range(3):
-        told = resonances_of_sensors(two_sensors(seed, heights=(0.0, 0.0), moving=True), band_hz=BAND)
+        told = resonances_of_sensors(
+            two_sensors(seed, heights=(0.0, 0.0), moving=True), band_hz=BAND
+        )
         assert all(one.found for one in told.alone["a"])
         assert not any(one.found for one in told.resonances)
         assert "heard on a only, not on b" in told.resonances[0].reason
@@ -72,7 +90,9 @@ def test_a_sensor_without_spectra_leaves_the_others_word():
 
 def test_where_sensors_have_agreed_one_of_them_is_enough_for_a_recording():
     sensors = two_sensors(4)
-    told = resonances_of_sensors({"a": sensors["a"], "b": [*sensors["b"][:9], None, None, None]}, band_hz=BAND)
+    told = resonances_of_sensors(
+        {"a": sensors["a"], "b": [*sensors["b"][:9], None, None, None]}, band_hz=BAND
+    )
     assert told.heard_on == (("a", "b"),) * 9 + (("a",),) * 3
     assert told.resonances[10].reason.endswith("here on a only")
     deaf = [replace(one, density=np.ones_like(one.density)) for one in sensors["b"]]
@@ -82,9 +102,15 @@ def test_where_sensors_have_agreed_one_of_them_is_enough_for_a_recording():
 
 def test_a_spectrum_without_vibration_is_one_that_its_sensor_does_not_have():
     sensors = two_sensors(4)
-    dead = [*sensors["b"][:9], replace(sensors["b"][9], density=np.zeros_like(FREQUENCY)), *sensors["b"][10:]]
+    dead = [
+        *sensors["b"][:9],
+        replace(sensors["b"][9], density=np.zeros_like(FREQUENCY)),
+        *sensors["b"][10:],
+    ]
     told = resonances_of_sensors({"a": sensors["a"], "b": dead}, band_hz=BAND)
-    without = resonances_of_sensors({"a": sensors["a"], "b": [*dead[:9], None, *dead[10:]]}, band_hz=BAND)
+    without = resonances_of_sensors(
+        {"a": sensors["a"], "b": [*dead[:9], None, *dead[10:]]}, band_hz=BAND
+    )
     assert [one.crf_hz for one in told.resonances] == [one.crf_hz for one in without.resonances]
     assert told.heard_on[9] == ("a",)
     assert "no vibration at all" in told.alone["b"][9].reason
@@ -93,13 +119,21 @@ def test_a_spectrum_without_vibration_is_one_that_its_sensor_does_not_have():
 def test_a_sensor_that_was_moved_parts_the_series_of_all():
     """The same recordings four times, behind the second time with b's line through another structure."""
     once = two_sensors(9)
-    assert learn_sensors({name: 4 * every for name, every in once.items()}, band_hz=BAND)[0].moved == ()
+    assert (
+        learn_sensors({name: 4 * every for name, every in once.items()}, band_hz=BAND)[0].moved
+        == ()
+    )
     mode = 1.0 + 0.04j / (1.0 - (FREQUENCY / 3300.0) ** 2 + 0.04j * FREQUENCY / 3300.0)
     elsewhere = [
-        replace(one, density=one.density + 0.5 * (np.abs(mode) ** 2 - 1.0) * line_shape(FREQUENCY, f0, 0.02))
+        replace(
+            one,
+            density=one.density + 0.5 * (np.abs(mode) ** 2 - 1.0) * line_shape(FREQUENCY, f0, 0.02),
+        )
         for one, f0 in zip(once["b"], TRUTH, strict=True)
     ]
-    told, shared = learn_sensors({"a": 4 * once["a"], "b": [*2 * once["b"], *2 * elsewhere]}, band_hz=BAND)
+    told, shared = learn_sensors(
+        {"a": 4 * once["a"], "b": [*2 * once["b"], *2 * elsewhere]}, band_hz=BAND
+    )
     assert told.moved == ((24, "b"),)
     assert len(told.resonances) == len(told.alone["b"]) == 4 * TRUTH.size
     assert shared.lines({"a": once["a"][-1:], "b": elsewhere[-1:]}).resonances[0].found
@@ -130,6 +164,10 @@ def test_heights_stay_those_of_one_sensor_whoever_is_named_first_later():
 def test_a_line_that_the_first_sensor_does_not_hear_has_no_height():
     two, other = two_sensors(100, size=0.3), two_sensors(5, heights=(0.0, 0.0))
     told = resonances_of_sensors({"deaf": other["a"], **two}, band_hz=BAND)
-    found = [one for one, names in zip(told.resonances, told.heard_on, strict=True) if "deaf" not in names and names]
+    found = [
+        one
+        for one, names in zip(told.resonances, told.heard_on, strict=True)
+        if "deaf" not in names and names
+    ]
     assert found
     assert all(np.isnan(one.crfa) and np.isnan(one.crfa_std) for one in found)

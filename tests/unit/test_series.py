@@ -3,10 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.signals import Spectrum
-from asperity.wear import learn_series, series_resonances
-from asperity.wear.expected import (
+from asperity.core.errors import BadInput
+from asperity.core.signals import Spectrum
+from asperity.resonance import learn_series, series_resonances
+from asperity.resonance.resonance import line_shape
+from asperity.resonance.separation import _lifted, _scored, separate
+from asperity.resonance.series import JudgedLine, objection_to, separated
+from asperity.resonance.spectrum_model import (
     Blocks,
     Parameters,
     away,
@@ -16,10 +19,7 @@ from asperity.wear.expected import (
     own_at,
     point_at,
 )
-from asperity.wear.resonance import line_shape
-from asperity.wear.separation import _lifted, _scored, separate
-from asperity.wear.series import JudgedLine, objection_to, separated
-from asperity.wear.transfer import through
+from asperity.resonance.transfer import through
 
 BAND = (1800.0, 4000.0)
 FREQUENCY = np.arange(0.0, 6000.0, 1.0)
@@ -65,7 +65,9 @@ def test_the_moving_line_is_told_from_standing_modes_as_high():
     assert np.max(np.abs(errors)) < 3.0
     assert [one.crfa for one in found] == pytest.approx(np.full(TRUTH.size, 0.7), rel=0.1)
     fooled = series_resonances(series(), band_hz=BAND, method="peak")
-    assert np.mean([abs(one.crf_hz - f) > 100.0 for one, f in zip(fooled, TRUTH, strict=True)]) > 0.5
+    assert (
+        np.mean([abs(one.crf_hz - f) > 100.0 for one, f in zip(fooled, TRUTH, strict=True)]) > 0.5
+    )
 
 
 def test_a_further_recording_is_judged_beside_what_others_have_settled():
@@ -75,13 +77,20 @@ def test_a_further_recording_is_judged_beside_what_others_have_settled():
     together = series_resonances(spectra, band_hz=BAND)
     first, shared, moved = learn_series(spectra[:40], band_hz=BAND)
     assert moved == ()
-    assert [one.crf_hz for one in first] == [one.crf_hz for one in series_resonances(spectra[:40], band_hz=BAND)]
+    assert [one.crf_hz for one in first] == [
+        one.crf_hz for one in series_resonances(spectra[:40], band_hz=BAND)
+    ]
     beside = shared.resonances(spectra[40:])
-    pulls = [(one.crf_hz - all_.crf_hz) / all_.crf_std for one, all_ in zip(beside, together[40:], strict=True)]
+    pulls = [
+        (one.crf_hz - all_.crf_hz) / all_.crf_std
+        for one, all_ in zip(beside, together[40:], strict=True)
+    ]
     assert np.max(np.abs(pulls)) < 1.0
     errors = [(one.crf_hz - f) / one.crf_std for one, f in zip(beside, truth[40:], strict=True)]
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
-    assert [one.crf_std for one in beside] == pytest.approx([one.crf_std for one in together[40:]], rel=0.3)
+    assert [one.crf_std for one in beside] == pytest.approx(
+        [one.crf_std for one in together[40:]], rel=0.3
+    )
     (silent,) = shared.resonances(series(0.0, truth=truth[:1], seed=6))
     assert not silent.found
     with pytest.raises(BadInput, match="not of this series"):
@@ -103,7 +112,12 @@ def fit_of_seven():
     centre = np.linspace(2000.0, 4000.0, 50)
     blocks = Blocks(centre, rng.gamma(5.0, 0.2, (7, 50)), np.full((7, 50), 30.0))
     own = np.column_stack(
-        [rng.normal(0, 1, 7), np.log(rng.uniform(2500, 3500, 7)), rng.normal(-4, 0.3, 7), rng.normal(0, 1, 7)]
+        [
+            rng.normal(0, 1, 7),
+            np.log(rng.uniform(2500, 3500, 7)),
+            rng.normal(-4, 0.3, 7),
+            rng.normal(0, 1, 7),
+        ]
     )
     passed = through(1900.0, 4100.0)
     passed = passed._replace(coefficients=rng.normal(0.0, 0.3, passed.coefficients.size))
@@ -117,19 +131,27 @@ def test_the_score_is_the_slope_of_the_cost(fit_of_seven):
     for row, column in ((0, 0), (3, 1), (5, 2), (6, 3)):
         shift = np.zeros_like(own)
         shift[row, column] = d
-        up, down = (np.sum(costs_at(blocks, at._replace(own=own + side * shift))) for side in (1.0, -1.0))
+        up, down = (
+            np.sum(costs_at(blocks, at._replace(own=own + side * shift))) for side in (1.0, -1.0)
+        )
         slope = (up - down) / (2 * d)
         assert point.own_score[row, column] == pytest.approx(-slope, rel=1e-4, abs=1e-3)
     shift = np.zeros(50)
     shift[20] = d
-    up, down = (np.sum(costs_at(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0))
+    up, down = (
+        np.sum(costs_at(blocks, at._replace(base=at.base + side * shift))) for side in (1.0, -1.0)
+    )
     assert point.base_score[20] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
     for number in (0, 7, 30):
         shift = np.zeros(passed.coefficients.size)
         shift[number] = d
-        ends = [passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)]
+        ends = [
+            passed._replace(coefficients=passed.coefficients + side * shift) for side in (1.0, -1.0)
+        ]
         up, down = (np.sum(costs_at(blocks, at._replace(transfer=end))) for end in ends)
-        assert point.passed_score[number] == pytest.approx(-(up - down) / (2 * d), rel=1e-4, abs=1e-3)
+        assert point.passed_score[number] == pytest.approx(
+            -(up - down) / (2 * d), rel=1e-4, abs=1e-3
+        )
 
 
 def test_lines_beside_what_is_settled_are_those_of_the_whole_fit(fit_of_seven):
@@ -139,7 +161,9 @@ def test_lines_beside_what_is_settled_are_those_of_the_whole_fit(fit_of_seven):
     alone = own_at(blocks, at)
     np.testing.assert_array_equal(alone.score, whole.own_score)
     np.testing.assert_array_equal(alone.information, whole.own_information)
-    np.testing.assert_allclose(alone.passed(blocks.centre, at), whole.passed_own, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(
+        alone.passed(blocks.centre, at), whole.passed_own, rtol=1e-12, atol=1e-9
+    )
     np.testing.assert_array_equal(lines(blocks.centre, at), lines_and_slopes(blocks.centre, at)[0])
     level, f0, damping = (np.exp(at.own[:, column, None]) for column in range(3))
     apart = np.exp(away(blocks.centre, at) @ at.transfer.coefficients)
@@ -174,7 +198,11 @@ def test_where_nothing_moves_nothing_is_found():
 
 
 def test_a_line_that_keeps_its_place_is_found_by_its_changing_share_and_has_no_exact_height():
-    found = [one for one in series_resonances(series(truth=np.full(12, 3100.0)), band_hz=BAND) if one.found]
+    found = [
+        one
+        for one in series_resonances(series(truth=np.full(12, 3100.0)), band_hz=BAND)
+        if one.found
+    ]
     assert found
     for one in found:
         assert abs(one.crf_hz - 3100.0) < 4.0 * one.crf_std
@@ -211,8 +239,16 @@ def test_the_fitted_curve_is_the_spectrum():
     [
         (lambda: series()[:5], "joint", "at least 6 recordings"),
         (lambda: series(), "loudest", "series method"),
-        (lambda: [*series()[:6], replace(series()[0], frequency_hz=2 * FREQUENCY)], "joint", "same lines"),
-        (lambda: [*series()[:6], replace(series()[0], density=0 * FREQUENCY)], "joint", "no vibration"),
+        (
+            lambda: [*series()[:6], replace(series()[0], frequency_hz=2 * FREQUENCY)],
+            "joint",
+            "same lines",
+        ),
+        (
+            lambda: [*series()[:6], replace(series()[0], density=0 * FREQUENCY)],
+            "joint",
+            "no vibration",
+        ),
         (lambda: [replace(one, smoothing_passes=3) for one in series()], "joint", "unsmoothed"),
     ],
 )
@@ -250,7 +286,9 @@ def test_of_a_long_series_some_settle_what_all_share():
     ],
 )
 def test_every_line_that_is_not_the_contacts_is_refused_with_its_reason(changes, words):
-    line = JudgedLine(f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0)
+    line = JudgedLine(
+        f0=2800.0, f0_std=2.0, damping=0.02, evidence=50.0, misfit=0.05, rival=2300.0, lead=40.0
+    )
     said = objection_to(line._replace(**changes), BAND)
     assert said is None if words is None else words in said
 
@@ -260,10 +298,15 @@ def through_structures(seed, *, moved):
     truth = np.tile(np.linspace(2700.0, 3700.0, 12), 2)
     ways = []
     for at, height in ((3000.0, 1.5), (3350.0, -0.8)):
-        passed = 1.0 + height * 2j * 0.02 / (1.0 - (FREQUENCY / at) ** 2 + 2j * 0.02 * FREQUENCY / at)
+        passed = 1.0 + height * 2j * 0.02 / (
+            1.0 - (FREQUENCY / at) ** 2 + 2j * 0.02 * FREQUENCY / at
+        )
         ways.append(np.abs(passed) ** 2)
     first = series(truth=truth[:12], passed=ways[0], seed=seed)
-    return [*first, *series(truth=truth[12:], passed=ways[1 if moved else 0], seed=100 + seed)], truth
+    return [
+        *first,
+        *series(truth=truth[12:], passed=ways[1 if moved else 0], seed=100 + seed),
+    ], truth
 
 
 def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
@@ -274,7 +317,9 @@ def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
     errors = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(found, truth, strict=True)])
     assert np.sqrt(np.mean(errors**2)) < 1.5
     whole = separated(spectra, band_hz=BAND).resonances
-    together = np.array([(one.crf_hz - f) / one.crf_std for one, f in zip(whole, truth, strict=True)])
+    together = np.array(
+        [(one.crf_hz - f) / one.crf_std for one, f in zip(whole, truth, strict=True)]
+    )
     assert np.sqrt(np.mean(together**2)) > 2.0
     (beside,) = shared.resonances(spectra[-1:])  # what is learned is the last part's
     assert beside.crf_hz == pytest.approx(found[-1].crf_hz, abs=found[-1].crf_std)
@@ -284,7 +329,10 @@ def test_a_moved_sensor_is_told_and_each_part_has_its_own_transfer():
 
 def test_a_louder_sensor_and_modes_that_drift_have_not_moved():
     spectra, _ = through_structures(2, moved=False)
-    louder = [replace(one, density=(2.0 if i >= 12 else 1.0) * one.density) for i, one in enumerate(spectra)]
+    louder = [
+        replace(one, density=(2.0 if i >= 12 else 1.0) * one.density)
+        for i, one in enumerate(spectra)
+    ]
     assert learn_series(louder, band_hz=BAND).moved == ()
     drifting = [
         replace(one, density=np.interp(FREQUENCY / (1.0 + 1e-4 * number), FREQUENCY, one.density))
@@ -301,6 +349,8 @@ def test_a_base_that_was_nil_below_a_line_comes_back():
     base = settled.parameters.base.copy()
     base[below - 20 : below + 20] = -60.0
     nil = settled.parameters._replace(base=base)
-    stays, comes_back = (_scored(blocks, start, settled.pace) for start in (nil, _lifted(blocks, nil)))
+    stays, comes_back = (
+        _scored(blocks, start, settled.pace) for start in (nil, _lifted(blocks, nil))
+    )
     assert comes_back.cost == pytest.approx(settled.cost, abs=1.0)
     assert stays.cost > settled.cost + 100.0

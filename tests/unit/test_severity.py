@@ -6,18 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.core.signals import Signal, power_spectrum
+from asperity.monitoring import track_recordings
 from asperity.rating import severity_zone, velocity_rms
 from asperity.recording import read_recording
-from asperity.signals import Signal, power_spectrum
-from asperity.tracking import track_recordings
 from asperity.vibration import Envelope
 
 RATE = 20e3
 
 
 @pytest.mark.parametrize(
-    ("hertz", "within"), [(10.5, 0.06), (12.5, 0.03), (25.0, 0.01), (50.0, 3e-3), (300.0, 2e-3), (990.0, 2e-3)]
+    ("hertz", "within"),
+    [(10.5, 0.06), (12.5, 0.03), (25.0, 0.01), (50.0, 3e-3), (300.0, 2e-3), (990.0, 2e-3)],
 )
 def test_velocity_of_a_tone_is_acceleration_over_angular_frequency(hertz, within):
     time = np.arange(round(10 * RATE)) / RATE
@@ -40,7 +41,11 @@ def test_velocity_is_not_told_by_coarse_lines_or_a_low_rate():
 
 
 @pytest.mark.parametrize(
-    ("machine", "mm_s", "zone"),  # ISO 10816-3:2009, tables A.1 and A.2, which ISO 20816-3:2022 has taken over
+    (
+        "machine",
+        "mm_s",
+        "zone",
+    ),  # ISO 10816-3:2009, tables A.1 and A.2, which ISO 20816-3:2022 has taken over
     [
         ("large-rigid", (2.2, 2.4, 4.4, 4.6, 7.0, 7.2), "ABBCCD"),
         ("large-flexible", (3.4, 3.6, 7.0, 7.2, 10.9, 11.1), "ABBCCD"),
@@ -100,13 +105,20 @@ def recordings(folder, velocities, depths, seconds=2.0, **stated):
 @pytest.mark.parametrize(
     ("velocity", "zone", "state", "said"),
     [
-        (8e-3, "D", "alarm", "velocity 8 mm/s rms, 10 to 1000 Hz: zone D of ISO 20816-3 (large-rigid), severe enough"),
+        (
+            8e-3,
+            "D",
+            "alarm",
+            "velocity 8 mm/s rms, 10 to 1000 Hz: zone D of ISO 20816-3 (large-rigid), severe enough",
+        ),
         (6e-3, "C", "cannot-tell", "These recordings cannot tell"),
         (3e-3, "B", "cannot-tell", "These recordings cannot tell"),
     ],
 )
 def test_a_zone_raises_what_the_standard_says(tmp_path, velocity, zone, state, said):
-    folder = recordings(tmp_path / "in", [velocity] * 3, [0.0] * 3, seconds=4.0, machine_class="large-rigid")
+    folder = recordings(
+        tmp_path / "in", [velocity] * 3, [0.0] * 3, seconds=4.0, machine_class="large-rigid"
+    )
     track = track_recordings([folder], band_hz=(2000.0, 4000.0))
     assert {recording.zone for recording in track.recordings} == {zone}
     assert track.alarm.state == state
@@ -121,7 +133,9 @@ def test_a_zone_raises_what_the_standard_says(tmp_path, velocity, zone, state, s
 
 def test_zone_d_alarms_though_it_has_gone_since(tmp_path):
     velocities = [1e-3, 9e-3, 9e-3, 1e-3, 1e-3]
-    folder = recordings(tmp_path / "in", velocities, [0.0] * 5, seconds=4.0, machine_class="large-rigid")
+    folder = recordings(
+        tmp_path / "in", velocities, [0.0] * 5, seconds=4.0, machine_class="large-rigid"
+    )
     track = track_recordings([folder], band_hz=(2000.0, 4000.0))
     assert (track.alarm.state, track.alarm.since, track.alarm.raised_by) == ("alarm", 2, "zone")
 
@@ -134,11 +148,15 @@ def test_without_a_class_there_is_a_velocity_and_no_zone(tmp_path):
     assert "zone of ISO 20816-3 not determined: no machine_class" in track.recordings[-1].severity()
 
 
-@pytest.mark.parametrize("late", [np.geomspace(0.05, 0.9, 14), np.full(14, 0.3)], ids=["grows", "jumps"])
+@pytest.mark.parametrize(
+    "late", [np.geomspace(0.05, 0.9, 14), np.full(14, 0.3)], ids=["grows", "jumps"]
+)
 def test_a_fault_that_is_heard_in_the_envelope_alarms_where_the_level_does_not(tmp_path, late):
     """The level stays where it is; only the outer ring is heard more and more."""
     depths = np.concatenate([np.zeros(14), late])
-    folder = recordings(tmp_path / "in", [1e-3] * 28, depths, faults_hz={"outer ring": 87.3, "inner ring": 131.9})
+    folder = recordings(
+        tmp_path / "in", [1e-3] * 28, depths, faults_hz={"outer ring": 87.3, "inner ring": 131.9}
+    )
     track = track_recordings([folder], band_hz=(2000.0, 4000.0))
     assert (track.alarm.state, track.alarm.raised_by) == ("alarm", "the envelope at outer ring")
     assert track.table["depth_outer ring"].iloc[-1] > 5.0 * track.table["depth_inner ring"].iloc[-1]

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.signal import get_window, lfilter, welch
 
-from asperity.errors import BadInput
-from asperity.signals import (
+from asperity.core.errors import BadInput
+from asperity.core.signals import (
     SAMPLES_A_BLOCK,
     Signal,
     Spectrum,
@@ -35,24 +35,32 @@ def impulse_spectrum(at: int, lines: int = 12) -> Spectrum:
     )
 
 
-@pytest.mark.parametrize(("segment", "window"), [(None, "boxcar"), (None, "hann"), (256, "hann"), (500, "boxcar")])
+@pytest.mark.parametrize(
+    ("segment", "window"), [(None, "boxcar"), (None, "hann"), (256, "hann"), (500, "boxcar")]
+)
 def test_the_spectrum_integrates_to_the_variance(segment, window):
     signal = white(200_000)
     spectrum = power_spectrum(signal, segment=segment, window=window)
-    assert np.sum(spectrum.density) * spectrum.spacing_hz == pytest.approx(np.var(signal.values), rel=0.02)
+    assert np.sum(spectrum.density) * spectrum.spacing_hz == pytest.approx(
+        np.var(signal.values), rel=0.02
+    )
 
 
 def test_a_periodogram_obeys_parseval_to_rounding():
     signal = white(4096)
     spectrum = power_spectrum(signal, window="boxcar")
-    assert np.sum(spectrum.density) * spectrum.spacing_hz == pytest.approx(np.var(signal.values), rel=1e-12)
+    assert np.sum(spectrum.density) * spectrum.spacing_hz == pytest.approx(
+        np.var(signal.values), rel=1e-12
+    )
     assert spectrum.averages == pytest.approx(1.0)
     assert spectrum.resolution_hz == pytest.approx(1.0 / signal.duration_s)
 
 
 def test_a_sine_on_a_line_shows_its_power_over_the_resolution():
     time = np.arange(1000) / 1000.0
-    spectrum = power_spectrum(Signal(3.0 * np.sin(2 * np.pi * 100.0 * time), 1000.0, "g"), window="hann")
+    spectrum = power_spectrum(
+        Signal(3.0 * np.sin(2 * np.pi * 100.0 * time), 1000.0, "g"), window="hann"
+    )
     at = int(np.argmax(spectrum.density))
     assert spectrum.frequency_hz[at] == pytest.approx(100.0)
     assert spectrum.density[at] * spectrum.resolution_hz == pytest.approx(4.5, rel=1e-9)
@@ -64,7 +72,9 @@ def test_the_unit_is_squared_as_a_whole():
     assert power_spectrum(white(100)).unit == "(m/s^2)^2/Hz"
 
 
-@pytest.mark.parametrize(("segment", "window"), [(None, "boxcar"), (None, "hann"), (200, "hann"), (200, "boxcar")])
+@pytest.mark.parametrize(
+    ("segment", "window"), [(None, "boxcar"), (None, "hann"), (200, "hann"), (200, "boxcar")]
+)
 def test_averages_say_how_much_a_sum_over_lines_scatters(segment, window):
     """Mean of n lines of unit white noise: variance 1 / (n averages), by 1500 records."""
     means = []
@@ -77,9 +87,13 @@ def test_averages_say_how_much_a_sum_over_lines_scatters(segment, window):
 
 
 def test_known_averages_of_hann_windows():
-    assert power_spectrum(white(4000), window="hann").averages == pytest.approx(18.0 / 35.0, rel=1e-3)
+    assert power_spectrum(white(4000), window="hann").averages == pytest.approx(
+        18.0 / 35.0, rel=1e-3
+    )
     many = power_spectrum(white(400_000), segment=1000, window="hann")
-    assert many.averages == pytest.approx(18.0 / 19.0 * 400, rel=0.01)  # half overlapped: 94.7 % of all there is
+    assert many.averages == pytest.approx(
+        18.0 / 19.0 * 400, rel=0.01
+    )  # half overlapped: 94.7 % of all there is
 
 
 ROWS = {
@@ -118,7 +132,8 @@ def test_what_has_no_spectrum_is_refused_by_name():
 
 
 @pytest.mark.parametrize(
-    ("samples", "segment", "window"), [(1000, 100, "hann"), (1001, 101, "hann"), (999, 64, "boxcar")]
+    ("samples", "segment", "window"),
+    [(1000, 100, "hann"), (1001, 101, "hann"), (999, 64, "boxcar")],
 )
 def test_a_record_in_blocks_has_the_spectrum_of_the_whole(samples, segment, window):
     values = np.random.default_rng(3).standard_normal(samples) + 5.0
@@ -151,7 +166,9 @@ def test_averages_count_what_the_pieces_beside_a_gap_share():
     values = np.random.default_rng(5).standard_normal(1000)
     values[310:330] = np.nan
     spectrum = averaged_spectrum([values], 1.0, "m", segment=100)
-    starts = [start for start in range(0, 901, 50) if np.isfinite(values[start : start + 100]).all()]
+    starts = [
+        start for start in range(0, 901, 50) if np.isfinite(values[start : start + 100]).all()
+    ]
     weight = np.zeros(1000)
     taper = get_window("hann", 100)
     for start in starts:
@@ -159,8 +176,12 @@ def test_averages_count_what_the_pieces_beside_a_gap_share():
     assert spectrum.averages == pytest.approx(1.0 / (100 * np.sum(weight**2)), rel=1e-12)
 
 
-@pytest.mark.parametrize("samples", [1, 2, SAMPLES_A_BLOCK - 1, SAMPLES_A_BLOCK, 2 * SAMPLES_A_BLOCK + 1])
-@pytest.mark.parametrize("filter_", [([0.3], [1.0]), ([0.1, 0.2], [2.0, -1.9]), ([1.0, 0.5, 0.1], [1.0, -1.9, 0.95])])
+@pytest.mark.parametrize(
+    "samples", [1, 2, SAMPLES_A_BLOCK - 1, SAMPLES_A_BLOCK, 2 * SAMPLES_A_BLOCK + 1]
+)
+@pytest.mark.parametrize(
+    "filter_", [([0.3], [1.0]), ([0.1, 0.2], [2.0, -1.9]), ([1.0, 0.5, 0.1], [1.0, -1.9, 0.95])]
+)
 def test_recursion_is_lfilter(samples, filter_):
     numerator, denominator = map(np.array, filter_)
     values = np.random.default_rng(3).standard_normal(samples)
@@ -172,4 +193,6 @@ def test_recursion_is_lfilter(samples, filter_):
 @pytest.mark.parametrize("samples", [8, 9, 1000])
 def test_tapers_are_scipys(samples):
     for window in ("hann", "boxcar", "hamming"):
-        np.testing.assert_allclose(taper(window, samples), get_window(window, samples), rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(
+            taper(window, samples), get_window(window, samples), rtol=1e-12, atol=1e-15
+        )

@@ -17,7 +17,7 @@ from benchmarks.soonest import (
 )
 from benchmarks.soonest import knee as course_of
 
-from asperity.wear.sequential import knee
+from asperity.trend.sequential import knee
 
 
 def test_independent_rows_are_those_of_the_dense_covariance():
@@ -40,7 +40,12 @@ def test_in_scatter_of_its_own_a_course_is_told_by_what_dense_covariances_say():
     own = np.eye(25)
     other = near.size**2 * scipy.linalg.toeplitz(near.memory ** np.arange(25))
     inverse = np.linalg.inv(other)
-    told = np.trace(inverse @ own) - 25 + near.left @ near.left / near.size**2 + np.linalg.slogdet(other)[1]
+    told = (
+        np.trace(inverse @ own)
+        - 25
+        + near.left @ near.left / near.size**2
+        + np.linalg.slogdet(other)[1]
+    )
     assert near.apart == pytest.approx(0.5 * told)
     assert near.apart < 0.5 * distance(18, 6, 30.0, 0.0, courses) ** 2
     assert 0.0 < near.memory < 0.7

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 import scipy
 
-from asperity.errors import BadInput
-from asperity.wear import Detector, IndicatorMethod, split_stages
-from asperity.wear.bends import _precision
-from asperity.wear.indicators import INDICATOR_METHODS
-from asperity.wear.stages import STAGE_DETECTORS
+from asperity.core.errors import BadInput
+from asperity.resonance import IndicatorMethod
+from asperity.resonance.indicators import INDICATOR_METHODS
+from asperity.trend import Detector, split_stages
+from asperity.trend.change_points import _precision
+from asperity.trend.stages import STAGE_DETECTORS
 
-SQ = np.array([0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49])  # the paper's samples [um]
+SQ = np.array(
+    [0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49]
+)  # the paper's samples [um]
 SQ_STD = np.array([0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06])
 X = np.repeat(SQ, 5)
 
@@ -26,14 +29,18 @@ def saturating(x, length=0.8):
 
 
 def trial(truth, seed, std=15.0):
-    return split_stages(X, truth(X) + std * np.random.default_rng(seed).standard_normal(X.size), crf_std_hz=std)
+    return split_stages(
+        X, truth(X) + std * np.random.default_rng(seed).standard_normal(X.size), crf_std_hz=std
+    )
 
 
 def test_without_scatter_the_break_is_where_it_is():
     found = split_stages(SQ, knee(SQ))
     assert found.kind == "severe"
     assert found.split == pytest.approx(1.8, abs=0.01)
-    assert found.slopes == pytest.approx(((3640 - 2921.93) / 1.26, (3811.88 - 3640) / 1.69), rel=0.02)
+    assert found.slopes == pytest.approx(
+        ((3640 - 2921.93) / 1.26, (3811.88 - 3640) / 1.69), rel=0.02
+    )
 
 
 def test_the_break_falls_between_the_papers_samples_and_its_interval_covers():
@@ -153,12 +160,20 @@ def test_the_tables_have_the_names_that_signatures_promise():
 def test_scatter_that_remembers_is_weighed_by_the_inverse_of_its_covariance():
     """The two diagonals beside the dense matrix and its determinant."""
     rng = np.random.default_rng(2)
-    variance, memory, off = rng.uniform(0.5, 2.0, (3, 9)), np.array([0.0, 0.4, 0.85]), rng.standard_normal(9)
+    variance, memory, off = (
+        rng.uniform(0.5, 2.0, (3, 9)),
+        np.array([0.0, 0.4, 0.85]),
+        rng.standard_normal(9),
+    )
     told = _precision(variance, memory)
     for row, share in enumerate(memory):
         apart = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
         dense = share**apart * np.sqrt(np.outer(variance[row], variance[row]))
-        sparse = np.diag(told.own[row]) + np.diag(told.next[row, 1:], 1) + np.diag(told.next[row, 1:], -1)
+        sparse = (
+            np.diag(told.own[row])
+            + np.diag(told.next[row, 1:], 1)
+            + np.diag(told.next[row, 1:], -1)
+        )
         assert sparse @ dense == pytest.approx(np.eye(9), abs=1e-12)
         assert told.log_determinant[row] == pytest.approx(np.linalg.slogdet(2.0 * np.pi * dense)[1])
         assert off @ sparse @ off == pytest.approx(off @ np.linalg.solve(dense, off))
@@ -169,7 +184,9 @@ def test_the_interval_holds_the_break_where_scatter_remembers():
     x, held = np.arange(40.0), []
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        scatter = scipy.signal.lfilter([np.sqrt(1.0 - 0.7**2)], [1.0, -0.7], rng.standard_normal(140))[100:]
+        scatter = scipy.signal.lfilter(
+            [np.sqrt(1.0 - 0.7**2)], [1.0, -0.7], rng.standard_normal(140)
+        )[100:]
         at = rng.uniform(12.0, 24.0)
         course = 40.0 * np.minimum(x, at) + 7.0 * np.maximum(x - at, 0.0)
         found = split_stages(x, 2922.0 + course + 15.0 * scatter)

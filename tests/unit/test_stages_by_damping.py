@@ -5,10 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.wear import Resonance, damping_objection, line_shape, no_resonance, split_stages
+from asperity.core.errors import BadInput
+from asperity.resonance import Resonance, damping_objection, line_shape, no_resonance
+from asperity.trend import split_stages
 
-SQ = np.array([0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49])  # the paper's samples [um]
+SQ = np.array(
+    [0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49]
+)  # the paper's samples [um]
 X = np.repeat(SQ, 5)
 SHARE = 0.05  # relative deviation of a damping ratio
 HERTZ = 15.0
@@ -78,7 +81,10 @@ def test_damping_that_rises_is_running_in():
 
 
 def test_a_smooth_fall_has_no_stage_and_level_damping_no_change():
-    assert np.mean([trial(seed, damping=curve).kind == "no distinct stage" for seed in range(30)]) >= 0.9
+    assert (
+        np.mean([trial(seed, damping=curve).kind == "no distinct stage" for seed in range(30)])
+        >= 0.9
+    )
     still = [trial(seed, damping=lambda x: level(x, 0.02)) for seed in range(60)]
     assert np.mean([one.kind == "no change" for one in still]) >= 0.95
     value, error = re.search(r"damping holds at ([\d.]+) ± ([\d.]+)", still[0].verdict).groups()
@@ -91,12 +97,18 @@ def test_crf_alone_is_what_it_was_whatever_the_damping():
     plain = split_stages(X, rising(X), crf_std_hz=HERTZ)
     beside = split_stages(X, rising(X), crf_std_hz=HERTZ, damping_ratio=curve(X), damping_std=0.001)
     assert beside.source == plain.source == "crf"
-    assert (beside.verdict, beside.split, beside.evidence) == (plain.verdict, plain.split, plain.evidence)
+    assert (beside.verdict, beside.split, beside.evidence) == (
+        plain.verdict,
+        plain.split,
+        plain.evidence,
+    )
 
 
 def test_together_they_know_the_break_better_than_either():
     widths = {
-        source: np.mean([np.diff(trial(seed, crf=rising, source=source).interval) for seed in range(20)])
+        source: np.mean(
+            [np.diff(trial(seed, crf=rising, source=source).interval) for seed in range(20)]
+        )
         for source in ("crf", "damping", "both")
     }
     assert widths["both"] < 0.95 * min(widths["crf"], widths["damping"])
@@ -146,7 +158,10 @@ def test_a_damping_that_holds_contradicts_nothing():
     def straight(x):
         return np.interp(x, [0.54, 3.49], [2900.0, 3750.0])
 
-    found = [trial(seed, crf=straight, damping=lambda x: level(x, 0.02), source="both", x=SQ) for seed in range(20)]
+    found = [
+        trial(seed, crf=straight, damping=lambda x: level(x, 0.02), source="both", x=SQ)
+        for seed in range(20)
+    ]
     assert {one.kind for one in found} == {"no distinct stage"}
 
 
@@ -168,7 +183,10 @@ def test_damping_known_at_too_few_places_is_not_determined(source):
         ({"source": "width", "damping_ratio": SQ}, "crf, damping, both"),
         ({"source": "both", "damping_ratio": SQ[:3]}, "rows of one length"),
         ({"source": "both", "damping_ratio": -SQ}, "must be positive"),
-        ({"source": "both", "damping_ratio": SQ, "damping_std": -1.0}, "damping deviation must be 0 or more"),
+        (
+            {"source": "both", "damping_ratio": SQ, "damping_std": -1.0},
+            "damping deviation must be 0 or more",
+        ),
     ],
 )
 def test_what_cannot_be_meant_is_refused(changes, named):
@@ -181,9 +199,14 @@ def test_what_cannot_be_meant_is_refused(changes, named):
 
 def fitted(ratio, std, *, found=True):
     return Resonance(
-        found=found, reason="", band_hz=(2e3, 4e3), method="likelihood", crf_hz=3000.0, damping_ratio=ratio,
+        found=found,
+        reason="",
+        band_hz=(2e3, 4e3),
+        method="likelihood",
+        crf_hz=3000.0,
+        damping_ratio=ratio,
         damping_ratio_std=std,
-    )  # fmt: skip
+    )
 
 
 def test_a_line_that_is_wide_and_well_known_has_a_damping_ratio():

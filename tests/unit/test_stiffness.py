@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.contact.hertz import point_contact, point_stiffness
+from asperity.core.errors import BadInput
 from asperity.coupling import VibrationModel, contact_vibration, excitation
-from asperity.ehl import Options, contact_state, roller_depth, solve_contact, tangent_stiffness
-from asperity.errors import BadInput
-from asperity.grid import Grid
-from asperity.hertz import point_contact, point_stiffness
+from asperity.ehl import Options, solve_contact
+from asperity.solution import contact_state, roller_depth, tangent_stiffness
 from asperity.surface import Surface, flat_surface
 
 STEEL = ContactConditions(
@@ -32,7 +33,9 @@ def test_a_smooth_dry_line_contact_has_johnsons_stiffness(load, depth):
     """dδ/dP' of δ = (P'/πE*) (2 ln(2d/a) + 1), by hand: (2/πE*) ln(2d/a)."""
     conditions = replace(STEEL, load=load)
     a = conditions.hertz.half_widths[0]
-    smooth = solve_contact(conditions, None, flat_surface(Grid((96, 8), (-1.5 * a, -a / 2), (1.5 * a, a / 2))))
+    smooth = solve_contact(
+        conditions, None, flat_surface(Grid((96, 8), (-1.5 * a, -a / 2), (1.5 * a, a / 2)))
+    )
     found = tangent_stiffness(smooth, reference_depth=depth)
     compliance = 2.0 * np.log(2.0 * depth / a) / (np.pi * STEEL.pair.reduced_modulus * STEEL.length)
     assert found.total == pytest.approx(1.0 / compliance, rel=5e-3)
@@ -50,7 +53,9 @@ def test_a_smooth_dry_point_contact_has_hertzs_stiffness(radius):
     found = tangent_stiffness(solve_contact(conditions, None, flat_surface(grid)))
     assert found.total == pytest.approx(1.5 * 200.0 / conditions.hertz.approach, rel=0.01)
     if geometry == "point":
-        assert found.total == pytest.approx(point_stiffness(200.0, 5.4e-3, STEEL.pair.reduced_modulus), rel=0.01)
+        assert found.total == pytest.approx(
+            point_stiffness(200.0, 5.4e-3, STEEL.pair.reduced_modulus), rel=0.01
+        )
     assert found.reference_depth is None
 
 
@@ -69,7 +74,9 @@ def test_a_row_of_point_contacts_has_hertzs_stiffness(load):
     grid = Grid((96, 96), (-half, -period / 2.0), (half, period / 2.0))
     spheres = Surface(np.repeat(-(grid.y**2)[None, :] / (2.0 * radius), 96, axis=0), grid)
     solved = solve_contact(conditions, None, spheres, options=Options(tolerance=1e-5))
-    assert solved.pressure.max() == pytest.approx(point_contact(load, radius, modulus).p_max, rel=0.01)
+    assert solved.pressure.max() == pytest.approx(
+        point_contact(load, radius, modulus).p_max, rel=0.01
+    )
     found = tangent_stiffness(solved, reference_depth=2.0 * period * np.exp(-np.euler_gamma))
     assert found.total == pytest.approx(point_stiffness(load, radius, modulus), rel=0.01)
 
@@ -78,18 +85,26 @@ def test_a_point_contact_vibrates_on_its_tangent_stiffness():
     conditions = replace(STEEL, geometry="point", length=None, load=200.0)
     a = conditions.hertz.half_widths[0]
     solved = solve_contact(
-        conditions, None, flat_surface(Grid((64, 64), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), (False, False)))
+        conditions,
+        None,
+        flat_surface(Grid((64, 64), (-1.5 * a, -1.5 * a), (1.5 * a, 1.5 * a), (False, False))),
     )
     model = VibrationModel(mass=0.1, damping_ratio=0.02, stiffness_law="tangent")
-    heard = contact_vibration(replace(contact_state(solved), sq=1e-6), conditions, model, solution=solved)
-    assert heard.full_load_crf_hz == pytest.approx(3292.0, abs=1.0)  # docs/paper.md: 200 N, E* 109.89 GPa
+    heard = contact_vibration(
+        replace(contact_state(solved), sq=1e-6), conditions, model, solution=solved
+    )
+    assert heard.full_load_crf_hz == pytest.approx(
+        3292.0, abs=1.0
+    )  # docs/paper.md: 200 N, E* 109.89 GPa
     assert heard.resonance.crf_hz == pytest.approx(3292.0, rel=0.005)
 
 
 @pytest.fixture(scope="module")
 def mixed():
     """The paper's contact at Sq 1 um on a small grid."""
-    case = load_case(PAPER).with_overrides({"grid.cells": [64, 64], "surface.correlation_length": "30 um"})
+    case = load_case(PAPER).with_overrides(
+        {"grid.cells": [64, 64], "surface.correlation_length": "30 um"}
+    )
     return solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
 
 

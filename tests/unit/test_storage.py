@@ -6,14 +6,22 @@ import numpy as np
 import pytest
 import xarray
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus, load_solution
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
+from asperity.core.storage import netcdf_bytes, write_sealed
+from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus
+from asperity.ehl.contact_solution import FORMAT
 from asperity.ehl.outcome import ATTEMPTS, Figures, GridError
-from asperity.ehl.solution import FORMAT
-from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.grid import Grid
-from asperity.kept import netcdf_bytes, write_sealed
-from asperity.lubricant import Barus, DowsonHigginson, Incompressible, Lubricant, Newtonian, Roelands
+from asperity.lubricant import (
+    Barus,
+    DowsonHigginson,
+    Incompressible,
+    Lubricant,
+    Newtonian,
+    Roelands,
+)
+from asperity.solution import load_solution
 from asperity.surface import Surface
 
 
@@ -34,7 +42,9 @@ def solution():
             length=0.01,
             hardness=2e9,
         ),
-        lubricant=Lubricant(viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()),
+        lubricant=Lubricant(
+            viscosity=Barus(0.096, 18.2e-9), density=DowsonHigginson(880.0), rheology=Newtonian()
+        ),
         surface=Surface(rng.standard_normal(cells) * 1e-6, grid),
         options=Options(tolerance=3e-7, max_iterations=17, contact_film=1e-9 / 3.0),
         pressure=rng.random(cells) * 1e9,
@@ -48,14 +58,28 @@ def solution():
             0.1 + 0.2,
             ATTEMPTS[2],
             small,
-            GridError(car=0.2 / 3.0, clr=0.2 / 7.0, h_min=2e-9 / 3.0, h_central=2e-9 / 7.0, lean=small.times(-0.5)),
+            GridError(
+                car=0.2 / 3.0,
+                clr=0.2 / 7.0,
+                h_min=2e-9 / 3.0,
+                h_central=2e-9 / 7.0,
+                lean=small.times(-0.5),
+            ),
         ),
         attributes={"case": 'model = "unified"\n# größer\n', "notes": "[]"},
     )
 
 
 def same(one, other):
-    for name in ("conditions", "lubricant", "options", "rigid_approach", "convergence", "attributes", "grid"):
+    for name in (
+        "conditions",
+        "lubricant",
+        "options",
+        "rigid_approach",
+        "convergence",
+        "attributes",
+        "grid",
+    ):
         assert getattr(one, name) == getattr(other, name), name
     for name in ("pressure", "gap", "in_contact"):
         a, b = getattr(one, name), getattr(other, name)
@@ -74,7 +98,11 @@ def test_every_number_comes_back_bit_for_bit(solution, tmp_path):
     "changes",
     [
         {"lubricant": None},
-        {"lubricant": Lubricant(viscosity=Roelands(0.04, 2e-8), density=Incompressible(850.0), rheology=Newtonian())},
+        {
+            "lubricant": Lubricant(
+                viscosity=Roelands(0.04, 2e-8), density=Incompressible(850.0), rheology=Newtonian()
+            )
+        },
         {"attributes": {}},
     ],
 )
@@ -94,7 +122,10 @@ def test_anyone_can_read_the_file_without_asperity(solution, tmp_path):
         assert opened.attrs["Conventions"].startswith("CF-")
         assert opened.attrs["case"] == solution.attributes["case"]
         assert opened["pressure"].dims == ("x", "y")
-        units = {name: opened[name].attrs["units"] for name in ("x", "y", "pressure", "gap", "surface_height")}
+        units = {
+            name: opened[name].attrs["units"]
+            for name in ("x", "y", "pressure", "gap", "surface_height")
+        }
         assert units == {"x": "m", "y": "m", "pressure": "Pa", "gap": "m", "surface_height": "m"}
         np.testing.assert_array_equal(opened["x"], solution.grid.x)
         for name in ("asperity", "numpy", "scipy", "numba", "python"):
@@ -147,9 +178,14 @@ def test_what_is_no_run_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("failure", "raised"),
-    [(KeyboardInterrupt(), KeyboardInterrupt), (OSError(errno.ENOSPC, "No space left on device"), AsperityError)],
+    [
+        (KeyboardInterrupt(), KeyboardInterrupt),
+        (OSError(errno.ENOSPC, "No space left on device"), AsperityError),
+    ],
 )
-def test_an_interrupted_save_leaves_what_was_there(solution, tmp_path, monkeypatch, failure, raised):
+def test_an_interrupted_save_leaves_what_was_there(
+    solution, tmp_path, monkeypatch, failure, raised
+):
     path = solution.save(tmp_path / "run.nc")
     before = path.read_bytes()
 

@@ -1,11 +1,24 @@
 import numpy as np
 import pytest
 
-from asperity import BadInput, ContactConditions, ElasticPair, flat_surface, solve_contact, subsurface_stress
-from asperity.ehl import StressTensor, hertz_stress
-from asperity.ehl.influence import ODD_IN_X, ODD_IN_Y, Tractions, _influence, _rectangles
-from asperity.ehl.stress import default_depths, stress_below
-from asperity.grid import Grid
+from asperity import (
+    BadInput,
+    ContactConditions,
+    ElasticPair,
+    flat_surface,
+    solve_contact,
+    subsurface_stress,
+)
+from asperity.contact.grid import Grid
+from asperity.solution import StressTensor, hertz_stress
+from asperity.solution.stress import default_depths, stress_below
+from asperity.solution.stress_influence import (
+    ODD_IN_X,
+    ODD_IN_Y,
+    Tractions,
+    _influence,
+    _rectangles,
+)
 
 NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")
 
@@ -22,7 +35,9 @@ def matrices(tensor: StressTensor) -> np.ndarray:
 def test_equivalent_stresses_are_those_of_the_principal_stresses():
     tensor = random_tensor()
     principal = np.linalg.eigvalsh(matrices(tensor))
-    np.testing.assert_allclose(tensor.max_shear, (principal[:, 2] - principal[:, 0]) / 2.0, rtol=1e-9)
+    np.testing.assert_allclose(
+        tensor.max_shear, (principal[:, 2] - principal[:, 0]) / 2.0, rtol=1e-9
+    )
     apart = np.diff(principal, axis=1).T
     expected = np.sqrt((apart[0] ** 2 + apart[1] ** 2 + (apart[0] + apart[1]) ** 2) / 2.0)
     np.testing.assert_allclose(tensor.von_mises, expected, rtol=1e-9)
@@ -51,7 +66,9 @@ def images_summed(cells, spacing, depth, loaded, images=60):
     return total
 
 
-@pytest.mark.parametrize(("cells", "size"), [((16, 12), (1.2, 0.5)), ((12, 15), (0.5, 2.5)), ((13, 16), (1.0, 1.0))])
+@pytest.mark.parametrize(
+    ("cells", "size"), [((16, 12), (1.2, 0.5)), ((12, 15), (0.5, 2.5)), ((13, 16), (1.0, 1.0))]
+)
 @pytest.mark.parametrize("depth", [0.0, 0.3, 1.5, 3.0, 12.0])
 def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells, size, depth):
     """Two derivations: the half-space's answer to waves, and Love's corners. Depths in cells along x."""
@@ -62,11 +79,16 @@ def test_waves_and_strips_meet_closed_forms_of_rectangles_and_their_images(cells
     grid = Grid(cells, (0.0, 0.0), size)
     found = Tractions.of(grid, pressure, shear).stresses(depth * spacing[0], 0.3, keep=False)
     expected = images_summed(cells, spacing, depth * spacing[0], loaded)
-    np.testing.assert_allclose(found, expected, atol=2e-4)  # of the load; images left out matter as much
+    np.testing.assert_allclose(
+        found, expected, atol=2e-4
+    )  # of the load; images left out matter as much
 
 
 def test_deep_kernels_hold_only_the_waves_that_reach_so_far():
-    widths = [_influence((16, 64), (0.1, 0.1), True, depth, 0.3).shape[-1] for depth in (0.05, 1.0, 2.0, 50.0)]
+    widths = [
+        _influence((16, 64), (0.1, 0.1), True, depth, 0.3).shape[-1]
+        for depth in (0.05, 1.0, 2.0, 50.0)
+    ]
     reach = -np.log(1e-8) / (2.0 * np.pi / 6.4)  # over depth: the wavenumber of which 1e-8 is left
     assert widths == [33, int(reach / 1.0) + 1, int(reach / 2.0) + 1, 1]
 
@@ -99,14 +121,20 @@ def test_material_is_in_equilibrium():
     generator = np.random.default_rng(7)
     grid = Grid((48, 32), (0.0, 0.0), (1.5, 1.0))
     stress = stress_below(
-        generator.random(grid.cells), generator.normal(size=grid.cells), grid, np.array([0.4]), poisson_ratio=0.3
+        generator.random(grid.cells),
+        generator.normal(size=grid.cells),
+        grid,
+        np.array([0.4]),
+        poisson_ratio=0.3,
     )
     (dx, dy), dz = grid.spacing, 0.01
     above, here, below = (stress.at(0.4 + shift) for shift in (-dz, 0.0, dz))
 
     def divergence(name_x, name_y, name_z):
         along = np.gradient(getattr(here, name_x), dx, axis=0)
-        across = (np.roll(getattr(here, name_y), -1, 1) - np.roll(getattr(here, name_y), 1, 1)) / (2.0 * dy)
+        across = (np.roll(getattr(here, name_y), -1, 1) - np.roll(getattr(here, name_y), 1, 1)) / (
+            2.0 * dy
+        )
         down = (getattr(below, name_z) - getattr(above, name_z)) / (2.0 * dz)
         return (along + across + down)[1:-1], np.abs(down).max()
 
@@ -119,7 +147,13 @@ def test_the_peak_between_depths_hardly_depends_on_the_depths():
     grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
     peaks = [
-        stress_below(pressure, None, grid, np.concatenate([[0.0], np.geomspace(0.02, 3.0, count)]), poisson_ratio=0.3)
+        stress_below(
+            pressure,
+            None,
+            grid,
+            np.concatenate([[0.0], np.geomspace(0.02, 3.0, count)]),
+            poisson_ratio=0.3,
+        )
         for count in (9, 24)
     ]
     assert peaks[0].peak.value == pytest.approx(peaks[1].peak.value, rel=1e-4)
@@ -132,7 +166,9 @@ def test_the_core_is_what_lies_below_a_depth(core):
     grid = Grid((64, 8), (-2.0, -1.0), (2.0, 1.0))
     pressure = np.repeat(np.sqrt(np.maximum(1.0 - grid.x**2, 0.0))[:, None], 8, axis=1)
     depths = np.concatenate([[0.0], np.geomspace(0.02, 3.0, 12)])
-    stress = stress_below(pressure, 0.4 * pressure, grid, depths, poisson_ratio=0.3, core_depth=core)
+    stress = stress_below(
+        pressure, 0.4 * pressure, grid, depths, poisson_ratio=0.3, core_depth=core
+    )
     assert stress.peak.depth == 0.0
     fine = [stress.at(depth).von_mises.max() for depth in np.linspace(core, 3.0, 60)]
     assert stress.core.value == pytest.approx(max(fine), rel=1e-3)
@@ -142,8 +178,12 @@ def test_the_core_is_what_lies_below_a_depth(core):
 def test_maps_and_section_are_of_the_same_stresses():
     generator = np.random.default_rng(8)
     grid = Grid((24, 20), (0.0, 0.0), (1.2, 1.0))
-    stress = stress_below(generator.random(grid.cells), None, grid, np.array([0.0, 0.1, 0.3]), poisson_ratio=0.3)
-    np.testing.assert_allclose(stress.section.von_mises, stress.von_mises[:, stress.row, :], rtol=1e-9)
+    stress = stress_below(
+        generator.random(grid.cells), None, grid, np.array([0.0, 0.1, 0.3]), poisson_ratio=0.3
+    )
+    np.testing.assert_allclose(
+        stress.section.von_mises, stress.von_mises[:, stress.row, :], rtol=1e-9
+    )
     assert grid.y[stress.row] == stress.peak.y
     assert stress.largest.max() <= stress.peak.value
     k = list(stress.depths).index(stress.depth_of_largest[4, 7])
@@ -162,7 +202,12 @@ def test_stress_below_hertz_contacts_of_all_geometries(geometry, radius, length,
     """Johnson, section 4.2 and table 4.1: a slim ellipse (axis ratio 0.08) is nearly a line, depth in short axes."""
     pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
     bodies = ContactConditions(
-        pair=pair, geometry=geometry, radius=radius, load=100.0, length=length, surface_speeds=(1.0, 1.0)
+        pair=pair,
+        geometry=geometry,
+        radius=radius,
+        load=100.0,
+        length=length,
+        surface_speeds=(1.0, 1.0),
     )
     a = min(bodies.hertz.half_widths) if geometry == "elliptic" else bodies.hertz.half_widths[0]
     stress = hertz_stress(bodies, np.concatenate([[0.0], np.geomspace(0.01, 2.5, 15)]) * a)
@@ -173,7 +218,9 @@ def test_stress_below_hertz_contacts_of_all_geometries(geometry, radius, length,
 
 def test_default_depths_go_from_the_surface_to_below_the_contact():
     pair = ElasticPair((2e11, 2e11), (0.3, 0.3))
-    ball = ContactConditions(pair=pair, geometry="point", radius=0.01, load=10.0, surface_speeds=(1.0, 1.0))
+    ball = ContactConditions(
+        pair=pair, geometry="point", radius=0.01, load=10.0, surface_speeds=(1.0, 1.0)
+    )
     a = ball.hertz.half_widths[0]
     grid = Grid((64, 64), (-2 * a, -2 * a), (2 * a, 2 * a), (False, False))
     depths = default_depths(ball, grid)
@@ -210,10 +257,14 @@ def test_the_second_body_feels_the_opposite_traction_and_has_its_own_poisson_rat
     solution = solve_contact(bodies, None, flat_surface(grid))
     shear = 0.1 * solution.pressure
     first, second = (subsurface_stress(solution, shear=shear, body=body) for body in (1, 2))
-    np.testing.assert_allclose(second.at(0.3 * a).xz, first.at(0.3 * a).xz[::-1] * -1.0, atol=1e-4 * bodies.hertz.p_max)
+    np.testing.assert_allclose(
+        second.at(0.3 * a).xz, first.at(0.3 * a).xz[::-1] * -1.0, atol=1e-4 * bodies.hertz.p_max
+    )
     assert second.peak.x < 0.0 < first.peak.x
     sideways = second.at(0.5 * a)
-    np.testing.assert_allclose(sideways.yy, 0.2 * (sideways.xx + sideways.zz), atol=1e-5 * bodies.hertz.p_max)
+    np.testing.assert_allclose(
+        sideways.yy, 0.2 * (sideways.xx + sideways.zz), atol=1e-5 * bodies.hertz.p_max
+    )
     assert first.peak.value == pytest.approx(0.565 * bodies.hertz.p_max, rel=0.01)
     with pytest.raises(BadInput, match="body must be 1 or 2"):
         subsurface_stress(solution, body=0)
@@ -225,5 +276,7 @@ def test_the_largest_shear_of_single_precision_keeps_its_digits():
     inside = 1.0 - depth * np.arctan(1.0 / depth)
     across, down = -(1.0 + nu) * inside + 0.5 / (1.0 + depth**2), -1.0 / (1.0 + depth**2)
     nothing = np.zeros_like(depth)
-    single = StressTensor(*(part.astype(np.float32) for part in (across, across, down, nothing, nothing, nothing)))
+    single = StressTensor(
+        *(part.astype(np.float32) for part in (across, across, down, nothing, nothing, nothing))
+    )
     np.testing.assert_allclose(single.max_shear, 0.5 * np.abs(across - down), rtol=2e-6)

@@ -6,13 +6,15 @@ from benchmarks import failures
 from benchmarks.indicators import NINETY, drawn, heard, joint, transferred
 from benchmarks.sensors import BAND, FREQUENCY, _spectrum, machine
 
-from asperity.wear import line_shape, misfit, series_resonances
+from asperity.resonance import line_shape, series_resonances
+from asperity.resonance import residuals as misfit
 
 
 def held(rig):
     found = joint(heard(rig))
     off = [
-        abs(one.crf_hz - true.crf_hz) < NINETY * one.crf_std for one, true in zip(found, rig.recordings, strict=True)
+        abs(one.crf_hz - true.crf_hz) < NINETY * one.crf_std
+        for one, true in zip(found, rig.recordings, strict=True)
     ]
     return np.mean(off), np.array([one.crf_std for one in found])
 

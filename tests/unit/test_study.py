@@ -16,9 +16,9 @@ import pytest
 
 import asperity.study.execute as execution
 from asperity.case import load_case
-from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.kept import read_json, write_json, write_table
-from asperity.processes import cores
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
+from asperity.core.processes import cores
+from asperity.core.storage import read_json, write_json, write_table
 from asperity.results import RUN_GROUPS, solve_case
 from asperity.study import estimate_study, load_study, plan_points, plan_study, run_study
 
@@ -34,7 +34,9 @@ DRY = {
 
 @pytest.fixture(scope="module")
 def case():
-    return load_case(EXAMPLES / "paper.toml").with_overrides({**DRY, "study": {"sq": ["1 um", "2 um"], "seeds": 3}})
+    return load_case(EXAMPLES / "paper.toml").with_overrides(
+        {**DRY, "study": {"sq": ["1 um", "2 um"], "seeds": 3}}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +77,9 @@ class Dying:
 
 
 def same(result, unbroken):
-    pandas.testing.assert_frame_equal(result.table.drop(columns="seconds"), unbroken, check_exact=True)
+    pandas.testing.assert_frame_equal(
+        result.table.drop(columns="seconds"), unbroken, check_exact=True
+    )
 
 
 def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
@@ -85,7 +89,9 @@ def test_a_row_is_what_solving_the_case_gives(plan, unbroken):
     assert row["case_id"] == chosen.id
     assert row["surface.sq"] == 2e-6
     quick = alone.numbers([group for group in RUN_GROUPS if group not in ("own", "virgin")])
-    scalars = {name: value for name, value in quick.items() if name != "seconds" and value is not None}
+    scalars = {
+        name: value for name, value in quick.items() if name != "seconds" and value is not None
+    }
     assert {name: row[name] for name in scalars} == scalars
     assert row["crf_sound_hz"] == pytest.approx(3000, rel=0.5)
     assert row["crf_paper_hz"] == pytest.approx(row["crf_sound_hz"], rel=0.05)
@@ -103,7 +109,9 @@ def test_a_study_that_shakes_has_the_contacts_own_stiffness_and_damping(case):
     assert row["crf_sound_hz"] > 0.0
 
 
-def test_a_study_on_disk_is_the_study_in_memory_and_goes_on_where_it_was(plan, unbroken, executor, tmp_path):
+def test_a_study_on_disk_is_the_study_in_memory_and_goes_on_where_it_was(
+    plan, unbroken, executor, tmp_path
+):
     def stop(progress):
         if progress.done >= 2:
             raise KeyboardInterrupt
@@ -128,7 +136,10 @@ def test_shards_make_up_the_whole_in_one_folder_or_merged(plan, unbroken, execut
         run_study(plan, out=tmp_path / "together", executor=executor, shard=(k, 3))
     same(load_study(tmp_path / "together"), unbroken)
     merged = run_study(
-        plan, out=tmp_path / "merged", executor=executor, merge_from=[tmp_path / f"{k}" for k in (1, 2, 3)]
+        plan,
+        out=tmp_path / "merged",
+        executor=executor,
+        merge_from=[tmp_path / f"{k}" for k in (1, 2, 3)],
     )
     assert merged.computed == 0
     same(merged, unbroken)
@@ -137,7 +148,9 @@ def test_shards_make_up_the_whole_in_one_folder_or_merged(plan, unbroken, execut
 def test_what_a_crash_leaves_is_cleared_and_computed_again(plan, unbroken, executor, tmp_path):
     run_study(plan, out=tmp_path, executor=executor)
     part = next((tmp_path / "parts").glob("*.parquet"))
-    (tmp_path / "parts" / f".{part.name}.123.part").write_bytes(part.read_bytes()[:100])  # killed while writing
+    (tmp_path / "parts" / f".{part.name}.123.part").write_bytes(
+        part.read_bytes()[:100]
+    )  # killed while writing
     part.unlink()
     result = run_study(plan, out=tmp_path, executor=executor)
     assert result.computed > 0
@@ -160,7 +173,9 @@ def test_a_case_that_kills_its_process_fails_alone(plan, unbroken, monkeypatch, 
     assert list(result.failures["number"]) == [3]
     assert "process that computed it died" in result.failures["reason"].iloc[0]
     pandas.testing.assert_frame_equal(
-        result.table.drop(index=3).drop(columns="seconds"), unbroken.drop(index=3), check_dtype=False
+        result.table.drop(index=3).drop(columns="seconds"),
+        unbroken.drop(index=3),
+        check_dtype=False,
     )
     monkeypatch.setattr(execution, "_pool", lambda _: Dying([]))
     assert run_study(plan, out=tmp_path, workers=2).computed == 0
@@ -210,7 +225,10 @@ def test_ids_that_are_not_those_of_the_points_are_refused(plan, executor, tmp_pa
 def test_a_study_of_another_version_can_still_be_read(plan, unbroken, executor, tmp_path):
     run_study(plan, out=tmp_path, executor=executor)
     manifest = json.loads((tmp_path / "manifest.json").read_text())
-    manifest["versions"]["asperity"], manifest["design"] = "0.0.1", "that of a case file with other keys"
+    manifest["versions"]["asperity"], manifest["design"] = (
+        "0.0.1",
+        "that of a case file with other keys",
+    )
     renamed = {old: f"{number:016x}" for number, old in enumerate(manifest["ids"])}
     manifest["ids"] = list(renamed.values())
     del manifest["seal"]
@@ -218,7 +236,9 @@ def test_a_study_of_another_version_can_still_be_read(plan, unbroken, executor, 
     for part in (tmp_path / "parts").glob("*.parquet"):
         table = pandas.read_parquet(part)
         table["case_id"] = table["case_id"].map(renamed)
-        write_table(part, pyarrow.Table.from_pandas(table, preserve_index=False), manifest["design"])
+        write_table(
+            part, pyarrow.Table.from_pandas(table, preserve_index=False), manifest["design"]
+        )
     table = load_study(tmp_path).table.drop(columns=["case_id", "seconds"])
     pandas.testing.assert_frame_equal(table, unbroken.drop(columns="case_id"))
 
@@ -233,7 +253,9 @@ def test_two_processes_do_not_compute_in_one_folder(plan, executor, tmp_path):
     run_study(plan, out=tmp_path, executor=executor, progress=again)
 
 
-def test_a_full_disk_is_a_sentence_and_loses_nothing(plan, unbroken, executor, tmp_path, monkeypatch):
+def test_a_full_disk_is_a_sentence_and_loses_nothing(
+    plan, unbroken, executor, tmp_path, monkeypatch
+):
     run_study(plan, out=tmp_path, executor=executor, shard=(1, 3))
     before = load_study(tmp_path).table
     kept = os.fsync
@@ -270,7 +292,9 @@ def mapped(case, executor, tmp_path_factory):
     """Folders of two studies that keep maps, and differ in their load."""
     folders = []
     for load in ("500 N", "400 N"):
-        plan = plan_study(case.with_overrides({"contact.load": load, "study": {"sq": ["1 um"], "seeds": 1}}))
+        plan = plan_study(
+            case.with_overrides({"contact.load": load, "study": {"sq": ["1 um"], "seeds": 1}})
+        )
         folders.append(tmp_path_factory.mktemp("mapped") / "study")
         run_study(plan, out=folders[-1], executor=executor, fields=("pressure", "gap"))
     return folders
@@ -300,7 +324,9 @@ def test_a_flipped_bit_in_any_file_of_a_map_is_refused_or_changes_nothing(mapped
             except UnreadableFile:
                 refused += 1
             else:
-                assert {name: again[name].tobytes() for name in again} == {name: told[name].tobytes() for name in told}
+                assert {name: again[name].tobytes() for name in again} == {
+                    name: told[name].tobytes() for name in told
+                }
         path.write_bytes(whole)
     assert refused > 40
     result.maps(case_id)
@@ -374,7 +400,10 @@ def test_a_dry_run_says_what_is_left_and_keeps_nothing(plan, executor, tmp_path)
     [
         ({"shard": (0, 3)}, "shard must be k/N"),
         ({"workers": 0}, "workers must be positive"),
-        ({"fields": ("gap", "colour")}, "fields must be among pressure, gap, in_contact, surface_height, got colour"),
+        (
+            {"fields": ("gap", "colour")},
+            "fields must be among pressure, gap, in_contact, surface_height, got colour",
+        ),
     ],
 )
 def test_what_cannot_be_meant_is_refused(plan, tmp_path, settings, sentence):
@@ -400,17 +429,23 @@ def test_a_script_that_workers_cannot_import_is_told_so_and_no_case_is_blamed(ca
         "import asperity as asp\n"
         "asp.run_study(asp.study.plan_study(asp.load_case('case.toml')), out='out', workers=1)\n"  # and no __main__
     )
-    ran = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    ran = subprocess.run(
+        [sys.executable, script], cwd=tmp_path, capture_output=True, text=True, timeout=100
+    )
     assert ran.returncode == 1
     assert 'under if __name__ == "__main__":, or give executor' in ran.stderr
     assert not list((tmp_path / "out" / "parts").glob("*"))
 
 
-def test_what_is_finished_is_read_without_the_measured_surface_it_was_computed_on(case, executor, tmp_path):
+def test_what_is_finished_is_read_without_the_measured_surface_it_was_computed_on(
+    case, executor, tmp_path
+):
     heights = np.random.default_rng(1).normal(scale=1e-7, size=(40, 40))
     np.savetxt(tmp_path / "worn.txt", heights, fmt="%.6e")
     surface = {"file": str(tmp_path / "worn.txt"), "pixel": "5 um", "unit": "m", "fit": "tile"}
-    plan = plan_study(case.with_overrides({"surface": surface, "study": {"load": ["200 N"], "seeds": 2}}))
+    plan = plan_study(
+        case.with_overrides({"surface": surface, "study": {"load": ["200 N"], "seeds": 2}})
+    )
     there = run_study(plan, out=tmp_path / "study", executor=executor)
     assert not there.failed
     (tmp_path / "worn.txt").unlink()
@@ -420,7 +455,10 @@ def test_what_is_finished_is_read_without_the_measured_surface_it_was_computed_o
 SWEPT = {
     "grid": {"cells": [[24, 24], [32, 24]]},
     "material": {"hardness": ["1 GPa", "none"]},
-    "surface": [{"kind": "flat"}, {"kind": "gaussian", "sq": "1 um", "correlation_length": "30 um"}],
+    "surface": [
+        {"kind": "flat"},
+        {"kind": "gaussian", "sq": "1 um", "correlation_length": "30 um"},
+    ],
 }
 
 
@@ -432,7 +470,9 @@ SWEPT = {
         ("surface", SWEPT["surface"], [json.dumps(table) for table in SWEPT["surface"]]),
     ],
 )
-def test_pairs_tables_and_numbers_beside_names_are_columns_of_text(case, executor, tmp_path, key, swept, written):
+def test_pairs_tables_and_numbers_beside_names_are_columns_of_text(
+    case, executor, tmp_path, key, swept, written
+):
     plan = plan_study(case.with_overrides({"study": {key.partition(".")[0]: swept}}))
     result = run_study(plan, out=tmp_path, executor=executor)
     assert list(pandas.read_parquet(tmp_path / "table.parquet")[key]) == written

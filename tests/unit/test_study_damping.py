@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_study_report import PAPERS, figure_of, made, page_of, with_knee, without_maps
 
+from asperity.report.study.dynamic import over_roughness, rank_correlation, told_by
 from asperity.report.study.page import study_exhibits
-from asperity.report.study.shaken import over_roughness, rank_correlation, told_by
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.report.style import ON_PAPER
 from asperity.study import StudyOverview, curve_of
@@ -15,7 +15,9 @@ def shaken(*, seeds=5):
     """Damping that falls with the load share, a stiffness that has nothing to do with it; one surface has neither."""
     result = with_knee(seeds=seeds)
     table, random = result.table, np.random.default_rng(3)
-    table["contact_damping_ratio"] = 0.03 * (1.0 - table["clr"] / 0.85) + 0.0003 * random.standard_normal(len(table))
+    table["contact_damping_ratio"] = 0.03 * (
+        1.0 - table["clr"] / 0.85
+    ) + 0.0003 * random.standard_normal(len(table))
     table["contact_damping_ratio_virgin"] = 1.5 * table["contact_damping_ratio"]
     table["contact_stiffness_n_m"] = 3.3e8 + 1e7 * random.standard_normal(len(table))
     table["contact_resonance_hz"] = 2900.0
@@ -64,8 +66,14 @@ def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
     names = [exhibit.name for exhibit in study_exhibits(without_maps(result))]
     assert names[-2:] == ["damping", "told"]
     summary = curve_of(result).summary()
-    assert summary["contact_damping_ratio"].to_numpy() == pytest.approx(curve_of(result).mean("contact_damping_ratio"))
-    assert {"contact_damping_ratio_std", "contact_damping_ratio_low", "contact_stiffness_n_m"} <= set(summary)
+    assert summary["contact_damping_ratio"].to_numpy() == pytest.approx(
+        curve_of(result).mean("contact_damping_ratio")
+    )
+    assert {
+        "contact_damping_ratio_std",
+        "contact_damping_ratio_low",
+        "contact_stiffness_n_m",
+    } <= set(summary)
     page = page_of(without_maps(result))
     assert "Damping ratio of the contact" in page.text
     still = with_knee()
@@ -76,12 +84,20 @@ def test_page_and_levels_have_them_and_a_study_that_did_not_shake_has_none():
 
 def test_any_other_study_shows_the_damping_as_an_output():
     points = [{"contact.load": f"{load} N"} for load in (300, 400, 500)]
-    result = made(points, case=PAPERS, **{
-        "contact.load": [300.0, 400.0, 500.0], "clr": [0.5, 0.6, 0.7], "contact_damping_ratio": [0.02, 0.015, 0.01],
-        "contact_stiffness_n_m": [3.3e8, 3.31e8, 3.34e8],
-    })  # fmt: skip
+    result = made(
+        points,
+        case=PAPERS,
+        **{
+            "contact.load": [300.0, 400.0, 500.0],
+            "clr": [0.5, 0.6, 0.7],
+            "contact_damping_ratio": [0.02, 0.015, 0.01],
+            "contact_stiffness_n_m": [3.3e8, 3.31e8, 3.34e8],
+        },
+    )
     study = StudyOverview(result)
     assert {"contact_damping_ratio", "contact_stiffness_n_m"} <= set(study.outputs)
     (exhibit,) = sweep_exhibits(study)
-    assert {"ζ", "k [N/µm]"} <= {panel.get_title(loc="left") for panel in exhibit.figure(ON_PAPER).axes}
+    assert {"ζ", "k [N/µm]"} <= {
+        panel.get_title(loc="left") for panel in exhibit.figure(ON_PAPER).axes
+    }
     assert "contact_damping_ratio_std" in study.tables["points"]

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.study import plan_points, plan_study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -33,14 +33,18 @@ def test_the_papers_study_is_36_levels_of_5_surfaces(paper):
 
 
 def test_steps_are_decimal_so_that_a_level_is_the_number_a_user_would_write(paper):
-    case = planned(paper, sq=sq_range(step="0.1 um")).cases[7]  # 7 x 0.1 + 0.5 is 1.2000000000000002 in floats
+    case = planned(paper, sq=sq_range(step="0.1 um")).cases[
+        7
+    ]  # 7 x 0.1 + 0.5 is 1.2000000000000002 in floats
     by_hand = plan_points(paper, [{"surface.sq": "1.2 um"}]).cases[0]
     assert case.overrides["surface.sq"] == "1.2 um"
     assert case.id == by_hand.id
 
 
 def test_several_quantities_make_their_product_the_last_varying_fastest(paper):
-    plan = planned(paper, sq=["1 um", "2 um"], contact={"load": ["200 N", "500 N", "1 kN"]}, seeds=2)
+    plan = planned(
+        paper, sq=["1 um", "2 um"], contact={"load": ["200 N", "500 N", "1 kN"]}, seeds=2
+    )
     assert plan.axes == ("surface.sq", "contact.load")
     assert [tuple(point.values()) for point in plan.points] == [
         (sq, load) for sq in ("1 um", "2 um") for load in ("200 N", "500 N", "1 kN")
@@ -57,12 +61,20 @@ def test_ranges_by_count_meet_their_ends_on_either_scale(paper):
 
 def test_a_latin_hypercube_has_one_point_in_every_stripe_of_every_quantity(paper):
     plan = planned(
-        paper, sq=sq_range(scale="log"), slip={"from": 0.0, "to": 0.5}, surface={"kind": ["gaussian"]}, samples=20
+        paper,
+        sq=sq_range(scale="log"),
+        slip={"from": 0.0, "to": 0.5},
+        surface={"kind": ["gaussian"]},
+        samples=20,
     )
     slips = sorted(point["contact.slip"] for point in plan.points)
     assert [int(20 * slip / 0.5) for slip in slips] == list(range(20))
     again = planned(
-        paper, sq=sq_range(scale="log"), slip={"from": 0.0, "to": 0.5}, surface={"kind": ["gaussian"]}, samples=20
+        paper,
+        sq=sq_range(scale="log"),
+        slip={"from": 0.0, "to": 0.5},
+        surface={"kind": ["gaussian"]},
+        samples=20,
     )
     assert again.points == plan.points
 
@@ -124,7 +136,10 @@ REFUSED = [
     ({"load": ["200 N", "0.2 kN"]}, "has the point contact.load = 0.2 kN twice"),
     ({"load": ["200 N", "300 N"], "samples": 3}, "twice; write each value once"),
     ({"sq": ["1 um"], "seeds": [3, 3]}, "seeds must differ from one another, got 3, 3"),
-    ({"sq": ["1 um"], "surface": [{"kind": "flat"}]}, "sweeps surface and surface.sq, a part of it"),
+    (
+        {"sq": ["1 um"], "surface": [{"kind": "flat"}]},
+        "sweeps surface and surface.sq, a part of it",
+    ),
     ({"motion": {"steps": [3, 4]}}, "study.motion.steps changes nothing in a study"),
 ]
 
@@ -144,7 +159,14 @@ def test_a_case_without_a_study_says_how_to_add_one(paper):
 
 def test_the_text_of_a_case_restates_its_study(paper):
     case = paper.with_overrides(
-        {"study": {"sq": sq_range(count=3), "contact": {"load": ["200 N"]}, "seeds": [1, 2], "samples": 4}}
+        {
+            "study": {
+                "sq": sq_range(count=3),
+                "contact": {"load": ["200 N"]},
+                "seeds": [1, 2],
+                "samples": 4,
+            }
+        }
     )
     assert load_case(case.text) == case
     assert plan_study(load_case(case.text)).points == plan_study(case).points
@@ -163,15 +185,17 @@ def test_whole_tables_are_swept_and_each_has_the_seeds_that_it_knows(paper):
     )
     assert plan.axes == ("surface", "lubricant.viscosity")
     cases = [paper.with_overrides(case.overrides) for case in plan.cases]
-    assert [case.contents.surface.kind for case in cases] == 2 * ["gaussian"] + 2 * ["gaussian"] + 2 * ["flat"]
+    assert [case.contents.surface.kind for case in cases] == 2 * ["gaussian"] + 2 * [
+        "gaussian"
+    ] + 2 * ["flat"]
     assert cases[0].contents.surface.seed != cases[1].contents.surface.seed
     assert [case.contents.surface.seed for case in cases[2:4]] == [5, 5]
     assert {case.contents.lubricant.viscosity.law for case in cases} == {"roelands"}
     assert len({case.id for case in plan.cases}) == 6
     assert "seed" not in plan.points[0]["surface"]
-    assert planned(paper, viscosity=[{"law": "barus", "eta0": "1 Pa s", "alpha": "20 1/GPa"}]).axes == (
-        "lubricant.viscosity",
-    )
+    assert planned(
+        paper, viscosity=[{"law": "barus", "eta0": "1 Pa s", "alpha": "20 1/GPa"}]
+    ).axes == ("lubricant.viscosity",)
 
 
 def test_a_swept_surface_file_that_changes_makes_another_case(paper, tmp_path):

@@ -18,7 +18,7 @@ from test_report import Page
 import asperity
 from asperity.case import load_case
 from asperity.cli import main
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.paper import PAPER_ANCHORS, Anchor, is_papers_contact
 from asperity.report import write_study_report
 from asperity.report.study import contacts
@@ -42,9 +42,25 @@ from asperity.study import (
 PAPERS = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
 SMALL = PAPERS.with_overrides({"grid.cells": "[48, 32]", "surface.correlation_length": "40 um"})
 LEVELS_UM = (0.75, 1.0, 2.0, 3.5)
-PRINTED_CAR = {0.5: 5.57, 2.5: 59.22}  # Sq [um] and CAR [%], section 3.1 of Xu et al., Lubricants 2025, 13, 78
+PRINTED_CAR = {
+    0.5: 5.57,
+    2.5: 59.22,
+}  # Sq [um] and CAR [%], section 3.1 of Xu et al., Lubricants 2025, 13, 78
 PRINTED_CRF = {0.54: 2921.93, 3.49: 3811.88}  # Sq [um] and CRF [Hz], its section 4.2
-RINGS_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)  # its section 4.1
+RINGS_UM = (
+    0.54,
+    0.87,
+    1.25,
+    1.31,
+    1.64,
+    1.68,
+    1.92,
+    2.17,
+    2.43,
+    2.90,
+    3.06,
+    3.49,
+)  # its section 4.1
 RINGS_STD_UM = (0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06)
 
 
@@ -100,12 +116,21 @@ def with_knee(knee_um=2.5, *, seeds=5, scatter_hz=4.0):
         f"{name}_{preset}{unit}": values
         for preset in ("sound", "paper")
         for name, unit, values in (
-            ("crf", "_hz", crf), ("crf_std", "_hz", np.full(crf.size, 1.0)), ("crfa", "", 0.02 * sq_um),
+            ("crf", "_hz", crf),
+            ("crf_std", "_hz", np.full(crf.size, 1.0)),
+            ("crfa", "", 0.02 * sq_um),
         )
-    }  # fmt: skip
+    }
     shares = {"clr": 0.2 * sq_um, "car": 0.1 * sq_um, "car_domain": 0.15 * sq_um}
     points = [{"surface.sq": f"{sq:g} um"} for sq in np.unique(sq_um)]
-    return made(points, seeds=seeds, **{"surface.sq": 1e-6 * sq_um}, **shares, **heard, full_load_crf_hz=3834.0)
+    return made(
+        points,
+        seeds=seeds,
+        **{"surface.sq": 1e-6 * sq_um},
+        **shares,
+        **heard,
+        full_load_crf_hz=3834.0,
+    )
 
 
 def without_maps(result):
@@ -146,11 +171,20 @@ def points_of(axes, label):
 
 
 def test_page_loads_nothing(page):
-    assert not {tag for tag, _ in page.tags} & {"script", "iframe", "object", "embed", "video", "audio"}
+    assert not {tag for tag, _ in page.tags} & {
+        "script",
+        "iframe",
+        "object",
+        "embed",
+        "video",
+        "audio",
+    }
     for tag, attributes in page.tags:
         for name in ("src", "href", "srcset", "data"):
             target = attributes.get(name, "data:")
-            linked = tag == "a" and target.startswith(("#", "https://doi.org/"))  # a link loads nothing by itself
+            linked = tag == "a" and target.startswith(
+                ("#", "https://doi.org/")
+            )  # a link loads nothing by itself
             assert linked or target.startswith("data:"), (tag, name, target[:80])
     assert len(page.images()) == 5  # the paper's Figs 5, 6, 7, 8 and 13
     assert all(len(image["alt"]) > 40 for image in page.images())
@@ -166,14 +200,21 @@ def test_levels_are_means_with_students_interval(page, wear):
 
 
 def test_anchors_stand_in_a_table(page, wear):
-    rows = {plain(row[0]).split(" section")[0]: row[1:] for row in page.rows if "Lubricants" in row[0]}
+    rows = {
+        plain(row[0]).split(" section")[0]: row[1:] for row in page.rows if "Lubricants" in row[0]
+    }
     assert len(rows) == len(PAPER_ANCHORS)
     wanted, ours, *_ = rows["CRF at 3.49 µm, rig"]
     assert wanted.startswith("3812 ±")
     crf = wear.table.groupby("surface.sq")["crf_sound_hz"].mean().to_numpy()
     between = np.interp(3.49, LEVELS_UM, crf)
     assert float(ours.removesuffix(" Hz")) == pytest.approx(between, abs=0.6)
-    assert rows["CAR of the domain at 0.5 µm"][1:] == ["–", "–", "–", "NO"]  # the study begins at 0.75 um
+    assert rows["CAR of the domain at 0.5 µm"][1:] == [
+        "–",
+        "–",
+        "–",
+        "NO",
+    ]  # the study begins at 0.75 um
 
 
 def test_page_says_what_was_computed(page, wear):
@@ -204,7 +245,9 @@ def test_many_reasons_are_summed_up():
     study = with_knee()
     table = study.table.copy()
     table.loc[:13, "status"] = "not converged"
-    table.loc[:13, "reason"] = [f"stalled at a residual of {number}e-3" for number in (1, 1, *range(1, 13))]
+    table.loc[:13, "reason"] = [
+        f"stalled at a residual of {number}e-3" for number in (1, 1, *range(1, 13))
+    ]
     reasons = without_maps(replace(study, table=table)).reasons
     assert [reason.number for reason in reasons] == [3] + 9 * [1] + [2]
     assert reasons[-1].text == "2 other reasons"
@@ -251,9 +294,9 @@ def test_shares_over_sq_with_the_printed_car(wear):
         means = wear.table.groupby("surface.sq")[column].mean()
         drawn = line(axes, label).get_xydata()
         assert drawn == pytest.approx(np.column_stack([LEVELS_UM, 100.0 * means]))
-    assert dict(points_of(axes, "CAR, printed")) | dict(axes.containers[1][0].get_xydata()) == pytest.approx(
-        PRINTED_CAR
-    )
+    assert dict(points_of(axes, "CAR, printed")) | dict(
+        axes.containers[1][0].get_xydata()
+    ) == pytest.approx(PRINTED_CAR)
     assert axes.get_ylim()[1] >= 100.0
     assert axes.get_ylabel().endswith("[%]")
 
@@ -266,19 +309,27 @@ def test_stages_are_marked_where_crf_bends():
         assert low <= 2.5 <= high
         assert high - low < 0.3
         splits = sorted(
-            float(one.get_xdata()[0]) for one in axes.get_lines() if "printed split" in str(one.get_label())
+            float(one.get_xdata()[0])
+            for one in axes.get_lines()
+            if "printed split" in str(one.get_label())
         )
         assert splits == [1.8, 2.5]  # simulated and between the rig's samples of 1.68 and 1.92 um
     assert [text.get_text() for text in figure.axes[0].texts] == ["normal", "severe"]
-    assert dict(points_of(figure.axes[0], "CRF of the rig, printed")) == pytest.approx({0.54: 2921.93})
+    assert dict(points_of(figure.axes[0], "CRF of the rig, printed")) == pytest.approx(
+        {0.54: 2921.93}
+    )
 
 
 def test_levels_at_which_nothing_is_heard_keep_their_place():
     study = with_knee()
     quiet = study.table.copy()
-    quiet.loc[quiet["surface.sq"] < 3.9e-6, ["crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper"]] = np.nan
+    quiet.loc[
+        quiet["surface.sq"] < 3.9e-6, ["crf_sound_hz", "crfa_sound", "crf_paper_hz", "crfa_paper"]
+    ] = np.nan
     figure = figure_of(resonance, replace(study, table=quiet), ())
-    figure.savefig(io.BytesIO())  # a name of a stage outside the axes would leave them no room, and warn
+    figure.savefig(
+        io.BytesIO()
+    )  # a name of a stage outside the axes would leave them no room, and warn
     low, high = figure.axes[0].get_xlim()
     assert low < 0.5
     assert high > 4.0
@@ -299,7 +350,9 @@ def test_rings_of_the_rig_stand_beside_the_prediction():
     assert ours == pytest.approx(np.column_stack([sq, expected]), rel=1e-4)
     (container,) = [one for one in axes.containers if one.get_label() == "ours at a ring's Sq"]
     sideways = container[2][0].get_segments()
-    assert [bar[1, 0] - bar[0, 0] for bar in sideways] == pytest.approx(2.0 * np.array(RINGS_STD_UM))
+    assert [bar[1, 0] - bar[0, 0] for bar in sideways] == pytest.approx(
+        2.0 * np.array(RINGS_STD_UM)
+    )
     assert dict(points_of(axes, "rings, CRF printed")) == pytest.approx(PRINTED_CRF)
 
 
@@ -312,7 +365,9 @@ def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):
         title = axes.get_title("left")
         assert f"Sq {1e6 * sq:.3g} µm" in title
         shown = [float(share) for share in re.findall(r"([\d.]+) %", title)]
-        assert shown == pytest.approx([100 * row[name] for name in ("clr", "car", "car_domain")], abs=0.051)
+        assert shown == pytest.approx(
+            [100 * row[name] for name in ("clr", "car", "car_domain")], abs=0.051
+        )
         image = np.asarray(axes.images[0].get_array())
         yellow = np.all(np.isclose(image, to_rgb(CONTACT_COLOUR)), axis=2)
         in_zone = np.abs(run.case.grid.x) <= run.case.conditions.hertz.half_widths[0]
@@ -353,7 +408,12 @@ def test_printed_numbers_stand_beside_the_papers_contact_only(overrides, papers)
 def test_anchors_of_ones_own_replace_the_papers(wear):
     own = (Anchor(name="CLR of my rig", quantity="clr", value=0.7, tolerance=0.1, sq=2e-6),)
     overview = StudyOverview(wear, own)
-    assert [exhibit.name for exhibit in study_exhibits(overview)] == ["shares", "resonance", "contact-maps", "surfaces"]
+    assert [exhibit.name for exhibit in study_exhibits(overview)] == [
+        "shares",
+        "resonance",
+        "contact-maps",
+        "surfaces",
+    ]
     axes = figure_of(shares, wear, own, ON_PAGE).axes[0]
     assert points_of(axes, "CLR, given") == pytest.approx(np.array([[2.0, 70.0]]))
     assert [row["name"] for row in anchor_rows(overview)] == ["CLR of my rig"]
@@ -375,12 +435,15 @@ def over_two():
 def test_means_over_two_quantities_as_a_map():
     overview = StudyOverview(over_two())
     assert [exhibit.name for exhibit in study_exhibits(overview)] == [
-        "against-contact-load", "against-surface-correlation-length",
+        "against-contact-load",
+        "against-surface-correlation-length",
         "over-contact-load-and-surface-correlation-length",
-    ]  # fmt: skip
+    ]
     figure = study_exhibits(overview)[-1].figure(ON_PAPER)
     image = figure.axes[0].images[0].get_array()
-    assert np.asarray(image) == pytest.approx(np.array([[15, 75], [35, 52.5], [55, 30]]))  # means of pairs, by hand
+    assert np.asarray(image) == pytest.approx(
+        np.array([[15, 75], [35, 52.5], [55, 30]])
+    )  # means of pairs, by hand
     labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     assert labels == ["10", "20", "80"]  # um, one of them written in mm
     assert figure.get_supylabel() == "correlation length [µm]"
@@ -408,7 +471,9 @@ def test_means_against_one_quantity_have_students_interval():
 
 def test_samples_are_averaged_in_groups():
     sq = np.random.default_rng(1).uniform(0.5, 3.0, 40)
-    points = [{"surface.sq": f"{value:.4f} um", "lubricant.viscosity.alpha": "20 1/GPa"} for value in sq]
+    points = [
+        {"surface.sq": f"{value:.4f} um", "lubricant.viscosity.alpha": "20 1/GPa"} for value in sq
+    ]
     overview = StudyOverview(made(points, clr=sq / 4.0))
     (axis,) = overview.axes  # alpha has one value: no axis
     assert axis.binned
@@ -446,7 +511,9 @@ def test_many_cases_are_a_picture():
 
 
 def test_names_are_places_on_an_axis():
-    points = [{"surface.correlation_length": pair} for pair in (["10 um", "40 um"], ["20 um", "40 um"])]
+    points = [
+        {"surface.correlation_length": pair} for pair in (["10 um", "40 um"], ["20 um", "40 um"])
+    ]
     study = made(points, clr=[0.1, 0.2])
     axis = swept_axis(study.plan, study.table, "surface.correlation_length")
     assert axis.names == ("10 um, 40 um", "20 um, 40 um")
@@ -466,7 +533,13 @@ def written(wear, tmp_path_factory):
 
 def test_figures_and_tables_for_a_paper(written, wear):
     _, out = written
-    names = {"shares": 84.0, "rig": 84.0, "resonance": 174.0, "contact-maps": 174.0, "surfaces": 174.0}
+    names = {
+        "shares": 84.0,
+        "rig": 84.0,
+        "resonance": 174.0,
+        "contact-maps": 174.0,
+        "surfaces": 174.0,
+    }
     for name, width_mm in names.items():
         pixels = matplotlib.image.imread(out / f"{name}.png").shape[1]
         assert pixels / 300.0 * 25.4 == pytest.approx(width_mm, abs=0.2), name
@@ -486,7 +559,17 @@ def test_figures_and_tables_for_a_paper(written, wear):
 
 def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
-        main(["report", str(folder), "--out", str(tmp_path / "p.html"), "--figures", str(tmp_path / "f"), "--json"])
+        main(
+            [
+                "report",
+                str(folder),
+                "--out",
+                str(tmp_path / "p.html"),
+                "--figures",
+                str(tmp_path / "f"),
+                "--json",
+            ]
+        )
     assert not end.value.code
     said = json.loads(capsys.readouterr().out)
     assert said["report"] == str(tmp_path / "p.html")
@@ -494,12 +577,16 @@ def test_command_writes_the_same_to_the_last_byte(written, folder, tmp_path, cap
     assert (said["cases"], said["failed"]) == (12, 0)
     page, figures = written
     assert (tmp_path / "p.html").read_bytes() == page.read_bytes()
-    assert {file.name for file in (tmp_path / "f").iterdir()} == {file.name for file in figures.iterdir()}
+    assert {file.name for file in (tmp_path / "f").iterdir()} == {
+        file.name for file in figures.iterdir()
+    }
     for file in figures.iterdir():
         assert file.read_bytes() == (tmp_path / "f" / file.name).read_bytes(), file.name
 
 
-def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(wear, tmp_path, monkeypatch):
+def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(
+    wear, tmp_path, monkeypatch
+):
     monkeypatch.setattr(overview, "solve_case", lambda *_, **__: pytest.fail("solved first"))
     (tmp_path / "file").write_text("")
     with pytest.raises(BadInput, match="it is a file; name a folder"):
@@ -519,7 +606,9 @@ def test_a_place_that_cannot_be_written_to_is_refused_before_anything_is_drawn(w
         (["STUDY", "--out", "page.pdf"], "--out must be a file that ends in .html"),
     ],
 )
-def test_command_refuses_in_one_sentence(arguments, sentence, folder, tmp_path, capsys, monkeypatch):
+def test_command_refuses_in_one_sentence(
+    arguments, sentence, folder, tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "EMPTY").mkdir()
     with pytest.raises(SystemExit) as end:

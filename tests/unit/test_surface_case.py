@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.results import solve_case
 from asperity.surface import parameters
 
@@ -37,7 +37,9 @@ def ring(folder, name="ring.x3p", seed=1):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_surface_is_made_and_restated(paper, kind):
-    case = paper.with_overrides({"surface": {"kind": kind, "sq": "0.7 um", "seed": 3, **KINDS[kind]}})
+    case = paper.with_overrides(
+        {"surface": {"kind": kind, "sq": "0.7 um", "seed": 3, **KINDS[kind]}}
+    )
     assert case.surface().sq == pytest.approx(0.7e-6, rel=1e-9)
     again = load_case(case.text, folder=case.folder)
     assert again == case
@@ -60,7 +62,12 @@ def test_two_measured_surfaces_keep_their_speeds(paper, tmp_path):
             "surface": {
                 "file": "ring.x3p",
                 "sq": "0.5 um",
-                "second": {"file": "roller.x3p", "sq": "0.2 um", "turn": True, "l_filter": "0.2 mm"},
+                "second": {
+                    "file": "roller.x3p",
+                    "sq": "0.2 um",
+                    "turn": True,
+                    "l_filter": "0.2 mm",
+                },
             }
         }
     ).text
@@ -79,7 +86,9 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
 
     grooves = 1e-6 * np.sin(np.arange(200) / 3.0)[:, None] * np.ones(220)
     x3pio.write(tmp_path / "ring.x3p", grooves.T, x_scale=2e-6, y_scale=2e-6)
-    across = load_case(paper.with_overrides({"surface": {"file": "ring.x3p"}}).text, folder=tmp_path)
+    across = load_case(
+        paper.with_overrides({"surface": {"file": "ring.x3p"}}).text, folder=tmp_path
+    )
     along = across.with_overrides({"surface.turn": True})
     assert np.ptp(across.surface().heights, axis=1).max() < 1e-12  # nothing changes along y ...
     assert np.ptp(along.surface().heights, axis=0).max() < 1e-12  # ... and turned, nothing along x
@@ -94,20 +103,40 @@ def test_turning_a_grooved_surface_lays_its_grooves_along_rolling(paper, tmp_pat
         ({"file": "ring.x3p", "form": "sphere"}, "surface.form"),
         ({"file": "ring.x3p", "turn": 90}, "surface.turn"),
         ({"file": "ring.x3p", "pixel": "5"}, "without a unit"),
-        ({"kind": "flat", "second": {"kind": "flat", "second": {"kind": "flat"}}}, "surface.second.second is a third"),
-        ({"kind": "flat", "second": {"kind": "grund"}}, 'did you mean "ground"'),
-        ({"file": "ring.x3p", "second": {"fil": "x"}}, "surface.second.fil is not a known key; did you mean file"),
         (
-            {"kind": "non-gaussian", "sq": "1 um", "correlation_length": "20 um", "skewness": -3, "kurtosis": 4},
+            {"kind": "flat", "second": {"kind": "flat", "second": {"kind": "flat"}}},
+            "surface.second.second is a third",
+        ),
+        ({"kind": "flat", "second": {"kind": "grund"}}, 'did you mean "ground"'),
+        (
+            {"file": "ring.x3p", "second": {"fil": "x"}},
+            "surface.second.fil is not a known key; did you mean file",
+        ),
+        (
+            {
+                "kind": "non-gaussian",
+                "sq": "1 um",
+                "correlation_length": "20 um",
+                "skewness": -3,
+                "kurtosis": 4,
+            },
             "kurtosis must be above 1",
         ),
-        ({"kind": "sandblasted", "sq": "1 um", "crater_radius": "1 um"}, "crater_radius must lie between"),
+        (
+            {"kind": "sandblasted", "sq": "1 um", "crater_radius": "1 um"},
+            "crater_radius must lie between",
+        ),
         (
             {"kind": "run-in", "sq": "1 um", "correlation_length": "20 um", "plateau_share": 1.5},
             "plateau_share must lie between 0 and 1",
         ),
         (
-            {"kind": "gaussian", "sq": "1 um", "correlation_length": ["20 um", "5 um"], "direction_deg": 45},
+            {
+                "kind": "gaussian",
+                "sq": "1 um",
+                "correlation_length": ["20 um", "5 um"],
+                "direction_deg": 45,
+            },
             "across it must be at least 2 cells",
         ),
     ],
@@ -119,7 +148,13 @@ def test_what_cannot_be_meant_is_refused(paper, surface, message):
 
 # Two bodies ----------------------------------------------------------------------------------------------------------
 
-GROUND = {"kind": "ground", "sq": "0.3 um", "groove_width": "30 um", "groove_length": "80 um", "seed": 1}
+GROUND = {
+    "kind": "ground",
+    "sq": "0.3 um",
+    "groove_width": "30 um",
+    "groove_length": "80 um",
+    "seed": 1,
+}
 
 
 def test_two_bodies_have_each_its_own_roughness_and_lay(paper):
@@ -129,7 +164,10 @@ def test_two_bodies_have_each_its_own_roughness_and_lay(paper):
     assert (both.first.sq, both.second.sq) == pytest.approx((0.3e-6, 0.4e-6), rel=1e-6)
     assert both.speeds == case.conditions.surface_speeds
     steep = [
-        [np.abs(np.diff(body.heights, axis=axis)).mean() / case.grid.spacing[axis] for axis in (0, 1)]
+        [
+            np.abs(np.diff(body.heights, axis=axis)).mean() / case.grid.spacing[axis]
+            for axis in (0, 1)
+        ]
         for body in (both.first, both.second)
     ]
     assert steep[0][1] > 1.5 * steep[0][0]  # grooves along rolling
@@ -188,8 +226,12 @@ def test_two_drawn_bodies_move_each_at_its_speed(paper):
 def test_a_solve_works_a_surfaces_correlation_lengths_out_once(monkeypatch):
     asked = []
     worked_out = parameters._autocorrelation
-    monkeypatch.setattr(parameters, "_autocorrelation", lambda *given: asked.append(1) or worked_out(*given))
-    case = load_case(PAPER).with_overrides({"grid.cells": [32, 24], "surface.correlation_length": "40 um"})
+    monkeypatch.setattr(
+        parameters, "_autocorrelation", lambda *given: asked.append(1) or worked_out(*given)
+    )
+    case = load_case(PAPER).with_overrides(
+        {"grid.cells": [32, 24], "surface.correlation_length": "40 um"}
+    )
     run = solve_case(case, surfaces=2)
     assert run.determined in (True, False)
     assert len(asked) == 2

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.surface import MeasuredSurface, condition_surface, gaussian_surface, level
 
 
@@ -14,7 +14,9 @@ def measured(heights, pixel=1e-6, uniform=None):
 
 def rough(cells=(160, 120), length=6e-6, seed=3):
     grid = Grid(cells, (0.0, 0.0), (cells[0] * 1e-6, cells[1] * 1e-6))
-    return gaussian_surface(grid, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)).heights
+    return gaussian_surface(
+        grid, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)
+    ).heights
 
 
 def wave(cells, wavelength, axis=0):
@@ -28,7 +30,10 @@ def wave(cells, wavelength, axis=0):
 def test_a_cylinder_of_any_axis_leaves_nothing(hollow, angle, tilt):
     grid = measured(np.zeros((120, 90))).grid
     x, y = np.meshgrid(grid.x, grid.y, indexing="ij")
-    across, along = x * np.cos(angle) + y * np.sin(angle) - 9e-6, y * np.cos(angle) - x * np.sin(angle)
+    across, along = (
+        x * np.cos(angle) + y * np.sin(angle) - 9e-6,
+        y * np.cos(angle) - x * np.sin(angle),
+    )
     # all points at one distance from the axis: z from the circle, stretched by the tilt
     heights = tilt * along + np.sqrt(1.0 + tilt**2) * np.sqrt((150e-6) ** 2 - across**2)
     heights[20:30, 40:60] = np.nan
@@ -45,7 +50,9 @@ def test_the_cylinder_of_a_profile():
     assert "5 mm radius" in step
 
 
-@pytest.mark.parametrize(("form", "degree"), [("plane", 1), ("quadratic", 2), ("cubic", 3), ("quartic", 4)])
+@pytest.mark.parametrize(
+    ("form", "degree"), [("plane", 1), ("quadratic", 2), ("cubic", 3), ("quartic", 4)]
+)
 def test_a_polynomial_takes_its_degree_and_no_higher(form, degree):
     x, y = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 50), indexing="ij")
     own = 1e-6 * (x + y) ** degree
@@ -53,7 +60,9 @@ def test_a_polynomial_takes_its_degree_and_no_higher(form, degree):
     assert level(measured(1e-6 * x ** (degree + 1)), form)[0].sq > 1e-8
 
 
-@pytest.mark.parametrize(("wavelength", "passed"), [(10e-6, 0.5 ** (2.0**2)), (20e-6, 0.5), (60e-6, 0.5 ** (1 / 9))])
+@pytest.mark.parametrize(
+    ("wavelength", "passed"), [(10e-6, 0.5 ** (2.0**2)), (20e-6, 0.5), (60e-6, 0.5 ** (1 / 9))]
+)
 @pytest.mark.parametrize("axis", [0, 1])
 def test_the_filters_pass_what_iso_16610_says(wavelength, passed, axis):
     """Transmission exp(-ln 2 (cut-off/wavelength)^2) of the Gaussian, and the rest of 1 for the L-filter."""

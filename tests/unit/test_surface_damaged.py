@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.surface import describe_surface
 
 FILES = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces"
@@ -22,13 +22,18 @@ def originals(folder):
     z = np.sin(x / 3.0) + 0.1 * y
     x3pio.write(folder / "a.x3p", 1e-6 * z.T, x_scale=2e-6, y_scale=3e-6)
     sdfio.write(folder / "a.sdf", 1e-6 * z.T, x_scale=2e-6, y_scale=2e-6)
-    (folder / "a.xyz").write_text("".join(f"{i} {j} {z[i, j]:.4f}\n" for j in range(16) for i in range(24)))
+    (folder / "a.xyz").write_text(
+        "".join(f"{i} {j} {z[i, j]:.4f}\n" for j in range(16) for i in range(24))
+    )
     rows = [f'"{i},5","{v:.3f}"\n'.replace(".", ",") for i, v in enumerate(z[:, 0])]
     (folder / "a.csv").write_text('"x","z"\n' + "".join(rows))
     (folder / "a.txt").write_text("\n".join(" ".join(f"{v:.4f}" for v in row) for row in z.T))
     np.save(folder / "a.npy", z)
     own = sorted(FILES.iterdir()) if FILES.is_dir() else []
-    return [[(path.name, path.read_bytes()) for path in paths] for paths in (sorted(folder.iterdir()), own)]
+    return [
+        [(path.name, path.read_bytes()) for path in paths]
+        for paths in (sorted(folder.iterdir()), own)
+    ]
 
 
 def damaged(content, rng):
@@ -53,7 +58,9 @@ def damaged(content, rng):
     return bytes(data)
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # readers that fail leave files open
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # readers that fail leave files open
 def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
     (tmp_path / "good").mkdir()
     (tmp_path / "bad").mkdir()
@@ -62,7 +69,9 @@ def test_300_damaged_files_leave_no_traceback(tmp_path, capfd):
     outcomes = []
     for number in range(300):
         name, content = (
-            large[number // 10 % len(large)] if large and number % 10 == 0 else small[number % 7 % len(small)]
+            large[number // 10 % len(large)]
+            if large and number % 10 == 0
+            else small[number % 7 % len(small)]
         )
         path = tmp_path / "bad" / name
         path.write_bytes(damaged(content, rng))
@@ -83,6 +92,8 @@ def outcome(path):
     unit, lateral = UNITS.get(path.suffix[1:], (None, None))
     pixel = 1e-6 if path.name in ("a.npy", "a.txt") else None
     try:
-        return describe_surface(path, unit=unit, lateral_unit=None if pixel else lateral, pixel=pixel).parameters.sq
+        return describe_surface(
+            path, unit=unit, lateral_unit=None if pixel else lateral, pixel=pixel
+        ).parameters.sq
     except BadInput as refusal:
         return str(refusal)

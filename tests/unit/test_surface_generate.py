@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.surface import gaussian_surface, self_affine_surface
 
 
@@ -21,13 +21,17 @@ def test_this_very_sample_has_the_sq_asked_for_and_no_mean():
 
 
 def test_sq_only_scales_the_surface_of_a_seed():
-    low, high = (gaussian_surface(grid(), sq=sq, correlation_length=20e-6, rng=seeded(7)) for sq in (0.5e-6, 4e-6))
+    low, high = (
+        gaussian_surface(grid(), sq=sq, correlation_length=20e-6, rng=seeded(7))
+        for sq in (0.5e-6, 4e-6)
+    )
     np.testing.assert_allclose(high.heights, 8.0 * low.heights, rtol=1e-12)
 
 
 def test_seeds_are_reproducible_and_differ():
     one, again, other = (
-        gaussian_surface(grid(), sq=1e-6, correlation_length=(30e-6, 15e-6), rng=seeded(s)) for s in (3, 3, 4)
+        gaussian_surface(grid(), sq=1e-6, correlation_length=(30e-6, 15e-6), rng=seeded(s))
+        for s in (3, 3, 4)
     )
     np.testing.assert_array_equal(one.heights, again.heights)
     assert abs(np.corrcoef(one.heights.ravel(), other.heights.ravel())[0, 1]) < 0.3
@@ -37,17 +41,22 @@ def test_seeds_are_reproducible_and_differ():
     "make",
     [
         lambda g: gaussian_surface(g, sq=1e-6, correlation_length=25e-6, rng=seeded(5)),
-        lambda g: self_affine_surface(g, sq=1e-6, hurst=0.8, cutoffs=(20e-6, 200e-6), rng=seeded(5)),
+        lambda g: self_affine_surface(
+            g, sq=1e-6, hurst=0.8, cutoffs=(20e-6, 200e-6), rng=seeded(5)
+        ),
     ],
 )
 def test_a_finer_grid_shows_the_same_physical_surface(make):
     coarse, fine = make(grid((64, 64))), make(grid((192, 192)))
     # the middle one of three fine cells has the coarse cell's centre
-    np.testing.assert_allclose(fine.heights[1::3, 1::3], coarse.heights, atol=1e-9 * 1e-6 + 1e-6 * 1e-6)
+    np.testing.assert_allclose(
+        fine.heights[1::3, 1::3], coarse.heights, atol=1e-9 * 1e-6 + 1e-6 * 1e-6
+    )
 
 
 @pytest.mark.parametrize(
-    ("length", "said"), [(1.9 * 400e-6 / 128, "at least 2 cells"), (201e-6, "half the domain"), (-1e-6, "positive")]
+    ("length", "said"),
+    [(1.9 * 400e-6 / 128, "at least 2 cells"), (201e-6, "half the domain"), (-1e-6, "positive")],
 )
 def test_a_correlation_length_the_grid_cannot_hold_is_refused(length, said):
     with pytest.raises(BadInput, match=said):
@@ -55,7 +64,8 @@ def test_a_correlation_length_the_grid_cannot_hold_is_refused(length, said):
 
 
 @pytest.mark.parametrize(
-    ("hurst", "cutoffs"), [(0.0, (20e-6, 200e-6)), (1.2, (20e-6, 200e-6)), (0.8, (200e-6, 20e-6)), (0.8, (1e-6, 1e-4))]
+    ("hurst", "cutoffs"),
+    [(0.0, (20e-6, 200e-6)), (1.2, (20e-6, 200e-6)), (0.8, (200e-6, 20e-6)), (0.8, (1e-6, 1e-4))],
 )
 def test_a_power_law_the_grid_cannot_hold_is_refused(hurst, cutoffs):
     with pytest.raises(BadInput):

@@ -3,9 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.grid import Grid
-from asperity.surface import CompositeSurface, MeasuredSurface, gaussian_surface, level, places, prepare_surface
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
+from asperity.surface import (
+    CompositeSurface,
+    MeasuredSurface,
+    gaussian_surface,
+    level,
+    places,
+    prepare_surface,
+)
 
 
 def measured(heights, pixel=1e-6):
@@ -16,7 +23,9 @@ def measured(heights, pixel=1e-6):
 
 def rough(cells=(300, 240), seed=2, pixel=1e-6, length=8e-6):
     grid = Grid(cells, (0.0, 0.0), (cells[0] * pixel, cells[1] * pixel))
-    return gaussian_surface(grid, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)).heights
+    return gaussian_surface(
+        grid, sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)
+    ).heights
 
 
 def contact(cells=(96, 64), size=(120e-6, 80e-6), periodic=(False, True)):
@@ -24,7 +33,9 @@ def contact(cells=(96, 64), size=(120e-6, 80e-6), periodic=(False, True)):
 
 
 def form_on(cells):
-    x, y = np.meshgrid(np.linspace(0.0, 1.0, cells[0]), np.linspace(0.0, 1.0, cells[1]), indexing="ij")
+    x, y = np.meshgrid(
+        np.linspace(0.0, 1.0, cells[0]), np.linspace(0.0, 1.0, cells[1]), indexing="ij"
+    )
     return 76e-3 + 1e-6 * (30.0 * x - 12.0 * y + 5.0 * x**2 - 7.0 * x * y + 3.0 * y**2)
 
 
@@ -72,11 +83,15 @@ def test_interpolation_follows_a_wave():
     np.testing.assert_allclose(prepared.surface.heights, expected - expected.mean(), atol=2e-9)
 
 
-@pytest.mark.parametrize(("wavelength", "passed"), [(40e-6, 1.0), (12.5e-6, 1.0), (8e-6, 0.0), (3.7e-6, 0.0)])
+@pytest.mark.parametrize(
+    ("wavelength", "passed"), [(40e-6, 1.0), (12.5e-6, 1.0), (8e-6, 0.0), (3.7e-6, 0.0)]
+)
 def test_a_coarser_grid_keeps_the_waves_it_can_show_and_no_others(wavelength, passed):
     x = (np.arange(800) - 399.5)[:, None] * np.ones(200) * 1e-6
     heights = np.cos(2.0 * np.pi * x / wavelength)
-    grid = Grid((48, 16), (-120e-6, -40e-6), (120e-6, 40e-6), periodic=(False, False))  # 5 um cells: none below 10 um
+    grid = Grid(
+        (48, 16), (-120e-6, -40e-6), (120e-6, 40e-6), periodic=(False, False)
+    )  # 5 um cells: none below 10 um
     resampled = prepare_surface(measured(heights), grid, form="none").surface.heights
     expected = passed * np.cos(2.0 * np.pi * grid.x / wavelength)
     np.testing.assert_allclose(resampled[:, 8], expected - expected.mean(), atol=0.005)
@@ -88,7 +103,9 @@ def test_the_ends_of_a_repeating_axis_meet():
     prepared = prepare_surface(measured(heights), grid).surface.heights
     steps = np.std(np.diff(prepared, axis=1))
     assert np.std(prepared[:, 0] - prepared[:, -1]) < 1.5 * steps
-    open_ended = prepare_surface(measured(heights), replace(grid, periodic=(False, False))).surface.heights
+    open_ended = prepare_surface(
+        measured(heights), replace(grid, periodic=(False, False))
+    ).surface.heights
     assert np.std(open_ended[:, 0] - open_ended[:, -1]) > 5.0 * steps
 
 
@@ -124,7 +141,9 @@ def test_too_many_holes_are_refused():
 
 def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_and_tiled_when_asked():
     small = measured(rough((80, 130)))
-    with pytest.raises(BadInput, match=r"80 x 130 um, smaller than the contact's 120 x 80 um.*smaller grid"):
+    with pytest.raises(
+        BadInput, match=r"80 x 130 um, smaller than the contact's 120 x 80 um.*smaller grid"
+    ):
         prepare_surface(small, contact())
     tiled = prepare_surface(small, contact((120, 80)), fit="tile", form="none")
     heights = tiled.surface.heights
@@ -134,10 +153,14 @@ def test_a_map_smaller_than_the_contact_is_refused_with_both_sizes_and_tiled_whe
 
 
 def test_scaling_gives_the_sq_asked_for_and_nothing_else_changes():
-    as_measured, scaled = (prepare_surface(measured(rough()), contact(), sq=sq) for sq in (None, 2.5e-6))
+    as_measured, scaled = (
+        prepare_surface(measured(rough()), contact(), sq=sq) for sq in (None, 2.5e-6)
+    )
     assert scaled.surface.sq == pytest.approx(2.5e-6, rel=1e-12)
     factor = 2.5e-6 / as_measured.surface.sq
-    np.testing.assert_allclose(scaled.surface.heights, factor * as_measured.surface.heights, rtol=1e-9)
+    np.testing.assert_allclose(
+        scaled.surface.heights, factor * as_measured.surface.heights, rtol=1e-9
+    )
     assert all(abs(p.surface.heights.mean()) < 1e-18 for p in (as_measured, scaled))
 
 
@@ -189,14 +212,20 @@ def test_a_profile_shorter_than_the_contact_is_refused_and_mirrored_when_asked()
     with pytest.raises(BadInput, match=r"profile of 80 um, shorter than the contact's 120 um"):
         prepare_surface(profile(80e-6), contact())
     prepared = prepare_surface(profile(80e-6), contact((120, 64)), fit="tile", form="none")
-    np.testing.assert_allclose(prepared.surface.heights[:20], prepared.surface.heights[20:40][::-1], atol=1e-12)
+    np.testing.assert_allclose(
+        prepared.surface.heights[:20], prepared.surface.heights[20:40][::-1], atol=1e-12
+    )
 
 
 def test_resampling_keeps_the_spectrum_up_to_nine_tenths_of_the_last_wave():
-    grid = Grid((100, 80), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False))  # 2 um cells over 1 um pixels
+    grid = Grid(
+        (100, 80), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False)
+    )  # 2 um cells over 1 um pixels
     fine = Grid((200, 160), (-100e-6, -80e-6), (100e-6, 80e-6), (False, False))
     heights = rough(length=2e-6)
-    coarse, same = (prepare_surface(measured(heights), g, form="none").surface for g in (grid, fine))
+    coarse, same = (
+        prepare_surface(measured(heights), g, form="none").surface for g in (grid, fine)
+    )
     window = np.outer(np.hanning(100), np.hanning(80))
     found = np.abs(np.fft.fft2(coarse.heights * window))[:45, :36]
     truth = np.abs(np.fft.fft2(same.heights * np.kron(window, np.ones((2, 2)))))[:45, :36] / 4.0
@@ -207,7 +236,9 @@ def test_resampling_keeps_the_spectrum_up_to_nine_tenths_of_the_last_wave():
 def test_turning_a_map_turns_what_is_prepared():
     heights = rough((300, 300))
     square = contact((80, 80), (80e-6, 80e-6), periodic=(False, False))
-    plain, turned = (prepare_surface(measured(heights), square, turn=turn).surface for turn in (False, True))
+    plain, turned = (
+        prepare_surface(measured(heights), square, turn=turn).surface for turn in (False, True)
+    )
     np.testing.assert_allclose(turned.heights, plain.heights[:, ::-1].T, atol=1e-12)
 
 
@@ -235,7 +266,9 @@ def test_another_place_is_what_lies_beside_the_centre():
         prepare_surface(measured(heights), grid, form="none", place=place).surface.heights
         for place in range(places(measured(heights), grid))
     ]
-    assert len(everywhere) == 5 * 5  # 600/120 along, 500/80 across, an odd number of each about the centre
+    assert (
+        len(everywhere) == 5 * 5
+    )  # 600/120 along, 500/80 across, an odd number of each about the centre
     blocks = [
         block - block.mean()
         for i in range(5)
@@ -245,7 +278,9 @@ def test_another_place_is_what_lies_beside_the_centre():
     for place in everywhere:
         assert min(np.abs(place - block).max() for block in blocks) < 1e-12
     assert len({place.tobytes() for place in everywhere}) == 25
-    np.testing.assert_array_equal(everywhere[0], prepare_surface(measured(heights), grid, form="none").surface.heights)
+    np.testing.assert_array_equal(
+        everywhere[0], prepare_surface(measured(heights), grid, form="none").surface.heights
+    )
     with pytest.raises(BadInput, match="room for 25 of the contact's"):
         prepare_surface(measured(heights), grid, place=25)
 

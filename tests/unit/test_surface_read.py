@@ -4,14 +4,18 @@ import warnings
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput, UnreadableFile
-from asperity.quiet import quietly
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.third_party import quietly
 from asperity.surface import read_surface
 from asperity.surface.read import surface_topography
 
 
 def xyz(path, cells=(20, 12), pixel=(2.0, 3.0)):
-    rows = [f"{i * pixel[0]} {j * pixel[1]} {i + 100 * j}\n" for j in range(cells[1]) for i in range(cells[0])]
+    rows = [
+        f"{i * pixel[0]} {j * pixel[1]} {i + 100 * j}\n"
+        for j in range(cells[1])
+        for i in range(cells[0])
+    ]
     path.write_text("".join(rows))
     return path
 
@@ -49,7 +53,8 @@ def test_an_x3p_in_a_folder_of_its_own_is_read_and_noted(x3p, tmp_path):
         for name in standard.namelist():
             content = standard.read(name)
             loose.writestr(
-                f"inner/{name}", content.replace(b"ISO5436_2", b"ISO5436") if name == "main.xml" else content
+                f"inner/{name}",
+                content.replace(b"ISO5436_2", b"ISO5436") if name == "main.xml" else content,
             )
     measured = read_surface(tmp_path / "loose.x3p")
     np.testing.assert_allclose(measured.heights, heights, rtol=1e-12)
@@ -87,7 +92,9 @@ def test_a_unit_that_is_no_length_is_refused(tmp_path):
 
 @pytest.mark.parametrize("unit", ["km", "pm"])
 def test_an_implausible_pixel_is_noted(tmp_path, unit):
-    measured = read_surface(xyz(tmp_path / "points.txt", pixel=(2.0, 2.0)), unit="um", lateral_unit=unit)
+    measured = read_surface(
+        xyz(tmp_path / "points.txt", pixel=(2.0, 2.0)), unit="um", lateral_unit=unit
+    )
     assert sum("check the lateral unit" in note for note in measured.notes) == 2
 
 
@@ -159,7 +166,9 @@ def test_a_profile_goes_on_unchanged_along_y(tmp_path):
     measured = read_surface(path, unit="um", lateral_unit="mm")
     assert measured.uniform == 1
     assert measured.grid.spacing[0] == pytest.approx(0.5e-6)
-    np.testing.assert_allclose(measured.heights, 1e-6 * np.sin(np.arange(200))[:, None] * np.ones(8), atol=6e-12)
+    np.testing.assert_allclose(
+        measured.heights, 1e-6 * np.sin(np.arange(200))[:, None] * np.ones(8), atol=6e-12
+    )
 
 
 def test_a_row_of_an_x3p_is_a_profile_too(tmp_path):
@@ -175,7 +184,10 @@ def test_a_row_of_an_x3p_is_a_profile_too(tmp_path):
 
 
 TABLES = {
-    "decimal commas in quotes": ("x.csv", '"x","z"\n' + "".join(f'"{i},50","{i}0,25"\n' for i in range(12))),
+    "decimal commas in quotes": (
+        "x.csv",
+        '"x","z"\n' + "".join(f'"{i},50","{i}0,25"\n' for i in range(12)),
+    ),
     "semicolons": ("x.txt", "X;Z\n[mm];[um]\n" + "".join(f"{i},5;{i}0,25\n" for i in range(12))),
     "tabs": ("x.dat", "".join(f"{i}.5\t{i}0.25\t\n" for i in range(12))),
     "commas": ("x.csv", "x,z\n" + "".join(f"{i}.5,{i}0.25\n" for i in range(12))),
@@ -208,7 +220,9 @@ def test_a_matrix_of_bare_heights_needs_its_pixel(tmp_path, name):
     else:
         separator = "," if name == "bare.csv" else " "
         rows = heights.T[::-1]  # a file's first line is its top, an array's first column its bottom
-        (tmp_path / name).write_text("\n".join(separator.join(f"{z:.9f}" for z in row) for row in rows))
+        (tmp_path / name).write_text(
+            "\n".join(separator.join(f"{z:.9f}" for z in row) for row in rows)
+        )
     with pytest.raises(BadInput, match="give pixel"):
         read_surface(tmp_path / name, unit="um")
     with pytest.raises(BadInput, match="give unit"):

@@ -1,8 +1,14 @@
 import numpy as np
 import pytest
 
-from asperity.grid import Grid
-from asperity.surface import MeasuredSurface, Surface, flat_surface, gaussian_surface, surface_spectrum
+from asperity.contact.grid import Grid
+from asperity.surface import (
+    MeasuredSurface,
+    Surface,
+    flat_surface,
+    gaussian_surface,
+    surface_spectrum,
+)
 
 BOTH = (True, True)
 
@@ -13,7 +19,9 @@ def test_the_density_integrates_to_sq_squared():
     surface = gaussian_surface(on, sq=1.3e-6, correlation_length=8e-6, rng=np.random.default_rng(1))
     spectrum = surface_spectrum(surface)
     q, c = spectrum.wavenumber, spectrum.density
-    assert np.sqrt(np.trapezoid(c * q**2, np.log(q)) / (2.0 * np.pi)) == pytest.approx(1.3e-6, rel=0.03)
+    assert np.sqrt(np.trapezoid(c * q**2, np.log(q)) / (2.0 * np.pi)) == pytest.approx(
+        1.3e-6, rel=0.03
+    )
     # closed form of the Gaussian autocorrelation: C = pi l^2 Sq^2 exp(-(q l)^2/4)
     some = (q > 5e4) & (q < 4e5)
     expected = np.pi * (8e-6) ** 2 * (1.3e-6) ** 2 * np.exp(-((q * 8e-6) ** 2) / 4.0)
@@ -24,7 +32,9 @@ def test_tapering_the_edges_takes_no_power():
     on = Grid((256, 256), (0.0, 0.0), (256e-6, 256e-6), (False, False))
     sq = []
     for seed in range(8):
-        surface = gaussian_surface(on, sq=1.3e-6, correlation_length=8e-6, rng=np.random.default_rng(seed))
+        surface = gaussian_surface(
+            on, sq=1.3e-6, correlation_length=8e-6, rng=np.random.default_rng(seed)
+        )
         spectrum = surface_spectrum(surface)
         power = np.trapezoid(spectrum.density * spectrum.wavenumber**2, np.log(spectrum.wavenumber))
         sq.append(np.sqrt(power / (2.0 * np.pi)))
@@ -34,7 +44,9 @@ def test_tapering_the_edges_takes_no_power():
 @pytest.mark.parametrize("degrees", [0, 45, 90, 150])
 def test_ridges_are_found_where_they_run(degrees):
     on = Grid((128, 128), (0.0, 0.0), (128e-6, 128e-6), (False, False))
-    across = on.y[None, :] * np.cos(np.radians(degrees)) - on.x[:, None] * np.sin(np.radians(degrees))
+    across = on.y[None, :] * np.cos(np.radians(degrees)) - on.x[:, None] * np.sin(
+        np.radians(degrees)
+    )
     spectrum = surface_spectrum(Surface(1e-6 * np.cos(2.0 * np.pi * across / 10e-6), on))
     assert np.degrees(spectrum.lay[np.argmax(spectrum.share)]) == pytest.approx(degrees, abs=2.6)
     assert spectrum.share.sum() == pytest.approx(1.0)
@@ -46,7 +58,9 @@ def test_the_spectrum_of_a_profile_integrates_to_rq_squared():
     on = Grid(z.shape, (0.0, 0.0), (z.shape[0] * 1e-6, 8e-6), (False, False))
     measured = MeasuredSurface(z, on, "line.hfm", "xyz", uniform=1)
     spectrum = surface_spectrum(measured)
-    rq = np.sqrt(np.trapezoid(spectrum.density * spectrum.wavenumber, np.log(spectrum.wavenumber)) / np.pi)
+    rq = np.sqrt(
+        np.trapezoid(spectrum.density * spectrum.wavenumber, np.log(spectrum.wavenumber)) / np.pi
+    )
     assert rq == pytest.approx(measured.sq, rel=0.1)
     assert spectrum.lay.size == 0
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.lubricant import BairWiner, EyringShear, LinearBairWiner, RoelandsWarmth, Thermal
 from asperity.results import load_run, solve_case
 
@@ -29,7 +29,12 @@ def test_what_is_said_arrives_in_si_and_comes_back():
             "thermal.conductivity": ["30 W/m/K", "0.5 W/cm/K"],
             "thermal.warmth": {"law": "roelands", "s0": 1.1},
             "thermal.feedback": "true",
-            "lubricant.friction": {"law": "bair-winer-linear", "tau_l0": "2 MPa", "slope": 0.05, "softening": "2 1/kK"},
+            "lubricant.friction": {
+                "law": "bair-winer-linear",
+                "tau_l0": "2 MPa",
+                "slope": 0.05,
+                "softening": "2 1/kK",
+            },
             "material.boundary_friction": 0.1,
         }
     )
@@ -49,8 +54,16 @@ def test_what_is_said_arrives_in_si_and_comes_back():
     ("key", "value", "says"),
     [
         ("thermal.ambient", 60, 'must be a temperature such as "40 degC", got the bare number 60'),
-        ("thermal.ambient", "1000 degC", "temperature must lie between -60 and 500 degC, .* got 1000 degC, 1273.15 K"),
-        ("thermal.ambient", "40 C", 'got "40 C", which is something else; degrees Celsius are written degC or °C'),
+        (
+            "thermal.ambient",
+            "1000 degC",
+            "temperature must lie between -60 and 500 degC, .* got 1000 degC, 1273.15 K",
+        ),
+        (
+            "thermal.ambient",
+            "40 C",
+            'got "40 C", which is something else; degrees Celsius are written degC or °C',
+        ),
         (
             "thermal.ambient",
             "40 cSt",
@@ -58,12 +71,20 @@ def test_what_is_said_arrives_in_si_and_comes_back():
         ),
         ("surface.sq", "5 %", 'surface.sq must be a length such as "5.4 mm", got "5 %"$'),
         ("contact.slip", "20 %", 'got "20 %"; write a share, 0.05 for 5 %'),
-        ("lubricant.viscosity.eta0", "100 cSt", "something else; a kinematic viscosity times the density is one"),
+        (
+            "lubricant.viscosity.eta0",
+            "100 cSt",
+            "something else; a kinematic viscosity times the density is one",
+        ),
         ("thermal.warmth", "exponentiel", 'did you mean "exponential"'),
         ("thermal.feedbck", True, "did you mean feedback"),
         ("thermal.conductivity", "46 W", "a thermal conductivity"),
         ("lubricant.friction", "ree-eyring", "lubricant.friction.tau0 is missing"),
-        ("material.boundary_friction", -0.1, "material.boundary_friction must be greater than or equal to 0"),
+        (
+            "material.boundary_friction",
+            -0.1,
+            "material.boundary_friction must be greater than or equal to 0",
+        ),
     ],
 )
 def test_a_mistake_is_one_sentence(key, value, says):
@@ -80,7 +101,9 @@ def test_degrees_celsius_are_read_as_people_write_them(text):
 
 def test_a_run_with_feedback_is_warmer_oil_and_comes_back_from_disk(tmp_path):
     small = {"grid.cells": [64, 64], "surface.correlation_length": "30 um", "vibration": "none"}
-    case = CASE.with_overrides(small | {"lubricant.friction": {"law": "ree-eyring", "tau0": "5 MPa"}})
+    case = CASE.with_overrides(
+        small | {"lubricant.friction": {"law": "ree-eyring", "tau0": "5 MPa"}}
+    )
     cold = solve_case(case)
     warm = solve_case(case.with_overrides({"thermal.feedback": "true"}))
     assert cold.solution.viscosity_factor is None

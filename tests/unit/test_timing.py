@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from asperity.errors import UnreadableFile
+from asperity.core.errors import UnreadableFile
 from asperity.recording import open_recording
 from asperity.recording import text as text_reader
 from asperity.recording.timing import Filling, clock_of, timed
@@ -33,7 +33,9 @@ def test_gaps_are_found_behind_coarse_times():
     times = np.round(np.arange(44_100) / 44_100.0, 5)
     kept = np.delete(np.arange(44_100), np.r_[500:501, 20_000:23_000])
     filling = Filling(clock_of(times[kept]))
-    whole = np.concatenate([filling.spread(times[part], part.astype(float)) for part in np.array_split(kept, 7)])
+    whole = np.concatenate(
+        [filling.spread(times[part], part.astype(float)) for part in np.array_split(kept, 7)]
+    )
     assert whole.size == 44_100
     assert np.flatnonzero(np.isnan(whole)).tolist() == [500, *range(20_000, 23_000)]
     assert np.array_equal(whole[~np.isnan(whole)], kept)
@@ -57,7 +59,8 @@ def rows(rate, gap):
 
 def csv(path, times, values):
     path.write_text(
-        "time [s],acc [m/s^2]\n" + "".join(f"{t:.5f},{v:.6f}\n" for t, v in zip(times, values, strict=True))
+        "time [s],acc [m/s^2]\n"
+        + "".join(f"{t:.5f},{v:.6f}\n" for t, v in zip(times, values, strict=True))
     )
     return path
 
@@ -66,11 +69,15 @@ def parquet(path, times, values, dates=False):
     import pandas
 
     column = pandas.to_datetime(times, unit="s", origin="2026-10-25") if dates else times
-    pandas.DataFrame({"time" if dates else "time [s]": column, "acc [m/s^2]": values}).to_parquet(path)
+    pandas.DataFrame({"time" if dates else "time [s]": column, "acc [m/s^2]": values}).to_parquet(
+        path
+    )
     return path
 
 
-@pytest.mark.parametrize("write", [csv, parquet, partial(parquet, dates=True)], ids=["csv", "parquet", "dates"])
+@pytest.mark.parametrize(
+    "write", [csv, parquet, partial(parquet, dates=True)], ids=["csv", "parquet", "dates"]
+)
 @pytest.mark.parametrize("large", [False, True])
 def test_a_gap_is_a_gap_in_every_file_with_times(tmp_path, monkeypatch, write, large):
     if large:
@@ -85,16 +92,18 @@ def test_a_gap_is_a_gap_in_every_file_with_times(tmp_path, monkeypatch, write, l
         assert read.values.size == 38_400
         assert int(np.isnan(read.values).sum()) == missing
         assert np.allclose(read.values[~np.isnan(read.values)], values, atol=1e-6)
-        assert any("1 gap in its times: 400 samples are missing" in note for note in read.notes) == (missing > 0)
+        assert any(
+            "1 gap in its times: 400 samples are missing" in note for note in read.notes
+        ) == (missing > 0)
 
 
 def test_what_a_rate_is_in_doubt_by_crf_is_too():
     from dataclasses import replace
 
+    from asperity.monitoring.reading import Reading
+    from asperity.monitoring.target import search_target
+    from asperity.monitoring.track import judge
     from asperity.paper import simulate_rig
-    from asperity.tracking.reading import Reading
-    from asperity.tracking.target import search_target
-    from asperity.tracking.track import judge
 
     rig = simulate_rig(samples=6, repeats=1, duration_s=10.0)
     sure = [
@@ -103,9 +112,12 @@ def test_what_a_rate_is_in_doubt_by_crf_is_too():
     ]
     target = search_target(None, rig.band_hz)
     known, doubted = (
-        judge([replace(one, rate_doubt=doubt) for one in sure], target).recordings[0].resonance for doubt in (0.0, 0.01)
+        judge([replace(one, rate_doubt=doubt) for one in sure], target).recordings[0].resonance
+        for doubt in (0.0, 0.01)
     )
     assert known.found
     assert doubted.crf_std == pytest.approx(np.hypot(known.crf_std, 0.01 * known.crf_hz))
-    assert doubted.crf_shared_std == pytest.approx(np.hypot(known.crf_shared_std, 0.01 * known.crf_hz))
+    assert doubted.crf_shared_std == pytest.approx(
+        np.hypot(known.crf_shared_std, 0.01 * known.crf_hz)
+    )
     assert known.crf_shared_std <= known.crf_std

@@ -15,22 +15,37 @@ from asperity.results import FrictionCurve, FrictionPoint
 def boxes(figure):
     """Where the titles are, from left to right."""
     figure.draw_without_rendering()
-    titles = [title for axes in figure.axes for title in (axes.title, axes._left_title) if title.get_text()]
+    titles = [
+        title
+        for axes in figure.axes
+        for title in (axes.title, axes._left_title)
+        if title.get_text()
+    ]
     return sorted((title.get_window_extent() for title in titles), key=lambda box: box.x0)
 
 
 def all_readable(figure):
     found = boxes(figure)
     assert found
-    inside = all(box.x0 >= 0.0 and box.x1 <= figure.bbox.width and box.y1 <= figure.bbox.height for box in found)
-    return inside and all(left.x1 <= right.x0 or left.y0 >= right.y1 for left, right in pairwise(found))
+    inside = all(
+        box.x0 >= 0.0 and box.x1 <= figure.bbox.width and box.y1 <= figure.bbox.height
+        for box in found
+    )
+    return inside and all(
+        left.x1 <= right.x0 or left.y0 >= right.y1 for left, right in pairwise(found)
+    )
 
 
 @pytest.fixture
 def curve():
     numbers = dict.fromkeys(FrictionPoint.__dataclass_fields__, 0.1)
-    points = tuple(FrictionPoint(**{**numbers, "converged": True, "entrainment_speed_m_s": u}) for u in (0.5, 1.0, 2.0))
-    return FrictionCurve(kind="stribeck", points=points, boundary_friction=0.15, sq=0.3e-6, feedback=True)
+    points = tuple(
+        FrictionPoint(**{**numbers, "converged": True, "entrainment_speed_m_s": u})
+        for u in (0.5, 1.0, 2.0)
+    )
+    return FrictionCurve(
+        kind="stribeck", points=points, boundary_friction=0.15, sq=0.3e-6, feedback=True
+    )
 
 
 def test_both_titles_of_a_friction_curve_are_read_whole(curve, tmp_path):
@@ -44,7 +59,9 @@ def test_both_titles_of_a_friction_curve_are_read_whole(curve, tmp_path):
 
 
 @pytest.mark.parametrize("extent", [(1.0, 3.0), (1.0, 1.0), (3.0, 1.0)])
-@pytest.mark.parametrize("title", ["Film thickness", "Shear stress (colours by its square root), friction 0.0394"])
+@pytest.mark.parametrize(
+    "title", ["Film thickness", "Shear stress (colours by its square root), friction 0.0394"]
+)
 def test_the_title_of_a_map_is_read_whole_however_narrow_the_map(extent, title):
     with ON_PAGE.drawing():
         figure, axes = map_figure(ON_PAGE, extent)

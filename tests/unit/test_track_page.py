@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asperity.monitoring import track_recordings
 from asperity.report.style import ON_PAGE
 from asperity.report.track.exhibits import levels, trend
 from asperity.report.track.page import NEXT, render_track_page
-from asperity.tracking import track_recordings
-from asperity.wear import ALARM_STATES
+from asperity.trend import ALARM_STATES
 
 BAND = (2000.0, 4000.0)
 
@@ -37,7 +37,9 @@ def acted(track):
 def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
     said = acted(failing)
     assert list(said) == ["What", "Since", "Last heard", "Severity", "How sure", "What next"]
-    assert re.fullmatch(r"The level \(rms\) rose to [\d.]+ times what it was since [\d.]+ h\.", said["What"])
+    assert re.fullmatch(
+        r"The level \(rms\) rose to [\d.]+ times what it was since [\d.]+ h\.", said["What"]
+    )
     first = failing.recordings[failing.alarm.since]
     assert first.reading.started.replace("T", " ") in said["Since"]
     assert said["Last heard"].endswith("2024-01-02 11:00:00")
@@ -48,7 +50,9 @@ def test_who_must_act_reads_what_since_when_how_sure_and_what_next(failing):
 
 def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing):
     struck = [
-        replace(one, reading=replace(one.reading, depths={"BPFO": 0.1 * 1.1**number, "BSF": np.nan}))
+        replace(
+            one, reading=replace(one.reading, depths={"BPFO": 0.1 * 1.1**number, "BSF": np.nan})
+        )
         for number, one in enumerate(failing.recordings)
     ]
     figure = levels(replace(failing, recordings=tuple(struck))).draw(ON_PAGE)
@@ -65,7 +69,10 @@ def test_levels_are_drawn_over_their_first_beside_the_least_that_alarms(failing)
 def test_a_crf_that_conditions_explain_is_drawn_without_them(failing):
     """Where it would be at the first load, speed and temperature, beside where it is."""
     moved = [
-        replace(one, resonance=replace(one.resonance, found=True, crf_hz=3e3 + 10.0 * number, crf_std=5.0))
+        replace(
+            one,
+            resonance=replace(one.resonance, found=True, crf_hz=3e3 + 10.0 * number, crf_std=5.0),
+        )
         for number, one in enumerate(failing.recordings)
     ]
     steadied = [replace(one, crf_reference_hz=3e3) for one in moved]
@@ -85,11 +92,16 @@ def test_every_state_has_something_to_do(failing, state):
 
 
 @pytest.mark.parametrize(
-    ("probability", "said"), [(1.0, "above 0.99"), (0.997, "above 0.99"), (0.42, "0.42"), (0.0, "below 0.01")]
+    ("probability", "said"),
+    [(1.0, "above 0.99"), (0.997, "above 0.99"), (0.42, "0.42"), (0.0, "below 0.01")],
 )
 def test_a_probability_is_never_certain(failing, probability, said):
     *others, last = failing.recordings
-    found = replace(last, resonance=replace(last.resonance, found=True, crf_hz=3e3), severe_probability=probability)
+    found = replace(
+        last,
+        resonance=replace(last.resonance, found=True, crf_hz=3e3),
+        severe_probability=probability,
+    )
     html = render_track_page(replace(failing, recordings=(*others, found)))
     tile = re.search(r"Severe, last recording.*?</div>", html, re.S)[0]
     assert said in re.sub("<[^>]*>", "", tile)

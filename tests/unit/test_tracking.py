@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.coupling import search_band
-from asperity.errors import BadInput, UnreadableFile
-from asperity.recording import ReadOptions
-from asperity.tracking import recordings_in, search_target, track_recordings
-from asperity.tracking.files import read_table
-from asperity.tracking.reading import (
+from asperity.monitoring import recordings_in, search_target, track_recordings
+from asperity.monitoring.files import read_table
+from asperity.monitoring.reading import (
     common_spacing,
     read_spectrum,
     reading_bytes,
     reading_from,
     segment_length,
 )
-from asperity.tracking.track import judge
+from asperity.monitoring.track import judge
+from asperity.recording import ReadOptions
 
 RATE = 20e3
 CASE = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
@@ -63,7 +63,11 @@ def test_a_table_places_recordings(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text("file;sq_um;sq_um_std;load_n\na.wav;0,54;0,1;500\nb.wav;0,87;;\n")
     table = read_table(path)
-    assert (table.x_name, table.places["a.wav"].x, table.places["a.wav"].x_std) == ("sq_um", 0.54, 0.1)
+    assert (table.x_name, table.places["a.wav"].x, table.places["a.wav"].x_std) == (
+        "sq_um",
+        0.54,
+        0.1,
+    )
     assert table.place(Path("there/b.wav")).x_std is None
     for text, said in (
         ("name,x\na,1\n", "needs a column file"),
@@ -101,7 +105,9 @@ def test_a_reading_is_kept_in_full(tmp_path):
     assert np.array_equal(again.spectrum.density, readings.spectrum.density)
     assert np.array_equal(again.spectrum.frequency_hz, readings.spectrum.frequency_hz)
     assert np.array_equal(again.velocity, readings.velocity, equal_nan=True)
-    assert replace(again, spectrum=None, velocity=0.0) == replace(readings, spectrum=None, velocity=0.0)
+    assert replace(again, spectrum=None, velocity=0.0) == replace(
+        readings, spectrum=None, velocity=0.0
+    )
     with pytest.raises(UnreadableFile, match="read again"):
         reading_from(packed[:500], "kept")
     with pytest.raises(UnreadableFile, match="kept is damaged"):
@@ -111,7 +117,7 @@ def test_a_reading_is_kept_in_full(tmp_path):
 def test_processes_read_what_one_alone_reads(tmp_path, monkeypatch):
     files = [record(tmp_path / f"{k}.npz", k, f0=2500.0 + 100.0 * k) for k in range(7)]
     alone = track_recordings(files, case=CASE)
-    monkeypatch.setattr("asperity.tracking.reading.WORTH_A_POOL", 0)
+    monkeypatch.setattr("asperity.monitoring.reading.WORTH_A_POOL", 0)
     together = track_recordings(files, case=CASE, workers=2)
     assert together.scalars() == alone.scalars()
 
@@ -127,7 +133,9 @@ def test_recordings_far_quieter_than_the_series_are_off(tmp_path):
 def test_another_sampling_rate_is_left_out_and_said(tmp_path):
     files = [record(tmp_path / f"{k}.npz", k, rate=25e3 if k == 2 else RATE) for k in range(7)]
     track = track_recordings(files, case=CASE, method="likelihood")
-    assert "sampled at 25000 Hz where the series has 20000 Hz" in track.recordings[2].resonance.reason
+    assert (
+        "sampled at 25000 Hz where the series has 20000 Hz" in track.recordings[2].resonance.reason
+    )
     assert any("1 of 7 recordings have another sampling rate" in note for note in track.notes)
 
 
@@ -138,7 +146,10 @@ def test_rates_that_differ_by_a_clocks_drift_are_one_series(tmp_path):
 
 
 def test_time_is_the_place_where_all_recordings_know_theirs(tmp_path):
-    readings = [read_spectrum(record(tmp_path / f"{k}.npz", k), ReadOptions(), TARGET, 4.0) for k in range(3)]
+    readings = [
+        read_spectrum(record(tmp_path / f"{k}.npz", k), ReadOptions(), TARGET, 4.0)
+        for k in range(3)
+    ]
     timed = [replace(one, started=f"2024-01-0{3 - k}T12:00:00") for k, one in enumerate(readings)]
     track = judge(timed, TARGET)
     assert (track.x_name, [one.x for one in track.recordings]) == ("time_h", [0.0, 24.0, 48.0])
@@ -149,7 +160,10 @@ def test_time_is_the_place_where_all_recordings_know_theirs(tmp_path):
 @pytest.mark.parametrize(
     ("starts", "hours"),
     [
-        (("02:30:00+02:00", "02:30:00+01:00"), 1.0),  # half past two in summer time, and again when clocks went back
+        (
+            ("02:30:00+02:00", "02:30:00+01:00"),
+            1.0,
+        ),  # half past two in summer time, and again when clocks went back
         (("02:45:00+02:00", "02:15:00+01:00"), 0.5),
         (("02:15:00", "02:45:00"), 0.5),  # as they stand, whatever the night
     ],
@@ -166,14 +180,28 @@ def test_times_with_a_zone_are_told_apart_when_clocks_go_back(tmp_path, starts, 
 def test_few_recordings_are_taken_one_by_one_and_that_is_said(tmp_path):
     track = track_recordings([record(tmp_path / "a.npz", 1)], case=CASE)
     assert (track.method, track.resonance_count) == ("modes", 0)
-    assert re.search(r"a line at (2\d|30)\d\d Hz stands out, but one spectrum cannot tell", track.verdict())
+    assert re.search(
+        r"a line at (2\d|30)\d\d Hz stands out, but one spectrum cannot tell", track.verdict()
+    )
     assert any("needs 6 recordings and has 1" in note for note in track.notes)
-    trusted = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").recordings[0].resonance
+    trusted = (
+        track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood")
+        .recordings[0]
+        .resonance
+    )
     assert trusted.crf_hz == pytest.approx(3000.0, rel=0.01)
-    row = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").scalars()["recordings"][0]
-    assert row["damping_ratio"] == trusted.damping_ratio == pytest.approx(0.02, abs=4.0 * row["damping_std"])
+    row = track_recordings([tmp_path / "a.npz"], case=CASE, method="likelihood").scalars()[
+        "recordings"
+    ][0]
+    assert (
+        row["damping_ratio"]
+        == trusted.damping_ratio
+        == pytest.approx(0.02, abs=4.0 * row["damping_std"])
+    )
     assert 0.0 < row["damping_std"] < 0.004
-    peak = track_recordings([tmp_path / "a.npz"], case=CASE, method="peak").scalars()["recordings"][0]
+    peak = track_recordings([tmp_path / "a.npz"], case=CASE, method="peak").scalars()["recordings"][
+        0
+    ]
     assert (peak["damping_ratio"], peak["damping_std"]) == (None, None)
     with pytest.raises(BadInput, match="x needs one value for each of 1"):
         track_recordings([tmp_path / "a.npz"], case=CASE, x=[1.0, 2.0])

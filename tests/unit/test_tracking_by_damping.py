@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.monitoring import track_recordings
 from asperity.report.track.page import render_track_page
-from asperity.tracking import track_recordings
 
 RATE, F0, SECONDS = 20e3, 3000.0, 8.0
 PLACES = np.arange(1.0, 13.0)
@@ -22,7 +22,9 @@ def record(path, seed, ratio, seconds=SECONDS):
     rng = np.random.default_rng(seed)
     turn, shrink = 2.0 * np.pi * F0 / RATE, np.exp(-2.0 * np.pi * ratio * F0 / RATE)
     noise = rng.standard_normal((2, round(seconds * RATE)))
-    ringing = lfilter([1.0], [1.0, -2.0 * shrink * np.cos(turn * np.sqrt(1 - ratio**2)), shrink**2], noise[0])
+    ringing = lfilter(
+        [1.0], [1.0, -2.0 * shrink * np.cos(turn * np.sqrt(1 - ratio**2)), shrink**2], noise[0]
+    )
     np.savez(path, acc=ringing + noise[1], fs=RATE, unit="m/s^2")
     return path
 
@@ -35,7 +37,9 @@ def series(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def track(series):
-    return track_recordings(series, band_hz=(2e3, 4e3), x=PLACES, method="likelihood", stages_from="damping")
+    return track_recordings(
+        series, band_hz=(2e3, 4e3), x=PLACES, method="likelihood", stages_from="damping"
+    )
 
 
 def test_crf_sees_nothing_where_damping_sees_the_stage(track):
@@ -59,7 +63,11 @@ def test_what_decides_has_labels_and_alarm(track, series):
     assert plain.alarm.state == "none"
     assert {one.label for one in plain.recordings} == {"none"}
     rows = dict(track.stage_rows())
-    assert set(rows) == {"stage by CRF", "stage by damping, which decides", "stage by CRF and damping"}
+    assert set(rows) == {
+        "stage by CRF",
+        "stage by damping, which decides",
+        "stage by CRF and damping",
+    }
 
 
 def test_json_has_every_way_and_which_decides(track):
@@ -84,7 +92,8 @@ def test_the_page_shows_each_way_and_the_damping_with_its_break(track):
 
 def test_the_trend_has_a_drawing_of_its_own_for_telephones(track):
     found = re.search(
-        r'<source media="([^"]*)" srcset="([^"]*)" width="(\d+)" height="\d+"><img ', render_track_page(track)
+        r'<source media="([^"]*)" srcset="([^"]*)" width="(\d+)" height="\d+"><img ',
+        render_track_page(track),
     )
     assert found[1] == "(max-width: 480px)"
     assert " " not in found[2]  # which ends an address in a srcset
@@ -93,14 +102,20 @@ def test_the_trend_has_a_drawing_of_its_own_for_telephones(track):
 
 
 def test_a_method_without_a_width_determines_no_damping(series):
-    track = track_recordings(series, band_hz=(2e3, 4e3), x=PLACES, method="peak", stages_from="both")
+    track = track_recordings(
+        series, band_hz=(2e3, 4e3), x=PLACES, method="peak", stages_from="both"
+    )
     assert {one.damping_reason for one in track.recordings} == {"the method peak fits no width"}
     assert track.stages.kind == "too few"
-    assert track.verdict().startswith("Cannot tell: none of the last 3 recordings show what decides")
+    assert track.verdict().startswith(
+        "Cannot tell: none of the last 3 recordings show what decides"
+    )
     assert "Not determined: " in track.verdict()
     assert np.isnan([one.severe_probability for one in track.recordings]).all()
     assert track.alarm.state == "cannot-tell"
-    assert any("not determined of 12 of 12 resonances: the method peak" in note for note in track.notes)
+    assert any(
+        "not determined of 12 of 12 resonances: the method peak" in note for note in track.notes
+    )
     page = render_track_page(track)
     assert page.count("not determined</td>") >= 12
     assert "Damping of the contact resonance" not in page
@@ -108,7 +123,10 @@ def test_a_method_without_a_width_determines_no_damping(series):
 
 @pytest.mark.parametrize(
     ("ratio", "said"),
-    [(0.003, "less than 4 times the spectrum's resolution of 6.0 Hz"), (0.0005, "of the line was taken out as tones")],
+    [
+        (0.003, "less than 4 times the spectrum's resolution of 6.0 Hz"),
+        (0.0005, "of the line was taken out as tones"),
+    ],
 )
 def test_a_line_as_narrow_as_the_spectrum_is_not_taken_for_damping(tmp_path, ratio, said):
     path = record(tmp_path / "narrow.npz", 1, ratio, seconds=2.0)  # 18 and 3 Hz wide

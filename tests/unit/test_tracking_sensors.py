@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.monitoring import keep_track, store_overview, track_recordings
 from asperity.recording import ReadOptions
-from asperity.tracking import keep_track, store_overview, track_recordings
 from support.heard import BAND, RATE, TRUTH, hears
 
 
@@ -39,13 +39,17 @@ def test_channels_of_one_file_are_sensors_of_one_machine(both, tmp_path):
     assert row["sensors"]["b"]["hears"] is True
     assert row["sensors"]["b"]["rms"] != row["sensors"]["a"]["rms"]
     assert {"rms_a", "rms_b", "hears_b"} <= set(track.table.columns)
-    kept = keep_track(track, tmp_path / "asperity.db", ReadOptions(channel="a,b"), machine="rig", point="ring")
+    kept = keep_track(
+        track, tmp_path / "asperity.db", ReadOptions(channel="a,b"), machine="rig", point="ring"
+    )
     assert kept.alarm == track.alarm
     assert [one["sensor"] for one in store_overview(tmp_path / "asperity.db").rows] == ["a", "b"]
 
 
 def test_files_of_sensors_are_laid_beside_one_another_by_a_table(both, tmp_path):
-    rows = [f"{name}{number}.npz,{number + 0.5},{name}" for name in "ab" for number in range(TRUTH.size)]
+    rows = [
+        f"{name}{number}.npz,{number + 0.5},{name}" for name in "ab" for number in range(TRUTH.size)
+    ]
     (tmp_path / "table.csv").write_text("\n".join(["file,x,sensor", *rows]))
     by_table = track_recordings([both / "apart"], table=tmp_path / "table.csv", band_hz=BAND)
     by_channel = track_recordings([both / "whole"], channel="a,b", band_hz=BAND)
@@ -53,7 +57,9 @@ def test_files_of_sensors_are_laid_beside_one_another_by_a_table(both, tmp_path)
     assert [one.resonance.crf_hz for one in by_table.recordings] == pytest.approx(
         [one.resonance.crf_hz for one in by_channel.recordings], rel=1e-9
     )
-    (tmp_path / "table.csv").write_text("\n".join(["file,x,sensor", *rows[:-8], *(row[:-1] for row in rows[-8:])]))
+    (tmp_path / "table.csv").write_text(
+        "\n".join(["file,x,sensor", *rows[:-8], *(row[:-1] for row in rows[-8:])])
+    )
     with pytest.raises(BadInput, match="others do not"):
         track_recordings([both / "apart"], table=tmp_path / "table.csv", band_hz=BAND)
 
@@ -68,7 +74,9 @@ def test_a_sidecar_says_of_which_sensor_a_recording_is_and_when_it_began(both, t
             to.with_suffix(".npz.toml").write_text(said)
     track = track_recordings([tmp_path], band_hz=BAND)
     assert track.x_name == "time_h"
-    assert [one.x for one in track.recordings] == pytest.approx([24.0 * number for number in range(TRUTH.size)])
+    assert [one.x for one in track.recordings] == pytest.approx(
+        [24.0 * number for number in range(TRUTH.size)]
+    )
     assert "on a and b in 8" in track.verdict()
 
 
@@ -76,7 +84,9 @@ def test_a_dead_sensor_is_told_and_the_other_goes_on(both):
     track = track_recordings([both / "dead"], channel="a,b", band_hz=BAND)
     alone = track_recordings([both / "dead"], channel="a", band_hz=BAND)
     assert "The line was heard on a in 8. Sensor b is of no use in 8 of 8:" in track.verdict()
-    assert [one.resonance.crf_hz for one in track.recordings] == [one.resonance.crf_hz for one in alone.recordings]
+    assert [one.resonance.crf_hz for one in track.recordings] == [
+        one.resonance.crf_hz for one in alone.recordings
+    ]
     assert track.alarm.state == alone.alarm.state != "blind"
 
 
@@ -91,7 +101,9 @@ def test_a_level_that_grows_on_the_other_sensor_is_heard(tmp_path):
     assert track.alarm.raised_by.endswith("on b")
 
 
-@pytest.mark.parametrize(("channel", "named"), [("a,c", "channel c cannot be read"), ("a,a", "names one twice")])
+@pytest.mark.parametrize(
+    ("channel", "named"), [("a,c", "channel c cannot be read"), ("a,a", "names one twice")]
+)
 def test_channels_that_are_none_are_refused(both, channel, named):
     with pytest.raises(BadInput, match=named):
         track_recordings([both / "whole"], channel=channel, band_hz=BAND)
@@ -101,10 +113,18 @@ def test_sensors_that_are_off_together_are_no_copies(both, tmp_path):
     for number in range(TRUTH.size):
         with np.load(both / "whole" / f"{number}.npz") as kept:
             running = 0.0 if number == 4 else 1.0
-            np.savez(tmp_path / f"{number}.npz", a=running * kept["a"], b=running * kept["b"], fs=RATE, unit="m/s^2")
+            np.savez(
+                tmp_path / f"{number}.npz",
+                a=running * kept["a"],
+                b=running * kept["b"],
+                fs=RATE,
+                unit="m/s^2",
+            )
     track = track_recordings([tmp_path], channel="a,b", band_hz=BAND)
     assert "on a and b in 7" in track.verdict()
-    assert [one.resonance.found for one in track.recordings] == [number != 4 for number in range(TRUTH.size)]
+    assert [one.resonance.found for one in track.recordings] == [
+        number != 4 for number in range(TRUTH.size)
+    ]
 
 
 def test_a_copy_is_no_second_sensor(tmp_path):
@@ -132,16 +152,21 @@ def test_sensors_are_laid_beside_one_another_by_number_where_there_are_as_many(b
 
 
 @pytest.mark.parametrize(
-    ("x_name", "off", "together"), [("time_h", 0.5 / 3600.0, 8), ("sq_um", 1e-4, 8), ("sq_um", 0.2, 0)]
+    ("x_name", "off", "together"),
+    [("time_h", 0.5 / 3600.0, 8), ("sq_um", 1e-4, 8), ("sq_um", 0.2, 0)],
 )
 def test_x_that_are_one_but_for_a_clock_or_rounding_are_one(both, tmp_path, x_name, off, together):
     rows = [
-        f"{name}{number}.npz,{number + off * (name == 'b')!r},{name}" for name in "ab" for number in range(TRUTH.size)
+        f"{name}{number}.npz,{number + off * (name == 'b')!r},{name}"
+        for name in "ab"
+        for number in range(TRUTH.size)
     ]
     (tmp_path / "table.csv").write_text("\n".join([f"file,{x_name},sensor", *rows]))
     track = track_recordings([both / "apart"], table=tmp_path / "table.csv", band_hz=BAND)
     assert sum(len(one.on_sensors) == 2 for one in track.recordings) == together
-    assert any("No recordings of two sensors stand at one x" in note for note in track.notes) == (together == 0)
+    assert any("No recordings of two sensors stand at one x" in note for note in track.notes) == (
+        together == 0
+    )
 
 
 def test_a_file_that_nobody_knows_the_sensor_of_takes_no_place_from_another(both, tmp_path):
@@ -155,9 +180,9 @@ def test_a_file_that_nobody_knows_the_sensor_of_takes_no_place_from_another(both
     assert sum(len(one.on_sensors) == 2 for one in track.recordings) == TRUTH.size
     (tmp_path / "b4.npz").write_bytes(b"no recording, but its sidecar says whose")
     track = track_recordings([tmp_path], band_hz=BAND)
-    assert [one.on_sensors["b"].reading.refused for one in track.recordings if len(one.on_sensors) == 2] == [
-        number == 4 for number in range(TRUTH.size)
-    ]
+    assert [
+        one.on_sensors["b"].reading.refused for one in track.recordings if len(one.on_sensors) == 2
+    ] == [number == 4 for number in range(TRUTH.size)]
 
 
 def test_a_sensor_that_was_moved_is_noted_with_its_place(tmp_path, monkeypatch):
@@ -167,8 +192,13 @@ def test_a_sensor_that_was_moved_is_noted_with_its_place(tmp_path, monkeypatch):
         (heard,) = hears(rng, f0, (1.0,))
         np.savez(tmp_path / f"{number:02d}.npz", acc=heard, fs=RATE, unit="m/s^2")
     assert not any("mounting" in note for note in track_recordings([tmp_path], band_hz=BAND).notes)
-    monkeypatch.setattr("asperity.wear.series.moved_at", lambda blocks, _: 6 if len(blocks.density) == 14 else None)
+    monkeypatch.setattr(
+        "asperity.resonance.series.moved_at",
+        lambda blocks, _: 6 if len(blocks.density) == 14 else None,
+    )
     track = track_recordings([tmp_path], band_hz=BAND)
     (said,) = [note for note in track.notes if "mounting" in note]
     assert said.startswith("The sensor or its mounting changed at x = 7 (06.npz)")
-    assert [number for number, one in enumerate(track.recordings) if one.remounted is not None] == [6]
+    assert [number for number, one in enumerate(track.recordings) if one.remounted is not None] == [
+        6
+    ]

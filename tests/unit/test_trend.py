@@ -3,12 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.core.errors import BadInput
 from asperity.coupling import VibrationModel, dry_full_load, oscillator
-from asperity.errors import BadInput
-from asperity.wear import RecordingFacts, asperity_load_share, comparability
+from asperity.trend import RecordingFacts, asperity_load_share, comparability
 
-FACTS = RecordingFacts(name="a.csv", rate_hz=20e3, segment=20_000, window="hann", unit="m/s^2", duration_s=300.0)
+FACTS = RecordingFacts(
+    name="a.csv", rate_hz=20e3, segment=20_000, window="hann", unit="m/s^2", duration_s=300.0
+)
 
 
 def test_the_load_share_read_off_a_resonance_is_the_one_that_made_it():
@@ -21,7 +23,10 @@ def test_the_load_share_read_off_a_resonance_is_the_one_that_made_it():
     )
     model = VibrationModel(mass=0.1, damping_ratio=0.02)
     full = dry_full_load(conditions, 1e-6)
-    crf = {clr: oscillator(replace(full, clr=clr), conditions, model).natural_frequency_hz for clr in (0.2, 0.9, 1.0)}
+    crf = {
+        clr: oscillator(replace(full, clr=clr), conditions, model).natural_frequency_hz
+        for clr in (0.2, 0.9, 1.0)
+    }
     assert crf[1.0] == pytest.approx(3879.0, abs=1.0)  # physics of the rig: 3879 Hz for 207 GPa
     read = asperity_load_share(np.array([crf[0.2], crf[0.9]]), 0.0, crf[1.0])
     assert read.clr == pytest.approx([0.2, 0.9], rel=1e-9)
@@ -29,7 +34,10 @@ def test_the_load_share_read_off_a_resonance_is_the_one_that_made_it():
 
 def test_the_interval_of_the_load_share_is_that_of_drawn_frequencies():
     rng = np.random.default_rng(0)
-    crf, full = 3300.0 + 20.0 * rng.standard_normal(200_000), 3879.0 + 30.0 * rng.standard_normal(200_000)
+    crf, full = (
+        3300.0 + 20.0 * rng.standard_normal(200_000),
+        3879.0 + 30.0 * rng.standard_normal(200_000),
+    )
     read = asperity_load_share(3300.0, 20.0, 3879.0, full_load_std_hz=30.0)
     assert [*read.interval] == pytest.approx(np.quantile((crf / full) ** 6, [0.05, 0.95]), rel=0.01)
 
@@ -52,7 +60,10 @@ def test_recordings_that_are_alike_have_no_problems():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"rate_hz": 10e3, "segment": 10_000}, "sampling rate differs between recordings, from 10000 Hz \\(b.csv"),
+        (
+            {"rate_hz": 10e3, "segment": 10_000},
+            "sampling rate differs between recordings, from 10000 Hz \\(b.csv",
+        ),
         ({"segment": 10_000}, "resolution differs"),
         ({"unit": "V"}, "unit differs between recordings: m/s\\^2 \\(a.csv\\), V \\(b.csv\\)"),
         ({"unit": None}, "none \\(b.csv\\)"),

@@ -38,12 +38,16 @@ def three():
 
 
 def test_independent_parts_add_by_their_squares_and_numerical_ones_as_they_are():
-    both = Uncertainty(value=0.5, iteration=(0.01, 0.01), grid=(0.02, 0.03), surfaces=(0.04, 0.0), range=(0.0, 1.0))
+    both = Uncertainty(
+        value=0.5, iteration=(0.01, 0.01), grid=(0.02, 0.03), surfaces=(0.04, 0.0), range=(0.0, 1.0)
+    )
     assert both.low == pytest.approx(0.5 - 0.05)  # 3, 4, 5
     assert both.high == pytest.approx(0.5 + 0.04)
 
 
-@pytest.mark.parametrize(("value", "low", "high"), [(0.06, 0.0, 0.74), (0.95, 0.27, 1.0), (0.5, 0.0, 1.0)])
+@pytest.mark.parametrize(
+    ("value", "low", "high"), [(0.06, 0.0, 0.74), (0.95, 0.27, 1.0), (0.5, 0.0, 1.0)]
+)
 def test_no_share_of_the_load_is_off_beyond_nothing_and_all(value, low, high):
     """A CLR of 6 % once was said to be off by 113 %."""
     error = Uncertainty(value=value, iteration=(0.0, 0.0), grid=(0.68, 0.68), range=(0.0, 1.0))
@@ -77,7 +81,9 @@ def test_so_do_shares_and_none_is_below_nothing_or_above_all(centre, scatter):
         mean, (below, above) = one_surface(few, share=True)
         assert 0.0 <= mean - below <= mean + above <= 1.0
         held += mean - below <= further <= mean + above
-    assert 0.88 < held / 10_000 < 0.95  # ends that one per cent of the load blunts are on the safe side
+    assert (
+        0.88 < held / 10_000 < 0.95
+    )  # ends that one per cent of the load blunts are on the safe side
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0, 0.3])
@@ -118,10 +124,14 @@ def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
     apart = [solve_case(case(**{"surface.seed": 7 + number})) for number in range(3)]
     numbers = three.scalars()
     for key in ("clr", "car", "h_mean_m", "friction_coefficient", "von_mises_max_pa", "crf_hz"):
-        assert numbers[key] == pytest.approx(np.mean([one.scalars()[key] for one in apart]), rel=1e-9)
+        assert numbers[key] == pytest.approx(
+            np.mean([one.scalars()[key] for one in apart]), rel=1e-9
+        )
         assert numbers[key] != pytest.approx(alone.scalars()[key], rel=1e-9)
     assert numbers["surfaces"] == 3
-    assert numbers["iterations"] == alone.scalars()["iterations"]  # how it went is the first surface's
+    assert (
+        numbers["iterations"] == alone.scalars()["iterations"]
+    )  # how it went is the first surface's
     mean, sides = one_surface([one.state.clr for one in apart], share=True)
     assert three.error.clr.value == mean
     assert three.error.clr.surfaces == sides
@@ -132,14 +142,21 @@ def test_numbers_of_several_surfaces_are_means_over_them(three, alone):
 def test_the_scatter_of_the_load_share_is_handed_on_to_the_resonance(three):
     clr, crf = three.error.clr, three.error.crf_hz
     below, above = (
-        (end / clr.value) ** (1.0 / 6.0) for end in (clr.value - clr.surfaces[0], clr.value + clr.surfaces[1])
+        (end / clr.value) ** (1.0 / 6.0)
+        for end in (clr.value - clr.surfaces[0], clr.value + clr.surfaces[1])
     )
-    f0 = three.vibration.oscillator.natural_frequency_hz * (clr.value / three.state.clr) ** (1.0 / 6.0)
+    f0 = three.vibration.oscillator.natural_frequency_hz * (clr.value / three.state.clr) ** (
+        1.0 / 6.0
+    )
     assert crf.surfaces == pytest.approx((f0 * (1.0 - below), f0 * (above - 1.0)))
 
 
 def test_a_law_that_needs_the_solved_contact_says_that_its_numerical_error_is_unknown():
-    tangent = {"vibration.stiffness_law": "tangent", "vibration.rate": "200 kHz", "surface.sq": "2 um"}
+    tangent = {
+        "vibration.stiffness_law": "tangent",
+        "vibration.rate": "200 kHz",
+        "surface.sq": "2 um",
+    }
     found = solve_case(case(**tangent, **{"grid.cells": [96, 96]}))
     assert found.error.clr.interval is not None
     assert found.error.crf_hz.grid is None
@@ -157,7 +174,9 @@ def test_processes_change_nothing(three, monkeypatch):
     monkeypatch.setattr(solving, "WORTH_PROCESSES_S", 0.0)
     monkeypatch.setattr(solving, "cores", lambda: 2)
     done = []
-    spread = solve_case(case(), surfaces=3, workers=2, surface_progress=lambda *told: done.append(told))
+    spread = solve_case(
+        case(), surfaces=3, workers=2, surface_progress=lambda *told: done.append(told)
+    )
     assert done == [(2, 3), (3, 3)]
     assert [timeless(row) for row in spread.others] == [timeless(row) for row in three.others]
 
@@ -208,19 +227,25 @@ def measured_case(folder, columns, rows, **overrides):
     heights = 1e6 * gaussian(columns, rows)
     np.savetxt(folder / "map.txt", heights.T)
     surface = {"file": "map.txt", "unit": "um", "pixel": ["2 um", "2 um"]}
-    return load_case(PAPER, folder=folder).with_overrides({**ALONE, "surface": surface, **overrides})
+    return load_case(PAPER, folder=folder).with_overrides(
+        {**ALONE, "surface": surface, **overrides}
+    )
 
 
 def gaussian(columns, rows):
-    from asperity.grid import Grid
+    from asperity.contact.grid import Grid
     from asperity.surface import gaussian_surface
 
     grid = Grid((columns, rows), (0.0, 0.0), (columns * 2e-6, rows * 2e-6))
-    return gaussian_surface(grid, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(3)).heights
+    return gaussian_surface(
+        grid, sq=1e-6, correlation_length=20e-6, rng=np.random.default_rng(3)
+    ).heights
 
 
 def test_a_measured_map_is_solved_at_places_that_do_not_overlap(tmp_path):
-    wide = measured_case(tmp_path, 190, 310)  # 380 um x 620 um: three side by side across, with ends to blend
+    wide = measured_case(
+        tmp_path, 190, 310
+    )  # 380 um x 620 um: three side by side across, with ends to blend
     assert wide.surface_count() == 3
     found = solve_case(wide, surfaces=None)
     assert found.error.surfaces == 3
@@ -228,9 +253,15 @@ def test_a_measured_map_is_solved_at_places_that_do_not_overlap(tmp_path):
     assert [one.contents.surface.place for one in places] == [None, 1, 2]
     heights = [one.surface().heights for one in places]
     assert (
-        max(abs(np.corrcoef(heights[i].ravel(), heights[j].ravel())[0, 1]) for i, j in ((0, 1), (0, 2), (1, 2))) < 0.3
+        max(
+            abs(np.corrcoef(heights[i].ravel(), heights[j].ravel())[0, 1])
+            for i, j in ((0, 1), (0, 2), (1, 2))
+        )
+        < 0.3
     )
-    assert places[1].surface().heights == pytest.approx(load_case(places[1].text, folder=tmp_path).surface().heights)
+    assert places[1].surface().heights == pytest.approx(
+        load_case(places[1].text, folder=tmp_path).surface().heights
+    )
 
 
 def test_a_map_with_room_for_one_is_solved_once_and_more_are_refused(tmp_path):

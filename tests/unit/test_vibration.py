@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.signals import Signal, power_spectrum
+from asperity.core.errors import BadInput
+from asperity.core.signals import Signal, power_spectrum
 from asperity.vibration import ContactOscillator, acceleration, expected_spectrum, mass_motion
 
 STEEL = ContactOscillator(mass=0.1, stiffness=4.3765e7, damping_ratio=0.02)
@@ -22,7 +22,9 @@ def rough(samples: int, rate: float, rms: float, seed: int = 5) -> Signal:
 
 def test_frequency_and_damping_are_those_worked_out_by_hand():
     assert STEEL.natural_frequency_hz == pytest.approx(3329.5, rel=1e-4)
-    assert STEEL.damping == pytest.approx(0.04 * np.sqrt(4.3765e7 * 0.1), rel=1e-12)  # 2 zeta sqrt(S m)
+    assert STEEL.damping == pytest.approx(
+        0.04 * np.sqrt(4.3765e7 * 0.1), rel=1e-12
+    )  # 2 zeta sqrt(S m)
 
 
 @pytest.mark.parametrize("damping_ratio", [0.005, 0.02, 0.3])
@@ -41,7 +43,9 @@ def test_response_to_kinks_is_the_closed_form(damping_ratio, rate):
         decay = slope * np.exp(-damping_ratio * omega * t)
         r = decay * np.sin(damped * t) / damped
         r_rate = decay * (np.cos(damped * t) - damping_ratio * omega / damped * np.sin(damped * t))
-        after = np.where(np.arange(time.size) > kink, 1.0, np.where(np.arange(time.size) == kink, 0.5, 0.0))
+        after = np.where(
+            np.arange(time.size) > kink, 1.0, np.where(np.arange(time.size) == kink, 0.5, 0.0)
+        )
         expected += after * (omega**2 * r + 2 * damping_ratio * omega * r_rate)
     response = acceleration(oscillator, Signal(heights, rate, "m"))
     assert np.max(np.abs(response.values - expected)) < 1e-9 * np.max(np.abs(expected))
@@ -57,10 +61,16 @@ def test_response_to_a_sine_is_the_closed_form_of_its_straight_lines(frequency):
     """A sampled sine joined by lines is sum_k sinc^2(f_k/rate) e^(i 2 pi f_k t), f_k = f + k rate."""
     rate, samples = 50e3, 40_000
     time = np.arange(samples) / rate
-    response = acceleration(STEEL, Signal(1e-6 * np.sin(2 * np.pi * frequency * time), rate, "m")).values
+    response = acceleration(
+        STEEL, Signal(1e-6 * np.sin(2 * np.pi * frequency * time), rate, "m")
+    ).values
     f = frequency + rate * np.arange(-400_000, 400_001)
     w = 2j * np.pi * f
-    transfer = w**2 * (STEEL.stiffness + w * STEEL.damping) / (0.1 * w**2 + w * STEEL.damping + STEEL.stiffness)
+    transfer = (
+        w**2
+        * (STEEL.stiffness + w * STEEL.damping)
+        / (0.1 * w**2 + w * STEEL.damping + STEEL.stiffness)
+    )
     phasor = 1e-6 * np.sum(np.sinc(f / rate) ** 2 * transfer)
     expected = np.imag(phasor * np.exp(2j * np.pi * frequency * time))
     steady = slice(samples // 2, samples - 1)
@@ -74,22 +84,34 @@ def test_straight_lines_weaken_the_resonance_by_sinc_to_the_fourth(rate):
     response = acceleration(STEEL, Signal(1e-6 * np.sin(2 * np.pi * f0 * time), rate, "m")).values
     steady = response[-1001:-1]
     basis = np.exp(2j * np.pi * f0 * time[-1001:-1])
-    (amplitude, _), *_ = np.linalg.lstsq(np.column_stack([basis, basis.conj()]), steady.astype(complex), rcond=None)
+    (amplitude, _), *_ = np.linalg.lstsq(
+        np.column_stack([basis, basis.conj()]), steady.astype(complex), rcond=None
+    )
     power = abs(2 * amplitude) ** 2
-    assert power == pytest.approx(1e-12 * float(STEEL.gain(np.array(f0))) * np.sinc(f0 / rate) ** 4, rel=1e-4)
+    assert power == pytest.approx(
+        1e-12 * float(STEEL.gain(np.array(f0))) * np.sinc(f0 / rate) ** 4, rel=1e-4
+    )
 
 
 def test_gain_is_the_transfer_function_squared():
     f = np.array([0.0, 10.0, 3000.0, 3329.5, 9000.0])
     w = 2j * np.pi * f
-    transfer = w**2 * (STEEL.stiffness + w * STEEL.damping) / (0.1 * w**2 + w * STEEL.damping + STEEL.stiffness)
+    transfer = (
+        w**2
+        * (STEEL.stiffness + w * STEEL.damping)
+        / (0.1 * w**2 + w * STEEL.damping + STEEL.stiffness)
+    )
     assert STEEL.gain(f) == pytest.approx(np.abs(transfer) ** 2, rel=1e-10)
 
 
 def test_spectrum_of_a_long_response_is_the_expected_spectrum_of_its_profile():
     rate = 200e3
-    heights = np.cumsum(np.cumsum(np.random.default_rng(5).standard_normal(2_000_000)))  # white acceleration
-    profile = Signal(1e-9 * (heights - np.linspace(heights[0], heights[-1], heights.size)), rate, "m")
+    heights = np.cumsum(
+        np.cumsum(np.random.default_rng(5).standard_normal(2_000_000))
+    )  # white acceleration
+    profile = Signal(
+        1e-9 * (heights - np.linspace(heights[0], heights[-1], heights.size)), rate, "m"
+    )
     measured = power_spectrum(acceleration(STEEL, profile), segment=8000)
     band = (measured.frequency_hz > 2000) & (measured.frequency_hz < 5000)
     f = measured.frequency_hz[band]
@@ -98,7 +120,9 @@ def test_spectrum_of_a_long_response_is_the_expected_spectrum_of_its_profile():
     white_profile = 1e-18 * 2 / rate / (2 - 2 * np.cos(theta)) ** 2
     expected = STEEL.gain(f) * white_profile * np.sinc(f / rate) ** 4
     ratio = measured.density[band] / expected
-    assert np.mean(ratio) == pytest.approx(1.0, abs=4.0 / np.sqrt(ratio.size * measured.averages) + 5e-3)
+    assert np.mean(ratio) == pytest.approx(
+        1.0, abs=4.0 / np.sqrt(ratio.size * measured.averages) + 5e-3
+    )
     assert np.std(ratio) == pytest.approx(1.0 / np.sqrt(measured.averages), rel=0.3)
 
 
@@ -126,7 +150,12 @@ def test_bad_input_is_named():
         acceleration(STEEL, Signal(np.zeros(10), 1e4, "m/s^2"))
     with pytest.raises(BadInput, match="finite"):
         acceleration(STEEL, Signal(np.array([0.0, np.nan, 0.0]), 1e4, "m"))
-    for fields in ({"mass": -0.1}, {"stiffness": 0.0}, {"damping_ratio": 0.0}, {"damping_ratio": 1.0}):
+    for fields in (
+        {"mass": -0.1},
+        {"stiffness": 0.0},
+        {"damping_ratio": 0.0},
+        {"damping_ratio": 1.0},
+    ):
         ((name, value),) = fields.items()
         with pytest.raises(BadInput, match=f"{name.replace('_', ' ')} must .* got {value:g}"):
             ContactOscillator(**{"mass": 0.1, "stiffness": 1e7, "damping_ratio": 0.02, **fields})
@@ -145,7 +174,9 @@ def test_runge_kutta_is_of_fifth_order():
     profile = rough(5000, 10e3, 1.0)
     exact = acceleration(STEEL, profile).values
     errors = [
-        np.std(acceleration(STEEL, profile, method="rk5", substeps=n).values - exact) / np.std(exact) for n in (8, 16)
+        np.std(acceleration(STEEL, profile, method="rk5", substeps=n).values - exact)
+        / np.std(exact)
+        for n in (8, 16)
     ]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(5.0, abs=0.3)
 
@@ -175,17 +206,23 @@ def test_the_kernel_is_scipys_dormand_prince():
 def test_motion_is_consistent(method):
     profile = rough(20_000, 100e3, 1.0)
     moved = mass_motion(HERTZ, profile, method=method)
-    assert moved.acceleration == pytest.approx(acceleration(HERTZ, profile, method=method).values, rel=1e-9, abs=1e-9)
+    assert moved.acceleration == pytest.approx(
+        acceleration(HERTZ, profile, method=method).values, rel=1e-9, abs=1e-9
+    )
     assert moved.displacement + moved.compression == pytest.approx(profile.values, rel=1e-12)
     assert moved.contact_loss == 0.0
     scale = np.std(moved.velocity)
-    assert np.gradient(moved.displacement, 1e-5)[1:-1] == pytest.approx(moved.velocity[1:-1], abs=0.02 * scale)
+    assert np.gradient(moved.displacement, 1e-5)[1:-1] == pytest.approx(
+        moved.velocity[1:-1], abs=0.02 * scale
+    )
 
 
 def test_a_small_nonlinear_motion_is_the_linear_one():
     profile = rough(20_000, 100e3, 0.1)  # 0.0005 F
     linear = acceleration(HERTZ, profile).values
-    assert acceleration(HERTZ, profile, method="nonlinear").values == pytest.approx(linear, abs=3e-3 * np.std(linear))
+    assert acceleration(HERTZ, profile, method="nonlinear").values == pytest.approx(
+        linear, abs=3e-3 * np.std(linear)
+    )
 
 
 def test_undamped_hertz_keeps_its_energy_over_1000_periods():
@@ -242,7 +279,11 @@ def test_gain_of_the_sampled_response_is_that_of_its_straight_lines():
     frequency = np.array([300.0, 2000.0, 3329.5, 4500.0])
     aliases = frequency[:, None] + rate * np.arange(-20_000, 20_001)
     w = 2j * np.pi * aliases
-    transfer = w**2 * (STEEL.stiffness + w * STEEL.damping) / (0.1 * w**2 + w * STEEL.damping + STEEL.stiffness)
+    transfer = (
+        w**2
+        * (STEEL.stiffness + w * STEEL.damping)
+        / (0.1 * w**2 + w * STEEL.damping + STEEL.stiffness)
+    )
     phasor = np.sum(np.sinc(aliases / rate) ** 2 * transfer, axis=1)
     assert STEEL.sampled_gain(frequency, rate) == pytest.approx(np.abs(phasor) ** 2, rel=1e-4)
 
@@ -265,5 +306,7 @@ def test_welch_of_a_long_record_is_the_closed_form_in_level_and_shape(rate, filt
     band = (measured.frequency_hz > 2000) & (measured.frequency_hz < 4700)
     ratio = measured.density[band] / expected.density[band]
     assert np.mean(ratio) == pytest.approx(1.0, abs=4.0 / np.sqrt(ratio.size * measured.averages))
-    pieces = 2 * 2_000_000 // measured.segment - 1  # neighbours overlap by half: their ordinates correlate by 1/36
+    pieces = (
+        2 * 2_000_000 // measured.segment - 1
+    )  # neighbours overlap by half: their ordinates correlate by 1/36
     assert np.std(ratio) == pytest.approx(np.sqrt(19 / 18 / pieces), rel=0.1)

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.ehl import Options, contact_state, load_solution, solve_contact
-from asperity.ehl.posing import contact_problem
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.ehl import Options, solve_contact
+from asperity.ehl.problem_setup import contact_problem
 from asperity.lubricant import Barus, ReeEyring
+from asperity.solution import contact_state, load_solution
 from support.paper import barus, contact, grid, rough
 
 COARSE = grid((64, 32))
@@ -26,7 +27,9 @@ def test_the_same_factor_everywhere_is_a_thinner_oil():
     pressure = rng.random(COARSE.cells)
     one, other = warm.evaluate(pressure, 1.0), thin.evaluate(pressure, 1.0)
     np.testing.assert_allclose(one.outflow, other.outflow, rtol=1e-12)
-    np.testing.assert_allclose(one.film.log_mobility_by_pressure, other.film.log_mobility_by_pressure, rtol=1e-12)
+    np.testing.assert_allclose(
+        one.film.log_mobility_by_pressure, other.film.log_mobility_by_pressure, rtol=1e-12
+    )
     np.testing.assert_allclose(warm.coarsened((48, 32)).viscosity_factor, 0.5)
 
 
@@ -41,7 +44,9 @@ def test_a_warm_solution_says_so_on_disk_and_off_it(tmp_path):
     assert contact_state(cold).reynolds_residual > 1e-3
 
 
-@pytest.mark.parametrize("factor", [np.ones((8, 8)), np.zeros(COARSE.cells), np.full(COARSE.cells, np.nan)])
+@pytest.mark.parametrize(
+    "factor", [np.ones((8, 8)), np.zeros(COARSE.cells), np.full(COARSE.cells, np.nan)]
+)
 def test_factors_that_do_not_fit_are_refused(factor):
     with pytest.raises(BadInput, match="viscosity_factor must be positive"):
         solve_contact(contact(), barus(), rough(COARSE, 1e-6), viscosity_factor=factor)

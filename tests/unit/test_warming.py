@@ -2,11 +2,21 @@
 
 import numpy as np
 import pytest
-from benchmarks.alarms import KNEES, NUMBER, RMS, WITHOUT_WEAR, judged, moved_sensor, saturating, straight
+from benchmarks.alarms import (
+    KNEES,
+    NUMBER,
+    RMS,
+    WITHOUT_WEAR,
+    judged,
+    moved_sensor,
+    saturating,
+    straight,
+)
 from benchmarks.alarms import warm_up as drawn_warm_up
 
-from asperity.tracking.alarming import Warming
-from asperity.wear import Watched, warm_up, warming
+from asperity.monitoring.alarm import Warming
+from asperity.trend import Watched, warm_up
+from asperity.trend import warm_up as warming
 
 
 def test_a_warm_up_is_measured_as_it_was_made():
@@ -29,8 +39,12 @@ def test_costs_beside_columns_are_those_of_least_squares():
     rows = np.maximum(at - at[2:-2, None], 0.0)
     dense = [np.linalg.lstsq(np.vstack([columns, row]).T, values, rcond=None)[1][0] for row in rows]
     assert warming._costs(columns, rows, values) == pytest.approx(40.0 * np.log(dense), rel=1e-10)
-    held = warming._costs(columns, 2.0 * columns, values)  # a row that the columns hold already adds nothing
-    assert held == pytest.approx(np.full(2, 40.0 * np.log(np.linalg.lstsq(columns.T, values, rcond=None)[1][0])))
+    held = warming._costs(
+        columns, 2.0 * columns, values
+    )  # a row that the columns hold already adds nothing
+    assert held == pytest.approx(
+        np.full(2, 40.0 * np.log(np.linalg.lstsq(columns.T, values, rcond=None)[1][0]))
+    )
 
 
 def test_most_warm_ups_are_known_and_no_other_course_is():
@@ -53,7 +67,9 @@ def test_most_warm_ups_are_known_and_no_other_course_is():
 
 
 def watched(name, values, contact):
-    return Watched(name=name, values=values, least=0.05, contact=contact, in_words=str, loud=not contact)
+    return Watched(
+        name=name, values=values, least=0.05, contact=contact, in_words=str, loud=not contact
+    )
 
 
 def test_what_a_warm_up_explains_is_excused_and_what_comes_on_top_is_not():
@@ -66,5 +82,8 @@ def test_what_a_warm_up_explains_is_excused_and_what_comes_on_top_is_not():
     assert warming.excuses(39, "CRF") == warming.excuses(39, RMS) == warming.said(39)
     assert warming.excuses(39, "kurtosis") == ""
     worn = crf + 0.04 * (NUMBER > 34)
-    assert Warming(NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h").said(39) == ""
+    assert (
+        Warming(NUMBER, [watched("CRF", worn, True)], [watched(RMS, level, False)], "h").said(39)
+        == ""
+    )
     assert judged(drawn_warm_up(np.random.default_rng([11, 1]))).state == "none"

@@ -9,11 +9,17 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.monitoring import (
+    acknowledge_in,
+    keep_track,
+    store_overview,
+    track_recordings,
+    watch_folder,
+)
+from asperity.monitoring.series_state import learned_bytes, learned_from
+from asperity.monitoring.simultaneous import Heard, by_time
 from asperity.recording import ReadOptions
-from asperity.tracking import acknowledge_in, keep_track, store_overview, track_recordings, watch_folder
-from asperity.tracking.instants import Heard, by_time
-from asperity.tracking.learned import learned_bytes, learned_from
 from support.heard import BAND, RATE, TRUTH, hears
 
 START = datetime(2025, 3, 1, 12, tzinfo=UTC)
@@ -31,7 +37,9 @@ def machine(tmp_path_factory):
         np.savez(folder / "whole" / f"{number}.npz", **heard, fs=RATE, unit="m/s^2")
         for late, (name, values) in enumerate(heard.items()):
             np.savez(folder / "apart" / f"{name}{number}.npz", acc=values, fs=RATE, unit="m/s^2")
-            said = f'sensor = "{name}"\nstarted = "{START + timedelta(days=number, seconds=late)}"\n'
+            said = (
+                f'sensor = "{name}"\nstarted = "{START + timedelta(days=number, seconds=late)}"\n'
+            )
             (folder / "apart" / f"{name}{number}.npz.toml").write_text(said)
     return folder
 
@@ -46,7 +54,13 @@ def arrive(machine, folder, *names):
 
 
 def looking(tmp_path, **asked):
-    asked = {"band_hz": BAND, "every_s": 0.0, "settle_s": 0.0, "machine": "rig", "point": "ring"} | asked
+    asked = {
+        "band_hz": BAND,
+        "every_s": 0.0,
+        "settle_s": 0.0,
+        "machine": "rig",
+        "point": "ring",
+    } | asked
     return watch_folder(tmp_path / "in", tmp_path / "out", **asked)
 
 
@@ -79,22 +93,36 @@ def test_channels_are_judged_as_track_judges_them_and_kept_by_their_names(machin
     own = tracked.recordings[0].on_sensors
     assert rms == [(name, pytest.approx(own[name].reading.quality.rms)) for name in "ab"]
     again = next(looking(tmp_path, channel="a,b", once=True, recall=True))
-    assert (again.track, again.said) == (None, json.loads(json.dumps(last.track.scalars(every_way=False))))
+    assert (again.track, again.said) == (
+        None,
+        json.loads(json.dumps(last.track.scalars(every_way=False))),
+    )
     kept = keep_track(
-        tracked, tmp_path / "out" / "asperity.db", ReadOptions(channel="a,b"), machine="rig", point="ring"
+        tracked,
+        tmp_path / "out" / "asperity.db",
+        ReadOptions(channel="a,b"),
+        machine="rig",
+        point="ring",
     )
     assert kept.alarm == tracked.alarm
     assert held(tmp_path, PER_SENSOR) == [("a", 9), ("b", 9)]  # a track and a watch keep the same
 
 
 def test_files_of_sensors_are_laid_beside_one_another_as_they_arrive(machine, tmp_path):
-    arrive(machine, tmp_path / "in", *(f"a{number}" for number in range(9)), *(f"b{number}" for number in range(7)))
+    arrive(
+        machine,
+        tmp_path / "in",
+        *(f"a{number}" for number in range(9)),
+        *(f"b{number}" for number in range(7)),
+    )
     looks = looking(tmp_path)
     next(looks)
     arrive(machine, tmp_path / "in", "b8", "b7")
     last = next(looks).track
     tracked = track_recordings([tmp_path / "in"], band_hz=BAND)
-    assert [one.x for one in last.recordings] == pytest.approx([24.0 * number for number in range(9)])
+    assert [one.x for one in last.recordings] == pytest.approx(
+        [24.0 * number for number in range(9)]
+    )
     assert [[*one.on_sensors] for one in last.recordings] == [["a", "b"]] * 9
     assert crf(last) == crf(tracked)
     assert last.verdict() == tracked.verdict()
@@ -153,7 +181,12 @@ def test_a_recording_that_the_table_does_not_know_yet_waits(machine, tmp_path):
 
 
 def test_a_sensor_of_which_nothing_comes_any_more_is_told(machine, tmp_path):
-    arrive(machine, tmp_path / "in", *(f"a{number}" for number in range(9)), *(f"b{number}" for number in range(6)))
+    arrive(
+        machine,
+        tmp_path / "in",
+        *(f"a{number}" for number in range(9)),
+        *(f"b{number}" for number in range(6)),
+    )
     update = next(looking(tmp_path))
     assert "Of sensor b nothing has come with the last 3 recordings." in update.track.verdict()
     assert "The line was heard on a and b in 6, on a in 3." in update.track.verdict()
@@ -163,7 +196,9 @@ def test_a_copy_does_not_end_a_watch(machine, tmp_path):
     arrive(machine, tmp_path / "in", "a0", "b0", "a1", "b1")
     shutil.copy(tmp_path / "in" / "a1.npz", tmp_path / "in" / "b1.npz")
     update = next(looking(tmp_path))
-    assert "Sensor b is of no use in 1 of 2: it holds the same samples as a." in update.track.verdict()
+    assert (
+        "Sensor b is of no use in 1 of 2: it holds the same samples as a." in update.track.verdict()
+    )
 
 
 def louder(folder, first, count, growth):
@@ -171,7 +206,13 @@ def louder(folder, first, count, growth):
     folder.mkdir(exist_ok=True)
     for number in range(first, first + count):
         a, b = hears(rng, 3000.0, (0.0, 0.0))
-        np.savez(folder / f"{number:02d}.npz", a=a, b=np.exp(growth * max(number - 12, 0)) * b, fs=RATE, unit="m/s^2")
+        np.savez(
+            folder / f"{number:02d}.npz",
+            a=a,
+            b=np.exp(growth * max(number - 12, 0)) * b,
+            fs=RATE,
+            unit="m/s^2",
+        )
 
 
 def test_an_alarm_is_that_of_all_told_once_and_acknowledged_once(tmp_path):
@@ -188,15 +229,20 @@ def test_an_alarm_is_that_of_all_told_once_and_acknowledged_once(tmp_path):
     assert next(looks).track.alarm.state == "alarm"
     assert told == [("alarm", "a, b", "the level (rms) on b")]
     store = tmp_path / "out" / "asperity.db"
-    assert [(row["sensor"], row["state"]) for row in store_overview(store).rows] == [("a", "alarm"), ("b", "alarm")]
+    assert [(row["sensor"], row["state"]) for row in store_overview(store).rows] == [
+        ("a", "alarm"),
+        ("b", "alarm"),
+    ]
     acknowledge_in(store, "rig/ring/b")
     louder(tmp_path / "in", 20, 1, 0.0)
     assert next(looks).track.alarm.state != "alarm"
     assert {row["state"] for row in store_overview(store).rows} == {"cannot-tell"}
 
 
-def test_further_recordings_are_judged_beside_what_the_series_has_shown(machine, tmp_path, monkeypatch):
-    from asperity.tracking import learned
+def test_further_recordings_are_judged_beside_what_the_series_has_shown(
+    machine, tmp_path, monkeypatch
+):
+    from asperity.monitoring import series_state as learned
 
     monkeypatch.setattr(learned, "WHOLE", 6)
     arrive(machine, tmp_path / "in", *"01234567")
@@ -229,9 +275,13 @@ def test_what_was_learned_of_sensors_is_kept_whole(machine, tmp_path):
 
 def test_a_sensor_that_somebody_named_has_no_others(machine, tmp_path):
     arrive(machine, tmp_path / "in", "a0", "b0")
-    with pytest.raises(BadInput, match="these recordings are of the sensors a, b, got sensor c; leave it out"):
+    with pytest.raises(
+        BadInput, match="these recordings are of the sensors a, b, got sensor c; leave it out"
+    ):
         next(looking(tmp_path, sensor="c"))
-    with pytest.raises(BadInput, match="channels are sensors of their own, got sensor c; leave it out"):
+    with pytest.raises(
+        BadInput, match="channels are sensors of their own, got sensor c; leave it out"
+    ):
         looking(tmp_path, sensor="c", channel="a,b")
 
 
@@ -255,7 +305,10 @@ def test_what_has_no_time_stands_where_the_one_before_does():
 def test_recordings_end_to_end_are_laid_beside_those_made_at_the_time():
     begin = [START + timedelta(seconds=10 * number) for number in range(8)]
     a = [Heard(f"a{number}", "a", time, 10.0) for number, time in enumerate(begin)]
-    b = [Heard(f"b{number}", "b", time - timedelta(milliseconds=1), 10.0) for number, time in enumerate(begin)][1:]
+    b = [
+        Heard(f"b{number}", "b", time - timedelta(milliseconds=1), 10.0)
+        for number, time in enumerate(begin)
+    ][1:]
     laid = by_time([*a, *b])
     assert [one.number for one in laid[:8]] == list(range(8))
     assert [one.number for one in laid[8:]] == list(range(1, 8))

@@ -8,7 +8,7 @@ import pandas
 import pytest
 
 from asperity.case import load_case
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.paper import (
     CRF_ENDS_HZ,
     PAPER_ANCHORS,
@@ -51,7 +51,9 @@ def test_means_deviations_and_intervals_are_students():
     assert curve.mean("car") == pytest.approx([1.0, 2.0])
     assert curve.std("car") == pytest.approx([1.0, 1.0])
     reach = 2.91998558 / np.sqrt(3.0)  # printed tables: t of 2 degrees of freedom, two-sided 90 %
-    assert curve.interval("car") == pytest.approx(np.array([[1.0 - reach, 1.0 + reach], [2.0 - reach, 2.0 + reach]]))
+    assert curve.interval("car") == pytest.approx(
+        np.array([[1.0 - reach, 1.0 + reach], [2.0 - reach, 2.0 + reach]])
+    )
 
 
 def test_between_levels_the_curve_is_straight_and_their_surfaces_independent():
@@ -123,7 +125,9 @@ def test_the_papers_anchors_are_its_printed_numbers():
     for number in ("5.57%", "59.22%", "2921.93 Hz", "3811.88 Hz", "1.68 μm", "1.92 μm"):
         assert number in printed
     values = {anchor.name: anchor.value for anchor in PAPER_ANCHORS}
-    assert values["CAR of the domain at 0.5 um"] == values["CAR of the Hertz zone at 0.5 um"] == 0.0557
+    assert (
+        values["CAR of the domain at 0.5 um"] == values["CAR of the Hertz zone at 0.5 um"] == 0.0557
+    )
     assert values["CAR of the domain at 2.5 um"] == 0.5922
     assert (values["CRF at 0.54 um, rig"], values["CRF at 3.49 um, rig"]) == (2921.93, 3811.88)
     assert values["split, rig"] == pytest.approx((1.68 + 1.92) / 2.0)
@@ -142,8 +146,15 @@ def test_a_curve_along_the_rigs_own_trend_is_off_by_nothing():
 
 
 def test_wear_curve_solves_each_level_with_each_seed():
-    dry = {"lubricant": "none", "grid.x": [-1.9, 1.9], "grid.cells": [24, 24], "vibration.duration": "0.1 s"}
-    case = load_case(EXAMPLES / "paper.toml").with_overrides({**dry, "surface.correlation_length": "30 um"})
+    dry = {
+        "lubricant": "none",
+        "grid.x": [-1.9, 1.9],
+        "grid.cells": [24, 24],
+        "vibration.duration": "0.1 s",
+    }
+    case = load_case(EXAMPLES / "paper.toml").with_overrides(
+        {**dry, "surface.correlation_length": "30 um"}
+    )
     with ThreadPoolExecutor(1) as executor:
         curve = wear_curve(case, sq_values=[2e-6, 1e-6], seeds=[4, 5], executor=executor)
     assert curve.sq == pytest.approx([1e-6, 2e-6])
@@ -159,10 +170,14 @@ def test_wear_curve_solves_each_level_with_each_seed():
 
 
 def test_a_study_of_something_else_has_no_wear_curve():
-    case = load_case(EXAMPLES / "paper.toml").with_overrides({"lubricant": "none", "grid.cells": [32, 24]})
+    case = load_case(EXAMPLES / "paper.toml").with_overrides(
+        {"lubricant": "none", "grid.cells": [32, 24]}
+    )
     with ThreadPoolExecutor(1) as executor:
         result = run_study(plan_points(case, [{"contact.load": "200 N"}]), executor=executor)
-    with pytest.raises(BadInput, match=r"needs a study that varies surface\.sq alone, got contact\.load"):
+    with pytest.raises(
+        BadInput, match=r"needs a study that varies surface\.sq alone, got contact\.load"
+    ):
         curve_of(result)
 
 
@@ -170,7 +185,9 @@ def test_anchors_of_ones_own_are_read_and_mistakes_named(tmp_path):
     file = tmp_path / "anchors.toml"
     own = '[[anchor]]\nname = "ours"\nquantity = "clr"\nsq = "0.6 um"\nvalue = 0.2\ntolerance = 0.05\n'
     file.write_text(own)
-    assert load_anchors(file) == (Anchor(name="ours", quantity="clr", sq=0.6e-6, value=0.2, tolerance=0.05),)
+    assert load_anchors(file) == (
+        Anchor(name="ours", quantity="clr", sq=0.6e-6, value=0.2, tolerance=0.05),
+    )
     for text, sentence in [
         (own.replace("0.05", "0.0"), "tolerance"),
         (own.replace('"0.6 um"', "0.6"), "bare number 0.6"),

@@ -7,15 +7,21 @@ import pytest
 
 from asperity import BadInput
 from asperity.surface import read_surface
-from asperity.wearing import Scar, find_scar, fit_wear_coefficient, read_friction_trace
-from asperity.wearing.fit import SCATTER, FrictionTrace
+from asperity.wear import Scar, find_scar, fit_wear_coefficient, read_friction_trace
+from asperity.wear.fit import SCATTER, FrictionTrace
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
 TRIBOMETER, PROFILE = DATA / "tribometer" / "trib_c1.csv", DATA / "surfaces" / "wear_track_C1.csv"
 WIDTH, DEPTH = 200e-6, 1e-6
 AREA = 2.0 / 3.0 * WIDTH * DEPTH  # of a parabola
 TRACE = FrictionTrace(
-    load=5.0, distance=100.0, laps=4000.0, track_radius=4e-3, friction_energy=50.0, coefficient=0.1, distance_error=0.0
+    load=5.0,
+    distance=100.0,
+    laps=4000.0,
+    track_radius=4e-3,
+    friction_energy=50.0,
+    coefficient=0.1,
+    distance_error=0.0,
 )
 K = AREA / (5.0 * 4000.0)
 
@@ -31,7 +37,9 @@ def scar_file(folder, *, ridge=0.0, noise=0.02e-6, tilt=3e-3, seed=0, depth=DEPT
     waves = np.convolve(rng.standard_normal(x.size + 40), np.ones(41) / np.sqrt(41.0), "valid")
     z += noise * waves + tilt * x + 5e-6
     path = folder / f"scar{seed}.csv"
-    path.write_text("x,z\n" + "\n".join(f"{a * 1e3:.5f},{b * 1e6:.4f}" for a, b in zip(x, z, strict=True)))
+    path.write_text(
+        "x,z\n" + "\n".join(f"{a * 1e3:.5f},{b * 1e6:.4f}" for a, b in zip(x, z, strict=True))
+    )
     return path
 
 
@@ -45,8 +53,12 @@ def test_a_clean_groove_gives_its_k(tmp_path):
     assert fitted.scar.width == pytest.approx(WIDTH, rel=0.05, abs=0.0)
     assert fitted.k.median == pytest.approx(K, rel=0.02, abs=0.0)
     assert fitted.k_all_lost == pytest.approx(K, rel=0.01, abs=0.0)
-    assert fitted.volume.median == pytest.approx(2.0 * np.pi * 100.0 / (2.0 * np.pi * 4000.0) * AREA, rel=0.02, abs=0.0)
-    assert fitted.energy_coefficient.median == pytest.approx(fitted.k.median * 500.0 / 50.0, rel=1e-9, abs=0.0)
+    assert fitted.volume.median == pytest.approx(
+        2.0 * np.pi * 100.0 / (2.0 * np.pi * 4000.0) * AREA, rel=0.02, abs=0.0
+    )
+    assert fitted.energy_coefficient.median == pytest.approx(
+        fitted.k.median * 500.0 / 50.0, rel=1e-9, abs=0.0
+    )
     assert fitted.k.low < K < fitted.k.high
 
 
@@ -55,7 +67,9 @@ def test_nine_intervals_of_ten_hold_the_k_of_a_noisy_groove(tmp_path):
     rng = np.random.default_rng(3)
     held = 0
     for seed in range(40):
-        here = scar(tmp_path, noise=0.05e-6, seed=seed, depth=DEPTH * (1.0 + 0.2 * rng.standard_normal()))
+        here = scar(
+            tmp_path, noise=0.05e-6, seed=seed, depth=DEPTH * (1.0 + 0.2 * rng.standard_normal())
+        )
         fitted = fit_wear_coefficient(TRACE, here)
         held += fitted.k.low <= K <= fitted.k.high
     assert 32 <= held <= 40
@@ -76,7 +90,10 @@ def test_what_is_piled_up_may_be_the_discs_own(tmp_path, ridge, lowest):
     assert fitted.k_none_lost == pytest.approx((1.0 - ridge) * K, abs=0.03 * K)
     assert fitted.k.low == pytest.approx(lowest * K, abs=0.03 * K)
     assert fitted.k.median == pytest.approx((1.0 - 0.5 * ridge) * K, rel=0.05, abs=0.0)
-    said = any("stands beside it" in note or "stands above the old surface" in note for note in fitted.notes)
+    said = any(
+        "stands beside it" in note or "stands above the old surface" in note
+        for note in fitted.notes
+    )
     assert said == (ridge > 0.0)
 
 
@@ -106,9 +123,13 @@ def test_a_trace_says_load_radius_and_energy(tmp_path):
     assert trace.distance == pytest.approx(4.0, rel=1e-9, abs=0.0)
     assert trace.laps == pytest.approx(160.0, rel=1e-9, abs=0.0)
     assert trace.track_radius == pytest.approx(0.025 / (2.0 * np.pi), rel=1e-9, abs=0.0)
-    assert trace.friction_energy == pytest.approx(4.0 * 0.995, rel=1e-9, abs=0.0)  # from the first row on
+    assert trace.friction_energy == pytest.approx(
+        4.0 * 0.995, rel=1e-9, abs=0.0
+    )  # from the first row on
     again = read_friction_trace(tmp_path / "trace.csv", track_radius=4.1e-3)
-    assert again.distance_error == pytest.approx(abs(0.025 / (2.0 * np.pi) / 4.1e-3 - 1.0), rel=1e-9, abs=0.0)
+    assert again.distance_error == pytest.approx(
+        abs(0.025 / (2.0 * np.pi) / 4.1e-3 - 1.0), rel=1e-9, abs=0.0
+    )
     assert any("off the one given" in note for note in again.notes)
 
 
@@ -123,10 +144,19 @@ def test_a_trace_says_load_radius_and_energy(tmp_path):
     ],
 )
 def test_what_a_trace_lacks_is_named(tmp_path, header, said):
-    values = {"Time": "0.1", "Distance": "0.02", "Laps": "0.8", "mu": "0.25", "FrictionForce": "1.0"}
+    values = {
+        "Time": "0.1",
+        "Distance": "0.02",
+        "Laps": "0.8",
+        "mu": "0.25",
+        "FrictionForce": "1.0",
+    }
 
     def row(i):
-        return [f"{float(values[name]) * (i if name in ('Time', 'Distance', 'Laps') else 1):.4f}" for name in names]
+        return [
+            f"{float(values[name]) * (i if name in ('Time', 'Distance', 'Laps') else 1):.4f}"
+            for name in names
+        ]
 
     names = header.split(";")
     with pytest.raises(BadInput, match=said):
@@ -138,7 +168,10 @@ def test_a_profile_without_a_track_is_refused(tmp_path):
         find_scar(scar(tmp_path, depth=0.0))
 
 
-@pytest.mark.skipif(not PROFILE.exists() or not TRIBOMETER.exists(), reason="the public test is not beside the project")
+@pytest.mark.skipif(
+    not PROFILE.exists() or not TRIBOMETER.exists(),
+    reason="the public test is not beside the project",
+)
 def test_the_public_test_bounds_k_and_says_what_it_cannot_tell():
     """C1 of gokcemay/trib: more stands above the old surface than is missing below it."""
     trace = read_friction_trace(TRIBOMETER)

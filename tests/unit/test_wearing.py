@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.surface import MovingSurfaces, Surface
-from asperity.wearing import (
+from asperity.wear import (
     PRIORS,
     Archard,
     Body,
@@ -38,10 +38,14 @@ def exposure(k: float = 1e-17, speed: float = 2.0, overrolling: float = 50.0) ->
 
 def test_a_flat_pin_wears_by_k_p_v_t():
     rubbing = Rubbing(pressure=np.array([1e6]), shear=np.array([1e5]), sliding_speed=0.1)
-    assert 1e-16 * Archard()(rubbing)[0] * 3600.0 == pytest.approx(36e-9, rel=1e-12, abs=0.0)  # machines.md 5.3
+    assert 1e-16 * Archard()(rubbing)[0] * 3600.0 == pytest.approx(
+        36e-9, rel=1e-12, abs=0.0
+    )  # machines.md 5.3
     assert DissipatedEnergy()(rubbing)[0] == pytest.approx(1e4)
     k = DissipatedEnergy().equal_to_archard(1e-16, 0.1)
-    assert k * DissipatedEnergy()(rubbing)[0] == pytest.approx(1e-16 * Archard()(rubbing)[0], abs=0.0)
+    assert k * DissipatedEnergy()(rubbing)[0] == pytest.approx(
+        1e-16 * Archard()(rubbing)[0], abs=0.0
+    )
     with pytest.raises(BadInput, match="boundary friction of 0"):
         DissipatedEnergy().equal_to_archard(1e-16, 0.0)
 
@@ -56,8 +60,12 @@ def test_a_cold_film_has_no_defects_and_a_hot_one_nothing_else():
     assert np.all(np.diff(law.defects(warm, speed)) > 0.0)
     # a temperature at which the exponent is known: E/(R T) = ln(crossing), so that half the sites ... 1 - 1/e are bare
     at = 5e4 / (8.31446261815324 * math.log(200.0))
-    assert law.defects(np.array([at]), speed)[0] == pytest.approx(1.0 - math.exp(-1.0), rel=1e-12, abs=0.0)
-    still = Rubbing(pressure=np.ones(3), shear=np.ones(3), sliding_speed=0.0, temperature=np.full(3, 400.0))
+    assert law.defects(np.array([at]), speed)[0] == pytest.approx(
+        1.0 - math.exp(-1.0), rel=1e-12, abs=0.0
+    )
+    still = Rubbing(
+        pressure=np.ones(3), shear=np.ones(3), sliding_speed=0.0, temperature=np.full(3, 400.0)
+    )
     assert not law(still).any()
 
 
@@ -80,7 +88,12 @@ def test_a_jump_takes_off_the_mean_and_adds_nothing():
     rate = np.maximum(rng.normal(size=grid.cells) - 1.5, 0.0) * 1e-12
     spike = np.zeros(grid.cells)
     spike[20, 30] = 1e-12
-    for seconds in (1e-3, 1.0, 1e3, 1e6):  # at 1e3 s the spike's spectrum, cut off by the cells, dips below 0
+    for seconds in (
+        1e-3,
+        1.0,
+        1e3,
+        1e6,
+    ):  # at 1e3 s the spike's spectrum, cut off by the cells, dips below 0
         for any_rate in (rate, spike):
             depth = taken_off(any_rate, seconds, exposure(), grid, MODULUS)
             assert depth.mean() == pytest.approx(any_rate.mean() * seconds, rel=1e-12, abs=0.0)
@@ -88,7 +101,10 @@ def test_a_jump_takes_off_the_mean_and_adds_nothing():
     short = exposure()
     steps = 1e-6 / short.decay(1e6, 1.0, MODULUS)  # so short that no wave decays
     np.testing.assert_allclose(
-        taken_off(rate, steps, short, grid, MODULUS), rate * steps, rtol=0, atol=3e-6 * rate.max() * steps
+        taken_off(rate, steps, short, grid, MODULUS),
+        rate * steps,
+        rtol=0,
+        atol=3e-6 * rate.max() * steps,
     )
     even = np.broadcast_to(rate[:1], rate.shape)
     assert is_even(taken_off(even, 1.0, exposure(), grid, MODULUS))
@@ -98,7 +114,11 @@ def test_a_jump_takes_off_the_mean_and_adds_nothing():
 def test_a_wave_in_full_contact_decays_as_in_closed_form_whatever_the_jump(jumps):
     grid = Grid((64, 64), (0.0, 0.0), (8e-5, 8e-5), periodic=(True, True))
     wave = 2.0 * np.pi / 2e-5
-    heights, body, mean = 1e-8 * np.cos(wave * grid.x)[:, None] * np.ones(64), exposure(k=1e-15), 1e9
+    heights, body, mean = (
+        1e-8 * np.cos(wave * grid.x)[:, None] * np.ones(64),
+        exposure(k=1e-15),
+        1e9,
+    )
     seconds = 2.0 / float(body.decay(wave, 1.0, MODULUS))  # two decay lengths in all
     now = heights
     for _ in range(jumps):
@@ -115,13 +135,18 @@ def test_a_jump_is_no_longer_than_its_depth_and_its_shortest_wave_allow():
     grid = Grid((64, 64), (0.0, 0.0), (8e-5, 8e-5), periodic=(True, True))
     fast, slow = np.full(grid.cells, 1e-9), np.full(grid.cells, 1e-12)
     gentle = exposure(k=1e-22)
-    assert longest_jump((gentle, gentle), (slow, fast), 1e-8, 1.0, grid.spacing, MODULUS) == pytest.approx(10.0)
+    assert longest_jump(
+        (gentle, gentle), (slow, fast), 1e-8, 1.0, grid.spacing, MODULUS
+    ) == pytest.approx(10.0)
     steep = exposure(k=1e-15)
     longest = longest_jump((gentle, steep), (slow, slow), 1.0, 0.7, grid.spacing, MODULUS)
     shortest_wave = math.pi * math.hypot(*(1.0 / side for side in grid.spacing))
     assert float(steep.decay(shortest_wave, longest, MODULUS)) == pytest.approx(0.7)
     still = exposure(k=0.0)
-    assert longest_jump((still, still), (0.0 * slow, 0.0 * slow), 1.0, 1.0, grid.spacing, MODULUS) == math.inf
+    assert (
+        longest_jump((still, still), (0.0 * slow, 0.0 * slow), 1.0, 1.0, grid.spacing, MODULUS)
+        == math.inf
+    )
 
 
 def test_what_passes_is_in_the_contact_for_its_width_over_its_speed():

@@ -13,10 +13,11 @@ import pytest
 from benchmarks.films import line_case
 
 from asperity import load_case, solve_case
-from asperity.ehl import Texture, auto_grid, contact_state, film_fits, grid_shortfalls, regime_card, solve_contact
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
+from asperity.ehl import Texture, auto_grid, film_fits, grid_shortfalls, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.solution import contact_state, regime_card
 from asperity.surface import flat_surface, gaussian_surface
 from support.paper import barus, contact
 
@@ -66,7 +67,9 @@ def test_a_grid_given_by_hand_is_too_coarse_where_its_film_is_off_by_one_per_cen
     for cells, error in zip((64, 128, 256, 512, 1024), errors, strict=True):
         if error is not None:
             grid = Grid((cells, 8), (left * a, -a), (right * a, a))
-            assert bool(grid_shortfalls(conditions, oil, flat_surface(grid))) == (abs(error) > 0.9), cells
+            assert bool(grid_shortfalls(conditions, oil, flat_surface(grid))) == (
+                abs(error) > 0.9
+            ), cells
 
 
 @pytest.mark.parametrize(("m", "l"), [(2.4, 17), (0.47, 17), (0.15, 17), (2.4, 5), (0.47, 5)])
@@ -74,7 +77,9 @@ def test_light_contacts_are_flooded(m, l):  # noqa: E741
     """Within 1 % of -30 a, where -4.5 a takes 2 to 69 % off."""
     conditions, oil, _ = line_case(m, l, "Roelands")
     a = conditions.hertz.half_widths[0]
-    far = solve_contact(conditions, oil, flat_surface(Grid((1024, 8), (-30.0 * a, -a), (8.0 * a, a))))
+    far = solve_contact(
+        conditions, oil, flat_surface(Grid((1024, 8), (-30.0 * a, -a), (8.0 * a, a)))
+    )
     near = solve_contact(conditions, oil, flat_surface(auto_grid(conditions, oil)))
     assert films(near) == pytest.approx(films(far), rel=0.01)
 
@@ -84,8 +89,14 @@ def test_a_soft_ball_has_the_film_of_the_soft_fit_and_no_contact():
     case = load_case(SOFT)
     run = solve_case(case.with_overrides({"surface": "flat"}))
     solution = run.solution
-    assert run.determined  # though the next coarser grid, which shows 2 cells of the inlet, has a load share of 24 %
-    fits = {fit.place: fit for fit in regime_card(solution).fits if fit.source == "Hamrock and Dowson, soft (1978)"}
+    assert (
+        run.determined
+    )  # though the next coarser grid, which shows 2 cells of the inlet, has a load share of 24 %
+    fits = {
+        fit.place: fit
+        for fit in regime_card(solution).fits
+        if fit.source == "Hamrock and Dowson, soft (1978)"
+    }
     assert abs(fits["central"].deviation) < 0.05
     assert abs(fits["least"].deviation) < 0.05
     assert not solution.in_contact.any()
@@ -132,15 +143,21 @@ seed = 1
 
 
 def test_the_film_ratio_of_a_soft_contact_is_made_of_the_soft_fit():
-    case = load_case(SOFT).with_overrides({"grid.cells": [64, 64], "grid.x": [-2, 1.5], "grid.y": [-2, 2]})
+    case = load_case(SOFT).with_overrides(
+        {"grid.cells": [64, 64], "grid.x": [-2, 1.5], "grid.y": [-2, 2]}
+    )
     state = contact_state(solve_contact(case.conditions, case.lubricant, case.surface()))
-    assert state.lambda_ratio == pytest.approx(2.98e-6 / 0.5e-6, rel=0.01)  # 0.10 by the hard piezoviscous fit
+    assert state.lambda_ratio == pytest.approx(
+        2.98e-6 / 0.5e-6, rel=0.01
+    )  # 0.10 by the hard piezoviscous fit
 
 
 @pytest.mark.parametrize("cells", [(128, 128), (192, 128), (256, 192)])
 def test_a_ball_bearing_on_grids_that_give_three_load_shares_is_not_determined(cells):
     """87, 46 and 2 % where 0.02 % is true: the inlet of 11 um has 0.8 to 1.6 cells."""
-    case = load_case(BEARING).with_overrides({"grid.cells": list(cells), "grid.x": [-4.5, 1.5], "grid.y": [-1.4, 1.4]})
+    case = load_case(BEARING).with_overrides(
+        {"grid.cells": list(cells), "grid.x": [-4.5, 1.5], "grid.y": [-1.4, 1.4]}
+    )
     shortfalls = grid_shortfalls(case.conditions, case.lubricant, case.surface())
     assert "cells across the inlet" in shortfalls[0]
     chosen = load_case(BEARING)
@@ -149,7 +166,14 @@ def test_a_ball_bearing_on_grids_that_give_three_load_shares_is_not_determined(c
 
 def test_the_verdict_says_that_the_grid_is_too_coarse():
     case = load_case(BEARING).with_overrides(
-        {"contact": {"geometry": "point", "radius": "10 mm", "load": "50 N", "entrainment_speed": "0.01 m/s"}}
+        {
+            "contact": {
+                "geometry": "point",
+                "radius": "10 mm",
+                "load": "50 N",
+                "entrainment_speed": "0.01 m/s",
+            }
+        }
         | {"surface": "flat", "grid.cells": [32, 32], "grid.x": [-4.5, 1.5], "grid.y": [-3, 3]}
     )
     run = solve_case(case, strict=False)
@@ -183,7 +207,10 @@ def test_films_that_carry_nothing_need_no_inlet():
         rng=np.random.default_rng(1),
     )
     assert grid_shortfalls(contact(speed=1e-4), barus(), surface) == ()
-    assert grid_shortfalls(contact(speed=5e-3, hardness=2e9), barus(), flat_surface(surface.grid)) != ()
+    assert (
+        grid_shortfalls(contact(speed=5e-3, hardness=2e9), barus(), flat_surface(surface.grid))
+        != ()
+    )
 
 
 def test_roughness_moves_the_edges_and_the_cells():
@@ -197,7 +224,9 @@ def test_roughness_moves_the_edges_and_the_cells():
     assert rough.extent[1] == pytest.approx(300e-6)
     finer = auto_grid(conditions, oil, Texture(sq=3e-6, lengths=(20e-6, 30e-6)), accuracy=0.0025)
     assert finer.spacing[0] == pytest.approx(rough.spacing[0] / 2.0, rel=0.05)
-    short = auto_grid(conditions, oil, Texture(sq=3e-6, lengths=(20e-6, 30e-6), most=(200e-6, 100e-6)))
+    short = auto_grid(
+        conditions, oil, Texture(sq=3e-6, lengths=(20e-6, 30e-6), most=(200e-6, 100e-6))
+    )
     assert short.extent == pytest.approx((200e-6, 100e-6))
     with pytest.raises(BadInput, match=r"accuracy must lie between 0.0001 and 0.2, got 0.5"):
         auto_grid(conditions, oil, accuracy=0.5)
@@ -207,7 +236,11 @@ def test_a_contact_has_its_asperities_inside_the_chosen_grid():
     """The paper's contact at Sq 1.5 um touches out to the outlet of the printed domain, and not of this one."""
     case = load_case(BEARING).with_overrides(
         {"contact": {"geometry": "line", "radius": "5.4 mm", "length": "10 mm", "load": "500 N"}}
-        | {"contact.entrainment_speed": "0.001 m/s", "lubricant": "none", "material.hardness": "2 GPa"}
+        | {
+            "contact.entrainment_speed": "0.001 m/s",
+            "lubricant": "none",
+            "material.hardness": "2 GPa",
+        }
         | {"surface.sq": "1.5 um", "surface.correlation_length": "20 um"}
     )
     run = solve_case(case, strict=False)
@@ -220,8 +253,12 @@ def test_a_contact_has_its_asperities_inside_the_chosen_grid():
 def test_every_fit_that_holds_is_met_by_the_solved_film():
     """Hard, soft and rigid: least films of published fits and central ones, on the chosen grid."""
     oils = {
-        "hard": Lubricant(viscosity=Roelands(0.04, 22e-9), density=DowsonHigginson(870.0), rheology=Newtonian()),
-        "thin": Lubricant(viscosity=Barus(0.1, 1e-12), density=DowsonHigginson(870.0), rheology=Newtonian()),
+        "hard": Lubricant(
+            viscosity=Roelands(0.04, 22e-9), density=DowsonHigginson(870.0), rheology=Newtonian()
+        ),
+        "thin": Lubricant(
+            viscosity=Barus(0.1, 1e-12), density=DowsonHigginson(870.0), rheology=Newtonian()
+        ),
     }
     for conditions, oil, regime in [
         (contact(load=5000.0, speed=1.0), oils["hard"], "piezoviscous-elastic"),
@@ -230,7 +267,9 @@ def test_every_fit_that_holds_is_met_by_the_solved_film():
     ]:
         assert film_fits(conditions, oil)
         a = conditions.hertz.half_widths[0]
-        inlet = (-200.0 * a, 30.0 * a) if regime == "isoviscous-rigid" else None  # farther than a grid is chosen
+        inlet = (
+            (-200.0 * a, 30.0 * a) if regime == "isoviscous-rigid" else None
+        )  # farther than a grid is chosen
         solution = solve_contact(conditions, oil, flat_surface(auto_grid(conditions, oil, x=inlet)))
         assert regime_card(solution).regime == regime
         for fit in regime_card(solution).fits:

@@ -7,9 +7,13 @@ from itertools import islice
 import pytest
 from benchmarks.bounded import OIL, ellipses, rollers
 
-from asperity.ehl import along_roller, contact_state, solve_contact
+from asperity.ehl import solve_contact
+from asperity.solution import along_roller, contact_state
 
-CONTACTS = {f"{c.geometry} {number}": (c, s) for number, c, s in [*islice(ellipses(), 6), *islice(rollers(), 2, 6)]}
+CONTACTS = {
+    f"{c.geometry} {number}": (c, s)
+    for number, c, s in [*islice(ellipses(), 6), *islice(rollers(), 2, 6)]
+}
 
 
 @pytest.mark.parametrize("name", CONTACTS)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl import solve_film
-from asperity.errors import BadInput, NotConverged
 from asperity.lubricant import Barus, DowsonHigginson
 
 VISCOSITY, SPEED = 0.039, 4.57 / 2.0
@@ -55,7 +55,9 @@ def test_parabolic_slider_b1():
         assert film.flux.mean() == pytest.approx(6.547565e-5, rel=1e-5)
         assert film.load == pytest.approx(101.4578e3, rel=1e-4)
         assert rupture / LENGTH == pytest.approx(0.6789776, abs=1.0 / cells)
-        assert film.spacing[0] * (np.argmax(film.pressure) + 0.5) / LENGTH == pytest.approx(0.321022, abs=1.0 / cells)
+        assert film.spacing[0] * (np.argmax(film.pressure) + 0.5) / LENGTH == pytest.approx(
+            0.321022, abs=1.0 / cells
+        )
         assert formed.size == 0
     assert errors[0] < 1e-4
     assert errors[1] < errors[0] / 2.0
@@ -66,7 +68,9 @@ def test_slider_with_a_pocket_b3(cells):
     length = 20e-3
     x = (np.arange(cells) + 0.5) * length / cells
     gap = np.where((x > 4e-3) & (x < 10e-3), 2e-6, 1e-6)
-    film = solve_film(gap, spacing=length / cells, entrainment_speed=0.5, viscosity=0.01, ends=(1e5, 1e5))
+    film = solve_film(
+        gap, spacing=length / cells, entrainment_speed=0.5, viscosity=0.01, ends=(1e5, 1e5)
+    )
     (rupture,), (formed,) = film.fronts
     assert np.ptp(film.flux) < 1e-10 * film.flux.mean()
     assert film.flux.mean() == pytest.approx(5.002083e-7, rel=1e-6)
@@ -89,7 +93,9 @@ def test_long_journal_bearing_with_a_groove_at_the_widest_gap(eccentricity):
         return (g - e * np.sin(g)) / (1.0 - e**2) ** 1.5
 
     def third(g):
-        return (g * (1.0 + e**2 / 2.0) - 2.0 * e * np.sin(g) + e**2 * np.sin(2.0 * g) / 4.0) / (1.0 - e**2) ** 2.5
+        return (g * (1.0 + e**2 / 2.0) - 2.0 * e * np.sin(g) + e**2 * np.sin(2.0 * g) / 4.0) / (
+            1.0 - e**2
+        ) ** 2.5
 
     def widest(g):
         return (1.0 - e**2) / (1.0 - e * np.cos(g))
@@ -101,14 +107,19 @@ def test_long_journal_bearing_with_a_groove_at_the_widest_gap(eccentricity):
     eta, u, r, c, cells = 0.02, 3.0, 25e-3, 30e-6, 400
     angle = (np.arange(cells) + 0.5) * 2.0 * np.pi / cells
     film = solve_film(
-        c * (1.0 + e * np.cos(angle)), spacing=2.0 * np.pi * r / cells, entrainment_speed=u, viscosity=eta
+        c * (1.0 + e * np.cos(angle)),
+        spacing=2.0 * np.pi * r / cells,
+        entrainment_speed=u,
+        viscosity=eta,
     )
     assert film.pressure.max() == pytest.approx(largest * eta * u * r / c**2, rel=5e-4)
     assert film.flux.mean() == pytest.approx(u * c * widest(end), rel=1e-4)
     assert np.ptp(film.flux) < 1e-10 * film.flux.mean()
     assert film.fronts[0][0] / r == pytest.approx(rupture, abs=2.0 * np.pi / cells)
     streams = film.cavitated & (angle > rupture + 0.1)
-    np.testing.assert_allclose(film.content[streams] * film.gap[streams], c * widest(end), rtol=1e-4)
+    np.testing.assert_allclose(
+        film.content[streams] * film.gap[streams], c * widest(end), rtol=1e-4
+    )
 
 
 def wavy_film(outlet):
@@ -125,7 +136,8 @@ def wavy_film(outlet):
     flux = brentq(lambda q: rise(wave, q, 0.0, rupture(q, 0)), 1.001 * least, 1.3 * least)
     ruptures = [rupture(flux, k) for k in range(3)]
     formed = [
-        brentq(lambda x, k=k: rise(wave, flux, x, ruptures[k]), wide[k], narrow[k] - 0.001 * LENGTH) for k in (1, 2)
+        brentq(lambda x, k=k: rise(wave, flux, x, ruptures[k]), wide[k], narrow[k] - 0.001 * LENGTH)
+        for k in (1, 2)
     ]
     formed.append(brentq(lambda x: rise(wave, flux, x, LENGTH) - outlet, ruptures[2], LENGTH))
     peaks = [peak(wave, flux, start, narrow[k]) for k, start in enumerate([0.0, *formed[:2]])]
@@ -154,7 +166,10 @@ def test_a_starved_slider_fills_where_its_oil_suffices():
     content, cells = 0.53, 800
     flux = content * SPEED * parabola(LENGTH / cells / 2.0)
     film = slider(parabola, cells, inflow_content=content)
-    meets = [brentq(lambda x: SPEED * parabola(x) - flux, *side) for side in ((0.0, LENGTH / 2), (LENGTH / 2, LENGTH))]
+    meets = [
+        brentq(lambda x: SPEED * parabola(x) - flux, *side)
+        for side in ((0.0, LENGTH / 2), (LENGTH / 2, LENGTH))
+    ]
     formed = brentq(lambda x: rise(parabola, flux, x, meets[1]), 0.0, meets[0] - 1e-4 * LENGTH)
     assert film.fronts[1] == pytest.approx([formed], abs=0.1 * LENGTH / cells)
     assert film.fronts[0] == pytest.approx([meets[1]], abs=1.5 * LENGTH / cells)
@@ -175,8 +190,14 @@ def test_barus_oil_is_a_transformed_plain_one():
     for cells in (400, 800):
         plain = slider(parabola, cells)
         film = slider(parabola, cells, viscosity=Barus(VISCOSITY, alpha))
-        errors.append(np.max(np.abs((1.0 - np.exp(-alpha * film.pressure)) / alpha / plain.pressure.max()
-                                    - plain.pressure / plain.pressure.max())))  # fmt: skip
+        errors.append(
+            np.max(
+                np.abs(
+                    (1.0 - np.exp(-alpha * film.pressure)) / alpha / plain.pressure.max()
+                    - plain.pressure / plain.pressure.max()
+                )
+            )
+        )
         assert film.pressure.max() > 2.0 * plain.pressure.max()
         assert np.ptp(film.flux) < 1e-10 * film.flux.mean()
     assert errors[0] < 1e-3
@@ -192,8 +213,12 @@ def test_a_field_that_does_not_vary_across_is_a_line():
         viscosity=VISCOSITY,
         ends=(0.0, 2e6),
     )
-    np.testing.assert_allclose(field.pressure, np.repeat(line.pressure[:, None], 5, axis=1), rtol=1e-8, atol=1.0)
-    np.testing.assert_allclose(field.content, np.repeat(line.content[:, None], 5, axis=1), rtol=1e-8)
+    np.testing.assert_allclose(
+        field.pressure, np.repeat(line.pressure[:, None], 5, axis=1), rtol=1e-8, atol=1.0
+    )
+    np.testing.assert_allclose(
+        field.content, np.repeat(line.content[:, None], 5, axis=1), rtol=1e-8
+    )
     assert field.load == pytest.approx(line.load * 5e-3)
 
 
@@ -220,8 +245,12 @@ def test_short_journal_bearing_is_ocvirks():
 
 def rough_gap(cells, spread, seed=1):
     rng = np.random.default_rng(seed)
-    waves = np.hypot(*np.meshgrid(np.fft.fftfreq(cells), np.fft.rfftfreq(cells), indexing="ij")) * cells
-    heights = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((cells, cells))) * np.exp(-((waves / 6.0) ** 2)))
+    waves = (
+        np.hypot(*np.meshgrid(np.fft.fftfreq(cells), np.fft.rfftfreq(cells), indexing="ij")) * cells
+    )
+    heights = np.fft.irfft2(
+        np.fft.rfft2(rng.standard_normal((cells, cells))) * np.exp(-((waves / 6.0) ** 2))
+    )
     return 1e-6 * np.exp(spread * heights / heights.std())
 
 

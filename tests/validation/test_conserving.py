@@ -6,25 +6,17 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
-from asperity.ehl import (
-    Options,
-    Scales,
-    SolveStatus,
-    clr_below,
-    contact_state,
-    load_solution,
-    moving_contact,
-    sharing_by_film,
-    solve_contact,
-)
-from asperity.ehl.mixed import Pressures, evaluate
-from asperity.ehl.mixed_linear import MixedLinear, newton_step
-from asperity.ehl.mixed_solve import pressures_of
-from asperity.ehl.posing import contact_problem
-from asperity.ehl.problem import Past
-from asperity.errors import BadInput, NotConverged
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput, NotConverged
+from asperity.ehl import Options, Scales, SolveStatus, solve_contact
+from asperity.ehl.linear_solvers.mixed import MixedLinear, newton_step
+from asperity.ehl.models.mixed import Pressures, evaluate
+from asperity.ehl.models.single_pressure import Past
+from asperity.ehl.problem_setup import contact_problem
+from asperity.ehl.strategies.mixed_search import pressures_of
+from asperity.solution import clr_below, contact_state, load_solution, sharing_by_film
 from asperity.surface import MovingSurfaces, Surface, flat_surface, gaussian_surface
+from asperity.transient import moving_contact
 from support.paper import ETA0, RADIUS, barus, contact, grid, rough
 
 CAP, FLOOR = 2e9, 5e-9
@@ -39,7 +31,9 @@ def solved(surface, *, hardness=CAP, options=OPTIONS, **more):
 
 # a full film, a mixed contact, and one of asperities that the cap flattens
 @pytest.fixture(
-    scope="module", params=[(0.5e-6, 60e-6, CAP), (1e-6, 40e-6, 0.7e9), (2.5e-6, 40e-6, CAP)], ids=["film", "0.7", "2"]
+    scope="module",
+    params=[(0.5e-6, 60e-6, CAP), (1e-6, 40e-6, 0.7e9), (2.5e-6, 40e-6, CAP)],
+    ids=["film", "0.7", "2"],
 )
 def some(request):
     sq, length, hardness = request.param
@@ -81,10 +75,14 @@ def test_no_oil_is_lost_on_the_way(some):
 def test_no_oil_is_lost_in_bounded_contacts_standing_or_moving(kind):
     """Of every cell inside, from the fields alone; the lines at both sides are at ambient pressure."""
     radius = 12.5e-3 if kind == "point" else (8e-3, 20e-3)
-    conditions = contact(geometry=kind, radius=radius, load=40.0, length=None, speed=0.1, hardness=CAP)
+    conditions = contact(
+        geometry=kind, radius=radius, load=40.0, length=None, speed=0.1, hardness=CAP
+    )
     a, b = conditions.hertz.half_widths
     on = Grid((64, 64), (-2.5 * a, -2.0 * b), (1.5 * a, 2.0 * b), periodic=(False, False))
-    surface = gaussian_surface(on, sq=0.3e-6, correlation_length=40e-6, rng=np.random.default_rng(1))
+    surface = gaussian_surface(
+        on, sq=0.3e-6, correlation_length=40e-6, rng=np.random.default_rng(1)
+    )
     solution = solve_contact(conditions, barus(), surface, options=OPTIONS)
     assert 0.1 < contact_state(solution).clr < 0.95
     assert (solution.oil.content < 1.0).mean() > 0.05
@@ -93,7 +91,9 @@ def test_no_oil_is_lost_in_bounded_contacts_standing_or_moving(kind):
     surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds)
     for one in islice(moving_contact(conditions, barus(), surfaces, options=OPTIONS), 4):
         assert one.solution.convergence.converged
-        assert one.state.mass_flux_imbalance < 1e-4  # of what the zone carries, which is less than what enters
+        assert (
+            one.state.mass_flux_imbalance < 1e-4
+        )  # of what the zone carries, which is less than what enters
 
 
 def test_the_unified_model_loses_some(flattened):
@@ -146,16 +146,24 @@ def test_a_smooth_film_is_the_unified_one_to_first_order():
 
 
 def posed(solution):
-    return contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
+    return contact_problem(
+        solution.conditions, solution.lubricant, solution.surface, solution.options
+    )
 
 
 def unknowns_of(solution):
-    return pressures_of(solution, posed(solution), Scales.of(solution.conditions, solution.lubricant))
+    return pressures_of(
+        solution, posed(solution), Scales.of(solution.conditions, solution.lubricant)
+    )
 
 
 def pasts(problem):
     content, dx = np.ones(problem.cells), problem.spacing[0]
-    return None, Past(3.0, -3.0 * content, followed=False), Past(1.0 / dx, -content / dx, followed=True)
+    return (
+        None,
+        Past(3.0, -3.0 * content, followed=False),
+        Past(1.0 / dx, -content / dx, followed=True),
+    )
 
 
 def test_the_linearisation_is_exact_but_at_borders(flattened):
@@ -164,7 +172,9 @@ def test_the_linearisation_is_exact_but_at_borders(flattened):
     for edge in (0, -1):  # a plateau, pressure and a cavity at both ends too
         at.oil[edge, :24], at.oil[edge, 24:40] = 1.2 * standing.p_cap, 0.5
     rng = np.random.default_rng(3)
-    way = Pressures(rng.standard_normal(standing.cells), 0.1 * rng.standard_normal(standing.cells), 0.03)
+    way = Pressures(
+        rng.standard_normal(standing.cells), 0.1 * rng.standard_normal(standing.cells), 0.03
+    )
     step = 1e-7
     for past in pasts(standing):
         problem = replace(standing, past=past)
@@ -180,7 +190,9 @@ def test_the_linearisation_is_exact_but_at_borders(flattened):
         expected = (after.outflow - before.outflow) * here.rows.fluid_scale / (2.0 * step)
         found = MixedLinear(here, np.float64).product(way.oil, way.total, way.approach)[0]
         same = (before.rows.state == after.rows.state) & (before.solid == after.solid)
-        opens = (here.gap > problem.contact_gap) == ~here.shut  # not so within 1 % of the contact film, and lifted
+        opens = (
+            here.gap > problem.contact_gap
+        ) == ~here.shut  # not so within 1 % of the contact film, and lifted
         same &= (here.solid == after.solid) & (opens | (here.unknowns.oil > problem.p_cap))
         same &= (before.gap > problem.contact_gap) == (after.gap > problem.contact_gap)
         for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
@@ -229,7 +241,9 @@ def test_what_is_invariant_hardly_depends_on_the_start(flattened):
 
 
 def test_the_usual_tolerance_is_close_to_a_much_tighter_one(some):
-    tight = solved(some.surface, hardness=some.p_cap, options=replace(OPTIONS, tolerance=1e-7), start=some)
+    tight = solved(
+        some.surface, hardness=some.p_cap, options=replace(OPTIONS, tolerance=1e-7), start=some
+    )
     here, there = sharing_by_film(some), sharing_by_film(tight)
     np.testing.assert_allclose(here.below, there.below, atol=5e-3)
     assert here.clr_solid == pytest.approx(there.clr_solid, abs=5e-3)
@@ -288,7 +302,9 @@ PURE_ROLLING = (1.91, 1.91)
 
 def moving(surface, *, speeds=PURE_ROLLING, hardness=CAP, **more):
     rolling = contact(hardness=hardness, surface_speeds=speeds)
-    return moving_contact(rolling, barus(), MovingSurfaces.one_rough(surface, speeds), options=OPTIONS, **more)
+    return moving_contact(
+        rolling, barus(), MovingSurfaces.one_rough(surface, speeds), options=OPTIONS, **more
+    )
 
 
 def oil_carried(solution):
@@ -319,22 +335,34 @@ def test_every_step_balances_its_oil():
 
 def test_oil_behind_the_contact_is_carried_as_it_is():
     """Where nothing presses, m_i^n = m_(i-1)^(n-1) whatever the roughness does."""
-    snapshots = list(islice(moving(rough(ON, 1e-6, correlation_length=60e-6), speeds=(2.3, 1.52)), 5))
+    snapshots = list(
+        islice(moving(rough(ON, 1e-6, correlation_length=60e-6), speeds=(2.3, 1.52)), 5)
+    )
     for before, after in pairwise(snapshots):
         held, now = (oil_carried(one.solution)[0] for one in (before, after))
         free = after.solution.oil.pressure == 0.0
-        alone = free[1:-1] & free[2:] & free[:-2] & np.roll(free, 1, 1)[1:-1] & np.roll(free, -1, 1)[1:-1]
+        alone = (
+            free[1:-1]
+            & free[2:]
+            & free[:-2]
+            & np.roll(free, 1, 1)[1:-1]
+            & np.roll(free, -1, 1)[1:-1]
+        )
         assert alone.sum() > 300
         np.testing.assert_allclose(now[1:-1][alone], held[:-2][alone], rtol=1e-4)
 
 
 def test_a_snapshot_stays_where_nothing_moves():
-    surface = Surface(np.tile(1e-7 * np.cos(2.0 * np.pi * ON.y / ON.extent[1]), (64, 1)), ON)  # a lay along rolling
+    surface = Surface(
+        np.tile(1e-7 * np.cos(2.0 * np.pi * ON.y / ON.extent[1]), (64, 1)), ON
+    )  # a lay along rolling
     first, *later = islice(moving(surface), 4)
     for snapshot in later:
         assert snapshot.solution.convergence.converged
         np.testing.assert_allclose(snapshot.solution.gap, first.solution.gap, rtol=2e-3)
-        np.testing.assert_allclose(snapshot.solution.pressure, first.solution.pressure, atol=2e-3 * P_H)
+        np.testing.assert_allclose(
+            snapshot.solution.pressure, first.solution.pressure, atol=2e-3 * P_H
+        )
 
 
 def test_motion_goes_on_from_what_it_remembers_to_the_last_digit():
@@ -348,7 +376,9 @@ def test_motion_goes_on_from_what_it_remembers_to_the_last_digit():
 
 
 def test_motion_from_rest_draws_oil_in_step_by_step():
-    snapshots = list(islice(moving(rough(ON, 0.5e-6, correlation_length=60e-6), start="stationary"), 6))
+    snapshots = list(
+        islice(moving(rough(ON, 0.5e-6, correlation_length=60e-6), start="stationary"), 6)
+    )
     assert (snapshots[0].solution.oil.content == 1.0).all()
     assert all(one.solution.convergence.converged for one in snapshots)
     clr = [one.state.clr for one in snapshots]
@@ -357,12 +387,16 @@ def test_motion_from_rest_draws_oil_in_step_by_step():
 
 
 @pytest.mark.parametrize(
-    ("speeds", "first"), [((1.91, 1.91), True), ((3.82, 0.0), True), ((3.82, 0.0), False)], ids=["one", "two", "none"]
+    ("speeds", "first"),
+    [((1.91, 1.91), True), ((3.82, 0.0), True), ((3.82, 0.0), False)],
+    ids=["one", "two", "none"],
 )
 def test_a_step_begins_where_roughness_has_carried_its_contacts(speeds, first):
     """Cells a step: from the cell before, or of a body that slides from another one, it takes twice as many steps."""
     rolling = contact(hardness=CAP, surface_speeds=speeds)
-    surfaces = MovingSurfaces.one_rough(rough(ON, 1e-6, correlation_length=40e-6), speeds, first=first)
+    surfaces = MovingSurfaces.one_rough(
+        rough(ON, 1e-6, correlation_length=40e-6), speeds, first=first
+    )
     taken = islice(moving_contact(rolling, barus(), surfaces, options=OPTIONS), 1, 4)
     assert max(snapshot.solution.convergence.iterations for snapshot in taken) <= 14
 
@@ -399,7 +433,10 @@ def test_waviness_in_motion_is_the_unified_models_in_a_full_film():
     heavy = contact(load=6000.0, surface_speeds=PURE_ROLLING)
     a, cells, waves = heavy.hertz.half_widths[0], 96, 4
     on = Grid((cells, 8), (-2.5 * a, -a), (1.5 * a, a))
-    wave = Surface(np.repeat(0.05e-6 * np.cos(2.0 * np.pi * waves * on.x / on.extent[0])[:, None], 8, axis=1), on)
+    wave = Surface(
+        np.repeat(0.05e-6 * np.cos(2.0 * np.pi * waves * on.x / on.extent[0])[:, None], 8, axis=1),
+        on,
+    )
     surfaces, period = MovingSurfaces.one_rough(wave, PURE_ROLLING), cells // waves
     left = []
     for model in ("paper", "conserving"):
@@ -408,4 +445,6 @@ def test_waviness_in_motion_is_the_unified_models_in_a_full_film():
         centre = np.array([one.solution.gap[np.argmin(np.abs(on.x)), 0] for one in steps])[-period:]
         left.append(2.0 * abs(np.fft.rfft(centre)[1]) / period / 0.05e-6)
     assert 0.1 < left[0] < 0.8
-    assert left[1] == pytest.approx(left[0], rel=0.05)  # 4 % above it here, 2 % on twice as many cells
+    assert left[1] == pytest.approx(
+        left[0], rel=0.05
+    )  # 4 % above it here, 2 % on twice as many cells

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import tamaas
 
-from asperity.ehl import Options, contact_state, solve_contact
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.ehl import Options, solve_contact
+from asperity.solution import contact_state
 from asperity.surface import Surface, flat_surface, gaussian_surface
 from support.paper import RADIUS, contact, grid, rough
 
@@ -91,7 +92,10 @@ def test_a_wave_pressed_flat_adds_its_own_pressure():
     height = 0.1 * P_H * 2.0 / (contact().pair.reduced_modulus * q)
     wave = np.cos(q * ON.y)
     found = solve_contact(
-        contact(), None, Surface(np.tile(height * wave, (128, 1)), ON), options=Options(tolerance=1e-6)
+        contact(),
+        None,
+        Surface(np.tile(height * wave, (128, 1)), ON),
+        options=Options(tolerance=1e-6),
     )
     middle = found.pressure[np.abs(ON.x) < 0.3 * A]
     assert np.all(middle > 0.0)
@@ -115,7 +119,9 @@ def test_short_waves_are_westergaards(full):
     amplitude = p_flat * length / (np.pi * conditions.pair.reduced_modulus)
     on = Grid((cells, cells), (-1.5 * a, 0.0), (1.5 * a, length))
     wave = amplitude * np.cos(2.0 * np.pi * on.y / length)
-    solution = solve_contact(conditions, None, Surface(np.tile(wave, (cells, 1)), on), options=Options(tolerance=1e-8))
+    solution = solve_contact(
+        conditions, None, Surface(np.tile(wave, (cells, 1)), on), options=Options(tolerance=1e-8)
+    )
     for line in (64, 80, 96):  # x/a = 0.01, 0.39, 0.76
         share = min(float(solution.pressure[line].mean()) / p_flat, 1.0)
         touching = 2.0 / np.pi * np.arcsin(np.sqrt(share))
@@ -131,13 +137,17 @@ def test_a_rough_ball_is_tamaas_without_images(sq, seed):
     a, cells = ball.hertz.half_widths[0], 96
     corners = (-1.6 * a, -1.6 * a), (1.6 * a, 1.6 * a)
     rng = np.random.default_rng(seed)
-    heights = gaussian_surface(Grid((cells, cells), *corners), sq=sq, correlation_length=0.4 * a, rng=rng).heights
+    heights = gaussian_surface(
+        Grid((cells, cells), *corners), sq=sq, correlation_length=0.4 * a, rng=rng
+    ).heights
     on = Grid((cells, cells), *corners, periodic=(False, False))
     solution = solve_contact(ball, None, Surface(heights, on), options=Options(tolerance=1e-8))
 
     tamaas.set_log_level(tamaas.LogLevel.error)
     side, modulus = on.extent[0] / a, ball.pair.reduced_modulus
-    model = tamaas.ModelFactory.createModel(tamaas.model_type.basic_2d, [side, side], [cells, cells])
+    model = tamaas.ModelFactory.createModel(
+        tamaas.model_type.basic_2d, [side, side], [cells, cells]
+    )
     model.E, model.nu = 1.0, 0.0  # stresses in units of E*
     tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
     bowl = -(on.x[:, None] ** 2 + on.y**2) / (2.0 * ball.radius)

@@ -9,24 +9,23 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from asperity.case import load_case
-from asperity.ehl import (
-    Options,
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
+from asperity.ehl import Options, solve_contact
+from asperity.ehl.linear_solvers.gmres import Shifted
+from asperity.ehl.linear_solvers.mixed import MixedLinear
+from asperity.ehl.linear_solvers.oscillating import elastic
+from asperity.ehl.scales import Scales
+from asperity.kernels import relax
+from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
+from asperity.solution import (
     ShakenContact,
     contact_state,
     dynamic_stiffness,
     own_resonance,
-    solve_contact,
     tangent_stiffness,
 )
-from asperity.ehl.krylov import Shifted
-from asperity.ehl.mixed_linear import MixedLinear
-from asperity.ehl.oscillating import elastic
-from asperity.ehl.scales import Scales
-from asperity.ehl.state import balance_of
-from asperity.errors import BadInput
-from asperity.grid import Grid
-from asperity.kernels import relax
-from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian
+from asperity.solution.state import balance_of
 from asperity.surface import flat_surface, gaussian_surface
 from support.line import Oil, line_contact, shaken
 from support.paper import barus, contact, grid
@@ -52,8 +51,14 @@ TABLE = {
 @cache
 def papers(sq_um, model="unified", cells=(96, 48)):
     case = load_case(PAPER).with_overrides({"grid.cells": list(cells), "model": model})
-    surface = case.with_overrides({"surface.sq": f"{sq_um} um"}).surface() if sq_um else flat_surface(case.grid)
-    return solve_contact(case.conditions, case.lubricant, surface, options=replace(case.options, tolerance=1e-5))
+    surface = (
+        case.with_overrides({"surface.sq": f"{sq_um} um"}).surface()
+        if sq_um
+        else flat_surface(case.grid)
+    )
+    return solve_contact(
+        case.conditions, case.lubricant, surface, options=replace(case.options, tolerance=1e-5)
+    )
 
 
 @pytest.mark.parametrize(("sq_um", "yielded"), list(TABLE))
@@ -65,7 +70,9 @@ def test_another_programs_table_comes_out(sq_um, yielded):
     shaken_contact = ShakenContact(solution, yielded=yielded)
     for frequency, expected in zip((0.0, 3e3, 10e3), stiffness, strict=True):
         if expected is not None:
-            assert shaken_contact.at(frequency).stiffness / MICRO == pytest.approx(expected, rel=0.01)
+            assert shaken_contact.at(frequency).stiffness / MICRO == pytest.approx(
+                expected, rel=0.01
+            )
     for frequency, expected in zip((1e3, 3e3, 5e3), (at_1, at_3, at_5), strict=True):
         assert shaken_contact.at(frequency).damping_ratio == pytest.approx(expected, abs=0.001)
 
@@ -90,11 +97,15 @@ def own_line(nodes):
 def test_a_smooth_line_has_the_stiffness_of_a_solver_that_shares_no_code(frequency_hz):
     conditions = contact()
     a, scales = conditions.hertz.half_widths[0], Scales.of(conditions, barus())
-    solution = solve_contact(conditions, barus(), flat_surface(grid((256, 8))), options=Options(tolerance=1e-6))
+    solution = solve_contact(
+        conditions, barus(), flat_surface(grid((256, 8))), options=Options(tolerance=1e-6)
+    )
     found = dynamic_stiffness(solution, frequency_hz, reference_depth=20.0 * a)
     film, speed, oil = own_line(801)
     with threadpool_limits(limits=1):
-        load = shaken(film, speed, oil, 2.0 * np.pi * frequency_hz * a / conditions.entrainment_speed)
+        load = shaken(
+            film, speed, oil, 2.0 * np.pi * frequency_hz * a / conditions.entrainment_speed
+        )
     response = load * scales.pressure * scales.length / scales.gap * conditions.length
     further = 2.0 * np.log(20.0) / (np.pi * conditions.pair.reduced_modulus * conditions.length)
     expected = 1.0 / (1.0 / response + further)
@@ -104,10 +115,14 @@ def test_a_smooth_line_has_the_stiffness_of_a_solver_that_shares_no_code(frequen
 
 
 def ball():
-    conditions = contact(geometry="point", radius=10e-3, load=15.0, length=None, speed=0.05, hardness=1e9)
+    conditions = contact(
+        geometry="point", radius=10e-3, load=15.0, length=None, speed=0.05, hardness=1e9
+    )
     a = conditions.hertz.half_widths[0]
     on = Grid((40, 32), (-2.5 * a, -1.8 * a), (1.6 * a, 1.8 * a), periodic=(False, False))
-    surface = gaussian_surface(on, sq=0.3e-6, correlation_length=0.3 * a, rng=np.random.default_rng(3))
+    surface = gaussian_surface(
+        on, sq=0.3e-6, correlation_length=0.3 * a, rng=np.random.default_rng(3)
+    )
     return conditions, surface
 
 
@@ -120,7 +135,11 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
         conditions, surface = ball()
         solution = solve_contact(conditions, barus(), surface, options=Options(model=model))
     else:
-        rough = {"grid.cells": [48, 24], "surface.sq": "2.5 um", "surface.correlation_length": "40 um"}
+        rough = {
+            "grid.cells": [48, 24],
+            "surface.sq": "2.5 um",
+            "surface.correlation_length": "40 um",
+        }
         case = load_case(PAPER).with_overrides(rough)
         conditions, surface = case.conditions, case.surface()
         solution = solve_contact(conditions, case.lubricant, surface, options=Options(model=model))
@@ -132,16 +151,23 @@ def test_gmres_answers_as_the_dense_equations_do(kind, model, yielded):
     crossing = 2.0 * np.pi * ready.scales.length / conditions.entrainment_speed
     with threadpool_limits(limits=1):
         expected = shaken_cells(balance, [crossing * frequency for frequency in hertz])
-    found = [complex(ready.oscillating.answer(crossing * one, tolerance=1e-9).total.sum()) for one in hertz]
+    found = [
+        complex(ready.oscillating.answer(crossing * one, tolerance=1e-9).total.sum())
+        for one in hertz
+    ]
     assert found == pytest.approx(expected, rel=2e-4)
 
 
 @pytest.mark.parametrize("hardness", [None, "2 GPa"])
 def test_where_nothing_yields_both_limits_are_one(hardness):
     """Solved for themselves they agree; where cells are at the cap they do not."""
-    case = load_case(PAPER).with_overrides({"grid.cells": [48, 24], "surface.sq": "1 um", "contact.load": "500 N"})
+    case = load_case(PAPER).with_overrides(
+        {"grid.cells": [48, 24], "surface.sq": "1 um", "contact.load": "500 N"}
+    )
     conditions = replace(case.conditions, hardness=hardness and case.conditions.hardness)
-    own = own_resonance(solve_contact(conditions, case.lubricant, case.surface(), options=case.options), 0.1)
+    own = own_resonance(
+        solve_contact(conditions, case.lubricant, case.surface(), options=case.options), 0.1
+    )
     assert own.virgin.yielded == "flowing"
     alone = ShakenContact(own.solution, yielded="flowing").settled(own.elastic.frequency_hz)
     assert own.virgin.stiffness == pytest.approx(alone.stiffness, rel=2e-3)
@@ -155,7 +181,9 @@ def test_a_sweep_that_cannot_move_begins_anew(monkeypatch):
     expected = ShakenContact(solution).resonance(0.1)
 
     def refused(_, frequency):
-        raise ArithmeticError(f"corrections that are no longer independent at frequency {frequency:g}")
+        raise ArithmeticError(
+            f"corrections that are no longer independent at frequency {frequency:g}"
+        )
 
     monkeypatch.setattr(Shifted, "move", refused)
     found = ShakenContact(solution).resonance(0.1)
@@ -179,9 +207,13 @@ def test_the_lines_follow_how_the_wedge_leans():
     compliance = 1.0 / linear.rows.contact_scale
     expected, _ = linear.of_gap(change, np.where(linear.free, compliance * change, 0.0))
     found = stencil_times(lines, change)
-    inner = linear.lubricated & (np.arange(linear.cells[0]) % (linear.cells[0] - 1) > 0)[:, None]  # no ambient oil
+    inner = (
+        linear.lubricated & (np.arange(linear.cells[0]) % (linear.cells[0] - 1) > 0)[:, None]
+    )  # no ambient oil
     assert (inner & linear.touching).sum() > 100
-    np.testing.assert_allclose(found[inner], expected[inner], atol=1e-9 * np.abs(expected[inner]).max())
+    np.testing.assert_allclose(
+        found[inner], expected[inner], atol=1e-9 * np.abs(expected[inner]).max()
+    )
     _, upright = MixedLinear(balance, float).inverse
     assert np.abs(stencil_times(upright, change) - expected)[inner].max() > 0.1
 
@@ -195,7 +227,8 @@ def test_a_shaken_contact_whose_bodies_touch_takes_few_steps():
 
 
 @pytest.mark.parametrize(
-    ("model", "sq_um"), [("mixed", 0.5), ("mixed", 1.0), ("mixed", 4.0), ("unified", 1.0), ("unified", 0.0)]
+    ("model", "sq_um"),
+    [("mixed", 0.5), ("mixed", 1.0), ("mixed", 4.0), ("unified", 1.0), ("unified", 0.0)],
 )
 def test_the_resonance_is_that_of_equations_met_to_the_end(model, sq_um):
     """Its damping ratio to 1 %, however small: 0.0003 at Sq 4 um; and the mass does resonate there, to 0.5 %."""
@@ -215,7 +248,9 @@ def test_a_slow_change_meets_the_tangent_of_contacts_solved_anew(model, sq_um):
     """Load steps of 0.1 %: larger ones let cells change hands."""
     solution = papers(sq_um, model)
     solved = tangent_stiffness(solution, step=0.002)
-    assert dynamic_stiffness(solution, 0.0, yielded="flowing").stiffness == pytest.approx(solved.total, rel=0.004)
+    assert dynamic_stiffness(solution, 0.0, yielded="flowing").stiffness == pytest.approx(
+        solved.total, rel=0.004
+    )
 
 
 @pytest.mark.parametrize(("sq_um", "printed"), [(1.0, 324.0), (2.5, 335.0), (4.0, 337.0)])
@@ -238,7 +273,9 @@ def test_oil_that_has_no_time_is_shut_in():
     ready = ShakenContact(solution)
     balance = ready.balance
     wet = (balance.rows.state == 2).ravel()
-    bend = np.stack([balance.problem.deflection(unit).ravel() for unit in np.eye(96)[:, :, None]], axis=1)
+    bend = np.stack(
+        [balance.problem.deflection(unit).ravel() for unit in np.eye(96)[:, :, None]], axis=1
+    )
     film = balance.film
     matrix = film.content_by_gap.ravel()[:, None] * bend + np.diag(film.content_by_pressure.ravel())
     locked = np.linalg.solve(matrix[np.ix_(wet, wet)], film.content_by_gap.ravel()[wet]).sum()
@@ -254,13 +291,17 @@ def test_what_damps_is_what_the_squeezed_oil_turns_to_heat(frequency_hz):
     dissipation is 12 η ∫ (x - C)²/h³ dx, least for the C that leaves no pressure at both ends: c by quadrature.
     """
     eta0 = 3e-3
-    oil = Lubricant(viscosity=Barus(eta0, 1e-13), density=DowsonHigginson(880.0), rheology=Newtonian())
+    oil = Lubricant(
+        viscosity=Barus(eta0, 1e-13), density=DowsonHigginson(880.0), rheology=Newtonian()
+    )
     conditions = contact(radius=10e-3, load=5.0, length=0.01, speed=1.0)
     a = conditions.hertz.half_widths[0]
     on = Grid((1024, 8), (-60.0 * a, -a), (40.0 * a, a))
     solution = solve_contact(conditions, oil, flat_surface(on), options=Options(tolerance=1e-6))
     wet, h = ~solution.cavitated[:, 0], solution.gap[:, 0]
-    zeroth, first, second = (float((on.x[wet] ** n / h[wet] ** 3).sum() * on.spacing[0]) for n in range(3))
+    zeroth, first, second = (
+        float((on.x[wet] ** n / h[wet] ** 3).sum() * on.spacing[0]) for n in range(3)
+    )
     expected = 12.0 * eta0 * conditions.length * (second - first**2 / zeroth)
     assert h.min() > 20.0 * (solution.pressure.max() / conditions.pair.effective_modulus) * a
     found = dynamic_stiffness(solution, frequency_hz, reference_depth=2.0 * a)
@@ -274,7 +315,9 @@ def test_a_mass_resonates_where_its_own_stiffness_is():
         exact = ready.at(found.frequency_hz, tolerance=1e-8)
         assert found.stiffness == pytest.approx(exact.stiffness, rel=1e-3)
         assert found.damping_ratio == pytest.approx(exact.damping_ratio, abs=1e-4)
-        assert found.stiffness == pytest.approx(mass * (2.0 * np.pi * found.frequency_hz) ** 2, rel=0.02)
+        assert found.stiffness == pytest.approx(
+            mass * (2.0 * np.pi * found.frequency_hz) ** 2, rel=0.02
+        )
         expected = 2.0 * np.pi * found.frequency_hz * found.damping / (2.0 * found.stiffness)
         assert found.damping_ratio == pytest.approx(expected)
 
@@ -300,11 +343,16 @@ def test_bad_input_is_named():
     with pytest.raises(BadInput, match="mass"):
         ShakenContact(solution).resonance(0.0)
     conserving = solve_contact(
-        contact(), barus(), flat_surface(grid((48, 8))), options=Options(model="conserving", tolerance=1e-3)
+        contact(),
+        barus(),
+        flat_surface(grid((48, 8))),
+        options=Options(model="conserving", tolerance=1e-3),
     )
     with pytest.raises(BadInput, match="conserving"):
         dynamic_stiffness(conserving, 1e3)
     few = Options(max_iterations=1)
-    unfinished = solve_contact(contact(), barus(), flat_surface(grid((48, 8))), options=few, strict=False)
+    unfinished = solve_contact(
+        contact(), barus(), flat_surface(grid((48, 8))), options=few, strict=False
+    )
     with pytest.raises(BadInput, match="stands still"):
         dynamic_stiffness(unfinished, 1e3)

@@ -7,19 +7,20 @@ import pytest
 from benchmarks.robustness import OIL as WIDE_OIL
 from benchmarks.robustness import contacts, prepared
 
-import asperity.ehl.search as searching
-from asperity.ehl import Options, contact_state, solve_contact
-from asperity.ehl.iterate import newton
-from asperity.ehl.mixed import Pressures
-from asperity.ehl.mixed_iterate import newton as mixed_newton
-from asperity.ehl.mixed_solve import CLIMB, MixedSearch
+import asperity.ehl.strategies.grid_continuation as searching
+from asperity.contact.grid import Grid
+from asperity.ehl import Options, solve_contact
+from asperity.ehl.grid_transfer import averaged
+from asperity.ehl.models.mixed import Pressures
+from asperity.ehl.newton.mixed import newton as mixed_newton
+from asperity.ehl.newton.single_pressure import newton
 from asperity.ehl.outcome import ATTEMPTS, FROM_DRY, Figures
-from asperity.ehl.posing import contact_problem, first_guess, grid_levels
+from asperity.ehl.problem_setup import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
-from asperity.ehl.search import grid_error
-from asperity.ehl.transfer import averaged
-from asperity.grid import Grid
+from asperity.ehl.strategies.grid_continuation import grid_error
+from asperity.ehl.strategies.mixed_search import CLIMB, MixedSearch
 from asperity.lubricant import Barus
+from asperity.solution import contact_state
 from asperity.surface import flat_surface
 from support.paper import barus, contact, grid, rough
 
@@ -32,7 +33,9 @@ def solved(surface, **given):
 
 @pytest.mark.parametrize("cells", [96, 192])
 def test_smooth_films_are_off_by_no_more_than_stated(cells):
-    here, true = (solved(flat_surface(grid((n, 8))), options=Options(tolerance=1e-7)) for n in (cells, 3072))
+    here, true = (
+        solved(flat_surface(grid((n, 8))), options=Options(tolerance=1e-7)) for n in (cells, 3072)
+    )
     error, state, truth = here.convergence.error, contact_state(here), contact_state(true)
     for name in ("h_central", "h_min"):
         off = abs(getattr(state, name) - getattr(truth, name))
@@ -45,7 +48,9 @@ def test_load_shares_are_off_by_about_what_is_stated(sq):
     """One surface on two grids; the median over four surfaces, because a bound from two grids is no certainty."""
     ratios = []
     for seed in range(4):
-        coarse, fine = (solved(rough(grid((n, n)), sq, seed=seed, correlation_length=40e-6)) for n in (96, 192))
+        coarse, fine = (
+            solved(rough(grid((n, n)), sq, seed=seed, correlation_length=40e-6)) for n in (96, 192)
+        )
         off = abs(contact_state(coarse).clr - contact_state(fine).clr)
         assert coarse.convergence.error.clr > 0.0
         ratios.append(off / coarse.convergence.error.clr)
@@ -61,7 +66,9 @@ def test_a_single_grid_has_no_estimate_and_a_warm_start_hands_on_that_of_its_own
     again = solved(rough(grid((96, 96)), 1.05e-6, correlation_length=40e-6), start=first)
     assert again.convergence.discretisation_error is None
     assert again.convergence.iteration_error.clr < 1e-3
-    hot = solved(first.surface, start=first, viscosity_factor=np.full(first.surface.heights.shape, 0.99))
+    hot = solved(
+        first.surface, start=first, viscosity_factor=np.full(first.surface.heights.shape, 0.99)
+    )
     assert hot.convergence.discretisation_error == first.convergence.discretisation_error
 
 
@@ -89,7 +96,9 @@ def test_smooth_films_of_conserved_oil_are_within_their_bars_of_first_order():
 def test_the_way_back_to_first_order_is_gone_to_its_end(seed):
     """Sharp elastic roughness: one step back told as little as a seventh, and no interval held the truth."""
     fine = rough(grid((384, 32), y=(-1.0, 1.0)), 0.5e-6, seed=seed, correlation_length=30e-6)
-    here = replace(fine, grid=grid((96, 32), y=(-1.0, 1.0)), heights=averaged(fine.heights, (96, 32)))
+    here = replace(
+        fine, grid=grid((96, 32), y=(-1.0, 1.0)), heights=averaged(fine.heights, (96, 32))
+    )
     slow = contact(hardness=None, speed=0.15)
     error = contact_state(solve_contact(slow, OIL, here)).error.clr
     assert error.low < contact_state(solve_contact(slow, OIL, fine)).clr < error.high
@@ -114,21 +123,33 @@ def test_grids_that_agree_by_chance_are_not_believed():
     """Two grids that both sit on the contact film agree, and said an error of 0.00 %."""
     chance = [figures(0.90), figures(0.60), figures(0.60)]
     assert grid_error(chance, smooth=False, cell=0.0).clr == pytest.approx(2.0 * 0.25 * 0.30)
-    orders = grid_error([figures(0.60), figures(0.60)], smooth=False, cell=0.0, by_first_order=figures(0.40))
-    assert orders.clr == pytest.approx(0.85 * 2.0 * 0.20)  # which holds as often, since it tells more
+    orders = grid_error(
+        [figures(0.60), figures(0.60)], smooth=False, cell=0.0, by_first_order=figures(0.40)
+    )
+    assert orders.clr == pytest.approx(
+        0.85 * 2.0 * 0.20
+    )  # which holds as often, since it tells more
     assert grid_error([figures(0.60), figures(0.60)], smooth=False, cell=0.05).clr > 0.005
-    assert grid_error([figures(0.60)], smooth=False, cell=0.05, by_first_order=figures(0.40)) is None
+    assert (
+        grid_error([figures(0.60)], smooth=False, cell=0.05, by_first_order=figures(0.40)) is None
+    )
 
 
 def test_three_grids_and_both_orders_say_that_the_load_share_keeps_its_way():
     """By hand: 0.70, 0.60, 0.56, and 0.57 by first order; other figures are not told so much by it."""
     found = grid_error(
-        [figures(0.70), figures(0.60), figures(0.56)], smooth=False, cell=0.05, by_first_order=figures(0.57)
+        [figures(0.70), figures(0.60), figures(0.56)],
+        smooth=False,
+        cell=0.05,
+        by_first_order=figures(0.57),
     )
     assert found.sides("clr") == pytest.approx((2.0 * 0.04 + 0.05**2, 0.5 * 0.04 + 0.05**2))
     assert found.sides("car") == pytest.approx((0.85 * 2.5 * 0.004, 0.85 * 1.5 * 0.004))
     chance = grid_error(
-        [figures(0.90), figures(0.60), figures(0.60)], smooth=False, cell=0.0, by_first_order=figures(0.60)
+        [figures(0.90), figures(0.60), figures(0.60)],
+        smooth=False,
+        cell=0.0,
+        by_first_order=figures(0.60),
     )
     assert chance.clr == pytest.approx(1.25 * 0.25 * 0.30)
 
@@ -157,7 +178,8 @@ def test_intervals_hold_the_load_share_of_a_finer_grid(model):
     held, wide = [], []
     for one in (contacts()[number] for number in (53, 153, 161, 353, 411, 503)):
         here, finer = (
-            solve_contact(*posed(one, cells), options=Options(model=model), strict=False) for cells in (96, 192)
+            solve_contact(*posed(one, cells), options=Options(model=model), strict=False)
+            for cells in (96, 192)
         )
         error, true = contact_state(here).error.clr, contact_state(finer).clr
         if here.convergence.converged and finer.convergence.converged and error.low is not None:
@@ -175,7 +197,8 @@ def posed(one, cells):
 
 def test_any_number_of_cells_will_do():
     even, odd = (
-        contact_state(solved(rough(grid(cells), 1e-6, correlation_length=40e-6))) for cells in ((96, 96), (97, 95))
+        contact_state(solved(rough(grid(cells), 1e-6, correlation_length=40e-6)))
+        for cells in ((96, 96), (97, 95))
     )
     assert odd.clr == pytest.approx(even.clr, abs=0.05)
 
@@ -222,7 +245,9 @@ def test_a_way_is_judged_by_its_own_steps(model, way):
     """What a way that failed has left says nothing of the next one's error; how wide cells are always does."""
     options = Options(model=model)
     scales = Scales.of(CONDITIONS, OIL)
-    problem = contact_problem(CONDITIONS, OIL, rough(grid((96, 96)), 1e-6, correlation_length=40e-6), options)
+    problem = contact_problem(
+        CONDITIONS, OIL, rough(grid((96, 96)), 1e-6, correlation_length=40e-6), options
+    )
     search = MixedSearch(options, scales.gap, None)
     search.by_first_order = Figures(car=50.0, clr=50.0, h_min=50.0, h_central=50.0)
     search.along(way, grid_levels(problem), lambda on: first_guess(on, CONDITIONS, OIL, scales))
@@ -236,7 +261,9 @@ def test_a_way_is_judged_by_its_own_steps(model, way):
 def test_a_heavy_smooth_ball_in_isoviscous_oil_is_solved_at_the_first_attempt(model):
     solution = isoviscous_ball(model)
     assert solution.convergence.attempt == ATTEMPTS[0]
-    assert len(solution.convergence.history) < 30  # 125 or 211, as the processor sums, without sturdy steps
+    assert (
+        len(solution.convergence.history) < 30
+    )  # 125 or 211, as the processor sums, without sturdy steps
     assert contact_state(solution).reynolds_residual < 1e-5
 
 
@@ -251,7 +278,9 @@ def test_a_smooth_contact_falls_back_on_the_sturdy_wedge(monkeypatch):
     monkeypatch.setattr(searching.Search, "run", counted(searching.Search.run))
     mended = isoviscous_ball("paper")
     assert mended.convergence.attempt == ATTEMPTS[1]
-    assert contact_state(mended).reynolds_residual < 1e-5  # judged by the equations that were solved
+    assert (
+        contact_state(mended).reynolds_residual < 1e-5
+    )  # judged by the equations that were solved
 
 
 def isoviscous_ball(model):
@@ -259,10 +288,17 @@ def isoviscous_ball(model):
     pair, radius, oil = contact().pair, 12.5e-3, replace(barus(), viscosity=Barus(0.04, 1e-14))
     modulus, twice_u = pair.effective_modulus, 1e-11
     speed, load = twice_u * modulus * radius / 0.08, 100.0 * twice_u**0.75 * modulus * radius**2
-    ball = contact(geometry="point", radius=radius, length=None, load=load, surface_speeds=(speed, speed))
+    ball = contact(
+        geometry="point", radius=radius, length=None, load=load, surface_speeds=(speed, speed)
+    )
     a = ball.hertz.half_widths[0]
     on = Grid((64, 64), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
-    return solve_contact(ball, oil, flat_surface(on), options=Options(tolerance=1e-5, contact_film=1e-13, model=model))
+    return solve_contact(
+        ball,
+        oil,
+        flat_surface(on),
+        options=Options(tolerance=1e-5, contact_film=1e-13, model=model),
+    )
 
 
 def counted(run):
@@ -271,7 +307,12 @@ def counted(run):
     def bounded(self, problem, steps, tolerance, most, **limits):
         def numbered():
             for number, step in enumerate(steps):
-                yield type(step)(number, step.balance, step.approach, step.change if np.isfinite(step.change) else 1.0)
+                yield type(step)(
+                    number,
+                    step.balance,
+                    step.approach,
+                    step.change if np.isfinite(step.change) else 1.0,
+                )
 
         return run(self, problem, numbered(), tolerance, most, **limits)
 

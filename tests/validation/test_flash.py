@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import k0e
 
-from asperity.ehl import flash_temperature, friction, friction_and_heat, solve_contact
-from asperity.ehl.flash import moving_source
-from asperity.hertz import line_pressure
+from asperity.contact.hertz import line_pressure
+from asperity.ehl import solve_contact
 from asperity.lubricant import EyringShear, Solid, Thermal
+from asperity.solution import flash_temperature, friction, friction_and_heat
+from asperity.solution.flash import moving_source
 from support.moving_heat import band, rectangle, rectangle_at_rest, tian_kennedy_square
 from support.paper import barus, contact, grid, rough
 from support.sampled import sampled
@@ -69,10 +70,14 @@ def test_a_square_at_rest_is_the_closed_form():
     np.testing.assert_allclose(rise, rise.T, rtol=1e-9)
 
 
-@pytest.mark.parametrize(("peclet", "within"), [(0.01, 0.02), (0.1, 0.02), (1.0, 0.06), (10.0, 0.06), (300.0, 0.02)])
+@pytest.mark.parametrize(
+    ("peclet", "within"), [(0.01, 0.02), (0.1, 0.02), (1.0, 0.06), (10.0, 0.06), (300.0, 0.02)]
+)
 def test_a_square_source_meets_tian_and_kennedy(peclet, within):
     """2 % at both ends, and the error of their own fit between."""
-    assert square_rise(peclet, 64).max() == pytest.approx(tian_kennedy_square(B, peclet, K), rel=within)
+    assert square_rise(peclet, 64).max() == pytest.approx(
+        tian_kennedy_square(B, peclet, K), rel=within
+    )
 
 
 @pytest.mark.parametrize("peclet", [0.05, 1.0, 10.0, -10.0, 300.0])
@@ -88,8 +93,8 @@ def test_few_panels_are_as_good_as_many(speed, monkeypatch):
     """The kernel in panels of half a cell throughout, with nodes enough."""
     place = (96, 16), (2e-6, 1e-6), speed, STEEL
     found = moving_source(*place, length=0.01).spectrum[0]
-    monkeypatch.setattr("asperity.ehl.flash.SPREAD", 0.0)
-    monkeypatch.setattr("asperity.ehl.flash.NODES", 16)
+    monkeypatch.setattr("asperity.solution.flash.SPREAD", 0.0)
+    monkeypatch.setattr("asperity.solution.flash.NODES", 16)
     expected = moving_source.__wrapped__(*place, length=0.01).spectrum[0]
     assert np.abs(found - expected).max() < 5e-5 * np.abs(expected).max()
 
@@ -108,7 +113,9 @@ def test_what_repeats_in_y_is_many_copies():
     copies = 25
     many = moving_source((16, n * copies), (dx, dx), 1.0, STEEL, length=None)(np.tile(heat, copies))
     middle = many[:, n * (copies // 2) : n * (copies // 2 + 1)]
-    np.testing.assert_allclose(repeating - repeating.mean(), middle - middle.mean(), atol=2e-3 * np.ptp(repeating))
+    np.testing.assert_allclose(
+        repeating - repeating.mean(), middle - middle.mean(), atol=2e-3 * np.ptp(repeating)
+    )
 
 
 def warm_contact(speeds, gap=0.5e-6, cells=(128, 8)):
@@ -133,7 +140,9 @@ def test_the_bodies_carry_away_what_friction_makes(speeds):
     x, dx = solution.grid.x, solution.grid.spacing[0]
     inputs = (heat.into_1[:, 0], heat.heat[:, 0] - heat.into_1[:, 0])
     carried = 0.0
-    for speed, heat_in, surface in zip(speeds, inputs, (heat.surface_1, heat.surface_2), strict=True):
+    for speed, heat_in, surface in zip(
+        speeds, inputs, (heat.surface_1, heat.surface_2), strict=True
+    ):
         if abs(speed) < 0.1:
             carried += heat_in.sum() * dx  # at rest: it spreads through no plane in particular
             continue
@@ -142,7 +151,11 @@ def test_the_bodies_carry_away_what_friction_makes(speeds):
         def rise(x_at, z, heat_in=heat_in, speed=speed):
             v, distance = speed / (2 * KAPPA), np.hypot(x_at - x, z)
             return (
-                np.sum(heat_in * np.exp(v * (x_at - x) - abs(v) * distance) * k0e(abs(v) * distance)) * dx / (np.pi * K)
+                np.sum(
+                    heat_in * np.exp(v * (x_at - x) - abs(v) * distance) * k0e(abs(v) * distance)
+                )
+                * dx
+                / (np.pi * K)
             )
 
         def flow(z, speed=speed, plane=plane, rise=rise):
@@ -166,11 +179,17 @@ def test_sharing_is_the_two_coupled_equations(speeds):
     crossing = thermal.oil_conductivity / solution.gap * (heat.surface_2 - heat.surface_1)
     size = np.abs(heat.heat).max()
     np.testing.assert_allclose(heat.into_1, heat.heat / 2.0 + crossing, atol=1e-4 * size)
-    rise = moving_source(solution.grid.cells, solution.grid.spacing, speeds[1], thermal.solids[1], length=0.01)
+    rise = moving_source(
+        solution.grid.cells, solution.grid.spacing, speeds[1], thermal.solids[1], length=0.01
+    )
     np.testing.assert_allclose(heat.surface_2, 16.85 + rise(heat.heat - heat.into_1), rtol=1e-9)
     across = (np.arange(100) + 0.5) / 100  # of the film: k_f T'' = -q/h between the two surfaces
-    bulge = np.mean(across * (1.0 - across) / 2.0) * heat.heat * solution.gap / thermal.oil_conductivity
-    np.testing.assert_allclose(heat.film, (heat.surface_1 + heat.surface_2) / 2.0 + bulge, rtol=1e-4)
+    bulge = (
+        np.mean(across * (1.0 - across) / 2.0) * heat.heat * solution.gap / thermal.oil_conductivity
+    )
+    np.testing.assert_allclose(
+        heat.film, (heat.surface_1 + heat.surface_2) / 2.0 + bulge, rtol=1e-4
+    )
 
 
 def test_sharing_agrees_with_a_dense_solution():
@@ -185,13 +204,17 @@ def test_sharing_agrees_with_a_dense_solution():
         body = moving_source((48, 8), solution.grid.spacing, speed, STEEL, length=0.01)
         answers.append(np.array([body(row[:, None] * np.ones(8))[:, 0] for row in np.eye(48)]).T)
     q, resistance = heat.heat[:, 0], gap[:, 0] / 0.14
-    passed = np.linalg.solve(np.diag(resistance) + sum(answers), (answers[1] - answers[0]) @ q / 2.0)
+    passed = np.linalg.solve(
+        np.diag(resistance) + sum(answers), (answers[1] - answers[0]) @ q / 2.0
+    )
     np.testing.assert_allclose(heat.into_1[:, 0], q / 2.0 + passed, atol=1e-4 * q.max())
 
 
 def test_opposed_speeds_are_mirror_images():
     heat = flash_temperature(warm_contact((2.000001, -2.0)))
-    np.testing.assert_allclose(heat.surface_1, heat.surface_2[::-1], rtol=1e-4, atol=1e-4 * heat.max_k)
+    np.testing.assert_allclose(
+        heat.surface_1, heat.surface_2[::-1], rtol=1e-4, atol=1e-4 * heat.max_k
+    )
     assert heat.surface_1.argmax() > heat.surface_2.argmax()
 
 
@@ -211,9 +234,13 @@ def test_pure_rolling_is_cold():
 
 
 def test_a_dry_rough_point_contact_is_as_hot_on_either_side():
-    conditions = contact(geometry="point", length=None, load=5.0, hardness=2e9, surface_speeds=(2.0, -0.5))
+    conditions = contact(
+        geometry="point", length=None, load=5.0, hardness=2e9, surface_speeds=(2.0, -0.5)
+    )
     a = conditions.hertz.half_widths[0]
-    on = replace(grid((64, 64)), lower=(-2 * a, -2 * a), upper=(2 * a, 2 * a), periodic=(False, False))
+    on = replace(
+        grid((64, 64)), lower=(-2 * a, -2 * a), upper=(2 * a, 2 * a), periodic=(False, False)
+    )
     solution = solve_contact(conditions, None, rough(on, 0.2e-6, correlation_length=a / 4))
     rubbing, heat = friction_and_heat(solution)
     touching = solution.in_contact

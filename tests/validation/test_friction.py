@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.special import iv, modstruve
 
-from asperity.ehl import contact_state, friction, solve_contact
-from asperity.errors import BadInput
-from asperity.hertz import line_pressure
+from asperity.contact.hertz import line_pressure
+from asperity.core.errors import BadInput
+from asperity.ehl import solve_contact
 from asperity.lubricant import BairWiner, EyringShear, LinearBairWiner, NewtonianShear
+from asperity.solution import contact_state, friction
 from support.paper import ETA0, barus, contact, grid, rough
 from support.sampled import sampled
 
@@ -24,7 +25,13 @@ def hertz_film(law, conditions=None):
     """Hertz's pressure over a film of one thickness, as far as the pressure reaches."""
     pressure = line_pressure(FINE.x, A, P_H)[:, None]
     oil = replace(barus(ALPHA), friction=law)
-    return sampled(conditions or contact(), oil, FINE, pressure, np.where(np.abs(FINE.x) < A, GAP, FAR)[:, None])
+    return sampled(
+        conditions or contact(),
+        oil,
+        FINE,
+        pressure,
+        np.where(np.abs(FINE.x) < A, GAP, FAR)[:, None],
+    )
 
 
 def test_newtonian_traction_of_a_line_contact():
@@ -33,7 +40,9 @@ def test_newtonian_traction_of_a_line_contact():
     force = ETA0 * SLIDING / GAP * A * np.pi * (iv(1, beta) + modstruve(-1, beta))
     found = friction(hertz_film(NewtonianShear()))
     assert found.coefficient == pytest.approx(force / contact().line_load, rel=1e-3)
-    assert found.shear_force == pytest.approx(-found.coefficient * 500.0)  # body 1, the faster, is held back
+    assert found.shear_force == pytest.approx(
+        -found.coefficient * 500.0
+    )  # body 1, the faster, is held back
     assert found.power == pytest.approx(-found.shear_force * SLIDING)
 
 
@@ -54,7 +63,9 @@ def test_bair_winer_traction_without_elasticity_is_a_quadrature():
         return -limit * np.expm1(-ETA0 * np.exp(ALPHA * pressure) * SLIDING / (GAP * limit))
 
     force = quad(stress, -A, A, epsrel=1e-9)[0]
-    assert friction(hertz_film(law)).coefficient == pytest.approx(force / contact().line_load, rel=1e-3)
+    assert friction(hertz_film(law)).coefficient == pytest.approx(
+        force / contact().line_load, rel=1e-3
+    )
 
 
 def test_bair_winer_traction_with_elasticity_is_the_equation_integrated():
@@ -83,7 +94,9 @@ def test_faster_sliding_meets_the_limit():
 
 
 def test_a_dry_contact_has_the_boundary_friction():
-    dry = solve_contact(contact(hardness=2e9), None, rough(grid((64, 64)), 1e-6, correlation_length=30e-6))
+    dry = solve_contact(
+        contact(hardness=2e9), None, rough(grid((64, 64)), 1e-6, correlation_length=30e-6)
+    )
     found = friction(dry, boundary_friction=0.15)
     assert found.coefficient == pytest.approx(0.15, abs=1e-3 * 0.15)
     assert found.asperity_part == pytest.approx(found.coefficient)
@@ -93,7 +106,10 @@ def test_a_dry_contact_has_the_boundary_friction():
 def test_down_the_stribeck_curve_the_asperities_friction_is_left():
     """The oil's part fades with the speed; what stays is f_b times the load share (the model's valleys keep theirs)."""
     surface = rough(grid((64, 64)), 1e-6, correlation_length=30e-6)
-    solved = [solve_contact(contact(speed=speed, hardness=2e9), barus(), surface) for speed in (1.0, 1e-2, 1e-5)]
+    solved = [
+        solve_contact(contact(speed=speed, hardness=2e9), barus(), surface)
+        for speed in (1.0, 1e-2, 1e-5)
+    ]
     found = [friction(solution, boundary_friction=0.12) for solution in solved]
     assert found[0].coefficient < found[1].coefficient < found[2].coefficient
     assert found[0].oil_part > 0.005
@@ -102,7 +118,10 @@ def test_down_the_stribeck_curve_the_asperities_friction_is_left():
 
 
 def test_signs_and_pure_rolling():
-    forward, backward = (friction(hertz_film(BairWiner(), contact(surface_speeds=s))) for s in ((2.1, 1.7), (1.7, 2.1)))
+    forward, backward = (
+        friction(hertz_film(BairWiner(), contact(surface_speeds=s)))
+        for s in ((2.1, 1.7), (1.7, 2.1))
+    )
     np.testing.assert_allclose(forward.shear, -backward.shear)
     assert forward.shear.min() < 0.0
     rolling = friction(hertz_film(BairWiner(), contact(surface_speeds=(1.9, 1.9))))
@@ -118,7 +137,8 @@ def test_ruptured_oil_is_not_sheared():
 def test_warm_oil_is_easier_to_shear():
     solution = hertz_film(NewtonianShear())
     cold, warm = (
-        friction(solution, film_temperature=np.full(FINE.cells, temperature)) for temperature in (313.15, 323.15)
+        friction(solution, film_temperature=np.full(FINE.cells, temperature))
+        for temperature in (313.15, 323.15)
     )
     assert friction(solution).coefficient == cold.coefficient
     assert warm.coefficient / cold.coefficient == pytest.approx(np.exp(-0.37), rel=1e-6)
@@ -126,7 +146,9 @@ def test_warm_oil_is_easier_to_shear():
     assert friction(softer).coefficient == pytest.approx(0.5 * cold.coefficient)
 
 
-@pytest.mark.parametrize("wrong", [{"boundary_friction": -0.1}, {"film_temperature": np.ones((3, 3))}])
+@pytest.mark.parametrize(
+    "wrong", [{"boundary_friction": -0.1}, {"film_temperature": np.ones((3, 3))}]
+)
 def test_nonsense_is_refused(wrong):
     with pytest.raises(BadInput):
         friction(hertz_film(BairWiner()), **wrong)

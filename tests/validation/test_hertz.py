@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from asperity.ehl import Options, contact_state, solve_contact
-from asperity.hertz import line_gap, line_pressure
+from asperity.contact.hertz import line_gap, line_pressure
+from asperity.ehl import Options, solve_contact
+from asperity.solution import contact_state
 from asperity.surface import flat_surface
 from support.paper import RADIUS, contact, grid
 
@@ -14,7 +15,10 @@ A, P_H = HERTZ.half_widths[0], HERTZ.p_max
 
 def solved(cells, **changes):
     return solve_contact(
-        contact(**changes), None, flat_surface(grid((cells, 8), (-2.0, 2.0))), options=Options(tolerance=1e-6)
+        contact(**changes),
+        None,
+        flat_surface(grid((cells, 8), (-2.0, 2.0))),
+        options=Options(tolerance=1e-6),
     )
 
 
@@ -47,7 +51,9 @@ def test_the_gap_outside_is_hertzs(fine):
 
 
 def test_a_smooth_contact_is_the_same_on_every_line(fine):
-    np.testing.assert_allclose(fine.pressure, fine.pressure[:, :1] @ np.ones((1, 8)), atol=1e-6 * P_H)
+    np.testing.assert_allclose(
+        fine.pressure, fine.pressure[:, :1] @ np.ones((1, 8)), atol=1e-6 * P_H
+    )
     np.testing.assert_allclose(fine.pressure, fine.pressure[::-1], atol=1e-4 * P_H)
 
 

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from asperity.ehl import Options, SolveStatus, contact_state, solve_contact
-from asperity.ehl.mixed import Pressures, evaluate
-from asperity.ehl.posing import contact_problem
-from asperity.errors import BadInput, NotConverged
-from asperity.grid import Grid
-from asperity.hertz import line_pressure
+from asperity.contact.grid import Grid
+from asperity.contact.hertz import line_pressure
+from asperity.core.errors import BadInput, NotConverged
+from asperity.ehl import Options, SolveStatus, solve_contact
+from asperity.ehl.models.mixed import Pressures, evaluate
+from asperity.ehl.problem_setup import contact_problem
+from asperity.solution import contact_state
 from asperity.surface import Surface, flat_surface
 from support.paper import RADIUS, barus, contact, grid, rough
 from support.reynolds import mass_outflow
@@ -20,7 +21,9 @@ COARSE, FINE = grid((64, 64)), grid((128, 128))
 
 def solved(surface, *, tolerance=1e-4, speed=1.91, hardness=CAP, model="mixed", **more):
     options = Options(tolerance=tolerance, contact_film=FLOOR, model=model)
-    return solve_contact(contact(hardness=hardness, speed=speed), barus(), surface, options=options, **more)
+    return solve_contact(
+        contact(hardness=hardness, speed=speed), barus(), surface, options=options, **more
+    )
 
 
 def clr(solution):
@@ -40,7 +43,9 @@ def tight(request):
 def flowing(solution):
     """Pressure of the oil, and the cells in which Reynolds' equation decides it: touching ones too if it can."""
     if solution.oil is None:
-        return solution.pressure, (solution.pressure > 0.0) & (solution.pressure < CAP) & ~solution.in_contact
+        return solution.pressure, (solution.pressure > 0.0) & (
+            solution.pressure < CAP
+        ) & ~solution.in_contact
     oil = solution.oil.pressure
     return oil, (oil > 0.0) & (oil < CAP)
 
@@ -73,7 +78,9 @@ def test_the_gap_is_the_surface_bent_by_the_pressure(tight):
     bent = problem.deflection(tight.pressure / P_H) * A**2 / RADIUS
     rigid = (tight.grid.x**2 / (2.0 * RADIUS))[:, None] - tight.surface.heights
     elastic = tight.pressure < CAP
-    np.testing.assert_allclose(tight.gap[elastic], (tight.rigid_approach + rigid + bent)[elastic], atol=0.1e-9)
+    np.testing.assert_allclose(
+        tight.gap[elastic], (tight.rigid_approach + rigid + bent)[elastic], atol=0.1e-9
+    )
 
 
 def test_lubricated_cells_conserve_oil(tight):
@@ -104,7 +111,9 @@ def test_the_equations_are_the_physical_ones(tight):
         unknowns = Pressures(tight.oil.pressure / P_H, tight.pressure / P_H, approach)
         balance = evaluate(problem, unknowns, second_order=True)
     expected = mass_outflow(tight) * RADIUS / (880.0 * 1.91 * A)
-    np.testing.assert_allclose(balance.outflow, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        balance.outflow, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max()
+    )
 
 
 def test_the_stated_imbalance_is_the_oil_that_non_lubricated_cells_make_or_lose(tight):
@@ -113,7 +122,9 @@ def test_the_stated_imbalance_is_the_oil_that_non_lubricated_cells_make_or_lose(
     lost = np.abs(mass_outflow(tight))[zone][~wet[zone]].sum() * np.prod(tight.grid.spacing)
     film = (tight.lubricant.density(oil) * tight.gap)[zone].mean()
     state = contact_state(tight)
-    assert state.mass_flux_imbalance == pytest.approx(lost / (1.91 * film * tight.grid.extent[1]), rel=1e-3)
+    assert state.mass_flux_imbalance == pytest.approx(
+        lost / (1.91 * film * tight.grid.extent[1]), rel=1e-3
+    )
 
 
 def test_a_hundred_times_tighter_changes_the_load_share_by_less_than_two_thousandths(usual):
@@ -147,7 +158,9 @@ def test_a_wider_strip_of_the_same_surface_is_the_same_contact():
 def test_units_do_not_matter():
     """Everything twice as long, loads fourfold, viscosity twofold: the same pressures, gaps twice as wide."""
     surface = rough(COARSE, SQ)
-    larger_grid = Grid(COARSE.cells, *(tuple(2.0 * c for c in corner) for corner in (COARSE.lower, COARSE.upper)))
+    larger_grid = Grid(
+        COARSE.cells, *(tuple(2.0 * c for c in corner) for corner in (COARSE.lower, COARSE.upper))
+    )
     larger = contact(hardness=CAP, radius=2.0 * RADIUS, load=2000.0, length=0.02, speed=2.0 * 1.91)
     once = solved(surface, tolerance=1e-5)
     twice = solve_contact(
@@ -162,7 +175,8 @@ def test_units_do_not_matter():
 
 def test_a_rougher_surface_carries_more_on_its_asperities():
     shares = [
-        np.mean([clr(solved(rough(COARSE, sq, seed))) for seed in (1, 2, 3)]) for sq in (0.3e-6, 0.5e-6, 1e-6, 2e-6)
+        np.mean([clr(solved(rough(COARSE, sq, seed))) for seed in (1, 2, 3)])
+        for sq in (0.3e-6, 0.5e-6, 1e-6, 2e-6)
     ]
     assert np.all(np.diff(shares) > 0.05)
     assert shares[0] < 0.1
@@ -171,7 +185,8 @@ def test_a_rougher_surface_carries_more_on_its_asperities():
 
 def test_a_faster_surface_carries_more_on_its_oil():
     shares = [
-        np.mean([clr(solved(rough(COARSE, 0.8e-6, seed), speed=u)) for seed in (1, 2)]) for u in (0.5, 1.0, 2.0, 4.0)
+        np.mean([clr(solved(rough(COARSE, 0.8e-6, seed), speed=u)) for seed in (1, 2)])
+        for u in (0.5, 1.0, 2.0, 4.0)
     ]
     assert np.all(np.diff(shares) < -0.05)
 
@@ -188,7 +203,9 @@ def test_hardly_any_oil_on_a_rough_surface_is_the_dry_contact(model):
     """At a crawl an oil that does not thicken leaves the contact; one pressure for both would keep CLR near 0.5."""
     surface = rough(COARSE, SQ)
     options = Options(contact_film=0.1e-9, model=model)
-    crawl = solve_contact(contact(hardness=CAP, speed=1e-7), barus(alpha=1e-11), surface, options=options)
+    crawl = solve_contact(
+        contact(hardness=CAP, speed=1e-7), barus(alpha=1e-11), surface, options=options
+    )
     assert clr(crawl) > 0.999
 
 
@@ -209,7 +226,9 @@ def test_a_purely_elastic_contact_is_solved_too(sq):
 def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
     surface = rough(COARSE, SQ)
     hurried = Options(max_iterations=3)
-    with pytest.raises(NotConverged, match=r"not solved: out of iterations.* after \d+ steps") as caught:
+    with pytest.raises(
+        NotConverged, match=r"not solved: out of iterations.* after \d+ steps"
+    ) as caught:
         solve_contact(contact(hardness=CAP), barus(), surface, options=hurried)
     unfinished = caught.value.solution
     assert unfinished.convergence.status is SolveStatus.OUT_OF_ITERATIONS
@@ -221,7 +240,11 @@ def test_an_unfinished_solve_is_loud_and_hands_over_what_it_has():
 
 
 def test_steps_from_a_coarser_grid_are_not_begun_anew_for_the_last_decimals():
-    numbers = [step.number for step in solved(rough(FINE, SQ)).convergence.history if step.cells == (128, 128)]
+    numbers = [
+        step.number
+        for step in solved(rough(FINE, SQ)).convergence.history
+        if step.cells == (128, 128)
+    ]
     assert numbers == list(range(len(numbers)))
     assert numbers[-1] > 3
 
@@ -249,7 +272,9 @@ def test_a_grid_that_does_not_hold_the_contact_is_refused(on, said):
 
 
 def test_a_load_beyond_what_the_cap_bears_on_the_grid_is_refused():
-    bears = contact().load / (contact().line_length * COARSE.extent[0])  # the mean pressure over the grid
+    bears = contact().load / (
+        contact().line_length * COARSE.extent[0]
+    )  # the mean pressure over the grid
     with pytest.raises(BadInput, match="bears 495 N at the most, and the load is 500 N"):
         solved(flat_surface(COARSE), hardness=0.99 * bears)
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from benchmarks.motion import VENNER, contact, waves
 
-from asperity.ehl import Options, Scales, contact_state, friction, moving_contact, solve_contact
-from asperity.ehl.posing import contact_problem
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.ehl import Options, Scales, solve_contact
+from asperity.ehl.problem_setup import contact_problem
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian
+from asperity.solution import contact_state, friction
 from asperity.surface import MovingSurfaces, Surface, flat_surface
+from asperity.transient import moving_contact
 from support import paper
 
 CELLS = {4.0: 64, 2.0: 64, 1.0: 64, 0.5: 64, 0.25: 128, 0.125: 64}  # a half-width
@@ -30,7 +32,9 @@ CELLS = {4.0: 64, 2.0: 64, 1.0: 64, 0.5: 64, 0.25: 128, 0.125: 64}  # a half-wid
     ],
 )
 def test_amplitude_of_moving_waviness_is_venners_within_5_percent(wavelength):
-    assert waves(wavelength, CELLS[wavelength]).central == pytest.approx(VENNER[wavelength], rel=0.05)
+    assert waves(wavelength, CELLS[wavelength]).central == pytest.approx(
+        VENNER[wavelength], rel=0.05
+    )
 
 
 def test_waves_do_not_care_how_high_they_are_below_the_film():
@@ -66,18 +70,24 @@ def test_where_nothing_moves_the_snapshot_stays(time_step):
     on = paper.grid((64, 64))
     conditions, tight = paper.contact(hardness=2e9), Options(tolerance=1e-7)
     surface = paper.rough(on, 1e-6)
-    taken = moving_contact(conditions, paper.barus(), standing(surface), options=tight, time_step=time_step)
+    taken = moving_contact(
+        conditions, paper.barus(), standing(surface), options=tight, time_step=time_step
+    )
     start, *_, last = islice(taken, 9)
     snapshot = solve_contact(conditions, paper.barus(), surface, options=tight)
     for one in (start, last):
-        np.testing.assert_allclose(one.solution.pressure, snapshot.pressure, atol=1e-5 * conditions.hertz.p_max)
+        np.testing.assert_allclose(
+            one.solution.pressure, snapshot.pressure, atol=1e-5 * conditions.hertz.p_max
+        )
         assert one.state.clr == pytest.approx(contact_state(snapshot).clr, abs=1e-5)
 
 
 def test_a_smooth_contact_stays_as_it_is_though_its_surfaces_run():
     on = paper.grid((128, 8))
     taken = moving_contact(
-        paper.contact(), paper.barus(), MovingSurfaces.one_rough(flat_surface(on), paper.contact().surface_speeds)
+        paper.contact(),
+        paper.barus(),
+        MovingSurfaces.one_rough(flat_surface(on), paper.contact().surface_speeds),
     )
     start, *_, last = islice(taken, 101)
     np.testing.assert_allclose(last.solution.gap, start.solution.gap, rtol=1e-5)
@@ -88,7 +98,9 @@ def test_a_contact_at_rest_fills_until_it_is_the_steady_one(time_step):
     """Whatever it began with, oil that crosses a smooth contact leaves nothing behind."""
     on, conditions = paper.grid((96, 8)), paper.contact(hardness=2e9)
     surfaces = MovingSurfaces.one_rough(flat_surface(on), conditions.surface_speeds)
-    taken = moving_contact(conditions, paper.barus(), surfaces, start="stationary", time_step=time_step)
+    taken = moving_contact(
+        conditions, paper.barus(), surfaces, start="stationary", time_step=time_step
+    )
     start, *_, last = islice(taken, int(192 / time_step) + 1)
     steady = contact_state(solve_contact(conditions, paper.barus(), flat_surface(on)))
     assert start.state.clr > 0.99
@@ -103,12 +115,16 @@ def full_film():
     """Waves in an oil that is not compressed, over a film thick enough to part the bodies; sliding."""
     conditions = paper.contact()
     on = paper.grid((384, 8))
-    oil = Lubricant(viscosity=Barus(paper.ETA0, 12e-9), density=Incompressible(880.0), rheology=Newtonian())
+    oil = Lubricant(
+        viscosity=Barus(paper.ETA0, 12e-9), density=Incompressible(880.0), rheology=Newtonian()
+    )
     length = on.extent[0] / 12.0
     profile = 0.05e-6 * np.cos(2.0 * np.pi * on.x / length)
     surface = Surface(np.repeat(profile[:, None], 8, axis=1), on)
     surfaces = MovingSurfaces.one_rough(surface, conditions.surface_speeds)
-    taken = moving_contact(conditions, oil, surfaces, options=Options(tolerance=1e-6), time_step=0.5)
+    taken = moving_contact(
+        conditions, oil, surfaces, options=Options(tolerance=1e-6), time_step=0.5
+    )
     return conditions, oil, list(islice(taken, 13))[-3:]
 
 
@@ -123,7 +139,9 @@ def test_what_walls_do_on_the_oil_is_what_its_flow_turns_to_heat(full_film):
     flow = gap**3 / (12.0 * oil.viscosity(pressure)) * np.gradient(pressure, on.x) ** 2
     assert now.flow_power == pytest.approx(np.sum(flow) * on.spacing[0] * length, rel=0.03)
     assert now.flow_power == pytest.approx(work, rel=0.03)
-    assert abs(np.sum(pressure * squeezed)) > 0.02 * abs(np.sum(pressure * drawn))  # the squeeze has its part in it
+    assert abs(np.sum(pressure * squeezed)) > 0.02 * abs(
+        np.sum(pressure * drawn)
+    )  # the squeeze has its part in it
 
 
 def test_elastic_energy_changes_by_the_work_of_pressure_on_the_deflection(full_film):
@@ -145,11 +163,18 @@ def test_friction_is_the_shear_of_the_film_and_heats_by_sliding(full_film):
     solution = now.solution
     rubbing = friction(solution)
     rate = conditions.sliding_speed / solution.gap[:, 0]
-    stress = np.where(solution.pressure[:, 0] > 0.0, oil.viscosity(solution.pressure[:, 0]) * rate, 0.0)
-    lost = np.sum(np.where(rate > 0.0, stress * rate * solution.gap[:, 0], 0.0)) * solution.grid.spacing[0]
+    stress = np.where(
+        solution.pressure[:, 0] > 0.0, oil.viscosity(solution.pressure[:, 0]) * rate, 0.0
+    )
+    lost = (
+        np.sum(np.where(rate > 0.0, stress * rate * solution.gap[:, 0], 0.0))
+        * solution.grid.spacing[0]
+    )
     limited = rubbing.power < lost * conditions.length  # Bair and Winer's limit may only take away
     assert limited
-    assert rubbing.power == pytest.approx(rubbing.coefficient * conditions.load * conditions.sliding_speed)
+    assert rubbing.power == pytest.approx(
+        rubbing.coefficient * conditions.load * conditions.sliding_speed
+    )
 
 
 def test_moving_asperities_carry_the_load_at_every_step():
@@ -159,7 +184,13 @@ def test_moving_asperities_carry_the_load_at_every_step():
     for one in taken:
         solution = one.solution
         assert solution.convergence.converged
-        carried = solution.pressure.sum() * on.spacing[0] * on.spacing[1] * conditions.length / on.extent[1]
+        carried = (
+            solution.pressure.sum()
+            * on.spacing[0]
+            * on.spacing[1]
+            * conditions.length
+            / on.extent[1]
+        )
         assert carried == pytest.approx(conditions.load, rel=1e-4)
         assert solution.pressure.max() <= conditions.hardness * (1.0 + 1e-12)
         assert solution.gap.min() >= solution.options.contact_film * (1.0 - 1e-12)
@@ -171,7 +202,9 @@ def test_moving_asperities_carry_the_load_at_every_step():
 
 def test_going_on_from_a_snapshot_is_as_if_there_had_been_no_stop():
     on, conditions = paper.grid((48, 48)), paper.contact(hardness=2e9)
-    surfaces = MovingSurfaces.one_rough(paper.rough(on, 1e-6, correlation_length=40e-6), conditions.surface_speeds)
+    surfaces = MovingSurfaces.one_rough(
+        paper.rough(on, 1e-6, correlation_length=40e-6), conditions.surface_speeds
+    )
     through = list(islice(moving_contact(conditions, paper.barus(), surfaces), 7))
     memory = {name: values.copy() for name, values in through[3].memory.items()}
     again = list(islice(moving_contact(conditions, paper.barus(), surfaces, resume=memory), 3))
@@ -186,48 +219,71 @@ def run_in():
     """Two passes of a rough surface that is flattened as it passes, in pure rolling."""
     conditions = paper.contact(hardness=0.7e9, surface_speeds=(1.91, 1.91))
     on = paper.grid((48, 48), x=(-3.0, 1.8))
-    surfaces = MovingSurfaces.one_rough(paper.rough(on, 1e-6, correlation_length=40e-6), conditions.surface_speeds)
-    return surfaces, list(islice(moving_contact(conditions, paper.barus(), surfaces, flattening=True), 97))
+    surfaces = MovingSurfaces.one_rough(
+        paper.rough(on, 1e-6, correlation_length=40e-6), conditions.surface_speeds
+    )
+    return surfaces, list(
+        islice(moving_contact(conditions, paper.barus(), surfaces, flattening=True), 97)
+    )
 
 
 def overlap(one):
     """How deep the bodies overlap [m], from pressure and roughness alone."""
     solution = one.solution
     scales = Scales.of(solution.conditions, solution.lubricant)
-    posed = contact_problem(solution.conditions, solution.lubricant, solution.surface, solution.options)
+    posed = contact_problem(
+        solution.conditions, solution.lubricant, solution.surface, solution.options
+    )
     bent = posed.undeformed + posed.deflection(solution.pressure / scales.pressure)
     gap = bent * scales.gap + solution.rigid_approach
-    return np.maximum(solution.options.contact_film - gap, 0.0) * (solution.pressure == solution.conditions.hardness)
+    return np.maximum(solution.options.contact_film - gap, 0.0) * (
+        solution.pressure == solution.conditions.hardness
+    )
 
 
 def test_tracks_lose_what_overlapped_and_nothing_else(run_in):
     surfaces, taken = run_in
     lost = np.cumsum([overlap(one).sum() for one in taken])
-    np.testing.assert_allclose([one.memory["lowered_first"].sum() for one in taken], lost, rtol=1e-9)
-    np.testing.assert_allclose([one.flattened for one in taken], lost / surfaces.first.heights.size, rtol=1e-9)
+    np.testing.assert_allclose(
+        [one.memory["lowered_first"].sum() for one in taken], lost, rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        [one.flattened for one in taken], lost / surfaces.first.heights.size, rtol=1e-9
+    )
     assert not np.any(taken[-1].memory["lowered_second"])  # it is smooth
     last, before = taken[-1].solution.surface.heights, taken[-2].memory["lowered_first"]
-    np.testing.assert_allclose(last, np.roll(surfaces.first.heights - before, 96, axis=0), atol=1e-15)
+    np.testing.assert_allclose(
+        last, np.roll(surfaces.first.heights - before, 96, axis=0), atol=1e-15
+    )
 
 
 def test_what_is_flat_stays_flat(run_in):
     """Asperities that have been through once carry the load on more area: the second pass takes off less."""
     _, taken = run_in
-    first, second = taken[48].flattened - taken[0].flattened, taken[96].flattened - taken[48].flattened
+    first, second = (
+        taken[48].flattened - taken[0].flattened,
+        taken[96].flattened - taken[48].flattened,
+    )
     assert 0.0 < second < 0.5 * first
     assert taken[96].track_sq < taken[0].track_sq
 
 
 def test_an_elastic_surface_is_never_flattened():
     on, conditions = paper.grid((48, 48), x=(-3.0, 1.8)), paper.contact()
-    surfaces = MovingSurfaces.one_rough(paper.rough(on, 0.5e-6, correlation_length=60e-6), conditions.surface_speeds)
+    surfaces = MovingSurfaces.one_rough(
+        paper.rough(on, 0.5e-6, correlation_length=60e-6), conditions.surface_speeds
+    )
     *_, last = islice(moving_contact(conditions, paper.barus(), surfaces, flattening=True), 4)
     assert last.flattened == 0.0
 
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
-    [({"time_step": 0.0}, "positive"), ({"time_step": 9.0}, "at most 8"), ({"start": "no"}, "steady")],
+    [
+        ({"time_step": 0.0}, "positive"),
+        ({"time_step": 9.0}, "at most 8"),
+        ({"start": "no"}, "steady"),
+    ],
 )
 def test_steps_that_cannot_be_meant_are_refused(wrong, said):
     on = paper.grid((64, 8))

@@ -7,10 +7,11 @@ H = (h/R)(2U)^-1/2, M = W (2U)^-3/4, L = G (2U)^1/4 with the mean speed in U.
 import numpy as np
 import pytest
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.ehl import Options, contact_state, least_film, solve_contact
-from asperity.grid import Grid
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.ehl import Options, least_film, solve_contact
 from asperity.lubricant import Barus, Incompressible, Lubricant, Newtonian, ReeEyring, Roelands
+from asperity.solution import contact_state
 from asperity.surface import flat_surface
 from support.paper import FirstPrinted
 
@@ -24,7 +25,9 @@ def moes_contact(m: float, l: float) -> tuple[ContactConditions, float]:  # noqa
     twice_u = (l / (ALPHA * modulus)) ** 4
     speed = twice_u * modulus * RADIUS / (2.0 * ETA0)
     load = m * twice_u**0.75 * modulus * RADIUS**2
-    conditions = ContactConditions(pair=PAIR, geometry="point", radius=RADIUS, load=load, surface_speeds=(speed, speed))
+    conditions = ContactConditions(
+        pair=PAIR, geometry="point", radius=RADIUS, load=load, surface_speeds=(speed, speed)
+    )
     return conditions, RADIUS * twice_u**0.5
 
 
@@ -38,7 +41,9 @@ def films(conditions: ContactConditions, oil: Lubricant, cells: int) -> tuple[fl
 
 
 BARUS = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=Newtonian())
-ROELANDS = Lubricant(viscosity=Roelands(ETA0, ALPHA), density=FirstPrinted(870.0), rheology=Newtonian())
+ROELANDS = Lubricant(
+    viscosity=Roelands(ETA0, ALPHA), density=FirstPrinted(870.0), rheology=Newtonian()
+)
 
 
 @pytest.mark.parametrize(
@@ -54,7 +59,10 @@ def test_films_of_a_ball_on_a_flat(m, l, oil, h_central, h_min):  # noqa: E741
     """Extrapolated from 96 and 192 cells a side; each grid alone closes in at second order."""
     conditions, unit = moes_contact(m, l)
     (coarse_c, coarse_m), (fine_c, fine_m) = (films(conditions, oil, cells) for cells in (96, 192))
-    extrapolated_c, extrapolated_m = fine_c + (fine_c - coarse_c) / 3.0, fine_m + (fine_m - coarse_m) / 3.0
+    extrapolated_c, extrapolated_m = (
+        fine_c + (fine_c - coarse_c) / 3.0,
+        fine_m + (fine_m - coarse_m) / 3.0,
+    )
     assert extrapolated_c / unit == pytest.approx(h_central, rel=0.005)
     assert extrapolated_m / unit == pytest.approx(h_min, rel=0.005)
     assert abs(fine_c / unit - h_central) < abs(coarse_c / unit - h_central) / 2.0
@@ -65,7 +73,9 @@ def test_oil_that_hardly_thickens_parts_a_ball_in_few_steps():
     conditions, _ = moes_contact(20, 0.5)
     a = conditions.hertz.half_widths[0]
     grid = Grid((129, 129), (-4.5 * a, -3.0 * a), (1.5 * a, 3.0 * a), periodic=(False, False))
-    solution = solve_contact(conditions, BARUS, flat_surface(grid), options=Options(contact_film=1e-12))
+    solution = solve_contact(
+        conditions, BARUS, flat_surface(grid), options=Options(contact_film=1e-12)
+    )
     assert len(solution.convergence.history) < 40
     assert solution.gap.min() == pytest.approx(least_film(conditions, BARUS), rel=0.1)
 
@@ -92,11 +102,17 @@ def test_a_dry_contact_is_hertz(radius):
 
 
 def test_shear_thinning_is_newtonian_without_sliding_and_thins_the_film_with_it():
-    thin = Lubricant(viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=ReeEyring(1e5))
+    thin = Lubricant(
+        viscosity=Barus(ETA0, ALPHA), density=Incompressible(870.0), rheology=ReeEyring(1e5)
+    )
     rolling, _ = moes_contact(20, 10)
     assert films(rolling, thin, 48) == pytest.approx(films(rolling, BARUS, 48), rel=1e-4)
     speed = rolling.entrainment_speed
     sliding = ContactConditions(
-        pair=PAIR, geometry="point", radius=RADIUS, load=rolling.load, surface_speeds=(1.8 * speed, 0.2 * speed)
+        pair=PAIR,
+        geometry="point",
+        radius=RADIUS,
+        load=rolling.load,
+        surface_speeds=(1.8 * speed, 0.2 * speed),
     )
     assert films(sliding, thin, 48)[0] < 0.9 * films(sliding, BARUS, 48)[0]

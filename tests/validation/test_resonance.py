@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
-from asperity.conditions import ContactConditions, ElasticPair
-from asperity.coupling import SampledLine, VibrationModel, contact_vibration, excitation, oscillator, search_band
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.core.signals import Signal, power_spectrum
+from asperity.coupling import (
+    SampledLine,
+    VibrationModel,
+    contact_vibration,
+    excitation,
+    oscillator,
+    search_band,
+)
 from asperity.ehl import ContactState
-from asperity.signals import Signal, power_spectrum
+from asperity.resonance import contact_resonance, line_shape
 from asperity.vibration import acceleration
-from asperity.wear import contact_resonance, line_shape
 
 CONDITIONS = ContactConditions(
     pair=ElasticPair((207e9, 207e9), (0.3, 0.3)),
@@ -51,21 +58,32 @@ def test_fitted_crf_of_a_record_is_the_oscillators_within_three_deviations(clr, 
         assert abs(seen.resonance.crfa - crfa) < 3.0 * seen.resonance.crfa_std
 
 
-@pytest.mark.parametrize(("filtered", "rate_hz"), [("bilinear", 10e3), ("continuous", 10e3), ("bilinear", 20e3)])
+@pytest.mark.parametrize(
+    ("filtered", "rate_hz"), [("bilinear", 10e3), ("continuous", 10e3), ("bilinear", 20e3)]
+)
 def test_a_coarsely_sampled_record_is_fitted_within_its_deviations(filtered, rate_hz):
     """At 10 kHz behind the bilinear filter a continuous oscillator's line lay 11 deviations too low."""
     off = []
     for seed in range(24):
         model = VibrationModel.preset(
-            "paper", mass=0.1, damping_ratio=0.02, damping_law="ratio", method="likelihood", seed=seed,
-            duration_s=16.384, rate_hz=rate_hz, filter=filtered,
-        )  # fmt: skip
+            "paper",
+            mass=0.1,
+            damping_ratio=0.02,
+            damping_law="ratio",
+            method="likelihood",
+            seed=seed,
+            duration_s=16.384,
+            rate_hz=rate_hz,
+            filter=filtered,
+        )
         heard = contact_vibration(touching(1.0, 1.0), CONDITIONS, model)
         found, spring = heard.resonance, heard.oscillator
-        off.append((
-            (found.crf_hz - spring.natural_frequency_hz) / found.crf_std,
-            (found.damping_ratio - spring.damping_ratio) / found.damping_ratio_std,
-        ))  # fmt: skip
+        off.append(
+            (
+                (found.crf_hz - spring.natural_frequency_hz) / found.crf_std,
+                (found.damping_ratio - spring.damping_ratio) / found.damping_ratio_std,
+            )
+        )
     assert np.abs(np.mean(off, axis=0)).max() < 1.2  # 24 records: ± 0.2 by chance
     assert np.all(np.std(off, axis=0) < 1.5)
 
@@ -73,8 +91,16 @@ def test_a_coarsely_sampled_record_is_fitted_within_its_deviations(filtered, rat
 @pytest.mark.parametrize("filtered", ["bilinear", "continuous"])
 def test_the_line_as_sampling_leaves_it_is_the_records_own_spectrum(filtered):
     """The closed form of the sampled record, line and factor apart; and means of 300 pieces of a record about it."""
-    model = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.05, damping_law="ratio", filter=filtered,
-                                  response="exact", duration_s=300 * 0.2, samples_per_period=2.0)  # fmt: skip
+    model = VibrationModel.preset(
+        "paper",
+        mass=0.1,
+        damping_ratio=0.05,
+        damping_law="ratio",
+        filter=filtered,
+        response="exact",
+        duration_s=300 * 0.2,
+        samples_per_period=2.0,
+    )
     heard = contact_vibration(touching(1.0, 1.0), CONDITIONS, model)
     line = SampledLine(excitation(touching(1.0, 1.0), CONDITIONS, model), model.rate_hz)
     f0, zeta = heard.oscillator.natural_frequency_hz, heard.oscillator.damping_ratio
@@ -95,13 +121,18 @@ def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(win
     """Item 6 of issue 2: 200 records of 0.8 s, the pieces of one long one, fitted in the contact model's band."""
     records, samples, rate = 200, 40_000, 50e3
     state = touching(0.5, 0.4)
-    model = VibrationModel(mass=0.1, damping_ratio=0.02, rate_hz=rate, duration_s=records * samples / rate)
+    model = VibrationModel(
+        mass=0.1, damping_ratio=0.02, rate_hz=rate, duration_s=records * samples / rate
+    )
     spring = oscillator(state, CONDITIONS, model)
     profile = excitation(state, CONDITIONS, model).profile(records * samples, rate, seed=1)
     pieces = acceleration(spring, profile).values.reshape(records, samples)
     band = search_band(CONDITIONS, model)
     fits = [
-        contact_resonance(power_spectrum(Signal(piece, rate, "m/s^2"), segment=segment, window=window), band_hz=band)
+        contact_resonance(
+            power_spectrum(Signal(piece, rate, "m/s^2"), segment=segment, window=window),
+            band_hz=band,
+        )
         for piece in pieces
     ]
     assert all(fit.found for fit in fits)
@@ -114,7 +145,17 @@ def test_over_200_records_the_stated_deviation_is_the_scatter_within_a_fifth(win
 
     # CRFA in the continuum, by hand: height^2 2 sqrt(2)/(pi fc) (fc/f0)^4 (2 pi f0)^4 (1 + 4 zeta^2)/(4 zeta^2)
     fc, zeta = model.excitation.cutoff_hz(state.car), 0.02
-    truth = 4e-12 * 2 * np.sqrt(2) / (np.pi * fc) * (2 * np.pi * fc) ** 4 * (1 + 4 * zeta**2) / (4 * zeta**2)
+    truth = (
+        4e-12
+        * 2
+        * np.sqrt(2)
+        / (np.pi * fc)
+        * (2 * np.pi * fc) ** 4
+        * (1 + 4 * zeta**2)
+        / (4 * zeta**2)
+    )
     relative = np.array([fit.crfa / truth for fit in fits])
-    assert np.std(relative) == pytest.approx(np.median([fit.crfa_std / fit.crfa for fit in fits]), rel=0.2)
+    assert np.std(relative) == pytest.approx(
+        np.median([fit.crfa_std / fit.crfa for fit in fits]), rel=0.2
+    )
     assert np.mean(relative) == pytest.approx(np.sinc(f0 / rate) ** 4, abs=0.04)

@@ -11,14 +11,19 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.ehl import along_roller, auto_grid, dynamic_stiffness, tangent_stiffness
-from asperity.ehl.posing import contact_problem
-from asperity.rollers import RollerShape
+from asperity.contact.rollers import RollerShape
+from asperity.ehl import auto_grid
+from asperity.ehl.problem_setup import contact_problem
+from asperity.solution import along_roller, dynamic_stiffness, tangent_stiffness
 from asperity.surface import gaussian_surface
 
 STEEL = asp.ElasticPair((206e9, 206e9), (0.3, 0.3))
 RADIUS, LENGTH, LOAD = 3.629e-3, 10e-3, 2000.0
-OIL = asp.Lubricant(viscosity=asp.Roelands(0.04, 20e-9), density=asp.DowsonHigginson(870.0), rheology=asp.Newtonian())
+OIL = asp.Lubricant(
+    viscosity=asp.Roelands(0.04, 20e-9),
+    density=asp.DowsonHigginson(870.0),
+    rheology=asp.Newtonian(),
+)
 ISO = RollerShape.iso(9e-3, LENGTH)
 
 
@@ -27,7 +32,13 @@ def lundberg(load: float) -> RollerShape:
 
 
 def roller(shape: RollerShape | None = None, load: float = LOAD, **given) -> asp.ContactConditions:
-    stated = {"radius": RADIUS, "length": LENGTH, "surface_speeds": (3.5, 3.5), "pair": STEEL, **given}
+    stated = {
+        "radius": RADIUS,
+        "length": LENGTH,
+        "surface_speeds": (3.5, 3.5),
+        "pair": STEEL,
+        **given,
+    }
     return asp.ContactConditions(geometry="roller", load=load, shape=shape, **stated)
 
 
@@ -36,7 +47,9 @@ def solved(conditions, oil=None, *, cells, reach=1.6, past=1, **options):
     nx, ny = cells
     a, end = conditions.hertz.half_widths[0], 0.5 * conditions.length * (1.0 + 2.0 * past / ny)
     x = (-reach * a, reach * a) if oil is None else (-4.5 * a, 1.5 * a)
-    surface = asp.flat_surface(asp.Grid((nx, ny + 2 * past), (x[0], -end), (x[1], end), (False, False)))
+    surface = asp.flat_surface(
+        asp.Grid((nx, ny + 2 * past), (x[0], -end), (x[1], end), (False, False))
+    )
     return asp.solve_contact(conditions, oil, surface, options=asp.Options(**options))
 
 
@@ -72,7 +85,9 @@ def test_lundbergs_shape_is_even_but_for_the_ends_and_loaded_throughout():
     at = np.interp(0.45 * LENGTH, along.y, along.pressure) / solution.conditions.hertz.p_max
     assert at == pytest.approx(1.0029, abs=1e-3)
     assert along.loaded_share == pytest.approx(1.0)
-    assert along.edge_pressure.on_grid == pytest.approx(1.131 * solution.conditions.hertz.p_max, rel=5e-4)
+    assert along.edge_pressure.on_grid == pytest.approx(
+        1.131 * solution.conditions.hertz.p_max, rel=5e-4
+    )
     iso = along_roller(solved(roller(ISO), cells=(48, 1024)))
     assert iso.loaded_share == pytest.approx(0.918, abs=0.004)
 
@@ -86,7 +101,9 @@ def test_what_lies_past_the_ends_changes_nothing(oil):
     wider = asp.Grid((64, 72), (x0, y0 - 3.0 * dy), (x1, y1 + 3.0 * dy), (False, False))
     wide = asp.solve_contact(conditions, oil, asp.flat_surface(wider))
     assert wide.pressure[:, :4].max() == wide.pressure[:, -4:].max() == 0.0
-    assert wide.pressure[:, 4:-4] == pytest.approx(narrow.pressure[:, 1:-1], abs=2e-3 * narrow.pressure.max())
+    assert wide.pressure[:, 4:-4] == pytest.approx(
+        narrow.pressure[:, 1:-1], abs=2e-3 * narrow.pressure.max()
+    )
     films = [along_roller(each).end_film.on_grid for each in (wide, narrow)]
     assert films[0] == pytest.approx(films[1], rel=2e-3, abs=1e-12)
 
@@ -96,7 +113,9 @@ def test_an_untilted_roller_is_symmetric_to_rounding():
     pressure = solution.pressure
     assert np.abs(pressure - pressure[:, ::-1]).max() < 1e-9 * pressure.max()
     assert abs(along_roller(solution).load_centre) < 1e-9 * LENGTH
-    here, there = (solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-8) for tilt in (3e-4, -3e-4))
+    here, there = (
+        solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-8) for tilt in (3e-4, -3e-4)
+    )
     assert np.abs(here.pressure - there.pressure[:, ::-1]).max() < 1e-8 * pressure.max()
 
 
@@ -108,13 +127,20 @@ def test_the_moment_is_what_the_energy_asks_for():
         problem = contact_problem(solution.conditions, None, solution.surface, solution.options)
         a, p_max = solution.conditions.hertz.half_widths[0], solution.conditions.hertz.p_max
         apart = np.where(problem.rim, 0.0, problem.form.gap(problem.x, problem.y))
-        work = solution.pressure * (0.5 * problem.deflection(solution.pressure / p_max) + apart) * a**2 / RADIUS
+        work = (
+            solution.pressure
+            * (0.5 * problem.deflection(solution.pressure / p_max) + apart)
+            * a**2
+            / RADIUS
+        )
         dx, dy = solution.grid.spacing
         return float(work.sum()) * dx * dy
 
     tilt, step = 0.5e-3, 2e-5
     along = along_roller(solved(roller(ISO.tilted(tilt)), cells=(48, 128), tolerance=1e-7))
-    assert along.moment == pytest.approx((energy(tilt + step) - energy(tilt - step)) / (2.0 * step), rel=1e-3)
+    assert along.moment == pytest.approx(
+        (energy(tilt + step) - energy(tilt - step)) / (2.0 * step), rel=1e-3
+    )
     assert along.moment < -1.0  # away from where the gap opens
     assert along.load == pytest.approx(LOAD, rel=1e-6)
 
@@ -144,7 +170,10 @@ def test_the_middle_of_a_long_roller_is_a_line_contact(oil):
     lower, upper = (grid.lower[0], -1e-4), (grid.upper[0], 1e-4)
     even = asp.solve_contact(line, oil, asp.flat_surface(asp.Grid((nx, 8), lower, upper)))
     within = np.abs(grid.x) < 0.7 * conditions.hertz.half_widths[0]  # before the spike
-    pressure, gap = solution.pressure[within, middle].mean(axis=1), solution.gap[within, middle].mean(axis=1)
+    pressure, gap = (
+        solution.pressure[within, middle].mean(axis=1),
+        solution.gap[within, middle].mean(axis=1),
+    )
     assert np.abs(pressure - even.pressure[within, 0]).max() < 5e-3 * even.pressure[within].max()
     if oil is not None:
         assert gap == pytest.approx(even.gap[within, 0], rel=5e-3)
@@ -162,17 +191,26 @@ def test_a_straight_rollers_middle_is_the_line_contact_of_its_own_load():
     assert along.middle_pressure == pytest.approx(along.pressure[middle], rel=1e-6)
     for each in (along, finer):
         assert each.edge_pressure.value is each.edge_pressure.bar is None
-        assert each.undetermined[0].startswith("The edge pressure is not determined: the roller's shape falls back too")
+        assert each.undetermined[0].startswith(
+            "The edge pressure is not determined: the roller's shape falls back too"
+        )
 
 
 def edges(shape, oil, *grids):
     """What is said of the edge pressure on each grid, over Hertz's, and how far it may be off."""
     conditions = roller(shape)
-    found = [along_roller(solved(conditions, oil, cells=(nx, ny - 8), past=4)).edge_pressure for nx, ny in grids]
-    return [tuple(x and x / conditions.hertz.p_max for x in (each.value, each.bar)) for each in found]
+    found = [
+        along_roller(solved(conditions, oil, cells=(nx, ny - 8), past=4)).edge_pressure
+        for nx, ny in grids
+    ]
+    return [
+        tuple(x and x / conditions.hertz.p_max for x in (each.value, each.bar)) for each in found
+    ]
 
 
-@pytest.mark.parametrize("shape", [lundberg(LOAD), lundberg(1.2 * LOAD), lundberg(1.5 * LOAD), ISO, ISO.tilted(1e-3)])
+@pytest.mark.parametrize(
+    "shape", [lundberg(LOAD), lundberg(1.2 * LOAD), lundberg(1.5 * LOAD), ISO, ISO.tilted(1e-3)]
+)
 def test_the_dry_edge_pressure_of_finer_grids_lies_within_the_bar(shape):
     *coarser, (finest, _) = edges(shape, None, (48, 256), (48, 512), (48, 1024))
     for value, bar in coarser:
@@ -201,28 +239,44 @@ def test_a_pressure_that_still_grows_is_no_edge_pressure():
     for oil in (None, OIL):
         assert edges(circle, oil, (48 if oil is None else 96, 256)) == [(None, None)]
     along = along_roller(solved(roller(circle), cells=(48, 120), past=4))
-    assert "lie 0.92 half-widths apart, where loaded ends need 0.5; take 237 cells" in along.undetermined[0]
+    assert (
+        "lie 0.92 half-widths apart, where loaded ends need 0.5; take 237 cells"
+        in along.undetermined[0]
+    )
 
 
 def test_an_end_at_the_pressure_cap_has_that_edge_pressure():
     along = along_roller(solved(roller(hardness=2e9), cells=(48, 248), past=4))
     assert along.edge_pressure.value == pytest.approx(2e9)
-    assert along_roller(solved(roller(hardness=20e9), cells=(48, 248), past=4)).edge_pressure.value is None
+    assert (
+        along_roller(solved(roller(hardness=20e9), cells=(48, 248), past=4)).edge_pressure.value
+        is None
+    )
 
 
 def test_the_film_at_loaded_ends_asks_for_close_lines():
     few, many, finest = (
-        along_roller(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4)) for ny in (256, 1024, 1536)
+        along_roller(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4))
+        for ny in (256, 1024, 1536)
     )
     assert few.end_film.value is None
-    assert any("film at the ends is not determined: its lines of cells lie 0.45" in said for said in few.undetermined)
-    assert abs(many.end_film.value - finest.end_film.value) < many.end_film.bar < 0.5 * many.end_film.value
+    assert any(
+        "film at the ends is not determined: its lines of cells lie 0.45" in said
+        for said in few.undetermined
+    )
+    assert (
+        abs(many.end_film.value - finest.end_film.value)
+        < many.end_film.bar
+        < 0.5 * many.end_film.value
+    )
 
 
 @pytest.mark.parametrize("oil", [None, OIL])
 def test_a_roller_with_a_strong_crown_is_a_point_contact(oil):
     speeds = (3.85, 3.15)
-    ball = asp.ContactConditions(pair=STEEL, geometry="point", radius=RADIUS, load=20.0, surface_speeds=speeds)
+    ball = asp.ContactConditions(
+        pair=STEEL, geometry="point", radius=RADIUS, load=20.0, surface_speeds=speeds
+    )
     a = ball.hertz.half_widths[0]
     grid = asp.Grid((96, 96), (-4.5 * a, -2.5 * a), (1.5 * a, 2.5 * a), (False, False))
     crowned = roller(RollerShape(crown_radius=RADIUS), 20.0, length=2e-3, surface_speeds=speeds)
@@ -246,7 +300,9 @@ def test_a_film_ends_alike_between_smooth_bodies_and_all_but_smooth_ones():
     """Which have another wedge and other means of mobilities, but across the ends the same."""
     smooth = solved(roller(lundberg(LOAD)), OIL, cells=(96, 96))
     heights = 1e-11 * np.random.default_rng(2).standard_normal(smooth.grid.cells)
-    rough = asp.solve_contact(smooth.conditions, OIL, asp.Surface(heights - heights.mean(), smooth.grid))
+    rough = asp.solve_contact(
+        smooth.conditions, OIL, asp.Surface(heights - heights.mean(), smooth.grid)
+    )
     ends = [along_roller(solution).end_film.on_grid for solution in (smooth, rough)]
     assert ends[1] == pytest.approx(ends[0], rel=0.1)
 
@@ -287,7 +343,9 @@ def test_models_agree_where_the_film_is_full():
 )
 def test_the_ends_of_the_range_are_solved(given, load):
     conditions = roller(None, load, **given)
-    shape = RollerShape.johns_gohar(1.3 * load, conditions.length, RADIUS, conditions.pair.reduced_modulus)
+    shape = RollerShape.johns_gohar(
+        1.3 * load, conditions.length, RADIUS, conditions.pair.reduced_modulus
+    )
     conditions = replace(conditions, shape=shape)
     grid = auto_grid(conditions, OIL, accuracy=0.1)
     solution = asp.solve_contact(conditions, OIL, asp.flat_surface(grid))
@@ -318,13 +376,17 @@ def test_a_straight_roller_is_led_on_from_the_dry_one():
     line = replace(roller(), geometry="line", load=float(along.line_load[middle]) * LENGTH)
     lower, upper = (solution.grid.lower[0], -1e-4), (solution.grid.upper[0], 1e-4)
     even = asp.solve_contact(line, OIL, asp.flat_surface(asp.Grid((128, 8), lower, upper)))
-    assert asp.contact_state(solution).h_central == pytest.approx(asp.contact_state(even).h_central, rel=5e-3)
+    assert asp.contact_state(solution).h_central == pytest.approx(
+        asp.contact_state(even).h_central, rel=5e-3
+    )
 
 
 def test_without_speed_a_rough_roller_is_dry():
     conditions = roller(lundberg(1.5 * LOAD), surface_speeds=(1e-4, 1e-4), hardness=4e9)
     grid = auto_grid(conditions, OIL, cells=(64, 128))
-    rough = gaussian_surface(grid, sq=0.5e-6, correlation_length=(40e-6, 400e-6), rng=np.random.default_rng(1))
+    rough = gaussian_surface(
+        grid, sq=0.5e-6, correlation_length=(40e-6, 400e-6), rng=np.random.default_rng(1)
+    )
     slow, dry = (asp.solve_contact(conditions, oil, rough) for oil in (OIL, None))
     assert asp.contact_state(slow).clr > 0.999
     assert slow.pressure == pytest.approx(dry.pressure, abs=0.02 * dry.pressure.max())

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from asperity.ehl import SubsurfaceStress
-from asperity.ehl.stress import stress_below
-from asperity.grid import Grid
-from asperity.hertz import line_pressure
+from asperity.contact.grid import Grid
+from asperity.contact.hertz import line_pressure
+from asperity.solution import SubsurfaceStress
+from asperity.solution.stress import stress_below
 from support import sliding
 
 NU = 0.3
@@ -17,13 +17,17 @@ DEPTHS = np.concatenate([[0.0], np.geomspace(0.01, 2.5, 15)])
 def below_line(friction: float, cells: int = 256) -> SubsurfaceStress:
     grid = Grid((cells, 8), (-2.0, -1.6), (2.0, 1.6))
     pressure = np.repeat(line_pressure(grid.x, 1.0, 1.0)[:, None], 8, axis=1)
-    return stress_below(pressure, friction * pressure if friction else None, grid, DEPTHS, poisson_ratio=NU)
+    return stress_below(
+        pressure, friction * pressure if friction else None, grid, DEPTHS, poisson_ratio=NU
+    )
 
 
 def below_point(friction: float, cells: int = 128) -> SubsurfaceStress:
     grid = Grid((cells, cells), (-1.6, -1.6), (1.6, 1.6), (False, False))
     pressure = np.sqrt(np.maximum(1.0 - grid.x[:, None] ** 2 - grid.y**2, 0.0))
-    return stress_below(pressure, friction * pressure if friction else None, grid, DEPTHS, poisson_ratio=NU)
+    return stress_below(
+        pressure, friction * pressure if friction else None, grid, DEPTHS, poisson_ratio=NU
+    )
 
 
 def von_mises(xx, yy, zz, xy, yz, xz):
@@ -56,7 +60,10 @@ def mcewen_peak(friction: float) -> tuple[float, float]:
         return -float(von_mises(xx, yy, zz, 0.0, 0.0, xz))
 
     starts = [(x, z) for x in (-0.6, 0.2, 0.6) for z in (1e-3, 0.3, 0.7)]
-    best = min((minimize(negative, start, method="Nelder-Mead") for start in starts), key=lambda found: found.fun)
+    best = min(
+        (minimize(negative, start, method="Nelder-Mead") for start in starts),
+        key=lambda found: found.fun,
+    )
     return -best.fun, float(abs(best.x[1]))
 
 
@@ -75,9 +82,13 @@ def test_the_whole_tensor_below_a_sliding_line_contact(friction):
     for depth in (0.06, 0.3, 0.786, 2.0):
         found = stress.at(depth)
         xx, yy, zz, xz = sliding.line(stress.grid.x, depth, friction, NU)
-        tolerance = 0.005 if depth < 0.1 else 0.0012  # of p_h; the root at the pressure's edge sets it
+        tolerance = (
+            0.005 if depth < 0.1 else 0.0012
+        )  # of p_h; the root at the pressure's edge sets it
         for name, expected in (("xx", xx), ("yy", yy), ("zz", zz), ("xz", xz)):
-            np.testing.assert_allclose(getattr(found, name)[:, 3], expected, atol=tolerance, err_msg=name)
+            np.testing.assert_allclose(
+                getattr(found, name)[:, 3], expected, atol=tolerance, err_msg=name
+            )
         assert max(np.abs(found.xy).max(), np.abs(found.yz).max()) < 1e-6
 
 
@@ -91,7 +102,9 @@ def test_the_whole_tensor_below_a_sliding_ball(friction):
         found = stress.at(depth)
         expected = sliding.point(x, y, np.full(x.shape, depth), friction, NU)
         for name, values in zip(("xx", "yy", "zz", "xy", "yz", "xz"), expected, strict=True):
-            np.testing.assert_allclose(getattr(found, name)[np.ix_(i, j)], values, atol=3e-3, err_msg=name)
+            np.testing.assert_allclose(
+                getattr(found, name)[np.ix_(i, j)], values, atol=3e-3, err_msg=name
+            )
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2])
@@ -106,7 +119,10 @@ def test_the_peak_below_a_sliding_ball_is_hamiltons(friction):
 def test_the_summed_point_loads_meet_the_closed_form_on_the_axis():
     """Shear below the middle of a sliding ball, sigma_xz/q = -1 + 3/2 z atan(1/z) - z^2/(2 (1 + z^2))."""
     z = np.array([0.1, 0.5, 1.0])
-    on_axis = sliding.point(np.zeros(3), np.zeros(3), z, 1.0, NU)[5] - sliding.point(0 * z, 0 * z, z, 0.0, NU)[5]
+    on_axis = (
+        sliding.point(np.zeros(3), np.zeros(3), z, 1.0, NU)[5]
+        - sliding.point(0 * z, 0 * z, z, 0.0, NU)[5]
+    )
     expected = -1.0 + 1.5 * z * np.arctan(1.0 / z) - 0.5 * z**2 / (1.0 + z**2)
     np.testing.assert_allclose(on_axis, expected, rtol=1e-6)
 
@@ -116,8 +132,12 @@ def test_traction_alone_stretches_the_surface_of_a_ball_as_hamilton_and_goodman_
     grid = Grid((256, 256), (-1.2, -1.2), (1.2, 1.2), (False, False))
     radius = np.hypot(grid.x[:, None], grid.y)
     traction = np.sqrt(np.maximum(1.0 - radius**2, 0.0))
-    surface = stress_below(0.0 * traction, traction, grid, np.array([0.0]), poisson_ratio=NU).at(0.0)
+    surface = stress_below(0.0 * traction, traction, grid, np.array([0.0]), poisson_ratio=NU).at(
+        0.0
+    )
     inside, x = radius < 0.7, np.broadcast_to(grid.x[:, None], grid.cells)
     for name, slope in (("xx", (4.0 + NU) * np.pi / 8.0), ("yy", 3.0 * NU * np.pi / 8.0)):
         expected = -slope * x[inside]
-        np.testing.assert_allclose(getattr(surface, name)[inside], expected, atol=0.01 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            getattr(surface, name)[inside], expected, atol=0.01 * np.abs(expected).max()
+        )

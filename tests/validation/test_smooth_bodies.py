@@ -7,13 +7,14 @@ import pytest
 from benchmarks import rollers
 from benchmarks.films import BARUS, NO_FLOOR, REFERENCE, ROELANDS, ball, line_case
 
-from asperity.ehl import Options, Scales, mixed_linear, solve_contact
-from asperity.ehl.locally import smoothed
-from asperity.ehl.mixed import Pressures, evaluate
-from asperity.ehl.mixed_iterate import newton
-from asperity.ehl.posing import contact_problem
-from asperity.grid import Grid
-from asperity.rollers import RollerShape
+from asperity.contact.grid import Grid
+from asperity.contact.rollers import RollerShape
+from asperity.ehl import Options, Scales, solve_contact
+from asperity.ehl.linear_solvers import mixed as mixed_linear
+from asperity.ehl.models.mixed import Pressures, evaluate
+from asperity.ehl.newton.mixed import newton
+from asperity.ehl.problem_setup import contact_problem
+from asperity.ehl.strategies.local_refinement import smoothed
 from asperity.surface import flat_surface
 
 OPTIONS = Options(contact_film=NO_FLOOR)
@@ -21,7 +22,9 @@ OPTIONS = Options(contact_film=NO_FLOOR)
 
 def on_a_grid(conditions, cells):
     a, b = conditions.hertz.half_widths
-    return flat_surface(Grid((cells, cells), (-4.5 * a, -3.0 * b), (1.5 * a, 3.0 * b), periodic=(False, False)))
+    return flat_surface(
+        Grid((cells, cells), (-4.5 * a, -3.0 * b), (1.5 * a, 3.0 * b), periodic=(False, False))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +59,9 @@ def test_worst_cells_are_solved_for_what_is_around_them(solved):
     far = (np.abs(problem.x - 0.5) > 1.6)[:, None] | (np.abs(problem.y) > 1.6)
     np.testing.assert_array_equal(found.total[far], right.total[far])
     assert not np.any(spike & far)
-    before, after = (evaluate(problem, each, second_order=False).residual_rms for each in (start, found))
+    before, after = (
+        evaluate(problem, each, second_order=False).residual_rms for each in (start, found)
+    )
     assert after < 0.15 * before
 
 
@@ -64,7 +69,9 @@ def test_nothing_is_done_where_little_or_everything_is_left(solved):
     problem, right = solved
     np.testing.assert_array_equal(smoothed(problem, right).total, right.total)
     noise = right.total * (1.0 + 0.05 * np.random.default_rng(3).standard_normal(problem.cells))
-    np.testing.assert_array_equal(smoothed(problem, Pressures(noise, noise, right.approach)).total, noise)
+    np.testing.assert_array_equal(
+        smoothed(problem, Pressures(noise, noise, right.approach)).total, noise
+    )
 
 
 def test_held_cells_and_bodies_stay(solved):
@@ -82,7 +89,13 @@ def test_held_cells_and_bodies_stay(solved):
 
 @pytest.mark.parametrize(
     ("load_number", "oil_number", "oil", "most"),
-    [(20, 10, BARUS, 5), (100, 5, BARUS, 3), (500, 10, ROELANDS, 4), (20, 2, BARUS, 3), (100, 15, ROELANDS, 5)],
+    [
+        (20, 10, BARUS, 5),
+        (100, 5, BARUS, 3),
+        (500, 10, ROELANDS, 4),
+        (20, 2, BARUS, 3),
+        (100, 15, ROELANDS, 5),
+    ],
 )
 def test_few_steps_a_grid_and_few_vectors_a_step(monkeypatch, load_number, oil_number, oil, most):
     """Of the finest grid; before, up to 10 steps (14 on 257 x 257) of 12 to 20 vectors."""
@@ -131,5 +144,7 @@ def test_a_roller_starts_from_its_dry_contact(shape):
     solution = solve_contact(contact, rollers.OIL, surface)
     assert solution.convergence.attempt == "coarse to fine"
     assert solution.convergence.iterations <= 24
-    cold = solve_contact(contact, rollers.OIL, surface, start=solution, options=Options(tolerance=1e-6))
+    cold = solve_contact(
+        contact, rollers.OIL, surface, start=solution, options=Options(tolerance=1e-6)
+    )
     np.testing.assert_allclose(cold.gap, solution.gap, rtol=1e-3)

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from asperity.ehl import Options, contact_state, solve_contact
+from asperity.ehl import Options, solve_contact
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.solution import contact_state
 from asperity.surface import flat_surface
 from support.line import Oil, line_contact
 from support.paper import ETA0, RADIUS, FirstPrinted, contact, grid
@@ -33,7 +34,9 @@ def name(row):
 def oil_of(row):
     alpha = float(row["alpha_1_per_gpa"]) * 1e-9
     if row["law"] == "barus":
-        return Lubricant(viscosity=Barus(ETA0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian())
+        return Lubricant(
+            viscosity=Barus(ETA0, alpha), density=DowsonHigginson(880.0), rheology=Newtonian()
+        )
     return Lubricant(viscosity=Roelands(ETA0, alpha), density=FirstPrinted(), rheology=Newtonian())
 
 
@@ -51,7 +54,9 @@ def film(index, cells=256):
     row = ROWS[index]
     on = grid((cells, 8), (float(row["inlet"]), float(row["outlet"])))
     conditions = contact(speed=float(row["speed_m_per_s"]))
-    solution = solve_contact(conditions, oil_of(row), flat_surface(on), options=Options(tolerance=1e-6))
+    solution = solve_contact(
+        conditions, oil_of(row), flat_surface(on), options=Options(tolerance=1e-6)
+    )
     state = contact_state(solution)
     return state.h_min, float(np.interp(0.0, on.x, solution.gap[:, 0])), state
 
@@ -72,7 +77,9 @@ def reference(index, nodes=501):
             lambda p: scale * ((1.0 + q * p) ** z - 1.0),
             lambda p: scale * z * q * (1.0 + q * p) ** (z - 1.0),
         )
-    oil = Oil(*thickening, lambda p: 1.0 + c1 * p / (1.0 + c2 * p), lambda p: c1 / (1.0 + c2 * p) ** 2)
+    oil = Oil(
+        *thickening, lambda p: 1.0 + c1 * p / (1.0 + c2 * p), lambda p: c1 / (1.0 + c2 * p) ** 2
+    )
     number = 12.0 * ETA0 * speed * RADIUS**2 / (A**3 * P_H)
     with threadpool_limits(1):  # threads only wait for one another in matrices this small
         solved = line_contact(float(row["inlet"]), float(row["outlet"]), nodes, number, oil)
@@ -120,4 +127,6 @@ def test_the_film_is_dowson_and_higginsons_within_ten_percent():
     conditions = contact()
     modulus = conditions.pair.effective_modulus
     u, w = ETA0 * 1.91 / (modulus * RADIUS), 50e3 / (modulus * RADIUS)
-    assert film(4)[0] == pytest.approx(2.65 * (20e-9 * modulus) ** 0.54 * u**0.7 * w**-0.13 * RADIUS, rel=0.1)
+    assert film(4)[0] == pytest.approx(
+        2.65 * (20e-9 * modulus) ** 0.54 * u**0.7 * w**-0.13 * RADIUS, rel=0.1
+    )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
 from asperity.surface import (
     correlation_lengths,
     gaussian_surface,
@@ -33,7 +33,11 @@ def test_gaussian_surfaces_have_their_sq_and_correlation_lengths(direction):
     asked = (20e-6, 10e-6)
     made = [
         gaussian_surface(
-            grid(), sq=1e-6, correlation_length=asked, direction=direction, rng=np.random.default_rng(seed)
+            grid(),
+            sq=1e-6,
+            correlation_length=asked,
+            direction=direction,
+            rng=np.random.default_rng(seed),
         )
         for seed in SEEDS
     ]
@@ -42,7 +46,9 @@ def test_gaussian_surfaces_have_their_sq_and_correlation_lengths(direction):
     assert found == pytest.approx(asked, rel=0.05)
 
 
-@pytest.mark.parametrize(("skewness", "kurtosis"), [(-1.0, 5.0), (0.5, 3.2), (0.0, 2.0), (-2.0, 9.0), (0.0, 3.0)])
+@pytest.mark.parametrize(
+    ("skewness", "kurtosis"), [(-1.0, 5.0), (0.5, 3.2), (0.0, 2.0), (-2.0, 9.0), (0.0, 3.0)]
+)
 def test_non_gaussian_surfaces_have_their_moments_in_every_sample(skewness, kurtosis):
     asked, found = (20e-6, 10e-6), []
     for seed in SEEDS:
@@ -69,22 +75,36 @@ def test_self_affine_surfaces_have_the_slope_of_their_hurst_exponent(hurst):
         )
         spectrum = surface_spectrum(surface)
         densities.append(spectrum.density)
-    inside = (spectrum.wavenumber > 2.0 * np.pi / 150e-6) & (spectrum.wavenumber < 2.0 * np.pi / 9e-6)
-    slope = np.polyfit(np.log(spectrum.wavenumber[inside]), np.log(np.mean(densities, axis=0)[inside]), 1)[0]
+    inside = (spectrum.wavenumber > 2.0 * np.pi / 150e-6) & (
+        spectrum.wavenumber < 2.0 * np.pi / 9e-6
+    )
+    slope = np.polyfit(
+        np.log(spectrum.wavenumber[inside]), np.log(np.mean(densities, axis=0)[inside]), 1
+    )[0]
     assert slope == pytest.approx(-2.0 * (1.0 + hurst), abs=0.05)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6])
 def test_a_run_in_surface_has_its_plateau(share):
     surface = run_in_surface(
-        grid(), sq=1e-6, correlation_length=12e-6, plateau_share=share, plateau_roughness=0.0,
+        grid(),
+        sq=1e-6,
+        correlation_length=12e-6,
+        plateau_share=share,
+        plateau_roughness=0.0,
         rng=np.random.default_rng(3),
-    )  # fmt: skip
+    )
     top = surface.heights.max()
     assert np.mean(surface.heights > top - 1e-12) == pytest.approx(share, abs=1e-3)
     assert surface.sq == pytest.approx(1e-6, rel=1e-12)
     rough = surface_parameters(
-        run_in_surface(grid(), sq=1e-6, correlation_length=12e-6, plateau_share=share, rng=np.random.default_rng(3))
+        run_in_surface(
+            grid(),
+            sq=1e-6,
+            correlation_length=12e-6,
+            plateau_share=share,
+            rng=np.random.default_rng(3),
+        )
     )
     assert rough.ssk < -0.2
     assert rough.svk > 3.0 * rough.spk
@@ -96,7 +116,12 @@ def test_the_lay_of_a_ground_surface_runs_where_it_was_asked_to(degrees):
     found = []
     for seed in range(4):
         surface = ground_surface(
-            grid(), sq=1e-6, groove_width=12e-6, groove_length=120e-6, direction=lay, rng=np.random.default_rng(seed)
+            grid(),
+            sq=1e-6,
+            groove_width=12e-6,
+            groove_length=120e-6,
+            direction=lay,
+            rng=np.random.default_rng(seed),
         )
         spectrum = surface_spectrum(surface)
         # the mean direction of a lay, which is the same backwards, is that of twice the angle
@@ -111,7 +136,8 @@ def test_the_lay_of_a_ground_surface_runs_where_it_was_asked_to(degrees):
 
 def test_a_sandblasted_surface_has_no_lay_and_pits_as_wide_as_its_craters():
     made = [
-        sandblasted_surface(grid(), sq=1e-6, crater_radius=12e-6, rng=np.random.default_rng(seed)) for seed in SEEDS
+        sandblasted_surface(grid(), sq=1e-6, crater_radius=12e-6, rng=np.random.default_rng(seed))
+        for seed in SEEDS
     ]
     assert [surface.sq for surface in made] == pytest.approx([1e-6] * 20, rel=1e-12)
     lengths = np.mean([correlation_lengths(surface) for surface in made], axis=0)
@@ -130,8 +156,12 @@ def test_a_sandblasted_surface_has_no_lay_and_pits_as_wide_as_its_craters():
 @pytest.mark.parametrize(
     "make",
     [
-        lambda g, r: gaussian_surface(g, sq=1e-6, correlation_length=(40e-6, 20e-6), direction=0.4, rng=r),
-        lambda g, r: ground_surface(g, sq=1e-6, groove_width=40e-6, groove_length=200e-6, direction=1.2, rng=r),
+        lambda g, r: gaussian_surface(
+            g, sq=1e-6, correlation_length=(40e-6, 20e-6), direction=0.4, rng=r
+        ),
+        lambda g, r: ground_surface(
+            g, sq=1e-6, groove_width=40e-6, groove_length=200e-6, direction=1.2, rng=r
+        ),
         lambda g, r: sandblasted_surface(g, sq=1e-6, crater_radius=30e-6, rng=r),
     ],
 )
@@ -145,14 +175,22 @@ def test_a_finer_grid_shows_the_same_physical_surface(make):
 
 
 REFERENCE = {
-    "gaussian": lambda g, r: gaussian_surface(g, sq=1e-6, correlation_length=(60e-6, 40e-6), direction=0.3, rng=r),
+    "gaussian": lambda g, r: gaussian_surface(
+        g, sq=1e-6, correlation_length=(60e-6, 40e-6), direction=0.3, rng=r
+    ),
     "non-gaussian": lambda g, r: non_gaussian_surface(
         g, sq=1e-6, skewness=-1.0, kurtosis=5.0, correlation_length=40e-6, rng=r
     ),
-    "self-affine": lambda g, r: self_affine_surface(g, sq=1e-6, hurst=0.8, cutoffs=(40e-6, 200e-6), rng=r),
-    "ground": lambda g, r: ground_surface(g, sq=1e-6, groove_width=80e-6, groove_length=200e-6, rng=r),
+    "self-affine": lambda g, r: self_affine_surface(
+        g, sq=1e-6, hurst=0.8, cutoffs=(40e-6, 200e-6), rng=r
+    ),
+    "ground": lambda g, r: ground_surface(
+        g, sq=1e-6, groove_width=80e-6, groove_length=200e-6, rng=r
+    ),
     "sandblasted": lambda g, r: sandblasted_surface(g, sq=1e-6, crater_radius=40e-6, rng=r),
-    "run-in": lambda g, r: run_in_surface(g, sq=1e-6, correlation_length=40e-6, plateau_share=0.4, rng=r),
+    "run-in": lambda g, r: run_in_surface(
+        g, sq=1e-6, correlation_length=40e-6, plateau_share=0.4, rng=r
+    ),
 }
 # heights [nm] of cells (0, 0), (9, 20) and (31, 5) of 32 x 32, seed 11, as first made
 RECORDED = {
@@ -168,4 +206,6 @@ RECORDED = {
 @pytest.mark.parametrize("kind", REFERENCE)
 def test_a_seed_is_the_same_surface_on_any_machine(kind):
     heights = REFERENCE[kind](grid(32), np.random.default_rng(11)).heights
-    assert [1e9 * heights[at] for at in ((0, 0), (9, 20), (31, 5))] == pytest.approx(RECORDED[kind], rel=1e-4, abs=0.01)
+    assert [1e9 * heights[at] for at in ((0, 0), (9, 20), (31, 5))] == pytest.approx(
+        RECORDED[kind], rel=1e-4, abs=0.01
+    )

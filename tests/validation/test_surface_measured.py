@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import BadInput, UnreadableFile
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.surface import describe_surface, prepare_surface, read_surface
 
 FILES = Path(__file__).parents[2].parent / "shared" / "data" / "surfaces"
-pytestmark = pytest.mark.skipif(not FILES.is_dir(), reason="the developers' measured surfaces are not on this machine")
+pytestmark = pytest.mark.skipif(
+    not FILES.is_dir(), reason="the developers' measured surfaces are not on this machine"
+)
 HERTZ = 55.9e-6  # half-width of the paper's contact at 500 N
 
 
@@ -59,7 +61,9 @@ def test_profiles_read_as_their_readme_says():
     track = describe_surface(FILES / "wear_track_C1.csv", unit="um", lateral_unit="mm").scalars()
     assert track["cells"][0] == 4800
     assert track["size_m"][0] == pytest.approx(2.4e-3, rel=1e-3)
-    assert track["profile"]["rt_m"] == pytest.approx(1.2e-6, rel=0.02)  # the file's extremes, -0.45 and 0.75, less form
+    assert track["profile"]["rt_m"] == pytest.approx(
+        1.2e-6, rel=0.02
+    )  # the file's extremes, -0.45 and 0.75, less form
 
 
 def test_an_archive_that_strays_from_the_standard_reads_as_its_readme_says():
@@ -78,7 +82,8 @@ def test_what_cannot_be_read_as_it_stands_is_refused_in_a_sentence(name, capfd):
 
 
 @pytest.mark.parametrize(
-    ("name", "share"), [("milled_1.opd", 0.9), ("isotropic.al3d", 0.4), ("isotropic_iso1.sdf", 0.99)]
+    ("name", "share"),
+    [("milled_1.opd", 0.9), ("isotropic.al3d", 0.4), ("isotropic_iso1.sdf", 0.99)],
 )
 def test_a_file_cut_short_is_refused(tmp_path, name, share):
     content = (FILES / name).read_bytes()
@@ -107,9 +112,9 @@ def test_the_milled_surface_covers_the_papers_contact():
         "blended",
         "removed",
     ]
-    assert prepare_surface(read_surface(FILES / "milled_1.opd"), paper_grid(), sq=1e-6).surface.sq == pytest.approx(
-        1e-6
-    )
+    assert prepare_surface(
+        read_surface(FILES / "milled_1.opd"), paper_grid(), sq=1e-6
+    ).surface.sq == pytest.approx(1e-6)
 
 
 def test_the_prepared_surface_does_not_depend_on_the_cells():
@@ -121,7 +126,9 @@ def test_the_prepared_surface_does_not_depend_on_the_cells():
 
 def test_the_small_surface_is_refused_and_tiles_when_asked():
     small = read_surface(FILES / "isotropic.al3d")
-    with pytest.raises(BadInput, match=r"87\.61 x 129\.7 um, smaller than the contact's 357\.8 x 178\.9 um"):
+    with pytest.raises(
+        BadInput, match=r"87\.61 x 129\.7 um, smaller than the contact's 357\.8 x 178\.9 um"
+    ):
         prepare_surface(small, paper_grid())
     tiled = prepare_surface(small, paper_grid(512), fit="tile")
     assert tiled.surface.sq == pytest.approx(0.259e-6, rel=0.05)

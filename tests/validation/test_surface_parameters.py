@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from asperity.grid import Grid
-from asperity.surface import MeasuredSurface, Surface, flat_surface, gaussian_surface, self_affine_surface
+from asperity.contact.grid import Grid
+from asperity.surface import (
+    MeasuredSurface,
+    Surface,
+    flat_surface,
+    gaussian_surface,
+    self_affine_surface,
+)
 from asperity.surface import surface_parameters as parameters
 from asperity.surface.read import surface_topography
 
@@ -16,7 +22,9 @@ def grid(cells=(256, 256), size=(256e-6, 256e-6), periodic=BOTH):
 
 
 def gaussian(seed, length=(8e-6, 8e-6), on=None):
-    return gaussian_surface(on or grid(), sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed))
+    return gaussian_surface(
+        on or grid(), sq=1e-6, correlation_length=length, rng=np.random.default_rng(seed)
+    )
 
 
 def correlation(surface):
@@ -27,7 +35,9 @@ def correlation(surface):
 def test_a_sinusoid():
     g = grid((400, 64), (100e-6, 32e-6))
     amplitude, wavelength = 2e-6, 20e-6
-    found = parameters(Surface(amplitude * np.sin(2 * np.pi * g.x / wavelength)[:, None] * np.ones(64), g))
+    found = parameters(
+        Surface(amplitude * np.sin(2 * np.pi * g.x / wavelength)[:, None] * np.ones(64), g)
+    )
     assert found.sq == pytest.approx(amplitude / np.sqrt(2.0), rel=1e-9)
     assert found.sa == pytest.approx(amplitude * 2.0 / np.pi, rel=1e-3)
     assert found.ssk == pytest.approx(0.0, abs=1e-9)
@@ -49,14 +59,22 @@ def test_gaussian_surfaces_have_gaussian_heights():
 def test_gaussian_surfaces_have_the_slope_and_lengths_of_their_autocorrelation(length):
     """R = exp(-(x/lx)^2 - (y/ly)^2): Sdq^2 = 2 Sq^2 (1/lx^2 + 1/ly^2), Sal = lx sqrt(ln 5), Str = lx/ly."""
     on = grid((512, 256), (256e-6, 256e-6))
-    mean = np.mean([np.fft.fftshift(correlation(gaussian(seed, length, on))) for seed in range(12)], axis=0)
+    mean = np.mean(
+        [np.fft.fftshift(correlation(gaussian(seed, length, on))) for seed in range(12)], axis=0
+    )
     # Sal and Str of one sample scatter; those of the autocorrelation averaged over samples do not
-    assert np.interp(length[0], on.x - on.x[256], mean[:, 128]) == pytest.approx(np.exp(-1.0), abs=0.02)
-    assert np.interp(length[1], on.y - on.y[128], mean[256]) == pytest.approx(np.exp(-1.0), abs=0.02)
+    assert np.interp(length[0], on.x - on.x[256], mean[:, 128]) == pytest.approx(
+        np.exp(-1.0), abs=0.02
+    )
+    assert np.interp(length[1], on.y - on.y[128], mean[256]) == pytest.approx(
+        np.exp(-1.0), abs=0.02
+    )
     found = [parameters(gaussian(seed, length, on)) for seed in range(12)]
     slope = 1e-6 * np.sqrt(2.0 / length[0] ** 2 + 2.0 / length[1] ** 2)
     assert np.mean([p.sdq for p in found]) == pytest.approx(slope, rel=0.01)
-    assert np.mean([p.sal for p in found]) == pytest.approx(length[0] * np.sqrt(np.log(5.0)), rel=0.06)
+    assert np.mean([p.sal for p in found]) == pytest.approx(
+        length[0] * np.sqrt(np.log(5.0)), rel=0.06
+    )
     assert np.mean([p.str_ for p in found]) == pytest.approx(length[0] / length[1], abs=0.12)
 
 
@@ -65,7 +83,14 @@ def test_self_affine_surfaces_have_the_power_law_asked_for(hurst):
     g = grid((256, 256), (256e-6, 256e-6))
     spectrum = np.mean(
         [
-            np.abs(np.fft.fft2(self_affine_surface(g, sq=1e-6, hurst=hurst, cutoffs=(4e-6, 64e-6), rng=r).heights)) ** 2
+            np.abs(
+                np.fft.fft2(
+                    self_affine_surface(
+                        g, sq=1e-6, hurst=hurst, cutoffs=(4e-6, 64e-6), rng=r
+                    ).heights
+                )
+            )
+            ** 2
             for r in np.random.default_rng(3).spawn(6)
         ],
         axis=0,
@@ -85,7 +110,9 @@ def test_the_slope_agrees_with_surfacetopography(periodic):
     heights = gaussian(5).heights[:200, :120]
     g = grid((200, 120), (300e-6, 120e-6), periodic)
     found = parameters(Surface(heights, g))
-    twin = surface_topography().Topography(heights - heights.mean(), (300e-6, 120e-6), periodic=periodic[0])
+    twin = surface_topography().Topography(
+        heights - heights.mean(), (300e-6, 120e-6), periodic=periodic[0]
+    )
     assert found.sdq == pytest.approx(twin.rms_gradient(), rel=0.01)
 
 
@@ -93,8 +120,18 @@ def test_missing_cells_hardly_move_the_parameters():
     heights = gaussian(6).heights
     g = grid(periodic=NEITHER)
     holed = np.where(np.random.default_rng(1).random(heights.shape) < 0.2, np.nan, heights)
-    whole, found = parameters(Surface(heights, g)), parameters(MeasuredSurface(holed, g, "map.x3p", "x3p"))
-    for name, tolerance in {"sa": 0.02, "sq": 0.02, "sku": 0.02, "sdq": 0.02, "sal": 0.01, "str_": 0.03}.items():
+    whole, found = (
+        parameters(Surface(heights, g)),
+        parameters(MeasuredSurface(holed, g, "map.x3p", "x3p")),
+    )
+    for name, tolerance in {
+        "sa": 0.02,
+        "sq": 0.02,
+        "sku": 0.02,
+        "sdq": 0.02,
+        "sal": 0.01,
+        "str_": 0.03,
+    }.items():
         assert getattr(found, name) == pytest.approx(getattr(whole, name), rel=tolerance), name
 
 

@@ -5,7 +5,7 @@ import pytest
 import surfalize
 from surfalize.profile import Profile
 
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
 from asperity.surface import (
     MeasuredSurface,
     Surface,
@@ -37,10 +37,14 @@ def made(kind, seed=4):
     rng = np.random.default_rng(seed)
     if kind == "gaussian":
         return gaussian_surface(grid(), sq=0.8e-6, correlation_length=(9e-6, 6e-6), rng=rng)
-    return non_gaussian_surface(grid(), sq=2e-6, skewness=-1.2, kurtosis=5.5, correlation_length=(14e-6, 5e-6), rng=rng)
+    return non_gaussian_surface(
+        grid(), sq=2e-6, skewness=-1.2, kurtosis=5.5, correlation_length=(14e-6, 5e-6), rng=rng
+    )
 
 
-@pytest.mark.filterwarnings("ignore:The surface has different pixel size")  # ours are meant to differ
+@pytest.mark.filterwarnings(
+    "ignore:The surface has different pixel size"
+)  # ours are meant to differ
 @pytest.mark.parametrize("kind", ["gaussian", "pitted"])
 def test_areal_parameters_agree_with_surfalize(kind):
     surface = made(kind)
@@ -52,7 +56,9 @@ def test_areal_parameters_agree_with_surfalize(kind):
         assert getattr(ours, name) == pytest.approx(expected, rel=0.01), name
     curve = bearing_curve(surface.heights)
     for height in (-1e-6, 0.0, 0.7e-6):
-        assert curve.material_ratio(height) == pytest.approx(theirs.Smr(height * 1e6) / 100.0, rel=0.01)
+        assert curve.material_ratio(height) == pytest.approx(
+            theirs.Smr(height * 1e6) / 100.0, rel=0.01
+        )
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "pitted"])
@@ -61,13 +67,17 @@ def test_profile_parameters_agree_with_surfalize(kind):
     profile -= profile.mean()
     ours, theirs = profile_parameters(profile, 0.5e-6), Profile(profile * 1e6, 0.5)
     for name, unit in LINEAR.items():
-        assert getattr(ours, name) == pytest.approx(getattr(theirs, name.capitalize())() * unit, rel=0.01), name
+        assert getattr(ours, name) == pytest.approx(
+            getattr(theirs, name.capitalize())() * unit, rel=0.01
+        ), name
 
 
 def test_the_bearing_curve_of_a_sinusoid():
     """Heights follow the arcsine law, flattest at its ends: the core line fits the outer 40 %, on either side."""
     on = Grid((4000, 16), (0.0, 0.0), (100e-6, 0.4e-6), (True, True))
-    found = surface_parameters(Surface(1e-6 * np.sin(2.0 * np.pi * on.x / 20e-6)[:, None] * np.ones(16), on))
+    found = surface_parameters(
+        Surface(1e-6 * np.sin(2.0 * np.pi * on.x / 20e-6)[:, None] * np.ones(16), on)
+    )
     assert (found.sp, found.sv, found.sz) == pytest.approx((1e-6, 1e-6, 2e-6), rel=1e-5)
     share = np.linspace(0.0, 0.4, 4001)
     slope = np.polyfit(share, 1e-6 * np.cos(np.pi * share), 1)[0]
@@ -81,7 +91,9 @@ def test_the_developed_area_of_a_sinusoid():
     on = Grid((2000, 16), (0.0, 0.0), (20e-6, 0.16e-6), (True, True))
     k, amplitude = 2.0 * np.pi / 10e-6, 2e-6
     found = surface_parameters(Surface(amplitude * np.sin(k * on.x)[:, None] * np.ones(16), on))
-    arc = np.mean(np.sqrt(1.0 + (amplitude * k * np.cos(np.linspace(0.0, 2.0 * np.pi, 100_001)[:-1])) ** 2))
+    arc = np.mean(
+        np.sqrt(1.0 + (amplitude * k * np.cos(np.linspace(0.0, 2.0 * np.pi, 100_001)[:-1])) ** 2)
+    )
     assert found.sdr == pytest.approx(arc - 1.0, rel=1e-4)
 
 
@@ -117,7 +129,9 @@ def test_correlation_lengths_of_a_turned_lay():
         on, sq=1e-6, correlation_length=(24e-6, 10e-6), direction=0.6, rng=np.random.default_rng(1)
     )
     assert correlation_lengths(surface, 0.6) == pytest.approx((24e-6, 10e-6), rel=0.04)
-    assert correlation_lengths(surface, 0.6 + np.pi / 2.0) == pytest.approx((10e-6, 24e-6), rel=0.04)
+    assert correlation_lengths(surface, 0.6 + np.pi / 2.0) == pytest.approx(
+        (10e-6, 24e-6), rel=0.04
+    )
 
 
 def test_a_measured_profile_is_uniform_in_every_areal_parameter():

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asperity.core.errors import BadInput
 from asperity.coupling import VibrationModel
-from asperity.errors import BadInput
 from asperity.paper import TABLE1_PRINTED, continuous_crfa, expected_crfa, reproduce_table1
 from asperity.paper.table1 import highest_point, riding
 
@@ -54,14 +54,21 @@ def test_median_crf_of_the_records_grows_as_load_to_the_sixth(ours):
 
 def test_crfa_grows_as_height_squared_record_by_record(ours):
     crfa = np.array([[row.crfa, row.crfa_low, row.crfa_high] for row in ours[4:8]])
-    assert crfa / crfa[0] == pytest.approx(np.repeat([[1.0], [4.0], [9.0], [16.0]], 3, axis=1), rel=1e-6)
+    assert crfa / crfa[0] == pytest.approx(
+        np.repeat([[1.0], [4.0], [9.0], [16.0]], 3, axis=1), rel=1e-6
+    )
 
 
 @pytest.mark.parametrize(("coefficient", "power"), [("kept", 4.0), ("readjusted", 3.0)])
 @pytest.mark.parametrize("height_of", ["record", "process"])
 def test_crfa_grows_with_the_cutoff(coefficient, power, height_of):
     model = VibrationModel.preset(
-        "paper", mass=0.1, damping_ratio=0.02, coefficient=coefficient, height_of=height_of, response="exact"
+        "paper",
+        mass=0.1,
+        damping_ratio=0.02,
+        coefficient=coefficient,
+        height_of=height_of,
+        response="exact",
     )
     cutoffs = (10.0, 20.0, 30.0, 40.0)
     crfa = [expected_crfa(model, cutoff, 2e-6, 200.0) for cutoff in cutoffs]
@@ -80,12 +87,14 @@ def test_crfa_falls_with_load_only_because_of_the_sampling(rate, falls):
     model = VibrationModel.preset("paper", mass=0.1, damping_ratio=0.02, rate_hz=rate)
     sampled = [expected_crfa(model, 30.0, 2e-6, load) for load in LOADS]
     assert exponent(LOADS, sampled) == pytest.approx(falls, abs=max(0.02, 0.1 * abs(falls)))
-    assert exponent(LOADS, [continuous_crfa(model, 30.0, 2e-6, load) for load in LOADS]) == pytest.approx(0, abs=1e-6)
+    assert exponent(
+        LOADS, [continuous_crfa(model, 30.0, 2e-6, load) for load in LOADS]
+    ) == pytest.approx(0, abs=1e-6)
 
 
 def test_the_closed_form_is_what_many_records_average_to():
     """Mean periodogram at f0 over 300 records of the paper's kind, within four standard errors."""
-    from asperity.signals import power_spectrum
+    from asperity.core.signals import power_spectrum
     from asperity.vibration import acceleration
 
     spring, noise = riding(PAPER, 30.0, 2e-6, 200.0)

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.ehl import (
+from asperity.core.errors import AsperityError, NotConverged
+from asperity.ehl import solve_contact
+from asperity.lubricant import ExponentialWarmth, EyringShear, NewtonianShear, Thermal
+from asperity.solution import (
     contact_state,
     flash_temperature,
     friction,
     friction_and_heat,
-    solve_contact,
     solve_thermal_contact,
 )
-from asperity.errors import AsperityError, NotConverged
-from asperity.lubricant import ExponentialWarmth, EyringShear, NewtonianShear, Thermal
 from asperity.surface import flat_surface
 from support.paper import barus, contact, grid, rough
 
@@ -39,7 +39,9 @@ def test_friction_and_heat_agree_with_each_other(pair):
     rubbing, heat = friction_and_heat(pair[1], thermal=WARM)
     again = friction(pair[1], thermal=WARM, film_temperature=313.15 + heat.film)
     assert again.coefficient == pytest.approx(rubbing.coefficient, rel=1e-3)
-    assert flash_temperature(pair[1], again, thermal=WARM).film_max_k == pytest.approx(heat.film_max_k, rel=2e-3)
+    assert flash_temperature(pair[1], again, thermal=WARM).film_max_k == pytest.approx(
+        heat.film_max_k, rel=2e-3
+    )
 
 
 def test_the_film_is_as_viscous_as_its_temperature_leaves_it(pair):
@@ -61,7 +63,10 @@ def test_warm_oil_shears_more_easily_and_parts_the_bodies_less(pair):
     cold, warm = (contact_state(solution) for solution in pair)
     assert warm.h_mean < cold.h_mean
     assert warm.clr >= cold.clr
-    isothermal, fed_back = friction_and_heat(pair[0])[0], friction_and_heat(pair[1], thermal=WARM)[0]
+    isothermal, fed_back = (
+        friction_and_heat(pair[0])[0],
+        friction_and_heat(pair[1], thermal=WARM)[0],
+    )
     assert fed_back.oil_part < 0.97 * isothermal.oil_part
 
 
@@ -69,7 +74,9 @@ def test_without_feedback_heat_is_only_a_result():
     given = (contact(surface_speeds=(2.9, 0.9)), barus(), SMOOTH)
     plain, thermal = solve_contact(*given), solve_thermal_contact(*given, thermal=Thermal())
     np.testing.assert_array_equal(plain.pressure, thermal.pressure)
-    rolling = solve_thermal_contact(contact(surface_speeds=(1.91, 1.91)), barus(), SMOOTH, thermal=WARM)
+    rolling = solve_thermal_contact(
+        contact(surface_speeds=(1.91, 1.91)), barus(), SMOOTH, thermal=WARM
+    )
     assert rolling.viscosity_factor is None
 
 
@@ -83,7 +90,7 @@ def test_a_runaway_law_is_tamed(monkeypatch):
     assert fed_back[0].coefficient < 0.5 * isothermal[0].coefficient
     touchy = replace(WARM, warmth=ExponentialWarmth(50.0))
     assert 0.0 < friction_and_heat(unlimited, thermal=touchy)[1].film_max_k < fed_back[1].film_max_k
-    monkeypatch.setattr("asperity.ehl.thermal.MOST_ROUNDS", 2)
+    monkeypatch.setattr("asperity.solution.thermal.MOST_ROUNDS", 2)
     with pytest.raises(AsperityError, match="did not settle"):
         friction_and_heat(unlimited, thermal=WARM)
 
@@ -95,12 +102,18 @@ def test_an_unfinished_contact_is_told():
     few = Options(max_iterations=2)
     with pytest.raises(NotConverged):
         solve_thermal_contact(*given, thermal=WARM, options=few)
-    assert not solve_thermal_contact(*given, thermal=WARM, options=few, strict=False).convergence.converged
+    assert not solve_thermal_contact(
+        *given, thermal=WARM, options=few, strict=False
+    ).convergence.converged
 
 
 def test_a_film_that_would_thin_too_much_at_once_is_warmed_in_steps():
     """At 19 m/s and 238 K the oil loses all but a ten-thousandth of its viscosity: Newton loses its way in one go."""
-    given = (contact(speed=19.1, hardness=2e9), barus(), rough(grid((64, 64)), 0.5e-6, correlation_length=30e-6))
+    given = (
+        contact(speed=19.1, hardness=2e9),
+        barus(),
+        rough(grid((64, 64)), 0.5e-6, correlation_length=30e-6),
+    )
     warm = solve_thermal_contact(*given, thermal=WARM)
     assert friction_and_heat(warm, thermal=WARM)[1].film_max_k > 150.0
     assert warm.viscosity_factor.min() < 1e-2

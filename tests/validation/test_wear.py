@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from asperity import run_wear
-from asperity.ageing import WearHistory
+from asperity.simulation import WearHistory
 from asperity.surface import MovingSurfaces, Surface
 from asperity.surface.read import surface_topography
 from support.wearing import DRY, POINT, worn_case
@@ -49,7 +49,9 @@ def test_worn_volume_is_k_times_load_times_sliding_distance(rough):
         lost = np.mean((history.before.first if body == 0 else history.before.second).heights)
         lost -= np.mean((history.after.first if body == 0 else history.after.second).heights)
         speed, rate = history.case.conditions.surface_speeds[body], (56.25, 5.0)[body]
-        assert lost * speed / rate * 10e-3 == pytest.approx(history.worn_volume[body], rel=1e-9, abs=0.0)
+        assert lost * speed / rate * 10e-3 == pytest.approx(
+            history.worn_volume[body], rel=1e-9, abs=0.0
+        )
         assert history.worn_volume[body] == pytest.approx(
             jump_by_jump(history, body), rel=3e-4, abs=0.0
         )  # load is met to 1e-4
@@ -62,7 +64,9 @@ def test_depth_a_passage_is_the_line_load_slid_over_the_speed():
     assert 0.1 < clr < 0.99  # oil bears some of it
     for body, k in ((0, 1e-17), (1, 3e-17)):
         a_passage = k * 5e4 * clr * conditions.sliding_speed / conditions.surface_speeds[body]
-        depth = float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
+        depth = (
+            float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
+        )
         assert depth == pytest.approx(a_passage, rel=3e-4, abs=0.0)
 
 
@@ -71,7 +75,9 @@ def test_depth_a_passage_does_not_ask_for_the_shape_of_the_pressure():
     smooth = {"surface": "flat", "contact.load": "2000 N", "contact.entrainment_speed": "1.75 m/s"}
     history = worn(0.001, {**DRY, **smooth, "contact.slip": 0.5 / 1.75, "wear.k": "1e-17 1/Pa"})
     for body, expected in ((0, 5.0e-13), (1, 6.667e-13)):
-        depth = float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
+        depth = (
+            float(history.table[f"worn_depth_{body + 1}_m"].iloc[-1]) / history.overrollings[body]
+        )
         assert depth == pytest.approx(expected, rel=2e-4, abs=0.0)
 
 
@@ -86,7 +92,9 @@ def test_a_ball_wears_a_parabola_across_its_track(cells):
     a, p0 = hertz.half_widths[0], hertz.p_max
     y = history.before.grid.y
     for body, k in ((0, 1e-17), (1, 3e-17)):
-        a_passage = k * 0.5 * math.pi * p0 * a * conditions.sliding_speed / conditions.surface_speeds[body]
+        a_passage = (
+            k * 0.5 * math.pi * p0 * a * conditions.sliding_speed / conditions.surface_speeds[body]
+        )
         profile = history.worn.worn[body].mean(axis=0) / history.overrollings[body]
         expected = a_passage * np.maximum(1.0 - (y / a) ** 2, 0.0)
         inner = np.abs(y) < 0.8 * a
@@ -107,7 +115,9 @@ def decay_of_ridges(half_width: float, hours: float) -> tuple[float, float]:
     wave = 2.0 * np.pi / across.extent[1]
     ridges = 2e-10 * np.cos(wave * (across.y - across.lower[1]))
     track = Surface(np.tile(ridges, (across.cells[0], 1)), flat.first.grid)
-    history = run_wear(case, hours=hours, surfaces=MovingSurfaces(track, flat.second, flat.speeds, flat.grid))
+    history = run_wear(
+        case, hours=hours, surfaces=MovingSurfaces(track, flat.second, flat.speeds, flat.grid)
+    )
     left = history.after.first.heights[0]
     swing = 2.0 * np.abs(np.fft.rfft(left))[1] / across.cells[1]
     speeds, sliding = case.conditions.surface_speeds, case.conditions.sliding_speed
@@ -139,8 +149,12 @@ def test_without_sliding_nothing_is_worn_off():
 
 def test_the_energy_law_is_archards_at_k_over_the_boundary_friction():
     by_pressure = worn(0.2)
-    by_energy = worn(0.2, {"wear.law": "energy", "wear.k": [f"{1e-17 / 0.15!r} 1/Pa", f"{3e-17 / 0.15!r} 1/Pa"]})
-    np.testing.assert_allclose(by_energy.after.first.heights, by_pressure.after.first.heights, rtol=0, atol=1e-16)
+    by_energy = worn(
+        0.2, {"wear.law": "energy", "wear.k": [f"{1e-17 / 0.15!r} 1/Pa", f"{3e-17 / 0.15!r} 1/Pa"]}
+    )
+    np.testing.assert_allclose(
+        by_energy.after.first.heights, by_pressure.after.first.heights, rtol=0, atol=1e-16
+    )
 
 
 def test_removal_alone_lowers_summits_and_leaves_pits():
@@ -157,14 +171,20 @@ def test_removal_alone_lowers_summits_and_leaves_pits():
 def test_a_harder_wear_coefficient_is_a_faster_clock():
     slow, fast = worn(0.4), worn(0.1, {"wear.k": ["4e-17 1/Pa", "12e-17 1/Pa"]})
     for key in ("sq_m", "clr", "worn_depth_1_m", "worn_depth_2_m"):
-        assert fast.table[key].iloc[-1] == pytest.approx(slow.table[key].iloc[-1], rel=1e-9, abs=0.0)
+        assert fast.table[key].iloc[-1] == pytest.approx(
+            slow.table[key].iloc[-1], rel=1e-9, abs=0.0
+        )
 
 
 def test_halving_the_jump_moves_roughness_and_load_share_little():
-    whole, half = (worn(1.0, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02))
+    whole, half = (
+        worn(1.0, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02)
+    )
     assert len(half.table) > 1.3 * len(whole.table)
     for key in ("sq_m", "clr"):
-        assert half.table[key].iloc[-1] == pytest.approx(whole.table[key].iloc[-1], rel=0.02, abs=0.0)
+        assert half.table[key].iloc[-1] == pytest.approx(
+            whole.table[key].iloc[-1], rel=0.02, abs=0.0
+        )
 
 
 @pytest.mark.skipif(not MEASURED.is_file(), reason="the measured surface is not beside the project")
@@ -179,7 +199,9 @@ def test_a_measured_surface_runs_in(tmp_path):
         heights = surface_topography().open_topography(str(path)).topography().heights()
         sq = float(np.std(heights))
         assert row["sq_1_m"] == pytest.approx(sq, rel=1e-9, abs=0.0)
-        assert row["ssk_1"] == pytest.approx(np.mean((heights - heights.mean()) ** 3) / sq**3, rel=1e-6, abs=1e-9)
+        assert row["ssk_1"] == pytest.approx(
+            np.mean((heights - heights.mean()) ** 3) / sq**3, rel=1e-6, abs=1e-9
+        )
     assert last["sq_m"] < first["sq_m"]
     assert last["spk_m"] < first["spk_m"]
     assert history.volume_error < 1e-9

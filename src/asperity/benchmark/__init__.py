@@ -1,6 +1,7 @@
 """The benchmark: contacts with certified values, and any solver held against them.
 
-Cases are plain files, made by `benchmark/certify.py`; what is drawn of the rows is left to `asperity.report`.
+Cases are plain files, made by `benchmark/certify.py`; what is drawn of the rows is left to
+`asperity.report`.
 """
 
 import lazy_loader

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 
 KINDS = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
 _BESIDE = Path(__file__).with_name("cases")  # in a wheel
@@ -46,7 +46,9 @@ def load_benchmark(folder: Path | None = None) -> tuple[BenchmarkCase, ...]:
     place = folder or (_BESIDE if _BESIDE.is_dir() else _IN_REPOSITORY)
     files = sorted(place.glob("*.toml"))
     if not files:
-        raise BadInput(f"{place} holds no cases of the benchmark (*.toml); name the folder that does")
+        raise BadInput(
+            f"{place} holds no cases of the benchmark (*.toml); name the folder that does"
+        )
     return tuple(_read(path) for path in files)
 
 
@@ -64,8 +66,17 @@ def _read(path: Path) -> BenchmarkCase:
             for entry in given.pop("certified")
         )
         kind = given["kind"]
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, IndexError, TypeError, ValueError) as error:
-        raise BadInput(f"{path} is no case of the benchmark: {error!r}; benchmark/certify.py writes them") from None
+    except (
+        tomllib.TOMLDecodeError,
+        UnicodeDecodeError,
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+    ) as error:
+        raise BadInput(
+            f"{path} is no case of the benchmark: {error!r}; benchmark/certify.py writes them"
+        ) from None
     if kind not in KINDS:
         raise BadInput(f"{path}: kind must be one of {', '.join(KINDS)}, got {kind}")
     if any(not math.isfinite(entry.value) or entry.uncertainty <= 0.0 for entry in certified):

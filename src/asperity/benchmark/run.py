@@ -10,22 +10,26 @@ from typing import Any
 
 import numpy as np
 
-from asperity import files
 from asperity.benchmark.cases import BenchmarkCase, load_benchmark
 from asperity.benchmark.solver import Solver
-from asperity.errors import AsperityError, BadInput
+from asperity.core import files
+from asperity.core.errors import AsperityError, BadInput
 
 CELLS = (64, 128)
-SHORT, TIMES = 1.0, 3  # s: so often a shorter solve is timed, as what else runs moves a short time most
+SHORT, TIMES = (
+    1.0,
+    3,
+)  # s: so often a shorter solve is timed, as what else runs moves a short time most
 
 
 @dataclass(frozen=True)
 class BenchmarkRow:
     """One quantity of one case as a solver found it on a number of cells.
 
-    `error` is relative to the certified value; `over_uncertainty` the same in units of its uncertainty, None where the
-    solver itself is one of the value's two ways; `seconds` of a processor for the whole case, without what is loaded or
-    compiled once, the least of three where it is under a second.
+    `error` is relative to the certified value; `over_uncertainty` the same in units of its
+    uncertainty, None where the solver itself is one of the value's two ways; `seconds` of a
+    processor for the whole case, without what is loaded or compiled once, the least of three where
+    it is under a second.
     """
 
     case: str
@@ -111,7 +115,9 @@ def run_benchmark(
         for count in sorted(cells):
             try:
                 if (what := (case.kind, case.given.get("geometry"))) not in warm:
-                    solver.solve(case.given, count)  # so that no clock counts what is loaded and compiled once
+                    solver.solve(
+                        case.given, count
+                    )  # so that no clock counts what is loaded and compiled once
                     warm.add(what)
                 found += _solved(solver, case, count)
             except AsperityError as error:  # of cells that are too few, say; more may do
@@ -138,12 +144,16 @@ def _solved(solver: Solver, case: BenchmarkCase, cells: int) -> Iterator[Benchma
                 entry.value,
                 entry.uncertainty,
                 off / abs(entry.value),
-                None if any(way.lower().startswith(solver.name) for way in entry.ways) else off / entry.uncertainty,
+                None
+                if any(way.lower().startswith(solver.name) for way in entry.ways)
+                else off / entry.uncertainty,
                 min(seconds),
             )
 
 
-def _timed(solver: Solver, case: BenchmarkCase, cells: int) -> tuple[Mapping[str, float], list[float]]:
+def _timed(
+    solver: Solver, case: BenchmarkCase, cells: int
+) -> tuple[Mapping[str, float], list[float]]:
     began = time.process_time()
     found = solver.solve(case.given, cells)
     return found, [time.process_time() - began]

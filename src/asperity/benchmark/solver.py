@@ -1,8 +1,9 @@
 """What a solver has to be for the benchmark, and the solver that a name stands for.
 
-An adapter is an object with three things: `name`; `kinds`, what kinds of case it solves; and `solve(given, cells)`,
-which takes the case's table of plain SI numbers and a number of cells along x, and returns quantities by their key. It
-may leave out quantities that it does not have. `--solver package.module:thing` takes such an object or a class of it.
+An adapter is an object with three things: `name`; `kinds`, what kinds of case it solves; and
+`solve(given, cells)`, which takes the case's table of plain SI numbers and a number of cells along
+x, and returns quantities by their key. It may leave out quantities that it does not have.
+`--solver package.module:thing` takes such an object or a class of it.
 """
 
 import importlib
@@ -11,12 +12,12 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 
 KNOWN = {
-    "asperity": "asperity.benchmark.ours:Ours",
-    "tamaas": "asperity.benchmark.others:Tamaas",
-    "contactmechanics": "asperity.benchmark.others:ContactMechanics",
+    "asperity": "asperity.benchmark.asperity_solver:Ours",
+    "tamaas": "asperity.benchmark.external_solvers:Tamaas",
+    "contactmechanics": "asperity.benchmark.external_solvers:ContactMechanics",
 }
 
 
@@ -52,5 +53,7 @@ def solver_named(name: str) -> Solver:
     finally:
         sys.path.pop(0)
     if not isinstance(solver, Solver):
-        raise BadInput(f"--solver {name}: an adapter has name, kinds and solve(given, cells); mend {thing}")
+        raise BadInput(
+            f"--solver {name}: an adapter has name, kinds and solve(given, cells); mend {thing}"
+        )
     return solver

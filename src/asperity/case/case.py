@@ -10,23 +10,24 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from asperity.case.amounts import plain
-from asperity.case.oils import SheetSection
-from asperity.case.refusals import parse_section
+from asperity.case.lubricant import SheetSection
+from asperity.case.messages import parse_section
+from asperity.case.roughness_scale import texture_of
 from asperity.case.sections import CaseFile, MotionSection
 from asperity.case.surfaces import FileSection, composite_roughness, moving_roughness, two_bodies
 from asperity.case.text import parse_toml, read_text, replaced, restated
-from asperity.case.texture import texture_of
+from asperity.case.units import plain
 from asperity.case.vibration import vibration_model
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.limits import require_affordable
 from asperity.coupling import VibrationModel
-from asperity.ehl import ACCURACY, Options, auto_grid, inlet_notes, plausibility_notes
-from asperity.errors import BadInput, UnreadableFile
-from asperity.grid import Grid
-from asperity.limits import require_affordable
+from asperity.ehl import ACCURACY, Options, auto_grid
 from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
+from asperity.solution import inlet_notes, plausibility_notes
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
-from asperity.wearing import WearModel
+from asperity.wear import WearModel
 
 # surfaces that a solution is the mean of, unless the case says: the wait is for as many solutions
 MANY_SURFACES, FEW_SURFACES = 5, 3
@@ -39,15 +40,17 @@ CELL_BYTES, CELL_S = 800.0, 1e-4  # what a cell takes of memory and time while a
 class Case:
     """A contact to solve, as its case file states it. Made by `load_case`.
 
-    `contents` are the file's tables, `folder` is where a surface file is looked for, `source` what messages call the
-    case, `stored` the roughness of the run that the case came from.
+    `contents` are the file's tables, `folder` is where a surface file is looked for, `source` what
+    messages call the case, `stored` the roughness of the run that the case came from.
     """
 
     contents: CaseFile
     folder: Path = field(compare=False, repr=False)
     source: str = field(compare=False)
     stored: Surface | None = field(default=None, compare=False, repr=False)
-    stored_notes: tuple[str, ...] = field(default=(), compare=False, repr=False)  # what was done to make `stored`
+    stored_notes: tuple[str, ...] = field(
+        default=(), compare=False, repr=False
+    )  # what was done to make `stored`
 
     def __post_init__(self) -> None:
         # refuse now what would else be refused later, perhaps after a long wait
@@ -57,10 +60,14 @@ class Case:
         for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration", "wear"):
             if name == "grid" and measured and self.contents.grid.chosen:
                 continue
-            with self.naming({"conditions": "contact and material", "options": "solver"}.get(name, name)):
+            with self.naming(
+                {"conditions": "contact and material", "options": "solver"}.get(name, name)
+            ):
                 getattr(self, name)
 
-    def __reduce__(self) -> tuple[Any, ...]:  # the sections of laws are made at run time, which pickle cannot follow
+    def __reduce__(
+        self,
+    ) -> tuple[Any, ...]:  # the sections of laws are made at run time, which pickle cannot follow
         again = partial(load_case, folder=self.folder, name=self.source, stored=self.stored)
         return again, (self.text,), {"stored_notes": self.stored_notes}
 
@@ -129,7 +136,8 @@ class Case:
     def grid(self) -> Grid:
         """The rectangle to compute on; half-widths turned into metres, along a line contact's length too.
 
-        What the case leaves out of it is chosen (`auto_grid`); roughness kept in a run brings its own.
+        What the case leaves out of it is chosen (`auto_grid`); roughness kept in a run brings its
+        own.
         """
         section, conditions = self.contents.grid, self.conditions
         line, (a, b) = conditions.endless, conditions.hertz.half_widths
@@ -137,7 +145,10 @@ class Case:
             return self.stored.grid
         x, y = (
             None if ends is None else (ends[0] * half, ends[1] * half)
-            for ends, half in ((section.x, a), (section.y, a if line else b))  # y runs along a line: in a too
+            for ends, half in (
+                (section.x, a),
+                (section.y, a if line else b),
+            )  # y runs along a line: in a too
         )
         if section.cells != "auto" and x is not None and y is not None:
             grid = Grid(section.cells, (x[0], y[0]), (x[1], y[1]), periodic=(False, line))
@@ -163,7 +174,11 @@ class Case:
     @cached_property
     def options(self) -> Options:
         """How hard to solve."""
-        solver = {name: plain(value) for name, value in self.contents.solver if name not in ("surfaces", "dynamic")}
+        solver = {
+            name: plain(value)
+            for name, value in self.contents.solver
+            if name not in ("surfaces", "dynamic")
+        }
         return Options(model=self.contents.model, **solver)
 
     @cached_property
@@ -181,12 +196,16 @@ class Case:
     def _roughness(self) -> tuple[Surface, tuple[str, ...]]:
         if self.stored is not None:
             return self.stored, self.stored_notes
-        return composite_roughness(self.contents.surface, self.grid, self.folder, self.conditions.surface_speeds)
+        return composite_roughness(
+            self.contents.surface, self.grid, self.folder, self.conditions.surface_speeds
+        )
 
     def composite(self) -> CompositeSurface | None:
         """Two measured surfaces apart, each with its speed; None when the case has no second one."""
         with self.naming("surface"):
-            return two_bodies(self.contents.surface, self.grid, self.folder, self.conditions.surface_speeds)
+            return two_bodies(
+                self.contents.surface, self.grid, self.folder, self.conditions.surface_speeds
+            )
 
     @property
     def motion(self) -> MotionSection:
@@ -196,24 +215,31 @@ class Case:
     def moving_surfaces(self) -> MovingSurfaces:
         """Both bodies' roughness on tracks that repeat along rolling, each at its own speed.
 
-        Roughness that is generated, or measured on one surface only, lies on the body that `motion.rough` names; "both"
-        bodies carry independent samples of Sq/√2 each, of which the first has the case's seed. Two measured surfaces
-        lie on one body each. A measured surface's ends are joined. Raises BadInput for one measured surface that shall
-        be on both bodies, a track that it does not cover, or roughness kept in a run, which is on neither track.
+        Roughness that is generated, or measured on one surface only, lies on the body that
+        `motion.rough` names; "both" bodies carry independent samples of Sq/√2 each, of which the
+        first has the case's seed. Two measured surfaces lie on one body each. A measured surface's
+        ends are joined. Raises BadInput for one measured surface that shall be on both bodies, a
+        track that it does not cover, or roughness kept in a run, which is on neither track.
         """
-        section, rough, speeds = self.contents.surface, self.motion.rough, self.conditions.surface_speeds
+        section, rough, speeds = (
+            self.contents.surface,
+            self.motion.rough,
+            self.conditions.surface_speeds,
+        )
         track = track_grid(self.grid, self.motion.track)
         _require_affordable(track)
         with self.naming("surface"):
             if self.stored is not None:
-                raise BadInput("is kept in a run, and what it had beside the contact is not; let the case file move")
+                raise BadInput(
+                    "is kept in a run, and what it had beside the contact is not; let the case file move"
+                )
             return moving_roughness(section, rough, track, self.folder, speeds, self.grid)
 
     def surface(self) -> Surface:
         """The composite roughness on the grid: generated, read and prepared, or as stored in the run.
 
-        Raises BadInput for a surface that the grid cannot carry or a measurement that does not cover the contact,
-        UnreadableFile for a surface file that cannot be read.
+        Raises BadInput for a surface that the grid cannot carry or a measurement that does not
+        cover the contact, UnreadableFile for a surface file that cannot be read.
         """
         with self.naming("surface"):
             return self._roughness[0]
@@ -221,14 +247,20 @@ class Case:
     def surface_count(self, asked: int | None = None) -> int:
         """How many surfaces to solve, where so many are `asked` for, or else as many as [solver] or the wait allows.
 
-        One where all surfaces of the case are the same. A measured map holds few that do not overlap, a run only its
-        own: BadInput where more are asked for.
+        One where all surfaces of the case are the same. A measured map holds few that do not
+        overlap, a run only its own: BadInput where more are asked for.
         """
         with self.naming("surface"):
             stated = self.contents.solver.surfaces if asked is None else asked
-            wanted = stated or (MANY_SURFACES if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID else FEW_SURFACES)
+            wanted = stated or (
+                MANY_SURFACES
+                if self.grid.cells[0] * self.grid.cells[1] <= FINE_GRID
+                else FEW_SURFACES
+            )
             if not 1 <= wanted <= MOST_SURFACES:
-                raise BadInput(f"surfaces must be 1 to {MOST_SURFACES}, got {wanted}; asperity study takes more")
+                raise BadInput(
+                    f"surfaces must be 1 to {MOST_SURFACES}, got {wanted}; asperity study takes more"
+                )
             if wanted == 1 or self.surface().sq == 0.0:
                 return 1
             try:
@@ -236,7 +268,8 @@ class Case:
             except UnreadableFile:
                 if self.stored is None or stated:
                     raise
-                available = 1  # a run holds the surface that was solved, its measurement need not be at hand
+                # a run holds the surface that was solved, its measurement need not be at hand
+                available = 1
             if available == 1 and all(part.fixed for part in self.contents.surface.parts.values()):
                 return 1
             if available is not None and stated and stated > available:
@@ -261,7 +294,11 @@ class Case:
         """What a reader of the results has to know about the case, a sentence each."""
         conditions, oil = self.conditions, self.lubricant
         of_oil = () if self._sheet is None else self._sheet.notes()
-        return (*of_oil, *plausibility_notes(conditions, oil), *inlet_notes(conditions, oil, self.grid))
+        return (
+            *of_oil,
+            *plausibility_notes(conditions, oil),
+            *inlet_notes(conditions, oil, self.grid),
+        )
 
     @property
     def text(self) -> str:
@@ -271,9 +308,10 @@ class Case:
     def with_overrides(self, overrides: Mapping[str, object]) -> "Case":
         """The case with values replaced, such as `{"contact.load": "400 N", "grid.cells": "[128, 128]"}`.
 
-        Text is read as a TOML value where it is one and taken as it stands where not. Stored roughness is kept
-        as long as neither the surface nor the grid changes. `vibration.preset` replaces all that presets choose.
-        Raises BadInput for a key or value that the case file would be refused for.
+        Text is read as a TOML value where it is one and taken as it stands where not. Stored
+        roughness is kept as long as neither the surface nor the grid changes. `vibration.preset`
+        replaces all that presets choose. Raises BadInput for a key or value that the case file
+        would be refused for.
         """
         tables = replaced(parse_toml(self.text, self.source), overrides, self.source)
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
@@ -284,11 +322,17 @@ class Case:
 def _require_affordable(grid: Grid) -> None:
     nx, ny = grid.cells
     cells = float(nx) * float(ny)
-    require_affordable(f"a grid of {nx:.10g} x {ny:.10g} cells", memory=CELL_BYTES * cells, seconds=CELL_S * cells)
+    require_affordable(
+        f"a grid of {nx:.10g} x {ny:.10g} cells", memory=CELL_BYTES * cells, seconds=CELL_S * cells
+    )
 
 
 def load_case(
-    source: str | Path, *, folder: Path | None = None, name: str | None = None, stored: Surface | None = None
+    source: str | Path,
+    *,
+    folder: Path | None = None,
+    name: str | None = None,
+    stored: Surface | None = None,
 ) -> Case:
     """Read a case file, or its text (a `str` of more than one line).
 
@@ -313,5 +357,7 @@ def load_case(
         text, name, folder = read_text(path), name or str(path), folder or path.parent
     tables = parse_toml(text, name)
     if "machine" in tables:
-        raise BadInput(f"{name}: states a [machine], which has several contacts; asperity machine solves them all")
+        raise BadInput(
+            f"{name}: states a [machine], which has several contacts; asperity machine solves them all"
+        )
     return Case(parse_section(CaseFile, tables, name), folder, name, stored)

@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
-from asperity.case.amounts import Count, Seed
-from asperity.case.refusals import Section, quoted, validated, with_axes
-from asperity.errors import BadInput
+from asperity.case.messages import Section, quoted, validated, with_axes
+from asperity.case.units import Count, Seed
+from asperity.core.errors import BadInput
 
 LEAST_POINTS, MOST_POINTS = 16, 4096
 _ENDS = {"from", "to", "value", "std"}
@@ -23,17 +23,25 @@ class PriorSection(Section):
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
-        stated = [name for name in ("start", "to", "value", "std") if getattr(self, name) is not None]
+        stated = [
+            name for name in ("start", "to", "value", "std") if getattr(self, name) is not None
+        ]
         if stated not in (["start", "to"], ["value", "std"]):
-            raise BadInput('must have from and to, or value and std, such as { value = "0.8 um", std = "0.1 um" }')
+            raise BadInput(
+                'must have from and to, or value and std, such as { value = "0.8 um", std = "0.1 um" }'
+            )
         return self
 
 
 class InferSection(Section):
     """[infer]: the emulator's size, and a prior for each quantity that is not known. Other keys name quantities."""
 
-    axes: dict[str, PriorSection | Literal["known"]] = Field(default_factory=dict)  # as written: key -> prior
-    points: Annotated[int, Strict(), Field(ge=LEAST_POINTS, le=MOST_POINTS)] = 256  # contacts, of a Sobol sequence
+    axes: dict[str, PriorSection | Literal["known"]] = Field(
+        default_factory=dict
+    )  # as written: key -> prior
+    points: Annotated[int, Strict(), Field(ge=LEAST_POINTS, le=MOST_POINTS)] = (
+        256  # contacts, of a Sobol sequence
+    )
     surfaces: Count = 4  # surfaces a point
     cells: tuple[Count, Count] = (64, 64)
     seed: Seed = 0  # of the sequence and of all that is drawn

@@ -1,7 +1,7 @@
 """Laws and sections: every law of a table becomes a section of the case file, and what a case chose becomes laws again.
 
-A parameter is a quantity where its law gives it a unit, else a plain value. Sections follow the tables of laws, so that
-a law needs nothing here.
+A parameter is a quantity where its law gives it a unit, else a plain value. Sections follow the
+tables of laws, so that a law needs nothing here.
 """
 
 from collections.abc import Mapping
@@ -11,9 +11,10 @@ from typing import Annotated, Any, NamedTuple, cast, get_type_hints
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
-from asperity.case.amounts import OPTIONAL, PAIRED, amount_in, default_amount, plain
-from asperity.case.refusals import Section, choose
-from asperity.errors import BadInput
+from asperity.case.messages import Section, choose
+from asperity.case.units import OPTIONAL, PAIRED, amount_in, default_amount, plain
+from asperity.core.errors import BadInput
+from asperity.core.quantities import parameters
 from asperity.lubricant import (
     FREEZING,
     LAWS,
@@ -25,7 +26,6 @@ from asperity.lubricant import (
     make_law,
     make_lubricant,
 )
-from asperity.quantities import parameters
 
 
 def section_field(kind: Any, default: Any, unit: str) -> tuple[Any, Any]:
@@ -41,7 +41,8 @@ def section_fields(law: type) -> dict[str, Any]:
     """A dataclass's fields as fields of a section."""
     types, marks = get_type_hints(law), parameters(law)
     return {
-        entry.name: section_field(types[entry.name], entry.default, marks[entry.name].unit) for entry in fields(law)
+        entry.name: section_field(types[entry.name], entry.default, marks[entry.name].unit)
+        for entry in fields(law)
     }
 
 
@@ -75,11 +76,15 @@ class LubricantSection(Section):
     viscosity: Annotated[Section, one_of("viscosity")]
     density: Annotated[Section, one_of("density")]
     rheology: Annotated[Section, one_of("rheology")]
-    friction: Annotated[Section, one_of("friction"), Field(validate_default=True)] = cast(Section, "bair-winer")
+    friction: Annotated[Section, one_of("friction"), Field(validate_default=True)] = cast(
+        Section, "bair-winer"
+    )
 
     def lubricant(self) -> Lubricant:
         """The oil."""
-        return make_lubricant({family: law_description(getattr(self, family)) for family in type(self).model_fields})
+        return make_lubricant(
+            {family: law_description(getattr(self, family)) for family in type(self).model_fields}
+        )
 
 
 def _both(kind: Any, default: Any) -> Any:
@@ -89,7 +94,10 @@ def _both(kind: Any, default: Any) -> Any:
 _THERMAL, _SOLID = section_fields(Thermal), section_fields(Solid)
 _NUMBERS: dict[str, Any] = {
     "ambient": _THERMAL["ambient"],
-    "bulk": (Annotated[_both(*_THERMAL["ambient"])[0] | None, PAIRED, OPTIONAL], None),  # of the bodies
+    "bulk": (
+        Annotated[_both(*_THERMAL["ambient"])[0] | None, PAIRED, OPTIONAL],
+        None,
+    ),  # of the bodies
     **{name: _both(*field) for name, field in _SOLID.items()},
     "oil_conductivity": _THERMAL["oil_conductivity"],
 }
@@ -106,14 +114,19 @@ class OilSupply(NamedTuple):
 class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those of `Thermal` and of both its `Solid`s
     """[thermal]: what takes up the heat of sliding, and whether the film feels it."""
 
-    warmth: Annotated[Section, one_of("warmth"), Field(validate_default=True)] = cast(Section, "exponential")
+    warmth: Annotated[Section, one_of("warmth"), Field(validate_default=True)] = cast(
+        Section, "exponential"
+    )
     feedback: Annotated[bool, Strict()] = Thermal().feedback
 
     @property
     def tacit(self) -> tuple[str, ...]:
         """Which of the keys that an oil by its data sheet can decide stand at their defaults."""
         default = ThermalSection()
-        by_default = {"ambient": self.ambient.text == default.ambient.text, "warmth": self.warmth == default.warmth}
+        by_default = {
+            "ambient": self.ambient.text == default.ambient.text,
+            "warmth": self.warmth == default.warmth,
+        }
         return tuple(key for key, tacit in by_default.items() if tacit)
 
     def thermal(self, oil: OilSupply | None = None) -> Thermal:
@@ -131,7 +144,9 @@ class ThermalSection(_Numbers):  # type: ignore[misc]  # its numbers are those o
                 )
             ambient = oil.temperature
             warmth = ExponentialWarmth(oil.thinning) if "warmth" in tacit else warmth
-        first, second = (Solid(**{name: plain(getattr(self, name))[body] for name in _SOLID}) for body in (0, 1))
+        first, second = (
+            Solid(**{name: plain(getattr(self, name))[body] for name in _SOLID}) for body in (0, 1)
+        )
         return Thermal(
             ambient=ambient,
             bulk=plain(self.bulk),

@@ -11,7 +11,12 @@ from typing import Annotated, Any, Literal, TypeAlias
 import tomli_w
 from pydantic import BeforeValidator, PlainValidator
 
-from asperity.case.amounts import (
+from asperity.case.case import Case
+from asperity.case.messages import Section, choose, parse_section
+from asperity.case.ratings import RatingSection
+from asperity.case.sections import CaseFile, MaterialSection
+from asperity.case.text import parse_toml, read_text, replaced
+from asperity.case.units import (
     OPTIONAL,
     PAIRED,
     Amount,
@@ -24,13 +29,8 @@ from asperity.case.amounts import (
     default_amount,
     plain,
 )
-from asperity.case.case import Case
-from asperity.case.ratings import RatingSection
-from asperity.case.refusals import Section, choose, parse_section
-from asperity.case.sections import CaseFile, MaterialSection
-from asperity.case.text import parse_toml, read_text, replaced
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput
+from asperity.contact.conditions import ElasticPair
+from asperity.core.errors import BadInput
 from asperity.machine import (
     BallBearing,
     CylindricalRollerBearing,
@@ -167,8 +167,8 @@ class _MachineTables(Section):
 class MachineCase:
     """A machine as its case file states it. Made by `load_machine`.
 
-    `tables` are the file's, `folder` is where a surface file is looked for, `source` what messages call the case.
-    `rating` has what standards ask for besides.
+    `tables` are the file's, `folder` is where a surface file is looked for, `source` what messages
+    call the case. `rating` has what standards ask for besides.
     """
 
     tables: Mapping[str, Any]
@@ -186,7 +186,11 @@ class MachineCase:
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader of the contacts has to know, a sentence each."""
-        taken = () if "material" in self.tables else ("Both bodies are taken for steel, E 206 GPa and ν 0.3.",)
+        taken = (
+            ()
+            if "material" in self.tables
+            else ("Both bodies are taken for steel, E 206 GPa and ν 0.3.",)
+        )
         return (*self.machine.notes(self.pair), *taken)
 
     @property
@@ -202,7 +206,10 @@ class MachineCase:
     def contact_table(self, contact: MachineContact) -> dict[str, Any]:
         """[contact] of a case file for one of the contacts; BadInput where it draws no oil in."""
         stated = contact.conditions(self.pair)
-        radii = [_written(radius, "m") for radius in (stated.radius_along_rolling, stated.radius_across_rolling)]
+        radii = [
+            _written(radius, "m")
+            for radius in (stated.radius_along_rolling, stated.radius_across_rolling)
+        ]
         length = {} if stated.length is None else {"length": _written(stated.length, "m")}
         return {
             "geometry": stated.geometry,
@@ -217,12 +224,16 @@ class MachineCase:
         """One of the contacts, with all else that the file states; BadInput as `load_case` raises it."""
         own = {key: table for key, table in self.tables.items() if key not in OWN}
         tables = {"material": STEEL, **own}
-        stated = parse_section(CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source)
+        stated = parse_section(
+            CaseFile, {**tables, "contact": self.contact_table(contact)}, self.source
+        )
         return Case(stated, self.folder, self.source)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> "MachineCase":
         """The machine with values replaced, such as `{"machine.torque": "300 N m"}`."""
-        return _machine_case(replaced(deepcopy(dict(self.tables)), overrides, self.source), self.folder, self.source)
+        return _machine_case(
+            replaced(deepcopy(dict(self.tables)), overrides, self.source), self.folder, self.source
+        )
 
 
 def load_machine(path: str | Path, overrides: Mapping[str, object] | None = None) -> MachineCase:
@@ -250,14 +261,18 @@ def states_machine(path: str | Path) -> bool:
 
 def _machine_case(tables: dict[str, Any], folder: Path, source: str) -> MachineCase:
     if "machine" not in tables:
-        raise BadInput(f"{source}: has no [machine]; add one, or solve its one contact by asperity solve")
+        raise BadInput(
+            f"{source}: has no [machine]; add one, or solve its one contact by asperity solve"
+        )
     if "contact" in tables:
         raise BadInput(f"{source}: states a [machine] and a [contact]; leave one of them out")
     known = {key: tables[key] for key in _MachineTables.model_fields if key in tables}
     stated = parse_section(_MachineTables, {"material": STEEL, **known}, source)
     section, material = stated.machine, stated.material
     pair = ElasticPair(plain(material.youngs_modulus), material.poisson_ratio)
-    given = {name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"}
+    given = {
+        name: plain(getattr(section, name)) for name in type(section).model_fields if name != "kind"
+    }
     try:
         machine = MACHINES[section.kind][1](**given)
         stated.rating.require_of(section.kind)

@@ -4,7 +4,14 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PlainValidator, Strict, field_validator, model_validator
 
-from asperity.case.amounts import (
+from asperity.case.infer import InferSection, parse_infer
+from asperity.case.laws import LubricantSection, ThermalSection
+from asperity.case.lubricant import SheetSection, parse_lubricant
+from asperity.case.messages import LocatedError, Section, quoted
+from asperity.case.roller_shape import ShapeSection
+from asperity.case.study import StudySection, parse_study
+from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
+from asperity.case.units import (
     OPTIONAL,
     PAIRED,
     Amount,
@@ -17,18 +24,12 @@ from asperity.case.amounts import (
     default_amount,
     parse_amount,
 )
-from asperity.case.infer import InferSection, parse_infer
-from asperity.case.laws import LubricantSection, ThermalSection
-from asperity.case.oils import SheetSection, parse_lubricant
-from asperity.case.refusals import LocatedError, Section, quoted
-from asperity.case.shapes import ShapeSection
-from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
-from asperity.case.sweep import StudySection, parse_study
 from asperity.case.vibration import parse_vibration
 from asperity.case.wear import WearSection
-from asperity.conditions import Geometry
-from asperity.ehl import BOUNDARY_FRICTION, LONGEST_STEP, ContactModel, Options, Start
-from asperity.errors import BadInput
+from asperity.contact.conditions import Geometry
+from asperity.core.errors import BadInput
+from asperity.ehl import LONGEST_STEP, ContactModel, Options, Start
+from asperity.solution import BOUNDARY_FRICTION
 
 MOST_FREQUENCIES = 200  # at which a contact may be shaken
 
@@ -81,7 +82,9 @@ class GridSection(Section):
     cells: Annotated[Literal["auto"] | tuple[int, int], PlainValidator(_parse_cells)] = "auto"
     x: tuple[Number, Number] | None = None
     y: tuple[Number, Number] | None = None
-    accuracy: Annotated[float | None, Strict(), Field(ge=1e-4, le=0.2)] = None  # relative, of the film
+    accuracy: Annotated[float | None, Strict(), Field(ge=1e-4, le=0.2)] = (
+        None  # relative, of the film
+    )
 
     @model_validator(mode="after")
     def _accuracy_has_a_choice(self) -> Self:
@@ -103,14 +106,20 @@ class SolverSection(Section):
     tolerance: Number = Options().tolerance
     max_iterations: Annotated[int, Strict()] = Options().max_iterations
     contact_film: Length = default_amount(Options().contact_film, "m")
-    dynamic: Annotated[int, Strict()] = 0  # frequencies at which the solved contact is shaken for k and c; 0: none
-    surfaces: Count | None = None  # surfaces of one kind that a solution is the mean of; left out: as the wait allows
+    dynamic: Annotated[int, Strict()] = (
+        0  # frequencies at which the solved contact is shaken for k and c; 0: none
+    )
+    surfaces: Count | None = (
+        None  # surfaces of one kind that a solution is the mean of; left out: as the wait allows
+    )
 
     @field_validator("dynamic")
     @classmethod
     def _a_curve_or_none(cls, count: int) -> int:
         if count and not 3 <= count <= MOST_FREQUENCIES:
-            raise BadInput(f"must be 0, for no curve over frequency, or 3 to {MOST_FREQUENCIES}, got {count}")
+            raise BadInput(
+                f"must be 0, for no curve over frequency, or 3 to {MOST_FREQUENCIES}, got {count}"
+            )
         return count
 
 
@@ -118,7 +127,9 @@ class MotionSection(Section):
     """[motion]: how `asperity run` lets the roughness move."""
 
     steps: Count = 200
-    time_step: Annotated[float, Strict(), Field(gt=0.0, le=LONGEST_STEP)] = 1.0  # cells that the oil travels in one
+    time_step: Annotated[float, Strict(), Field(gt=0.0, le=LONGEST_STEP)] = (
+        1.0  # cells that the oil travels in one
+    )
     rough: RoughBody = "first"  # which body carries a generated surface; both: a half each
     start: Start = "steady"
     track: Count = 1  # lengths of the domain after which a surface repeats

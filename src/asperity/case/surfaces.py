@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, PlainValidator, Strict, create_model
 
-from asperity.case.amounts import OPTIONAL, PAIRED, Length, Number, Seed, plain
-from asperity.case.refusals import LocatedError, Section, choose, validated
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.case.messages import LocatedError, Section, choose, validated
+from asperity.case.units import OPTIONAL, PAIRED, Length, Number, Seed, plain
+from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.surface import (
     CompositeSurface,
     Fit,
@@ -41,7 +41,9 @@ from asperity.surface import (
     self_affine_surface,
 )
 
-SAMPLE_DEVIATION = 0.05  # of a generated surface's correlation lengths, beyond which the notes say so
+SAMPLE_DEVIATION = (
+    0.05  # of a generated surface's correlation lengths, beyond which the notes say so
+)
 
 RoughBody = Literal["first", "second", "both"]
 
@@ -51,7 +53,9 @@ def _parse_second(value: object) -> "SurfaceSection | None":
     if value is None or value == "none":
         return None
     if isinstance(value, Mapping) and "second" in value:
-        raise LocatedError(("second",), "is a third surface where a contact has two bodies; leave it out")
+        raise LocatedError(
+            ("second",), "is a third surface where a contact has two bodies; leave it out"
+        )
     if isinstance(value, Mapping) and "kind" not in value:
         return validated(FileSection, value)
     return parse_surface(value)
@@ -135,12 +139,26 @@ KINDS: dict[str, _Kind] = {
     ),
     "ground": _Kind(
         ground_surface,
-        {"sq": _LENGTH, "groove_width": _LENGTH, "groove_length": _LENGTH, "direction_deg": _DIRECTION, "seed": _SEED},
+        {
+            "sq": _LENGTH,
+            "groove_width": _LENGTH,
+            "groove_length": _LENGTH,
+            "direction_deg": _DIRECTION,
+            "seed": _SEED,
+        },
     ),
-    "sandblasted": _Kind(sandblasted_surface, {"sq": _LENGTH, "crater_radius": _LENGTH, "seed": _SEED}),
-    "run-in": _Kind(  # plateau_roughness: Sq of the plateau over that of the surface before it was worn
+    "sandblasted": _Kind(
+        sandblasted_surface, {"sq": _LENGTH, "crater_radius": _LENGTH, "seed": _SEED}
+    ),
+    # plateau_roughness: Sq of the plateau over that of the surface before it was worn
+    "run-in": _Kind(
         run_in_surface,
-        {"sq": _LENGTH, "correlation_length": _PAIR, "plateau_share": _NUMBER, "plateau_roughness": (Number, 0.1)}
+        {
+            "sq": _LENGTH,
+            "correlation_length": _PAIR,
+            "plateau_share": _NUMBER,
+            "plateau_roughness": (Number, 0.1),
+        }
         | {"direction_deg": _DIRECTION, "seed": _SEED},
     ),
     "flat": _Kind(lambda grid, rng: flat_surface(grid), {}),  # noqa: ARG005
@@ -154,7 +172,9 @@ class GeneratedSection(SurfaceSection):
 
     def arguments(self) -> dict[str, Any]:
         """The fields as the generator takes them: SI, an angle in radians."""
-        values = {name: plain(getattr(self, name)) for name in KINDS[self.kind].fields if name != "seed"}
+        values = {
+            name: plain(getattr(self, name)) for name in KINDS[self.kind].fields if name != "seed"
+        }
         if "direction_deg" in values:
             values["direction"] = math.radians(values.pop("direction_deg"))
         return values
@@ -193,8 +213,14 @@ class GeneratedSection(SurfaceSection):
         if self.kind not in ("gaussian", "non-gaussian"):
             return ()
         arguments = self.arguments()
-        stated, lengths = arguments["correlation_length"], correlation_lengths(surface, arguments["direction"])
-        if all(abs(sample / mean - 1.0) <= SAMPLE_DEVIATION for sample, mean in zip(lengths, stated, strict=True)):
+        stated, lengths = (
+            arguments["correlation_length"],
+            correlation_lengths(surface, arguments["direction"]),
+        )
+        if all(
+            abs(sample / mean - 1.0) <= SAMPLE_DEVIATION
+            for sample, mean in zip(lengths, stated, strict=True)
+        ):
             return ()
         return (
             f"This sample's autocorrelation falls to 1/e over {area_text(lengths)}, where {area_text(stated)} "
@@ -203,7 +229,9 @@ class GeneratedSection(SurfaceSection):
 
 
 GENERATED_SECTIONS: dict[str, type[GeneratedSection]] = {
-    name: create_model(name, __base__=GeneratedSection, **{"kind": (Literal[name], ...), **kind.fields})
+    name: create_model(
+        name, __base__=GeneratedSection, **{"kind": (Literal[name], ...), **kind.fields}
+    )
     for name, kind in KINDS.items()
 }
 
@@ -215,18 +243,27 @@ class FileSection(SurfaceSection):
     sq: Annotated[Length | None, OPTIONAL] = None  # scale to this; left out: as measured
     form: Form = "quadratic"
     fit: Fit = "crop"
-    turn: Annotated[bool, Strict()] = False  # by a quarter turn: what the file has along x runs along y
+    turn: Annotated[bool, Strict()] = (
+        False  # by a quarter turn: what the file has along x runs along y
+    )
     outliers: Outliers = "keep"
     s_filter: Annotated[Length | None, OPTIONAL] = None
     l_filter: Annotated[Length | None, OPTIONAL] = None
     unit: str | None = None  # of the heights, where the file does not say
     lateral_unit: str | None = None
     pixel: Annotated[tuple[Length, Length], PAIRED] | None = None  # of a matrix of bare heights
-    place: Annotated[int, Strict(), Field(ge=0)] | None = None  # which part of the map; left out: its centre
+    place: Annotated[int, Strict(), Field(ge=0)] | None = (
+        None  # which part of the map; left out: its centre
+    )
 
     def measured(self, folder: Path) -> MeasuredSurface:
         """The file's map; `folder` is where the file is looked for."""
-        return read_surface(folder / self.file, unit=self.unit, lateral_unit=self.lateral_unit, pixel=plain(self.pixel))
+        return read_surface(
+            folder / self.file,
+            unit=self.unit,
+            lateral_unit=self.lateral_unit,
+            pixel=plain(self.pixel),
+        )
 
     @property
     def name(self) -> str:
@@ -273,10 +310,14 @@ def parse_surface(value: object) -> SurfaceSection:
     """The section of a generated surface by its kind, or that of a measured one."""
     if isinstance(value, Mapping) and "file" in value:
         if "kind" in value:
-            raise BadInput("has both kind and file; keep kind for a generated surface or file for a measured one")
+            raise BadInput(
+                "has both kind and file; keep kind for a generated surface or file for a measured one"
+            )
         return validated(FileSection, value)
     if isinstance(value, Mapping) and "kind" not in value:
-        raise BadInput(f"must hold kind (one of {', '.join(GENERATED_SECTIONS)}) or file (a measured surface)")
+        raise BadInput(
+            f"must hold kind (one of {', '.join(GENERATED_SECTIONS)}) or file (a measured surface)"
+        )
     return choose("kind", lambda: GENERATED_SECTIONS, value)
 
 
@@ -306,14 +347,21 @@ def composite_roughness(
     )
 
 
-def _bodies(section: SurfaceSection, grid: Grid, folder: Path) -> list[tuple[Surface, tuple[str, ...]]]:
+def _bodies(
+    section: SurfaceSection, grid: Grid, folder: Path
+) -> list[tuple[Surface, tuple[str, ...]]]:
     """Both bodies' surfaces; a second one that is drawn depends on the first one's seed too, and is no copy of it."""
     drawn = int(getattr(section, "seed", 0) or getattr(section, "place", 0) or 0)
     return [section.made(grid, folder), section.second.made(grid, folder, 2, drawn)]
 
 
 def moving_roughness(
-    section: SurfaceSection, rough: RoughBody, track: Grid, folder: Path, speeds: tuple[float, float], grid: Grid
+    section: SurfaceSection,
+    rough: RoughBody,
+    track: Grid,
+    folder: Path,
+    speeds: tuple[float, float],
+    grid: Grid,
 ) -> MovingSurfaces:
     """The roughness of both bodies on their tracks, seen through the contact's `grid`; see `Case.moving_surfaces`."""
     apart = two_bodies(section, track, folder, speeds)
@@ -321,7 +369,9 @@ def moving_roughness(
         return MovingSurfaces(apart.first, apart.second, speeds, grid)
     if isinstance(section, FileSection):
         if rough == "both":
-            raise BadInput(f"{section.file} is one surface and motion.rough asks for two; name the other as second")
+            raise BadInput(
+                f"{section.file} is one surface and motion.rough asks for two; name the other as second"
+            )
         surface = section.prepare(track, folder).surface
     else:
         assert isinstance(section, GeneratedSection)

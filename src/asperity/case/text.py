@@ -10,16 +10,16 @@ from typing import Any
 
 import tomli_w
 
-from asperity.case.amounts import Amount
 from asperity.case.infer import InferSection
-from asperity.case.oils import SheetSection
-from asperity.case.refusals import Section, parse_section, quoted
+from asperity.case.lubricant import SheetSection
+from asperity.case.messages import Section, parse_section, quoted
 from asperity.case.sections import CaseFile
-from asperity.case.sweep import StudySection
+from asperity.case.study import StudySection
+from asperity.case.units import Amount
 from asperity.case.vibration import preset_keys
-from asperity.errors import BadInput, UnreadableFile
-from asperity.files import require_file
-from asperity.quiet import first_line
+from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.files import require_file
+from asperity.core.third_party import first_line
 
 LONGEST = 4_000_000  # bytes of a case file
 
@@ -28,7 +28,9 @@ def read_text(path: Path) -> str:
     """A case file's text; `UnreadableFile` if it is missing or no text."""
     require_file(path)
     if path.stat().st_size > LONGEST:
-        raise UnreadableFile(f"{path} has {path.stat().st_size} bytes, too many for a case; check its name")
+        raise UnreadableFile(
+            f"{path} has {path.stat().st_size} bytes, too many for a case; check its name"
+        )
     try:
         return path.read_text("utf-8")
     except UnicodeDecodeError:
@@ -41,7 +43,10 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The tables of a text; `UnreadableFile` for what is no TOML."""
     try:
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # no TOML, or numbers and brackets beyond what Python reads
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # no TOML, or numbers and brackets beyond what Python reads
         raise UnreadableFile(f"{source} is not valid TOML: {first_line(error)}") from None
 
 
@@ -50,7 +55,9 @@ def restated(contents: CaseFile) -> str:
     tables = _plain(contents)
     if contents.lubricant is None:
         tables["lubricant"] = "none"
-    if isinstance(contents.lubricant, SheetSection):  # which decides these, and at another temperature otherwise
+    if isinstance(
+        contents.lubricant, SheetSection
+    ):  # which decides these, and at another temperature otherwise
         for key in contents.thermal.tacit:
             del tables["thermal"][key]
     return tomli_w.dumps(tables)
@@ -64,15 +71,21 @@ def _as_text(contents: CaseFile) -> tuple[Callable[[str], CaseFile], tuple[str]]
     return _reread, (restated(contents),)
 
 
-copyreg.pickle(CaseFile, _as_text)  # the sections of laws are made at run time, which pickle cannot follow
+copyreg.pickle(
+    CaseFile, _as_text
+)  # the sections of laws are made at run time, which pickle cannot follow
 
 
-def replaced(tables: dict[str, Any], overrides: Mapping[str, object], source: str) -> dict[str, Any]:
+def replaced(
+    tables: dict[str, Any], overrides: Mapping[str, object], source: str
+) -> dict[str, Any]:
     """The tables with values replaced by their dotted keys; text is read as TOML where it is TOML.
 
     `vibration.preset` replaces all that presets choose. Raises BadInput for what is no dotted key.
     """
-    if "vibration.preset" in overrides:  # what the old preset chose is written out, and would stand above the new
+    if (
+        "vibration.preset" in overrides
+    ):  # what the old preset chose is written out, and would stand above the new
         for choice in preset_keys():
             tables.get("vibration", {}).pop(choice, None)
     for path, value in overrides.items():
@@ -84,7 +97,9 @@ def replaced(tables: dict[str, Any], overrides: Mapping[str, object], source: st
             if not isinstance(table.get(parent), dict):
                 table[parent] = {}
             table = table[parent]
-        table[key] = _toml_value(value) if isinstance(value, str) else deepcopy(value)  # a later key may go into it
+        table[key] = (
+            _toml_value(value) if isinstance(value, str) else deepcopy(value)
+        )  # a later key may go into it
     return tables
 
 
@@ -102,13 +117,20 @@ def _toml_value(text: str) -> object:
     except tomllib.TOMLDecodeError:
         return text  # the shell took the quotes away
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"a value cannot be read ({first_line(error)}), got {quoted(text)}") from None
-    return read["value"] if len(read) == 1 else text  # a line of another key is no part of the value
+        raise BadInput(
+            f"a value cannot be read ({first_line(error)}), got {quoted(text)}"
+        ) from None
+    return (
+        read["value"] if len(read) == 1 else text
+    )  # a line of another key is no part of the value
 
 
 def _plain(section: Section) -> dict[str, Any]:
     """Tables of plain values, quantities as they were written; what is left out stays out."""
-    values = {entry.alias or name: getattr(section, name) for name, entry in type(section).model_fields.items()}
+    values = {
+        entry.alias or name: getattr(section, name)
+        for name, entry in type(section).model_fields.items()
+    }
     if isinstance(section, StudySection | InferSection):
         values |= values.pop("axes")
     return {key: _plain_value(value) for key, value in values.items() if value is not None}

@@ -6,9 +6,9 @@ from typing import Any, Literal
 
 from pydantic import create_model
 
-from asperity.case.amounts import default_amount, plain
 from asperity.case.laws import section_field
-from asperity.case.refusals import Section, validated
+from asperity.case.messages import Section, validated
+from asperity.case.units import default_amount, plain
 from asperity.coupling import PRESETS, VibrationModel, preset_choices, vibration_choices
 
 
@@ -17,7 +17,9 @@ def _vibration_key(name: str) -> str:
     return re.sub("_(hz|s)$", "", name)
 
 
-_FIELDS: dict[str, Any] = {_vibration_key(name): section_field(*choice) for name, choice in vibration_choices().items()}
+_FIELDS: dict[str, Any] = {
+    _vibration_key(name): section_field(*choice) for name, choice in vibration_choices().items()
+}
 _FIELDS = {"preset": (Literal["sound", "paper"], "sound"), **_FIELDS}
 VibrationSection = create_model("vibration", __base__=Section, **_FIELDS)
 
@@ -30,7 +32,10 @@ def parse_vibration(value: object) -> Any:
     if isinstance(value, Mapping) and isinstance(chosen, str) and chosen in PRESETS:
         units = {key: choice.unit for key, choice in vibration_choices().items()}
         preset = preset_choices(chosen).items()
-        written = {_vibration_key(key): default_amount(v, units[key]) if units[key] else v for key, v in preset}
+        written = {
+            _vibration_key(key): default_amount(v, units[key]) if units[key] else v
+            for key, v in preset
+        }
         value = {**written, **value}
     return validated(VibrationSection, value)
 
@@ -44,4 +49,6 @@ def vibration_model(section: Any) -> VibrationModel | None:
     """The vibration model that a section states; None without one."""
     if section is None:
         return None
-    return VibrationModel(**{name: plain(getattr(section, _vibration_key(name))) for name in vibration_choices()})
+    return VibrationModel(
+        **{name: plain(getattr(section, _vibration_key(name))) for name in vibration_choices()}
+    )

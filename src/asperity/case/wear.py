@@ -4,12 +4,20 @@ from typing import Annotated, Any, cast
 
 from pydantic import Field, PlainValidator, Strict, create_model
 
-from asperity.case.amounts import OPTIONAL, PAIRED, Count, amount_in, parse_amount, plain
 from asperity.case.laws import law_description, one_of_table
-from asperity.case.refusals import Section, quoted
-from asperity.conditions import ContactConditions
-from asperity.errors import BadInput
-from asperity.wearing import MECHANISMS, REMOVAL_LAWS, SCATTER, SEVERITIES, Coefficient, RemovalLaw, WearModel
+from asperity.case.messages import Section, quoted
+from asperity.case.units import OPTIONAL, PAIRED, Count, amount_in, parse_amount, plain
+from asperity.contact.conditions import ContactConditions
+from asperity.core.errors import BadInput
+from asperity.wear import (
+    MECHANISMS,
+    REMOVAL_LAWS,
+    SCATTER,
+    SEVERITIES,
+    Coefficient,
+    RemovalLaw,
+    WearModel,
+)
 
 
 def _parse_coefficient(value: object) -> Any:
@@ -17,14 +25,17 @@ def _parse_coefficient(value: object) -> Any:
     if isinstance(value, str) and value in SEVERITIES:
         return value
     if isinstance(value, str) and value.strip().isalpha():
-        raise BadInput(f'must be such as "1e-18 1/Pa", or one of {", ".join(SEVERITIES)}, got {quoted(value)}')
+        raise BadInput(
+            f'must be such as "1e-18 1/Pa", or one of {", ".join(SEVERITIES)}, got {quoted(value)}'
+        )
     return parse_amount("1/Pa", value, 0.0)
 
 
 _FREQUENCY = Annotated[float, amount_in("Hz")]
 _COEFFICIENT = Annotated[Any, PlainValidator(_parse_coefficient)]
 _MECHANISMS: dict[str, Any] = {
-    name: (Annotated[Section | None, one_of_table(table)], None) for name, table in MECHANISMS.items()
+    name: (Annotated[Section | None, one_of_table(table)], None)
+    for name, table in MECHANISMS.items()
 }
 _Mechanisms: Any = create_model("wear", __base__=Section, **_MECHANISMS)
 
@@ -32,9 +43,15 @@ _Mechanisms: Any = create_model("wear", __base__=Section, **_MECHANISMS)
 class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughens are those of MECHANISMS
     """[wear]: law and coefficients of removal, flattening, what roughens, and how time is cut into jumps."""
 
-    law: Annotated[Section, one_of_table(REMOVAL_LAWS), Field(validate_default=True)] = cast(Section, "archard")
-    k: Annotated[tuple[_COEFFICIENT, _COEFFICIENT], PAIRED]  # of each body: 1/Pa, or "mild", "moderate", "severe"
-    scatter: Annotated[float, Strict(), Field(ge=0.0, le=10.0)] = SCATTER  # of a stated k: deviation of its logarithm
+    law: Annotated[Section, one_of_table(REMOVAL_LAWS), Field(validate_default=True)] = cast(
+        Section, "archard"
+    )
+    k: Annotated[
+        tuple[_COEFFICIENT, _COEFFICIENT], PAIRED
+    ]  # of each body: 1/Pa, or "mild", "moderate", "severe"
+    scatter: Annotated[float, Strict(), Field(ge=0.0, le=10.0)] = (
+        SCATTER  # of a stated k: deviation of its logarithm
+    )
     flattening: Annotated[bool, Strict()] = False  # what is pressed flat stays flat
     overrolling: Annotated[tuple[_FREQUENCY, _FREQUENCY] | None, PAIRED, OPTIONAL] = None
     patches: Count | None = None
@@ -47,10 +64,14 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughe
         def coefficient(stated: Any) -> Coefficient:
             if not isinstance(stated, str):
                 known = Coefficient.stated(plain(stated), self.scatter)
-                law.equal_to_archard(known.k, boundary_friction if known.k else 1.0)  # which refuses what cannot wear
+                law.equal_to_archard(
+                    known.k, boundary_friction if known.k else 1.0
+                )  # which refuses what cannot wear
                 return known
             middle = Coefficient.of_class(stated, conditions.hardness)  # type: ignore[arg-type]
-            return Coefficient(law.equal_to_archard(middle.k, boundary_friction), middle.low, middle.high)
+            return Coefficient(
+                law.equal_to_archard(middle.k, boundary_friction), middle.low, middle.high
+            )
 
         first, second = map(coefficient, self.k)
         overrolling = plain(self.overrolling)
@@ -60,7 +81,11 @@ class WearSection(_Mechanisms):  # type: ignore[misc]  # the keys of what roughe
             law=law,
             coefficients=(first, second),
             flattening=self.flattening,
-            mechanisms={name: _made(one, MECHANISMS[name]) for name, one in chosen.items() if one is not None},
+            mechanisms={
+                name: _made(one, MECHANISMS[name])
+                for name, one in chosen.items()
+                if one is not None
+            },
             overrolling=overrolling,
             patches=self.patches,
             step=self.step,

@@ -1,23 +1,23 @@
 """The command line: parses, calls, prints. No physics. One module a group of commands.
 
-The first line of the output is the verdict; `--json` prints one object and nothing else; progress goes to stderr.
-Exit codes: 0 done, 2 bad input or usage, 1 anything else; of `track` and `watch` 3 an alarm (of
-`infer --forecast`, too), 4 they cannot tell, 5 sensor or machine off.
+The first line of the output is the verdict; `--json` prints one object and nothing else; progress
+goes to stderr. Exit codes: 0 done, 2 bad input or usage, 1 anything else; of `track` and `watch` 3
+an alarm (of `infer --forecast`, too), 4 they cannot tell, 5 sensor or machine off.
 """
 
-from asperity.cli import (  # each adds its commands
+from asperity.cli import (
     benchmark,
     contact,
-    exploration,
     friction,
     infer,
-    live,
     machine,
     motion,
     new,
+    page,
     pages,
     recordings,
     rig,
+    sensitivity,
     store,
     study,
     surface,
@@ -30,17 +30,17 @@ __all__ = [
     "app",
     "benchmark",
     "contact",
-    "exploration",
     "friction",
     "infer",
-    "live",
     "machine",
     "main",
     "motion",
     "new",
+    "page",
     "pages",
     "recordings",
     "rig",
+    "sensitivity",
     "store",
     "study",
     "surface",

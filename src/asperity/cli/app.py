@@ -11,11 +11,11 @@ from typing import Annotated
 import typer
 
 import asperity
-from asperity import quantities
 from asperity.cli.options import with_flags
-from asperity.errors import AsperityError, BadInput
-from asperity.processes import save_time
-from asperity.quiet import printable
+from asperity.core import quantities
+from asperity.core.errors import AsperityError, BadInput
+from asperity.core.processes import save_time
+from asperity.core.third_party import printable
 
 INTERRUPTED = 130  # what typer makes of Ctrl-C
 LONGEST = 480  # characters of a complaint
@@ -52,7 +52,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except typer.Abort:  # what typer makes of a library that met the end of a file
         code = _complain("a file ended before it should; read or copy it again", 1)
     except typer.TyperException as error:  # usage
-        code = _complain(f"{error.format_message().rstrip('.')}; asperity --help says what there is", error.exit_code)
+        code = _complain(
+            f"{error.format_message().rstrip('.')}; asperity --help says what there is",
+            error.exit_code,
+        )
     except OSError as error:
         if error.filename is not None:
             raise
@@ -62,7 +65,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _complain(sentence: str, code: int) -> int:
     shown = printable(sentence)
-    print(f"error: {shown if len(shown) <= LONGEST else f'{shown[: LONGEST - 3]}...'}", file=sys.stderr)
+    print(
+        f"error: {shown if len(shown) <= LONGEST else f'{shown[: LONGEST - 3]}...'}",
+        file=sys.stderr,
+    )
     return code
 
 
@@ -71,7 +77,9 @@ def _unheard(error: OSError) -> int:
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - for what exits write
     if isinstance(error, BrokenPipeError):  # whoever listened has heard enough
         return 1
-    return _complain(f"the output could not be written: {error.strerror}; what --out names is whole", 1)
+    return _complain(
+        f"the output could not be written: {error.strerror}; what --out names is whole", 1
+    )
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
@@ -96,7 +104,7 @@ def _show_version(context: typer.Context, requested: bool) -> None:
     if requested:
         print(f"asperity {asperity.__version__}")
         if "--verbose" in context.obj:
-            from asperity.cli.about import about
+            from asperity.cli.version_info import about
 
             print(*about(), sep="\n")
         raise typer.Exit
@@ -105,7 +113,8 @@ def _show_version(context: typer.Context, requested: bool) -> None:
 @app.callback()
 def _asperity(
     _version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
     _verbose: Annotated[
         bool, typer.Option("--verbose", help="With --version: what a bug report needs to know.")

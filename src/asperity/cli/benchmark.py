@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from asperity import benchmark as held
-from asperity import files, report
+from asperity import report
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, require_output
-from asperity.cli.show import Block, columns, progress, show, written
+from asperity.cli.output import Block, columns, progress, show, written
+from asperity.core import files
 
 if TYPE_CHECKING:
     from asperity.benchmark import BenchmarkResult
@@ -18,16 +19,25 @@ if TYPE_CHECKING:
 @app.command()
 def benchmark(
     solver: Annotated[
-        str, typer.Option(metavar="NAME", help="asperity, tamaas, contactmechanics, or package.module:thing.")
+        str,
+        typer.Option(
+            metavar="NAME", help="asperity, tamaas, contactmechanics, or package.module:thing."
+        ),
     ] = "asperity",
     cells: Annotated[
-        list[int] | None, typer.Option(metavar="N", help="Cells along x; repeat. By default 64 and 128.")
+        list[int] | None,
+        typer.Option(metavar="N", help="Cells along x; repeat. By default 64 and 128."),
     ] = None,
     cases: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of cases, in place of those that come with asperity.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder of cases, in place of those that come with asperity."
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="CSV", help="Write every row.")] = None,
-    figure: Annotated[Path | None, typer.Option(metavar="PNG|PDF", help="Draw error over time.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="PNG|PDF", help="Draw error over time.")
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -37,8 +47,12 @@ def benchmark(
     if figure is not None:
         files.require_writable(figure)
     chosen = held.solver_named(solver)
-    with progress("benchmark", "solving ...", quiet=quiet, compiles=solver == "asperity") as display:
-        result = held.run_benchmark(chosen, folder=cases, cells=cells or (64, 128), progress=display)
+    with progress(
+        "benchmark", "solving ...", quiet=quiet, compiles=solver == "asperity"
+    ) as display:
+        result = held.run_benchmark(
+            chosen, folder=cases, cells=cells or (64, 128), progress=display
+        )
     kept = [] if out is None else [result.save(out)]
     if figure is not None:
         kept.append(report.write_figure(report.benchmark_figure(result), figure))
@@ -69,5 +83,13 @@ def _rows(result: "BenchmarkResult") -> Block:
         for row in result.rows
         if row.cells == finest
     ]
-    heads = ["case", "quantity", "certified", f"on {finest} cells", "error [%]", "uncertainty [%]", "time [s]"]
+    heads = [
+        "case",
+        "quantity",
+        "certified",
+        f"on {finest} cells",
+        "error [%]",
+        "uncertainty [%]",
+        "time [s]",
+    ]
     yield from columns(heads, rows, left=2)

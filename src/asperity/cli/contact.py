@@ -5,12 +5,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import case, files, paper, processes, report, results
+from asperity import case, paper, report, results
 from asperity.cli.app import app
-from asperity.cli.options import Accuracy, AsJson, CaseOrRun, Overrides, Quiet, SurfaceFile, chosen_case, require_output
-from asperity.cli.show import Block, SolverSteps, known, progress, show, table, text
-from asperity.errors import AsperityError
-from asperity.quantities import quantity
+from asperity.cli.options import (
+    Accuracy,
+    AsJson,
+    CaseOrRun,
+    Overrides,
+    Quiet,
+    SurfaceFile,
+    chosen_case,
+    require_output,
+)
+from asperity.cli.output import Block, SolverSteps, known, progress, show, table, text
+from asperity.core import files, processes
+from asperity.core.errors import AsperityError
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -21,7 +31,9 @@ DEMO_SQ = ("0.5 um", "1.5 um", "3 um")
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for the case, the runs and the report.")] = Path("asperity-demo"),
+    out: Annotated[Path, typer.Option(help="Folder for the case, the runs and the report.")] = Path(
+        "asperity-demo"
+    ),
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -38,7 +50,11 @@ def demo(
     verdict = results.levels_verdict(runs)
     show(
         verdict,
-        lambda: {"verdict": verdict, "report": str(page), "runs": [run.summary() for run in runs.values()]},
+        lambda: {
+            "verdict": verdict,
+            "report": str(page),
+            "runs": [run.summary() for run in runs.values()],
+        },
         table((f"Sq {sq}", run.verdict()) for sq, run in runs.items()),
         [f"Report: {page}", f"Try next: asperity solve {case_file} --set contact.load='400 N'"],
         as_json=as_json,
@@ -46,7 +62,9 @@ def demo(
     )
     unfinished = results.not_converged(runs)
     if unfinished:
-        raise AsperityError(f"not converged at Sq {', '.join(unfinished)}; the unfinished states are in {out}")
+        raise AsperityError(
+            f"not converged at Sq {', '.join(unfinished)}; the unfinished states are in {out}"
+        )
 
 
 @app.command()
@@ -57,14 +75,22 @@ def solve(
     surfaces: Annotated[
         int | None,
         typer.Option(
-            metavar="N", min=1, help="Surfaces of its kind to solve: the numbers are means; default 5, fine grids 3."
+            metavar="N",
+            min=1,
+            help="Surfaces of its kind to solve: the numbers are means; default 5, fine grids 3.",
         ),
     ] = None,
     accuracy: Accuracy = None,
     dynamic: Annotated[
-        bool, typer.Option("--dynamic", help="Shake the solved contact: stiffness and damping over frequency, k and c.")
+        bool,
+        typer.Option(
+            "--dynamic",
+            help="Shake the solved contact: stiffness and damping over frequency, k and c.",
+        ),
     ] = False,
-    out: Annotated[Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="RUN.nc", help="Keep the run, with its case.")
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -88,7 +114,12 @@ def solve(
 
 
 def _solve(
-    chosen: "Case", *, label: str, quiet: bool, surfaces: int | None = 1, groups: tuple[str, ...] | None = None
+    chosen: "Case",
+    *,
+    label: str,
+    quiet: bool,
+    surfaces: int | None = 1,
+    groups: tuple[str, ...] | None = None,
 ) -> "Run":
     """A run, marked where it did not converge."""
     chosen.surface()  # made or read here: it may take seconds, which are not the solver's

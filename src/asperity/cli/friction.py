@@ -18,9 +18,9 @@ from asperity.cli.options import (
     chosen_case,
     require_output,
 )
-from asperity.cli.show import Block, columns, show, solver_progress, text, written
-from asperity.errors import AsperityError
-from asperity.quantities import quantity
+from asperity.cli.output import Block, columns, show, solver_progress, text, written
+from asperity.core.errors import AsperityError
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -32,7 +32,10 @@ def stribeck(
     path: CaseOrRun,
     speed: Annotated[
         list[float] | None,
-        typer.Option(metavar="M/S", help="An entrainment speed; may be repeated. By default 13 around the case's."),
+        typer.Option(
+            metavar="M/S",
+            help="An entrainment speed; may be repeated. By default 13 around the case's.",
+        ),
     ] = None,
     sq: Roughness = None,
     overrides: Overrides = None,
@@ -53,7 +56,10 @@ def traction(
     path: CaseOrRun,
     slip: Annotated[
         list[float] | None,
-        typer.Option(metavar="RATIO", help="A slide-to-roll ratio; may be repeated. By default 15 from 0 to 0.5."),
+        typer.Option(
+            metavar="RATIO",
+            help="A slide-to-roll ratio; may be repeated. By default 15 from 0 to 0.5.",
+        ),
     ] = None,
     sq: Roughness = None,
     overrides: Overrides = None,
@@ -71,7 +77,9 @@ def traction(
 
 def _cases(path: Path, roughness: list[str] | None, overrides: list[str] | None) -> "list[Case]":
     chosen = chosen_case(path, overrides)
-    return [chosen.with_overrides({"surface.sq": sq}) for sq in roughness] if roughness else [chosen]
+    return (
+        [chosen.with_overrides({"surface.sq": sq}) for sq in roughness] if roughness else [chosen]
+    )
 
 
 def _friction_command(
@@ -107,7 +115,9 @@ def _friction_command(
     )
     unfinished = sum(not point.converged for drawn in curves for point in drawn.points)
     if unfinished:
-        raise AsperityError(f"not converged at {unfinished} points, which are marked; do not use them")
+        raise AsperityError(
+            f"not converged at {unfinished} points, which are marked; do not use them"
+        )
 
 
 def _points(curve: "FrictionCurve") -> Block:
@@ -117,5 +127,11 @@ def _points(curve: "FrictionCurve") -> Block:
     yield f"  Sq {text('sq_m', curve.sq)}{', heat fed back' if curve.feedback else ''}"
     yield from columns(
         [*(entry.label for entry in selected), ""],
-        ([*(entry.number_in(row) for entry in selected), "" if row["converged"] else "NOT CONVERGED"] for row in rows),
+        (
+            [
+                *(entry.number_in(row) for entry in selected),
+                "" if row["converged"] else "NOT CONVERGED",
+            ]
+            for row in rows
+        ),
     )

@@ -6,47 +6,72 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from asperity import ageing, inference, processes, report
+from asperity import inference, report, simulation
 from asperity import surface as surfaces
 from asperity.cli import options
-from asperity.cli.ahead import contacts_solved, emulated, require_forecast
 from asperity.cli.app import app
+from asperity.cli.forecast import contacts_solved, emulated, require_forecast
 from asperity.cli.options import AsJson, Overrides, Page, Quiet, chosen_case, require_output
+from asperity.cli.output import Block, columns, progress, show, table, written
 from asperity.cli.recordings import EXIT_CODES
-from asperity.cli.show import Block, columns, progress, show, table, written
-from asperity.errors import BadInput, require_choice
-from asperity.quantities import quantity
+from asperity.core import processes
+from asperity.core.errors import BadInput, require_choice
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.ageing import WearHistory
-    from asperity.inference import Design, Emulator, Forecast, Inference, Limit, Listened, Sampler, Setting
-    from asperity.wear import SeriesMethod
+    from asperity.inference import (
+        Design,
+        Emulator,
+        Forecast,
+        Inference,
+        Limit,
+        Listened,
+        Sampler,
+        Setting,
+    )
+    from asperity.resonance import SeriesMethod
+    from asperity.simulation import WearHistory
 
 
 @app.command()
 def infer(
     paths: Annotated[
-        list[Path] | None, typer.Argument(metavar="[FILE...]", help="Recordings, or folders of them.")
+        list[Path] | None,
+        typer.Argument(metavar="[FILE...]", help="Recordings, or folders of them."),
     ] = None,
     case_file: Annotated[
         Path | None,
-        typer.Option("--case", metavar="CASE.toml", help="The contact; its [infer] says what is not known."),
+        typer.Option(
+            "--case", metavar="CASE.toml", help="The contact; its [infer] says what is not known."
+        ),
     ] = None,
     overrides: Overrides = None,
     surface: options.SurfaceFile = None,
     table_file: Annotated[
         Path | None,
-        typer.Option("--table", metavar="CSV", help="Columns file, load_n, entrainment_m_s, temperature_degc."),
+        typer.Option(
+            "--table",
+            metavar="CSV",
+            help="Columns file, load_n, entrainment_m_s, temperature_degc.",
+        ),
     ] = None,
     emulator: options.EmulatorFolder = None,
     extend: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Solve up to N further points where the posterior is; kept.")
+        int,
+        typer.Option(
+            metavar="N", min=0, help="Solve up to N further points where the posterior is; kept."
+        ),
     ] = 0,
-    sampler: Annotated[str, typer.Option(help="importance, or nested (dynesty), which takes minutes.")] = "importance",
+    sampler: Annotated[
+        str, typer.Option(help="importance, or nested (dynesty), which takes minutes.")
+    ] = "importance",
     forecast: options.ForecastLimit = None,
     worn: options.Worn = None,
     design: Annotated[
-        float | None, typer.Option(metavar="CLR", help="What keeps the load share below it, such as 0.3; alone, too.")
+        float | None,
+        typer.Option(
+            metavar="CLR", help="What keeps the load share below it, such as 0.3; alone, too."
+        ),
     ] = None,
     seed: options.SampleSeed = 0,
     rate: options.Rate = None,
@@ -62,20 +87,31 @@ def infer(
     quiet: Quiet = False,
 ) -> None:
     """Say what recordings tell of a contact, with intervals, what they cannot tell, and what to run next."""
-    case_file = _required(case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design)
+    case_file = _required(
+        case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
+    )
     setting, known = _setting(case_file, overrides, surface)
     limit = None if forecast is None else inference.read_limit(forecast, setting)
     if limit is not None:
         inference.require_limit(setting, limit, worn=worn is not None)
-    history = None if worn is None else ageing.load_wear(worn)
+    history = None if worn is None else simulation.load_wear(worn)
     require_output(page, ".html", option="--report")
     count, heard = workers or processes.cores(), inference.Listened()
     if paths:
         with progress("recordings", "reading recordings ...", quiet=quiet):
             heard = inference.listen(
-                paths, setting, table=table_file, band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale,
-                shaft_hz=shaft or None, method=cast("SeriesMethod | None", method), workers=count,
-            )  # fmt: skip
+                paths,
+                setting,
+                table=table_file,
+                band_hz=band,
+                rate_hz=rate,
+                unit=unit,
+                channel=channel,
+                scale=scale,
+                shaft_hz=shaft or None,
+                method=cast("SeriesMethod | None", method),
+                workers=count,
+            )
     answering = emulated(setting, emulator, count, quiet=quiet)
     ahead = _forecast(setting, answering, heard, limit, history, seed)
     latest = inference.latest(heard) if ahead is not None and ahead.told else heard
@@ -86,7 +122,11 @@ def infer(
         found = inference.with_further(found, extend, sampler=by, workers=count, progress=step)
     if found.emulator is not answering:
         ahead = _forecast(setting, found.emulator, heard, limit, history, seed)
-    kept = None if design is None else inference.design_contact(found.forward, found.draws.z, clr=design)
+    kept = (
+        None
+        if design is None
+        else inference.design_contact(found.forward, found.draws.z, clr=design)
+    )
     if page is not None:
         report.write_inference_report(found, page, forecast=ahead, design=kept)
     _show(found, ahead, kept, page, as_json=as_json, quiet=quiet)
@@ -127,7 +167,9 @@ def _forecast(
     return inference.forecast_heard(setting, emulator, heard, limit, worn=history, seed=seed)
 
 
-def _setting(path: Path, overrides: list[str] | None, surface: Path | None) -> tuple["Setting", tuple[str, ...]]:
+def _setting(
+    path: Path, overrides: list[str] | None, surface: Path | None
+) -> tuple["Setting", tuple[str, ...]]:
     """What is to be inferred, Sq as a surface was measured where one is given, and a note of that."""
     setting = inference.setting_of(chosen_case(path, overrides))
     if surface is None:
@@ -153,7 +195,13 @@ def _show(
         "report": None if page is None else str(page),
     }
     blocks = (_told(found), _points(found), _models(found), _notes(found), written("report", page))
-    show([*asked, found.verdict()], lambda: found.scalars() | told, *blocks, as_json=as_json, quiet=quiet)
+    show(
+        [*asked, found.verdict()],
+        lambda: found.scalars() | told,
+        *blocks,
+        as_json=as_json,
+        quiet=quiet,
+    )
     if ahead is not None and ahead.alarm:
         raise typer.Exit(EXIT_CODES["alarm"])
 
@@ -174,9 +222,7 @@ def _told(found: "Inference") -> Block:
             ]
         )
     point = found.forward.points[0]
-    place = (
-        f"at {quantity('load_n').text(point.load_n)}, {quantity('entrainment_speed_m_s').text(point.entrainment_m_s)}"
-    )
+    place = f"at {quantity('load_n').text(point.load_n)}, {quantity('entrainment_speed_m_s').text(point.entrainment_m_s)}"
     yield from columns([place, "median", "90 %", "90 %, laws exact", "bits", ""], rows, left=1)
 
 

@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from asperity import case, files, report, study
+from asperity import case, machines, report
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, OutFolder, Overrides, Quiet, Workers, read_overrides
-from asperity.cli.show import Block, Row, columns, progress, show, table
+from asperity.cli.output import Block, Row, columns, progress, show, table
 from asperity.cli.study import study_progress
-from asperity.errors import AsperityError
-from asperity.quantities import quantity
+from asperity.core import files
+from asperity.core.errors import AsperityError
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.quantities import Quantity
-    from asperity.study import MachineResult
+    from asperity.core.quantities import Quantity
+    from asperity.machines import MachineResult
 
 RESULT, PAGE, WORST_PAGE = "machine.json", "machine.html", "worst.html"
 CONDITIONS = (  # key of a row, and of the quantity that says how it is shown
@@ -27,26 +28,39 @@ CONDITIONS = (  # key of a row, and of the quantity that says how it is shown
     ("slide_to_roll", "slide_to_roll"),
     ("p_hertz_pa", "hertz_pressure_pa"),
 )
-SOLVED = ("h_central_m", "lambda_ratio", "clr", "car", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
+SOLVED = (
+    "h_central_m",
+    "lambda_ratio",
+    "clr",
+    "car",
+    "friction_coefficient",
+    "flash_temperature_max_k",
+    "crf_hz",
+)
 
 
 @app.command("machine")
 def machine_command(
-    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="A case with a [machine] in place of [contact].")],
+    path: Annotated[
+        Path,
+        typer.Argument(metavar="CASE.toml", help="A case with a [machine] in place of [contact]."),
+    ],
     out: OutFolder = None,
     workers: Workers = None,
     overrides: Overrides = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say the contacts' conditions; solve nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say the contacts' conditions; solve nothing.")
+    ] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Solve every contact of a machine: film, load sharing, friction, temperature, and which is worst."""
     chosen = case.load_machine(path, read_overrides(overrides))
     if dry_run:
-        result = study.machine_conditions(chosen)
+        result = machines.machine_conditions(chosen)
     else:
         with study_progress(path.name, quiet=quiet) as step:
-            result = study.solve_machine(chosen, out=out, workers=workers, progress=step)
+            result = machines.solve_machine(chosen, out=out, workers=workers, progress=step)
         if out is not None:
             _keep(result, out, quiet=quiet)
     show(
@@ -76,8 +90,12 @@ def _keep(result: "MachineResult", out: Path, *, quiet: bool) -> None:
     files.write_text(out / RESULT, json.dumps(result.scalars(), indent=2, allow_nan=False))
     with progress("the machine's page", quiet=quiet):
         if result.run is not None:
-            report.write_report([result.run], out / WORST_PAGE, title=f"{result.worst['name']}: the worst contact")
-        report.write_machine_report(result, out / PAGE, opened=None if result.run is None else WORST_PAGE)
+            report.write_report(
+                [result.run], out / WORST_PAGE, title=f"{result.worst['name']}: the worst contact"
+            )
+        report.write_machine_report(
+            result, out / PAGE, opened=None if result.run is None else WORST_PAGE
+        )
 
 
 def _ratings(result: "MachineResult") -> Iterator[Row]:
@@ -91,7 +109,10 @@ def _ratings(result: "MachineResult") -> Iterator[Row]:
         elif rating.alone is not None:
             yield entry.title, f"{entry.text(rating.alone)}  ({rating.standard}{beyond})"
         else:
-            yield entry.title, f"{entry.number(min(known))} to {entry.text(max(known))}  ({rating.standard}{beyond})"
+            yield (
+                entry.title,
+                f"{entry.number(min(known))} to {entry.text(max(known))}  ({rating.standard}{beyond})",
+            )
 
 
 def _contacts(result: "MachineResult") -> Block:
@@ -114,7 +135,10 @@ def _number(row: dict[str, Any], key: str, entry: "Quantity") -> str:
 
 def _frequencies(result: "MachineResult") -> list[Row]:
     found: dict[str, Any] = result.case.machine.frequencies
-    return [(key.removesuffix("_hz").replace("_", " "), f"{value:.4g} Hz") for key, value in found.items()]
+    return [
+        (key.removesuffix("_hz").replace("_", " "), f"{value:.4g} Hz")
+        for key, value in found.items()
+    ]
 
 
 def _unsolved(result: "MachineResult") -> Sequence[str]:

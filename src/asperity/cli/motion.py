@@ -5,39 +5,59 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import history, report
+from asperity import report, simulation
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, OutFolder, Overrides, Page, Quiet, SurfaceFile, chosen_case, require_output
-from asperity.cli.show import Block, Row, progress, show, table, text, written
-from asperity.errors import AsperityError, BadInput, NotConverged
-from asperity.quantities import catalogue, quantity
+from asperity.cli.options import (
+    AsJson,
+    OutFolder,
+    Overrides,
+    Page,
+    Quiet,
+    SurfaceFile,
+    chosen_case,
+    require_output,
+)
+from asperity.cli.output import Block, Row, progress, show, table, text, written
+from asperity.core.errors import AsperityError, BadInput, NotConverged
+from asperity.core.quantities import catalogue, quantity
 
 if TYPE_CHECKING:
-    from asperity.history import History, HistoryProgress
+    from asperity.simulation import History, HistoryProgress
 
 COMPILES = "the start; after installation the first solve compiles the solver, up to a minute ..."
 
 
 @app.command()
 def run(
-    path: Annotated[Path, typer.Argument(metavar="CASE.toml", help="A case; its [motion] says how it moves.")],
+    path: Annotated[
+        Path, typer.Argument(metavar="CASE.toml", help="A case; its [motion] says how it moves.")
+    ],
     steps: Annotated[
-        int | None, typer.Option(metavar="N", help="Number of the last step; by default the case's.")
+        int | None,
+        typer.Option(metavar="N", help="Number of the last step; by default the case's."),
     ] = None,
     passes: Annotated[
-        float | None, typer.Option(metavar="P", help="In place of --steps: how often the rough surface runs its track.")
+        float | None,
+        typer.Option(
+            metavar="P", help="In place of --steps: how often the rough surface runs its track."
+        ),
     ] = None,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     out: OutFolder = None,
     every: Annotated[
-        int | None, typer.Option(metavar="K", help="Keep maps of every K steps; by default about 40 in all.")
+        int | None,
+        typer.Option(metavar="K", help="Keep maps of every K steps; by default about 40 in all."),
     ] = None,
     keep_going: Annotated[
-        bool, typer.Option("--keep-going", help="Mark a step that does not converge, and go on from it.")
+        bool,
+        typer.Option("--keep-going", help="Mark a step that does not converge, and go on from it."),
     ] = False,
     listen: Annotated[
-        bool, typer.Option("--listen", help="Let the mass ride on the history, by the contact's own stiffness.")
+        bool,
+        typer.Option(
+            "--listen", help="Let the mass ride on the history, by the contact's own stiffness."
+        ),
     ] = False,
     page: Page = None,
     as_json: AsJson = False,
@@ -47,22 +67,36 @@ def run(
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
     if steps is not None and passes is not None:
-        raise BadInput(f"--steps {steps} and --passes {passes:g} both say how long to run; leave one out")
+        raise BadInput(
+            f"--steps {steps} and --passes {passes:g} both say how long to run; leave one out"
+        )
     failure = None
     try:
         with progress(path.name, COMPILES, quiet=quiet) as display:
 
             def step(taken: "HistoryProgress") -> None:
-                display(f"step {taken.number} of {taken.steps}, {_clr(taken)}", taken.number, taken.steps)
+                display(
+                    f"step {taken.number} of {taken.steps}, {_clr(taken)}",
+                    taken.number,
+                    taken.steps,
+                )
 
-            moved = history.run_history(
-                chosen, steps=steps, passes=passes, out=out, every=every, strict=not keep_going, progress=step
+            moved = simulation.run_history(
+                chosen,
+                steps=steps,
+                passes=passes,
+                out=out,
+                every=every,
+                strict=not keep_going,
+                progress=step,
             )
     except NotConverged as unfinished:
-        if not isinstance(unfinished.solution, history.History):  # there was no snapshot to start from
+        if not isinstance(
+            unfinished.solution, simulation.History
+        ):  # there was no snapshot to start from
             raise
         moved, failure = unfinished.solution, str(unfinished)
-    vibration = history.history_vibration(moved) if listen and failure is None else None
+    vibration = simulation.history_vibration(moved) if listen and failure is None else None
     if page is not None:
         report.write_motion_report(moved, page, vibration=vibration)
     added = {} if vibration is None else vibration.scalars()
@@ -94,7 +128,10 @@ def _history_table(moved: "History") -> Block:
     """Means over the settled steps with their deviations over time, and where they began."""
     values, motion = moved.scalars(), moved.case.motion
     rows: list[Row] = [
-        ("steps, of which computed now", f"{moved.steps}, {moved.computed} in {text('seconds', moved.seconds)}"),
+        (
+            "steps, of which computed now",
+            f"{moved.steps}, {moved.computed} in {text('seconds', moved.seconds)}",
+        ),
         (
             quantity("step_s").title,
             f"{text('step_s', values['step_s'])}, {motion.time_step:g} of the oil's way from cell to cell; "
@@ -105,11 +142,20 @@ def _history_table(moved: "History") -> Block:
     for entry in catalogue().values():
         if f"{entry.key}_std" in values and f"{entry.key}_start" in values:
             mean = entry.text(values[entry.key], values[f"{entry.key}_std"])
-            rows.append((entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})"))
+            rows.append(
+                (entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})")
+            )
     passes = values.get("passes", [])
     for lap in passes[:: max(1, len(passes) - 1)]:
         selected = [quantity(key) for key in ("clr", "car", "track_sq_m")]
-        rows.append((f"pass {lap['pass']}", ", ".join(f"{entry.short} {entry.text_in(lap)}" for entry in selected)))
+        rows.append(
+            (
+                f"pass {lap['pass']}",
+                ", ".join(f"{entry.short} {entry.text_in(lap)}" for entry in selected),
+            )
+        )
     if values["crf_hz"] is not None:
-        rows.append((f"{quantity('crf_hz').title}, of the mean contact", text("crf_hz", values["crf_hz"])))
+        rows.append(
+            (f"{quantity('crf_hz').title}, of the mean contact", text("crf_hz", values["crf_hz"]))
+        )
     yield from table(rows, moved.notes)

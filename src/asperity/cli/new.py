@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-from asperity import case, files
+from asperity import case
 from asperity.cli.app import app
-from asperity.errors import BadInput, require_choice
+from asperity.core import files
+from asperity.core.errors import BadInput, require_choice
 
 NEXT = {"wear": "wear {} --hours 1"}  # by kind of case, where it is not to solve it
 
@@ -15,9 +16,15 @@ NEXT = {"wear": "wear {} --hours 1"}  # by kind of case, where it is not to solv
 @app.command()
 def new(
     kind: Annotated[
-        str, typer.Argument(metavar="KIND", help="line, point, elliptic, roller, dry, measured, motion, study or wear.")
+        str,
+        typer.Argument(
+            metavar="KIND",
+            help="line, point, elliptic, roller, dry, measured, motion, study or wear.",
+        ),
     ],
-    out: Annotated[Path | None, typer.Option(metavar="CASE.toml", help="File to write; default: KIND.toml.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="CASE.toml", help="File to write; default: KIND.toml.")
+    ] = None,
 ) -> None:
     """Write a commented case to start from."""
     require_choice("kind of case", kind, case.KINDS)

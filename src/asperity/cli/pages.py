@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from asperity import ageing, history, paper, report, results, study
+from asperity import paper, report, results, simulation, study
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, StudyFigures, require_output
-from asperity.cli.show import progress, show, written
-from asperity.errors import BadInput
+from asperity.cli.output import progress, show, written
+from asperity.core.errors import BadInput
 
 
 @app.command("report")
@@ -22,11 +22,17 @@ def report_command(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(metavar="OUT.html", help="The page; by default beside the run, or in the folder.")
+        Path | None,
+        typer.Option(
+            metavar="OUT.html", help="The page; by default beside the run, or in the folder."
+        ),
     ] = None,
     figures: StudyFigures = None,
     anchors: Annotated[
-        Path | None, typer.Option(metavar="FILE.toml", help="Of a study: numbers that it should meet, not the paper's.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.toml", help="Of a study: numbers that it should meet, not the paper's."
+        ),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -34,9 +40,11 @@ def report_command(
     """Make one self-contained HTML page of one run, of several, of a study, of a history or of wear."""
     folders = [path for path in paths if path.is_dir()]
     if folders and len(paths) > 1:
-        raise BadInput(f"a study's page holds nothing else, got {len(paths)} paths; name {folders[0]} alone")
-    of_wear = bool(folders) and ageing.is_wear(folders[0])
-    of_study = bool(folders) and not of_wear and not history.is_history(folders[0])
+        raise BadInput(
+            f"a study's page holds nothing else, got {len(paths)} paths; name {folders[0]} alone"
+        )
+    of_wear = bool(folders) and simulation.is_wear(folders[0])
+    of_study = bool(folders) and not of_wear and not simulation.is_history(folders[0])
     if not of_study and (figures is not None or anchors is not None):
         option = "--figures" if figures is not None else "--anchors"
         raise BadInput(f"{option} is for a study's folder, got {paths[0]}; name the folder")
@@ -67,7 +75,7 @@ def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) ->
 
 
 def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
-    kept = history.load_history(folder)
+    kept = simulation.load_history(folder)
     report.write_motion_report(kept, out)
     show(
         kept.verdict(),
@@ -79,7 +87,7 @@ def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> N
 
 
 def _report_wear(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
-    kept = ageing.load_wear(folder)
+    kept = simulation.load_wear(folder)
     report.write_wear_report(kept, out)
     show(
         kept.verdict(),
@@ -91,7 +99,13 @@ def _report_wear(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None
 
 
 def _report_study(
-    folder: Path, out: Path, figures: Path | None, anchors: Path | None, *, as_json: bool, quiet: bool
+    folder: Path,
+    out: Path,
+    figures: Path | None,
+    anchors: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     chosen = None if anchors is None else paper.load_anchors(anchors)
     result = study.load_study(folder)

@@ -8,20 +8,26 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from asperity import files, processes, recording, report, tracking, wear
+from asperity import monitoring, recording, report, trend
 from asperity.cli import options
-from asperity.cli.ahead import follower
 from asperity.cli.app import app
+from asperity.cli.forecast import follower
 from asperity.cli.options import AsJson, Quiet, contact_at, require_output
-from asperity.cli.show import Block, Row, columns, progress, show, span, table, text, written
-from asperity.errors import BadInput
-from asperity.quantities import NO_VALUE, quantity
+from asperity.cli.output import Block, Row, columns, progress, show, span, table, text, written
+from asperity.core import files, processes
+from asperity.core.errors import BadInput
+from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.tracking import CheckedRecording, Reading, RecordingChecks, Track, Update
-    from asperity.wear import AlarmState, SeriesMethod, StageSource
+    from asperity.monitoring import CheckedRecording, Reading, RecordingChecks, Track, Update
+    from asperity.resonance import SeriesMethod
+    from asperity.trend import AlarmState, StageSource
 
-EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # of the alarm's state; the others end with 0
+EXIT_CODES = {
+    "alarm": 3,
+    "cannot-tell": 4,
+    "blind": 5,
+}  # of the alarm's state; the others end with 0
 PAGE = "report.html"
 IN_FULL = 4  # recordings that `check` shows with every fact
 
@@ -33,7 +39,11 @@ def check(
     ] = None,
     data_set: Annotated[
         Path | None,
-        typer.Option("--set", metavar="DIR", help="Say whether a folder is a set of data that others can use."),
+        typer.Option(
+            "--set",
+            metavar="DIR",
+            help="Say whether a folder is a set of data that others can use.",
+        ),
     ] = None,
     rate: options.Rate = None,
     unit: options.Unit = None,
@@ -47,20 +57,34 @@ def check(
     """Say what recordings hold: rate, unit, length, channels, gaps, clipping, offset, machine off, too short."""
     if data_set is not None:
         if paths:
-            raise BadInput(f"--set {data_set} takes no recordings beside it; its {tracking.STATED} names them")
+            raise BadInput(
+                f"--set {data_set} takes no recordings beside it; its {monitoring.STATED} names them"
+            )
         _show_set(data_set, as_json=as_json, quiet=quiet)
         return
     if not paths:
         raise BadInput("check takes recordings, or --set and the folder of a set of data; name one")
-    checks = tracking.check_recordings(
-        paths, case=contact_at(case_file), band_hz=band, rate_hz=rate, unit=unit, channel=channel, scale=scale
+    checks = monitoring.check_recordings(
+        paths,
+        case=contact_at(case_file),
+        band_hz=band,
+        rate_hz=rate,
+        unit=unit,
+        channel=channel,
+        scale=scale,
     )
     if checks.checked or as_json:
-        in_full = [_in_full(checked) for checked in checks.checked] if len(checks.checked) <= IN_FULL else []
+        in_full = (
+            [_in_full(checked) for checked in checks.checked]
+            if len(checks.checked) <= IN_FULL
+            else []
+        )
         show(
             checks.verdict(),
             checks.scalars,
-            [f"  for a resonance {text('width_hz', checks.target.width_hz)} wide in {checks.target.source}"],
+            [
+                f"  for a resonance {text('width_hz', checks.target.width_hz)} wide in {checks.target.source}"
+            ],
             *(in_full or [_in_lines(checks)]),
             as_json=as_json,
             quiet=quiet,
@@ -71,7 +95,7 @@ def check(
 
 def _show_set(folder: Path, *, as_json: bool, quiet: bool) -> None:
     """What a folder lacks of a set, a line each; exit code 2 unless it is one."""
-    found = tracking.check_set(folder)
+    found = monitoring.check_set(folder)
     lines = [f"  missing: {sentence}" for sentence in found.missing]
     show(found.verdict(), lambda: found.scalars(), lines, as_json=as_json, quiet=quiet)
     if not found.whole:
@@ -86,13 +110,19 @@ def _in_full(checked: "CheckedRecording") -> Block:
     level = ", ".join(quantity(key).number_in(values) for key in ("rms", "peak", "offset"))
     rows = [
         ("format", str(facts["format"].value)),
-        (quantity("rate_hz").title, f"{text('rate_hz', recording.rate_hz)}, stated by {facts['rate'].source}"),
+        (
+            quantity("rate_hz").title,
+            f"{text('rate_hz', recording.rate_hz)}, stated by {facts['rate'].source}",
+        ),
         *(
             (name, f"{facts[name].value}, stated by {facts[name].source}")
             for name in ("unit", "scale", "started")
             if name in facts
         ),
-        (quantity("duration_s").title, f"{text('duration_s', quality.duration_s)}, {quality.samples} samples"),
+        (
+            quantity("duration_s").title,
+            f"{text('duration_s', quality.duration_s)}, {quality.samples} samples",
+        ),
         ("rms, peak, offset", f"{level}; unit: {recording.unit}"),
     ]
     yield f"{recording.path}, channel {recording.channel.name}: {state}"
@@ -112,7 +142,9 @@ def _in_lines(checks: "RecordingChecks") -> Block:
         rows.append([name, *(entry.number_in(values) for entry in selected), values["unit"], state])
         for sentence in (*quality.faults, *quality.remarks):
             holders.setdefault(sentence, []).append(name)
-    yield from columns(["recording", *(entry.label for entry in selected), "unit", ""], rows, left=1)
+    yield from columns(
+        ["recording", *(entry.label for entry in selected), "unit", ""], rows, left=1
+    )
     for sentence, names in holders.items():
         everywhere = len(names) == len(checks.checked)
         more = f" and {len(names) - 3} more" if len(names) > 3 else ""
@@ -143,7 +175,8 @@ def track(
     sensor: options.SensorName = None,
     page: options.Page = None,
     out: Annotated[
-        list[Path] | None, typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat.")
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Write the table (.csv, .parquet) or all (.nc); repeat."),
     ] = None,
     workers: options.Workers = None,
     as_json: AsJson = False,
@@ -158,7 +191,7 @@ def track(
     count, stated = workers or processes.cores(), _as_read(rate, unit, channel, scale)
     ahead = follower(forecast, case_file, worn, emulator, workers=count, quiet=quiet)
     with _files_read("reading recordings ...", quiet=quiet) as step:
-        tracked = tracking.track_recordings(
+        tracked = monitoring.track_recordings(
             paths,
             case=contact_at(case_file),
             band_hz=band,
@@ -174,14 +207,21 @@ def track(
             progress=step,
         )
     if store is not None:
-        read, names = recording.ReadOptions(**stated), {"machine": machine, "point": point, "sensor": sensor}
-        tracked = tracking.keep_track(tracked, store, read, acknowledge=acknowledge, **names)
+        read, names = (
+            recording.ReadOptions(**stated),
+            {"machine": machine, "point": point, "sensor": sensor},
+        )
+        tracked = monitoring.keep_track(tracked, store, read, acknowledge=acknowledge, **names)
     kept = [*_write(tracked, out or (), page), *([] if store is None else [store])]
     hint = ["  Add --report track.html for the page, --out track.csv for the table."]
     show(
         tracked.verdict(),
         lambda: (
-            tracked.scalars() | {"report": None if page is None else str(page), "written": [str(path) for path in kept]}
+            tracked.scalars()
+            | {
+                "report": None if page is None else str(page),
+                "written": [str(path) for path in kept],
+            }
         ),
         _series(tracked),
         _searched(tracked),
@@ -195,15 +235,26 @@ def track(
 @app.command()
 def watch(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive.")],
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of results, else DIR/asperity-watch.")] = None,
-    once: Annotated[bool, typer.Option("--once", help="Take what is there, and end: for cron.")] = False,
-    every: Annotated[float, typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks.")] = 5.0,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of results, else DIR/asperity-watch.")
+    ] = None,
+    once: Annotated[
+        bool, typer.Option("--once", help="Take what is there, and end: for cron.")
+    ] = False,
+    every: Annotated[
+        float, typer.Option(metavar="SECONDS", min=0.05, help="Time between two looks.")
+    ] = 5.0,
     settle: Annotated[
-        float, typer.Option(metavar="SECONDS", min=0.0, help="How long a file must have stayed as it is.")
+        float,
+        typer.Option(metavar="SECONDS", min=0.0, help="How long a file must have stayed as it is."),
     ] = 2.0,
     expect: Annotated[
         float | None,
-        typer.Option(metavar="SECONDS", min=0.0, help="Blind, if none comes for so long; else 5 times the usual."),
+        typer.Option(
+            metavar="SECONDS",
+            min=0.0,
+            help="Blind, if none comes for so long; else 5 times the usual.",
+        ),
     ] = None,
     workers: options.Workers = None,
     rate: options.Rate = None,
@@ -239,7 +290,7 @@ def watch(
     pace: dict[str, Any] = {"once": once, "every_s": every, "settle_s": settle, "expect_s": expect}
     ahead = follower(forecast, case_file, worn, emulator, workers=count, quiet=quiet)
     with _files_read("watching ...", quiet=quiet) as step:
-        updates = tracking.watch_folder(
+        updates = monitoring.watch_folder(
             folder,
             kept,
             case=contact_at(case_file),
@@ -254,7 +305,7 @@ def watch(
             foreteller=ahead,
             **names,
             tell=_states(tell),
-            call=tracking.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
+            call=monitoring.callers(command=on_alarm, webhook=webhook, mqtt=mqtt),
             recall=(kept / PAGE).is_file(),
             **pace,
             workers=count,
@@ -264,7 +315,9 @@ def watch(
     _end(state)
 
 
-def _followed(updates: "Iterator[Update]", kept: Path, *, once: bool, as_json: bool, quiet: bool) -> str:
+def _followed(
+    updates: "Iterator[Update]", kept: Path, *, once: bool, as_json: bool, quiet: bool
+) -> str:
     """Write and show every update until Ctrl-C; the state of the last."""
     state = "cannot-tell"
     try:
@@ -273,18 +326,23 @@ def _followed(updates: "Iterator[Update]", kept: Path, *, once: bool, as_json: b
     except KeyboardInterrupt:
         if once:
             raise
-        print(f"stopped; what was heard is in {kept}, and the next watch goes on from there", file=sys.stderr)
+        print(
+            f"stopped; what was heard is in {kept}, and the next watch goes on from there",
+            file=sys.stderr,
+        )
     return state
 
 
-def _as_read(rate: float | None, unit: str | None, channel: str | None, scale: float | None) -> dict[str, Any]:
+def _as_read(
+    rate: float | None, unit: str | None, channel: str | None, scale: float | None
+) -> dict[str, Any]:
     """How recordings are read, by the names of the library."""
     return {"rate_hz": rate, "unit": unit, "channel": channel, "scale": scale}
 
 
 def _states(tell: str | None) -> "Sequence[AlarmState]":
     """States of which somebody is told."""
-    return wear.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(","))
+    return trend.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(","))
 
 
 def _end(state: str) -> None:
@@ -340,7 +398,9 @@ def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results
             outcome = f"no contact resonance: {row['reason']}"
         else:
             outcome = ", ".join(
-                f"{entry.short} {entry.text_in(row)}" for entry in selected if row[entry.key] is not None
+                f"{entry.short} {entry.text_in(row)}"
+                for entry in selected
+                if row[entry.key] is not None
             )
         yield f"  {Path(arrived.file).name}: {outcome}"
     yield f"  {len(recordings)} recordings so far; results in {results}"

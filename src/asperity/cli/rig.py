@@ -5,44 +5,64 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import ageing, case, paper
+from asperity import case, paper, simulation
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, case_at
-from asperity.cli.show import Row, known, progress, show, span, table
-from asperity.errors import BadInput
-from asperity.quantities import quantity
+from asperity.cli.output import Row, known, progress, show, span, table
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
-    from asperity.ageing import WearHistory
+    from asperity.simulation import WearHistory
 
 
 @app.command()
 def rig(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for recordings, table, truth and case.")],
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="New folder for recordings, table, truth and case.")
+    ],
     case_file: Annotated[
         Path | None,
         typer.Option(
-            "--case", metavar="CASE.toml", help="Solve this contact at each roughness, in place of the paper's trend."
+            "--case",
+            metavar="CASE.toml",
+            help="Solve this contact at each roughness, in place of the paper's trend.",
         ),
     ] = None,
     worn: Annotated[
         Path | None,
-        typer.Option("--wear", metavar="DIR", help="Record the contact that asperity wear --out kept, as it wears."),
+        typer.Option(
+            "--wear",
+            metavar="DIR",
+            help="Record the contact that asperity wear --out kept, as it wears.",
+        ),
     ] = None,
     hours: Annotated[
         list[float] | None,
-        typer.Option(metavar="H", help="With --wear: record it after so long; repeat. Else --samples over all of it."),
+        typer.Option(
+            metavar="H",
+            help="With --wear: record it after so long; repeat. Else --samples over all of it.",
+        ),
     ] = None,
     samples: Annotated[int, typer.Option(help="Worn rings, from Sq 0.54 to 3.49 um.")] = 12,
     repeats: Annotated[int, typer.Option(help="Tests of each ring.")] = 5,
-    duration: Annotated[str, typer.Option(metavar="TIME", help="Of each recording; the paper's are 300 s.")] = "10 s",
+    duration: Annotated[
+        str, typer.Option(metavar="TIME", help="Of each recording; the paper's are 300 s.")
+    ] = "10 s",
     rate: Annotated[str, typer.Option(metavar="FREQUENCY", help="Sampling rate.")] = "20 kHz",
     snr: Annotated[
-        float, typer.Option(metavar="DB", help="Power of the contact's line over all else in its band, in dB.")
+        float,
+        typer.Option(
+            metavar="DB", help="Power of the contact's line over all else in its band, in dB."
+        ),
     ] = 10.0,
     modes: Annotated[int, typer.Option(help="Structural modes in the contact's band.")] = 4,
-    trend: Annotated[str, typer.Option(help="CRF over roughness: knee, smooth or constant.")] = "knee",
-    file_format: Annotated[str, typer.Option("--format", help="h5 (rate and unit in the file) or wav.")] = "h5",
+    trend: Annotated[
+        str, typer.Option(help="CRF over roughness: knee, smooth or constant.")
+    ] = "knee",
+    file_format: Annotated[
+        str, typer.Option("--format", help="h5 (rate and unit in the file) or wav.")
+    ] = "h5",
     seed: Annotated[int, typer.Option(help="Of everything drawn.")] = 7,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -67,7 +87,9 @@ def rig(
             made,
             out,
             file_format=file_format,  # type: ignore[arg-type]
-            progress=lambda done, total: display(f"{done} of {total} recordings written", done, total),
+            progress=lambda done, total: display(
+                f"{done} of {total} recordings written", done, total
+            ),
         )
     show(
         paper.rig_verdict(made),
@@ -97,10 +119,12 @@ def _rows(made: "paper.Rig", out: Path) -> list[Row]:
     ]
 
 
-def _wear(worn: Path | None, hours: list[float] | None, case_file: Path | None) -> "WearHistory | None":
+def _wear(
+    worn: Path | None, hours: list[float] | None, case_file: Path | None
+) -> "WearHistory | None":
     """The wear history that is to be recorded, if any."""
     if worn is None and hours:
         raise BadInput(f"--hours {hours[0]:g} is a moment of a wear history; name one with --wear")
     if worn is not None and case_file is not None:
         raise BadInput(f"--wear {worn} brings its own case along; leave --case {case_file} out")
-    return None if worn is None else ageing.load_wear(worn)
+    return None if worn is None else simulation.load_wear(worn)

@@ -5,23 +5,29 @@ from typing import Annotated
 
 import typer
 
-from asperity import tracking
+from asperity import monitoring
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Quiet, require_output
+from asperity.cli.output import columns, show, written
 from asperity.cli.recordings import EXIT_CODES
-from asperity.cli.show import columns, show, written
-from asperity.quantities import NO_VALUE
+from asperity.core.quantities import NO_VALUE
 
 
 @app.command()
 def store(
-    file: Annotated[Path, typer.Argument(metavar="DB", help="The store of a watch or a track, such as asperity.db.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="DB", help="The store of a watch or a track, such as asperity.db."),
+    ],
     out: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Write every recording as a row (.parquet, .csv); may be repeated."),
+        typer.Option(
+            metavar="FILE", help="Write every recording as a row (.parquet, .csv); may be repeated."
+        ),
     ] = None,
     acknowledge: Annotated[
-        str | None, typer.Option(metavar="MACHINE/POINT/SENSOR", help="Somebody has looked at it, up to now.")
+        str | None,
+        typer.Option(metavar="MACHINE/POINT/SENSOR", help="Somebody has looked at it, up to now."),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -30,18 +36,25 @@ def store(
     for path in out or ():
         require_output(path, ".csv", ".parquet")
     if acknowledge is not None:
-        tracking.acknowledge_in(file, acknowledge)
-    overview = tracking.store_overview(file)
+        monitoring.acknowledge_in(file, acknowledge)
+    overview = monitoring.store_overview(file)
     kept = [overview.export(path) for path in out or ()]
     rows = [
-        [*(row[name] for name in ("machine", "point", "sensor")), str(row["recordings"]), row["state"],
-         NO_VALUE if row["since"] is None else Path(row["since"]).name, row["reason"]]
+        [
+            *(row[name] for name in ("machine", "point", "sensor")),
+            str(row["recordings"]),
+            row["state"],
+            NO_VALUE if row["since"] is None else Path(row["since"]).name,
+            row["reason"],
+        ]
         for row in overview.rows
-    ]  # fmt: skip
+    ]
     show(
         overview.verdict(),
         lambda: overview.scalars() | {"written": [str(path) for path in kept]},
-        columns(["machine", "point", "sensor", "recordings", "state", "since", "why"], rows, left=3) if rows else [],
+        columns(["machine", "point", "sensor", "recordings", "state", "since", "why"], rows, left=3)
+        if rows
+        else [],
         written("  Written", *kept),
         as_json=as_json,
         quiet=quiet,

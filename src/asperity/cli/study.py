@@ -21,9 +21,9 @@ from asperity.cli.options import (
     chosen_case,
     require_output,
 )
-from asperity.cli.show import Block, columns, progress, show, table, text
-from asperity.errors import AsperityError, BadInput
-from asperity.quantities import quantity
+from asperity.cli.output import Block, columns, progress, show, table, text
+from asperity.core.errors import AsperityError, BadInput
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
     from asperity.study import StudyCost, StudyPlan, StudyProgress, StudyResult, WearCurve
@@ -38,18 +38,27 @@ def study_command(
     out: OutFolder = None,
     workers: Workers = None,
     executor: Annotated[
-        str | None, typer.Option(metavar="dask:ADDRESS", help="Compute on a dask scheduler's workers.")
+        str | None,
+        typer.Option(metavar="dask:ADDRESS", help="Compute on a dask scheduler's workers."),
     ] = None,
-    shard: Annotated[str, typer.Option(metavar="k/N", help="Compute the k-th of N equal shares.")] = "1/1",
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed cases again.")] = False,
+    shard: Annotated[
+        str, typer.Option(metavar="k/N", help="Compute the k-th of N equal shares.")
+    ] = "1/1",
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Compute failed cases again.")
+    ] = False,
     merge: Annotated[
-        list[Path] | None, typer.Option(metavar="DIR", help="Take over the cases of another folder of this study.")
+        list[Path] | None,
+        typer.Option(metavar="DIR", help="Take over the cases of another folder of this study."),
     ] = None,
     fields: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Maps to keep: pressure,gap,in_contact,surface_height.")
+        str | None,
+        typer.Option(metavar="NAMES", help="Maps to keep: pressure,gap,in_contact,surface_height."),
     ] = None,
     overrides: Overrides = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what it would cost; keep nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what it would cost; keep nothing.")
+    ] = False,
     page: Page = None,
     figures: StudyFigures = None,
     as_json: AsJson = False,
@@ -97,7 +106,9 @@ def _require_whole(result: "StudyResult", part: tuple[int, int]) -> None:
             f"{result.failed} of {len(result.table)} cases failed; the first: {result.failures['reason'].iloc[0]}; "
             "--retry-failed computes them again"
         )
-    missing = sum(case.number % part[1] == part[0] - 1 for case in result.plan.cases) - len(result.table)
+    missing = sum(case.number % part[1] == part[0] - 1 for case in result.plan.cases) - len(
+        result.table
+    )
     if missing > 0:
         raise AsperityError(f"{missing} cases are missing; run the study again")
 
@@ -108,7 +119,11 @@ def study_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[StudyProgr
     with progress(label, "starting workers ...", quiet=quiet) as display:
 
         def step(state: "StudyProgress") -> None:
-            left = "" if state.seconds_left is None else f", {study.duration_text(state.seconds_left)} left"
+            left = (
+                ""
+                if state.seconds_left is None
+                else f", {study.duration_text(state.seconds_left)} left"
+            )
             rate = f"{state.rate:.2g} cases/s" if state.done else "starting workers ..."
             done = state.kept + state.done
             display(f"{done}/{state.total}, {rate}, {state.failed} failed{left}", done, state.total)
@@ -121,7 +136,9 @@ def _executor(name: str | None) -> AbstractContextManager[Any]:
         return nullcontext()
     kind, _, address = name.partition(":")
     if kind != "dask" or not address:
-        raise BadInput(f"--executor must be dask:ADDRESS such as dask:tcp://127.0.0.1:8786, got {name}")
+        raise BadInput(
+            f"--executor must be dask:ADDRESS such as dask:tcp://127.0.0.1:8786, got {name}"
+        )
     return study.dask_executor(address)
 
 
@@ -134,10 +151,17 @@ def _shard(text: str) -> tuple[int, int]:
 
 def _in_folder_to_come(page: Path, out: Path | None) -> bool:
     """Whether a page is to lie in the study's folder, which the study makes."""
-    return out is not None and not out.exists() and page.suffix == ".html" and page.resolve().parent == out.resolve()
+    return (
+        out is not None
+        and not out.exists()
+        and page.suffix == ".html"
+        and page.resolve().parent == out.resolve()
+    )
 
 
-def _make_page(result: "StudyResult", page: Path | None, figures: Path | None, *, quiet: bool) -> dict[str, str]:
+def _make_page(
+    result: "StudyResult", page: Path | None, figures: Path | None, *, quiet: bool
+) -> dict[str, str]:
     if page is None and figures is None:
         return {}
     assert result.folder is not None
@@ -156,7 +180,10 @@ def _curve(curve: "WearCurve | None") -> Block:
     yield from columns(
         [entry.label for entry in (sq, *selected)],
         (
-            [sq.number(level), *(entry.number(mean[at], deviation[at]) for entry, mean, deviation in means)]
+            [
+                sq.number(level),
+                *(entry.number(mean[at], deviation[at]) for entry, mean, deviation in means),
+            ]
             for at, level in enumerate(curve.sq)
         ),
     )
@@ -166,18 +193,28 @@ def _curve(curve: "WearCurve | None") -> Block:
 def _failures_and_files(result: "StudyResult", made: dict[str, str]) -> Block:
     for _, row in result.failures.head(SHOWN_FAILURES).iterrows():
         chosen = result.plan.cases[row["number"]].overrides
-        where = ", ".join(f"{key} = {study.as_written(chosen[key])}" for key in result.plan.axes if key in chosen)
+        where = ", ".join(
+            f"{key} = {study.as_written(chosen[key])}" for key in result.plan.axes if key in chosen
+        )
         yield f"  failed: {where}, realisation {row['realisation']}: {row['reason']}"
     if result.failed > SHOWN_FAILURES:
         yield f"  ... and {result.failed - SHOWN_FAILURES} more; column reason of the table"
-    yield from table([("table", str(result.path)), *(made or {"its page": f"asperity report {result.folder}"}).items()])
+    yield from table(
+        [
+            ("table", str(result.path)),
+            *(made or {"its page": f"asperity report {result.folder}"}).items(),
+        ]
+    )
 
 
 def _show_estimate(plan: "StudyPlan", cost: "StudyCost", *, as_json: bool, quiet: bool) -> None:
     rows = [
         ("points", f"{len(plan.points)}, over {', '.join(plan.axes) or 'seeds alone'}"),
         ("surfaces a point", str(plan.realisations)),
-        ("a case takes", f"{text('seconds', cost.case_s)} on one worker, mean of {cost.tried} tried"),
+        (
+            "a case takes",
+            f"{text('seconds', cost.case_s)} on one worker, mean of {cost.tried} tried",
+        ),
     ]
     show(
         study.estimate_verdict(cost),

@@ -8,9 +8,9 @@ import typer
 from asperity import case, report, surface
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, LateralUnit, OutPicture, Quiet, Unit, require_output
-from asperity.cli.show import Block, Row, known, show, table, written
-from asperity.errors import BadInput
-from asperity.quantities import select
+from asperity.cli.output import Block, Row, known, show, table, written
+from asperity.core.errors import BadInput
+from asperity.core.quantities import select
 
 if TYPE_CHECKING:
     from asperity.surface import SurfaceDescription
@@ -23,18 +23,25 @@ def surface_command(
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
     pixel: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Distance of the heights of a bare matrix: '1.6 um'.")
+        str | None,
+        typer.Option(metavar="LENGTH", help="Distance of the heights of a bare matrix: '1.6 um'."),
     ] = None,
     form: Annotated[
         str, typer.Option(help="Remove none, a plane, quadratic, cubic, quartic or cylinder form.")
     ] = "quadratic",
-    turn: Annotated[bool, typer.Option("--turn", help="Turn by 90 degrees: x of the file becomes y.")] = False,
-    outliers: Annotated[str, typer.Option(help="Keep or remove heights far off their neighbours.")] = "keep",
+    turn: Annotated[
+        bool, typer.Option("--turn", help="Turn by 90 degrees: x of the file becomes y.")
+    ] = False,
+    outliers: Annotated[
+        str, typer.Option(help="Keep or remove heights far off their neighbours.")
+    ] = "keep",
     s_filter: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Remove shorter waves (ISO 16610 Gaussian): '5 um'.")
+        str | None,
+        typer.Option(metavar="LENGTH", help="Remove shorter waves (ISO 16610 Gaussian): '5 um'."),
     ] = None,
     l_filter: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Remove longer waves (ISO 16610 Gaussian): '0.25 mm'.")
+        str | None,
+        typer.Option(metavar="LENGTH", help="Remove longer waves (ISO 16610 Gaussian): '0.25 mm'."),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -42,13 +49,21 @@ def surface_command(
     """Say what a surface file holds: size, pixel, missing data, what was done to it, parameters."""
     require_output(out, ".png")
     if out is not None and len(files) > 1:
-        raise BadInput(f"--out {out} holds one map, got {len(files)} surfaces; draw them one by one")
+        raise BadInput(
+            f"--out {out} holds one map, got {len(files)} surfaces; draw them one by one"
+        )
     lengths = {"pixel": pixel, "s_filter": s_filter, "l_filter": l_filter}
     given = {name: text for name, text in lengths.items() if text is not None}
     options: dict[str, Any] = {
         name: case.read_length(f"--{name.replace('_', '-')}", text) for name, text in given.items()
     }
-    options |= {"unit": unit, "lateral_unit": lateral_unit, "form": form, "turn": turn, "outliers": outliers}
+    options |= {
+        "unit": unit,
+        "lateral_unit": lateral_unit,
+        "form": form,
+        "turn": turn,
+        "outliers": outliers,
+    }
     described: list[SurfaceDescription] = []
     refused: list[tuple[Path, BadInput]] = []
     for file in files:
@@ -78,8 +93,16 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
     """The parameters of a map, or those of a profile, and what was done to it."""
     if named:
         yield str(description.path)
-    values, measured, of_map = description.scalars(), description.measured, description.profile is None
-    size = surface.area_text(measured.grid.extent) if of_map else surface.length_text(measured.grid.extent[0])
+    values, measured, of_map = (
+        description.scalars(),
+        description.measured,
+        description.profile is None,
+    )
+    size = (
+        surface.area_text(measured.grid.extent)
+        if of_map
+        else surface.length_text(measured.grid.extent[0])
+    )
     rows: list[Row] = [("format", measured.format), ("size", size)]
     profile = () if of_map else map(description.symbol, select("profile"))
     rows += (

@@ -7,40 +7,74 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import coupling, files, paper, report, results
+from asperity import coupling, paper, report, results
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Overrides, Quiet, chosen_case
-from asperity.cli.show import Block, columns, known, progress, show, solver_progress, span, table, written
-from asperity.errors import BadInput
-from asperity.quantities import quantity
+from asperity.cli.output import (
+    Block,
+    columns,
+    known,
+    progress,
+    show,
+    solver_progress,
+    span,
+    table,
+    written,
+)
+from asperity.core import files
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
     from asperity.case import Case
     from asperity.paper import Table1Row
 
-TABLE1 = ("cutoff_hz", "sq_m", "load_n", "crf_hz", "paper_crf_hz", "crfa", "crfa_low", "crfa_high", "paper_crfa")
+TABLE1 = (
+    "cutoff_hz",
+    "sq_m",
+    "load_n",
+    "crf_hz",
+    "paper_crf_hz",
+    "crfa",
+    "crfa_low",
+    "crfa_high",
+    "paper_crfa",
+)
 
 
 @app.command()
 def vibrate(
     path: Annotated[
-        Path | None, typer.Argument(metavar="CASE.toml", help="A case file with [vibration]; --table1 needs none.")
+        Path | None,
+        typer.Argument(
+            metavar="CASE.toml", help="A case file with [vibration]; --table1 needs none."
+        ),
     ] = None,
     preset: Annotated[
-        str | None, typer.Option(help="sound or paper, in place of the case's; --table1 takes paper by default.")
+        str | None,
+        typer.Option(
+            help="sound or paper, in place of the case's; --table1 takes paper by default."
+        ),
     ] = None,
-    table1: Annotated[bool, typer.Option("--table1", help="The paper's Table 1, printed and ours.")] = False,
-    records: Annotated[int | None, typer.Option(help="Records behind each row of the table.")] = None,
+    table1: Annotated[
+        bool, typer.Option("--table1", help="The paper's Table 1, printed and ours.")
+    ] = False,
+    records: Annotated[
+        int | None, typer.Option(help="Records behind each row of the table.")
+    ] = None,
     overrides: Overrides = None,
     figures: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Draw the paper's Figs 3 and 4, or the table, as PNG.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Draw the paper's Figs 3 and 4, or the table, as PNG."),
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Run the vibration model alone: dry, all load on asperities; or make the paper's Table 1."""
     if path is None and not table1:
-        raise BadInput("a case is missing; asperity vibrate CASE.toml, or asperity vibrate --table1")
+        raise BadInput(
+            "a case is missing; asperity vibrate CASE.toml, or asperity vibrate --table1"
+        )
     if records is not None and not table1:
         raise BadInput(f"--records {records} belongs to --table1; add it, or leave --records out")
     first = [f"vibration.preset={preset}"] if preset is not None else []
@@ -60,8 +94,12 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
     drawn: list[Path] = []
     if figures is not None and vibration.oscillator is not None and chosen.vibration is not None:
         drawn = [
-            report.write_figure(report.excitation_figure(vibration, chosen.vibration), figures / "excitation.png"),
-            report.write_figure(report.response_figure(vibration, chosen.vibration), figures / "response.png"),
+            report.write_figure(
+                report.excitation_figure(vibration, chosen.vibration), figures / "excitation.png"
+            ),
+            report.write_figure(
+                report.response_figure(vibration, chosen.vibration), figures / "response.png"
+            ),
         ]
     rows = [
         ("resonance", vibration.resonance.reason),
@@ -78,12 +116,16 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
     )
 
 
-def _table1(preset: str, records: int | None, figures: Path | None, *, as_json: bool, quiet: bool) -> None:
+def _table1(
+    preset: str, records: int | None, figures: Path | None, *, as_json: bool, quiet: bool
+) -> None:
     with progress("Table 1", "riding over the records ...", quiet=quiet):
         rows = paper.reproduce_table1(preset=preset, records=records)
     drawn: list[Path] = []
     if figures is not None:
-        model = coupling.VibrationModel.preset(preset, mass=paper.MASS, damping_ratio=paper.DAMPING_RATIO)
+        model = coupling.VibrationModel.preset(
+            preset, mass=paper.MASS, damping_ratio=paper.DAMPING_RATIO
+        )
         drawn = [
             report.write_figure(report.table1_figure(rows), figures / "table1.png"),
             report.write_figure(report.trend_over_load_figure(model), figures / "load-trend.png"),
@@ -107,6 +149,7 @@ def _printed_and_ours(rows: "Sequence[Table1Row]") -> Block:
     selected = [quantity(key) for key in TABLE1]
     values = [{**asdict(row), "sq_m": row.height_m} for row in rows]
     yield from columns(
-        [entry.label for entry in selected], ([entry.number_in(row) for entry in selected] for row in values)
+        [entry.label for entry in selected],
+        ([entry.number_in(row) for entry in selected] for row in values),
     )
     yield "  medians of single records; E 207 GPa, R 5.4 mm, m 0.1 kg, not the case's"

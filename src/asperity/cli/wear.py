@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import ageing, case, report, wearing
+from asperity import case, report, simulation
 from asperity import surface as surfaces
 from asperity.cli.app import app
 from asperity.cli.options import (
@@ -21,28 +21,47 @@ from asperity.cli.options import (
     chosen_case,
     require_output,
 )
-from asperity.cli.show import Block, columns, progress, show, span, table, written
-from asperity.errors import BadInput
-from asperity.processes import cores
-from asperity.quantities import quantity
+from asperity.cli.output import Block, columns, progress, show, span, table, written
+from asperity.core.errors import BadInput
+from asperity.core.processes import cores
+from asperity.core.quantities import quantity
+from asperity.wear import fit_wear_coefficient, read_friction_trace
 
 if TYPE_CHECKING:
-    from asperity.ageing import WearHistory, WearProgress
+    from asperity.simulation import WearHistory, WearProgress
     from asperity.surface import MeasuredSurface
-    from asperity.wearing import FittedWear
+    from asperity.wear import FittedWear
 
 STARTS = "the start; after installation the first solve compiles the solver, up to a minute ..."
 CONTACT = (
-    "sq_m", "ssk", "spk_m", "svk_m", "clr", "car", "h_mean_m", "friction_coefficient",
-    "flash_temperature_max_k", "crf_hz", "crfa",
-)  # fmt: skip
-OF_BODIES = ("overrollings", "worn_depth_m", "worn_depth_max_m", "worn_volume_m3", "sq_m", "spk_m", "svk_m")
+    "sq_m",
+    "ssk",
+    "spk_m",
+    "svk_m",
+    "clr",
+    "car",
+    "h_mean_m",
+    "friction_coefficient",
+    "flash_temperature_max_k",
+    "crf_hz",
+    "crfa",
+)
+OF_BODIES = (
+    "overrollings",
+    "worn_depth_m",
+    "worn_depth_max_m",
+    "worn_volume_m3",
+    "sq_m",
+    "spk_m",
+    "svk_m",
+)
 
 
 @app.command()
 def wear(
     path: Annotated[
-        Path | None, typer.Argument(metavar="[CASE.toml]", help="A case; its [wear] says how it wears.")
+        Path | None,
+        typer.Argument(metavar="[CASE.toml]", help="A case; its [wear] says how it wears."),
     ] = None,
     hours: Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")] = None,
     surface: SurfaceFile = None,
@@ -51,35 +70,52 @@ def wear(
     workers: Workers = None,
     page: Page = None,
     fit: Annotated[
-        Path | None, typer.Option(metavar="TRACE", help="In place of a case: k from a test's friction record ...")
+        Path | None,
+        typer.Option(
+            metavar="TRACE", help="In place of a case: k from a test's friction record ..."
+        ),
     ] = None,
-    scar: Annotated[Path | None, typer.Option(metavar="PROFILE", help="... and a profile across its track.")] = None,
+    scar: Annotated[
+        Path | None, typer.Option(metavar="PROFILE", help="... and a profile across its track.")
+    ] = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
-    load: Annotated[str | None, typer.Option(metavar="FORCE", help="Of the test, if its record has it not.")] = None,
+    load: Annotated[
+        str | None, typer.Option(metavar="FORCE", help="Of the test, if its record has it not.")
+    ] = None,
     track_radius: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Of the test, if its record has it not.")
     ] = None,
-    second_load: Annotated[str | None, typer.Option(metavar="FORCE", help="Of a second test, to predict.")] = None,
-    second_distance: Annotated[str | None, typer.Option(metavar="LENGTH", help="Of a second test, to predict.")] = None,
+    second_load: Annotated[
+        str | None, typer.Option(metavar="FORCE", help="Of a second test, to predict.")
+    ] = None,
+    second_distance: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Of a second test, to predict.")
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Let the contact wear: surfaces, load sharing, film and resonance over hours. Or fit k to a test, with --fit."""
     if fit is not None or scar is not None:
         if fit is None or scar is None or path is not None or hours is not None:
-            raise BadInput("--fit TRACE and --scar PROFILE go together, without a case or --hours; give those two")
+            raise BadInput(
+                "--fit TRACE and --scar PROFILE go together, without a case or --hours; give those two"
+            )
         amounts = {
             "load": _stated("--load", "N", load),
             "track_radius": _stated("--track-radius", "m", track_radius),
             "second_load": _stated("--second-load", "N", second_load),
             "second_distance": _stated("--second-distance", "m", second_distance),
         }
-        fitted = _fit(fit, surfaces.read_surface(scar, unit=unit, lateral_unit=lateral_unit), **amounts)
+        fitted = _fit(
+            fit, surfaces.read_surface(scar, unit=unit, lateral_unit=lateral_unit), **amounts
+        )
         show(fitted.verdict(), fitted.scalars, _fitted(fitted), as_json=as_json, quiet=quiet)
         return
     if path is None or hours is None:
-        raise BadInput("asperity wear takes a case and --hours, or --fit TRACE and --scar PROFILE; give either pair")
+        raise BadInput(
+            "asperity wear takes a case and --hours, or --fit TRACE and --scar PROFILE; give either pair"
+        )
     require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
     with progress(path.name, STARTS, quiet=quiet) as display:
@@ -93,7 +129,9 @@ def wear(
                 1000,
             )
 
-        worn = ageing.run_wear(chosen, hours=hours, out=out, workers=workers or cores(), progress=jump)
+        worn = simulation.run_wear(
+            chosen, hours=hours, out=out, workers=workers or cores(), progress=jump
+        )
     if page is not None:
         report.write_wear_report(worn, page)
     show(
@@ -122,8 +160,10 @@ def _fit(
     second_load: float | None,
     second_distance: float | None,
 ) -> "FittedWear":
-    trace = wearing.read_friction_trace(record, load=load, track_radius=track_radius)
-    return wearing.fit_wear_coefficient(trace, profile, second_load=second_load, second_distance=second_distance)
+    trace = read_friction_trace(record, load=load, track_radius=track_radius)
+    return fit_wear_coefficient(
+        trace, profile, second_load=second_load, second_distance=second_distance
+    )
 
 
 def _fitted(fitted: "FittedWear") -> Block:
@@ -136,17 +176,29 @@ def _fitted(fitted: "FittedWear") -> Block:
         "second_volume_m3": fitted.second_volume,
     }
     rows = [
-        (quantity(key).title, f"{quantity(key).number(one.median)}, {span(key, (one.low, one.high))}")
+        (
+            quantity(key).title,
+            f"{quantity(key).number(one.median)}, {span(key, (one.low, one.high))}",
+        )
         for key, one in estimates.items()
     ]
     bounds = quantity("wear_coefficient")
     rows += [
         ("k if what is piled up is foreign", bounds.text(fitted.k_all_lost)),
-        ("k if it is the disc's own", bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, nothing is lost"),
+        (
+            "k if it is the disc's own",
+            bounds.text(fitted.k_none_lost) if fitted.k_none_lost else "0, nothing is lost",
+        ),
         ("load, way, laps", f"{trace.load:.4g} N, {trace.distance:.4g} m, {trace.laps:.4g}"),
-        ("track", f"radius {surfaces.length_text(trace.track_radius)}, width {surfaces.length_text(scar.width)}"),
+        (
+            "track",
+            f"radius {surfaces.length_text(trace.track_radius)}, width {surfaces.length_text(scar.width)}",
+        ),
         ("missing, piled up", f"{scar.missing * 1e12:.3g}, {scar.piled * 1e12:.3g} µm²"),
-        (quantity("friction_coefficient").title, quantity("friction_coefficient").text(trace.coefficient)),
+        (
+            quantity("friction_coefficient").title,
+            quantity("friction_coefficient").text(trace.coefficient),
+        ),
     ]
     yield from table(rows, fitted.notes)
 
@@ -155,7 +207,12 @@ def _contact(worn: "WearHistory") -> Block:
     """Both surfaces together, and the contact, at first and at the end."""
     first, last = worn.table.iloc[0], worn.numbers_at_end
     rows = [
-        (quantity(key).title, quantity(key).number(first[key]), quantity(key).number_in(last), quantity(key).display)
+        (
+            quantity(key).title,
+            quantity(key).number(first[key]),
+            quantity(key).number_in(last),
+            quantity(key).display,
+        )
         for key in CONTACT
     ]
     return columns(["", "new", f"after {worn.hours:.4g} h", ""], rows, left=1)
@@ -167,6 +224,6 @@ def _bodies(worn: "WearHistory") -> Block:
     rows = []
     for key in OF_BODIES:
         entry = quantity(key)
-        ends = [entry.number(last[ageing.of_body(key, body)]) for body in (0, 1)]
+        ends = [entry.number(last[simulation.of_body(key, body)]) for body in (0, 1)]
         rows.append((entry.title, *ends, entry.display))
     return columns(["", "body 1", "body 2", ""], rows, left=1)

@@ -2,16 +2,20 @@
 
 import numpy as np
 
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.core.errors import BadInput
 from asperity.coupling.laws import LoadedContact
 from asperity.coupling.model import VibrationModel
 from asperity.coupling.spring import natural_frequency_hz
 from asperity.ehl import ContactState
-from asperity.errors import BadInput
 
-SMALLEST_SHARE = 0.01  # CLR at the lower end of the search band: below it the film is full and nothing resonates
+SMALLEST_SHARE = (
+    0.01  # CLR at the lower end of the search band: below it the film is full and nothing resonates
+)
 BAND_MARGIN = 0.05
-BAND_FACTOR = 1.5  # where the load share does not bound the resonance: the band about it, up and down
+BAND_FACTOR = (
+    1.5  # where the load share does not bound the resonance: the band about it, up and down
+)
 
 
 def dry_full_load(conditions: ContactConditions, sq: float) -> ContactState:
@@ -51,11 +55,13 @@ def band_about(frequency_hz: float, highest_hz: float = np.inf) -> tuple[float, 
 def require_sampling(conditions: ContactConditions, model: VibrationModel, sq: float) -> float:
     """The full-load resonance [Hz] of a contact with roughness `sq` [m], where the model samples it finely enough.
 
-    Needs no solved contact, so that it can be asked before one is solved. Raises BadInput for a sampling rate below
-    `samples_per_period` times that resonance.
+    Needs no solved contact, so that it can be asked before one is solved. Raises BadInput for a
+    sampling rate below `samples_per_period` times that resonance.
     """
     contact = LoadedContact(1.0, dry_full_load(conditions, sq), conditions)
-    full_load_hz = natural_frequency_hz(model.stiffness_law.at_full_load(conditions), contact, model)
+    full_load_hz = natural_frequency_hz(
+        model.stiffness_law.at_full_load(conditions), contact, model
+    )
     slowest = model.samples_per_period * full_load_hz
     if model.rate_hz < slowest:
         raise BadInput(

@@ -1,18 +1,19 @@
 """What the contact's roughness does to a mass on it: which excitation passes below, averaged over which contact patch.
 
-A law makes an `asperity.vibration.Excitation` of the contact under its load, and says what keeps it from doing so.
+A law makes an `asperity.vibration.Excitation` of the contact under its load, and says what keeps
+it from doing so.
 """
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from typing import Annotated, ClassVar, Literal, TypeAlias, get_args
 
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.hertz import point_contact
+from asperity.core.errors import BadInput, require_choice, require_positive
+from asperity.core.quantities import Parameter, Parametric
 from asperity.coupling.laws import LoadedContact
 from asperity.ehl import ContactState
-from asperity.errors import BadInput, require_choice, require_positive
-from asperity.hertz import point_contact
-from asperity.quantities import Parameter, Parametric
 from asperity.vibration import Excitation, FilteredNoise, NoiseFilter, PatchAverage, SurfaceTrack
 
 Coefficient: TypeAlias = Literal["readjusted", "kept"]
@@ -43,11 +44,14 @@ class ExcitationLaw(ABC):
 class CutoffLaw(Parametric):
     """Cut-off of the profile: fc = fc_ref (CAR/CAR_ref)^q.
 
-    The paper names no law. 30 Hz is the base case of its dry section 2, in which everything touches, hence CAR_ref = 1;
-    q = 0.18 is where its "the two effects offset" holds (in proportion, q = 1, CRFA would grow 60 000-fold).
+    The paper names no law. 30 Hz is the base case of its dry section 2, in which everything
+    touches, hence CAR_ref = 1; q = 0.18 is where its "the two effects offset" holds (in
+    proportion, q = 1, CRFA would grow 60 000-fold).
     """
 
-    cutoff_reference_hz: Annotated[float, Parameter("Hz", "fc_ref", "cut-off reference frequency")] = 30.0
+    cutoff_reference_hz: Annotated[
+        float, Parameter("Hz", "fc_ref", "cut-off reference frequency")
+    ] = 30.0
     car_reference: Annotated[float, Parameter("", "CAR_ref", "reference CAR")] = 1.0
     cutoff_exponent: Annotated[float, Parameter("", "q")] = 0.18
 
@@ -67,9 +71,10 @@ class CutoffLaw(Parametric):
 class NoiseExcitation(NoiseFilter, CutoffLaw, ExcitationLaw):
     """Filtered Gaussian noise of height Sq.
 
-    By default Sq is the height of the process, not of the one record: scaling each record to Sq would hand the chance
-    of a few hundred slow waves on to CRFA (about 9 % at 30 Hz and 4 s). The noise's `coefficient` is "readjusted" to
-    the height at every cut-off, or "kept" from the reference cut-off.
+    By default Sq is the height of the process, not of the one record: scaling each record to Sq
+    would hand the chance of a few hundred slow waves on to CRFA (about 9 % at 30 Hz and 4 s). The
+    noise's `coefficient` is "readjusted" to the height at every cut-off, or "kept" from the
+    reference cut-off.
     """
 
     coefficient: Coefficient = "readjusted"
@@ -122,7 +127,9 @@ class _Passing(Parametric):
         """Speed [m/s]; raises BadInput where nothing passes."""
         speed = conditions.sliding_speed if self.passing_speed is None else self.passing_speed
         if speed == 0.0:
-            raise BadInput("roughness passes the contact at the sliding speed, which is 0; give passing_speed, or slip")
+            raise BadInput(
+                "roughness passes the contact at the sliding speed, which is 0; give passing_speed, or slip"
+            )
         return speed
 
 
@@ -138,13 +145,17 @@ class SurfaceExcitation(_Passing, ExcitationLaw):
         """The surface's track; raises BadInput without a solution, for a flat surface, or where nothing passes."""
         speed = self.speed(contact.conditions)
         if contact.solution is None:
-            raise BadInput("excitation surface needs the solved contact's surface; solve the case, or take noise")
+            raise BadInput(
+                "excitation surface needs the solved contact's surface; solve the case, or take noise"
+            )
         return SurfaceTrack.of(contact.solution.surface, speed)
 
     summary = "the surface's own spectrum run over"
 
 
-EXCITATIONS: dict[str, type[ExcitationLaw]] = {law.name: law for law in (NoiseExcitation, SurfaceExcitation)}
+EXCITATIONS: dict[str, type[ExcitationLaw]] = {
+    law.name: law for law in (NoiseExcitation, SurfaceExcitation)
+}
 
 
 class PatchLaw(ABC):
@@ -197,8 +208,14 @@ class PointPatch(_Passing, PatchLaw):
         """Averaged over the circle; raises BadInput where nothing passes or asperities carry nothing."""
         conditions, speed = contact.conditions, self.speed(contact.conditions)
         load = require_positive("load share of the asperities (CLR)", contact.clr) * conditions.load
-        point = point_contact(load, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
-        return PatchAverage(source=source, shape="point", half_width=point.half_widths[0], speed=speed)
+        point = point_contact(
+            load, conditions.radius_along_rolling, conditions.pair.reduced_modulus
+        )
+        return PatchAverage(
+            source=source, shape="point", half_width=point.half_widths[0], speed=speed
+        )
 
 
-CONTACT_PATCHES: dict[str, type[PatchLaw]] = {law.name: law for law in (NoPatch, LinePatch, PointPatch)}
+CONTACT_PATCHES: dict[str, type[PatchLaw]] = {
+    law.name: law for law in (NoPatch, LinePatch, PointPatch)
+}

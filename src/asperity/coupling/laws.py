@@ -1,7 +1,8 @@
 """Laws of the contact's spring and damper, each a small frozen value that is called with the contact under its load.
 
-A law answers for itself: whether it is the asperities' spring alone, whether it needs the solved contact. A new law is
-a new class here and one line in its table; its parameters are keywords of `VibrationModel` and keys of the case file.
+A law answers for itself: whether it is the asperities' spring alone, whether it needs the solved
+contact. A new law is a new class here and one line in its table; its parameters are keywords of
+`VibrationModel` and keys of the case file.
 """
 
 from abc import ABC, abstractmethod
@@ -10,15 +11,16 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from asperity import ehl
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.hertz import line_stiffness, point_stiffness
+from asperity.core.errors import BadInput, articled
+from asperity.core.quantities import Parameter, Parametric
 from asperity.ehl import ContactSolution, ContactState
-from asperity.errors import BadInput, articled
-from asperity.hertz import line_stiffness, point_stiffness
-from asperity.quantities import Parameter, Parametric
+from asperity.solution import dynamic_stiffness, roller_depth, tangent_stiffness
 
 FILM_EXPONENT = 0.13  # h ~ load^-0.13: Dowson and Higginson's film of a line contact
-ROUGHNESS_FACTOR = 0.48  # γ in K = F/(γ Sq): S. Akarapu, T. Sharp, M. O. Robbins, Phys. Rev. Lett. 106 (2011) 204301
+# γ in K = F/(γ Sq): S. Akarapu, T. Sharp, M. O. Robbins, Phys. Rev. Lett. 106 (2011) 204301
+ROUGHNESS_FACTOR = 0.48
 
 
 class LoadedContact(NamedTuple):
@@ -38,10 +40,10 @@ class LoadedContact(NamedTuple):
 class StiffnessLaw(ABC):
     """Stiffness of the contact [N/m].
 
-    `asperities_alone`: no spring without touching asperities, and it carries and grows with their load; other laws
-    need the solved contact. `by_load_share`: what it takes of the contact is its load share and means over it, so that
-    it can be asked at another share. `point_spring`: a sphere's, force ~ compression^1.5, which a nonlinear response
-    supposes.
+    `asperities_alone`: no spring without touching asperities, and it carries and grows with their
+    load; other laws need the solved contact. `by_load_share`: what it takes of the contact is its
+    load share and means over it, so that it can be asked at another share. `point_spring`: a
+    sphere's, force ~ compression^1.5, which a nonlinear response supposes.
     """
 
     name: ClassVar[str]
@@ -69,7 +71,9 @@ class HertzPoint(StiffnessLaw):
     def __call__(self, contact: LoadedContact) -> float:
         """1.5 F/z0 [N/m]."""
         conditions = contact.conditions
-        return point_stiffness(contact.asperity_load, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
+        return point_stiffness(
+            contact.asperity_load, conditions.radius_along_rolling, conditions.pair.reduced_modulus
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +103,7 @@ class HertzLine(_LineApproach, StiffnessLaw):
             conditions.line_length,
             conditions.radius_along_rolling,
             conditions.pair.reduced_modulus,
-            self.reference_depth or ehl.roller_depth(conditions),
+            self.reference_depth or roller_depth(conditions),
         )
 
 
@@ -107,8 +111,9 @@ class HertzLine(_LineApproach, StiffnessLaw):
 class ParallelFilm(StiffnessLaw):
     """Asperity layer and oil film side by side, both on the elastic bodies: 1/S = 1/S_bodies + 1/(k_a + k_f).
 
-    S_bodies is Hertz's point spring under the whole load, k_a = CLR F / (γ Sq) the stiffness of a randomly rough layer,
-    k_f = (1 - CLR) F / (0.13 h) that of a film with h ~ load^-0.13, h its mean over the Hertz zone.
+    S_bodies is Hertz's point spring under the whole load, k_a = CLR F / (γ Sq) the stiffness of a
+    randomly rough layer, k_f = (1 - CLR) F / (0.13 h) that of a film with h ~ load^-0.13, h its
+    mean over the Hertz zone.
     """
 
     name = "parallel-film"
@@ -126,19 +131,21 @@ class ParallelFilm(StiffnessLaw):
 
 @dataclass(frozen=True, slots=True)
 class Tangent(_LineApproach, StiffnessLaw):
-    """Tangent stiffness of the solved contact itself, asperities and film: `asperity.ehl.tangent_stiffness`."""
+    """Tangent stiffness of the solved contact itself, asperities and film: `asperity.solution.tangent_stiffness`."""
 
     name = "tangent"
 
     def __call__(self, contact: LoadedContact) -> float:
         """dF/dδ [N/m]; raises BadInput without a solution, NotConverged where a neighbouring load has none."""
         if contact.solution is None:
-            raise BadInput("stiffness law tangent needs the solved contact; solve the case, or take another law")
+            raise BadInput(
+                "stiffness law tangent needs the solved contact; solve the case, or take another law"
+            )
         return self.of(contact.solution)
 
     def of(self, solution: ContactSolution) -> float:
         """dF/dδ of a solved contact [N/m]."""
-        return ehl.tangent_stiffness(solution, reference_depth=self.reference_depth).total
+        return tangent_stiffness(solution, reference_depth=self.reference_depth).total
 
     def at_full_load(self, conditions: ContactConditions) -> StiffnessLaw:
         """That of the smooth, dry contact: a tangent belongs to its own load share."""
@@ -161,7 +168,12 @@ class DampingLaw(ABC):
 
     @abstractmethod
     def __call__(
-        self, *, mass: float, stiffness: float, damping_ratio: float, solution: ContactSolution | None = None
+        self,
+        *,
+        mass: float,
+        stiffness: float,
+        damping_ratio: float,
+        solution: ContactSolution | None = None,
     ) -> float:
         """ζ, of a mass [kg] on a spring [N/m]."""
 
@@ -238,20 +250,27 @@ class HertzForRadian(DampingLaw):
 class ContactDamping(DampingLaw):
     """The solved contact's own ω c/2k at the oscillator's frequency, on top of ζ of all the rest, which is stated.
 
-    Of asperities that have borne this load before; `asperity.ehl.dynamic_stiffness`.
+    Of asperities that have borne this load before; `asperity.solution.dynamic_stiffness`.
     """
 
     name = "contact"
     needs_solution = True
 
     def __call__(
-        self, *, mass: float, stiffness: float, damping_ratio: float, solution: ContactSolution | None = None
+        self,
+        *,
+        mass: float,
+        stiffness: float,
+        damping_ratio: float,
+        solution: ContactSolution | None = None,
     ) -> float:
         """ζ of both; raises BadInput without a solution, or where the contact feeds more than the rest damps."""
         if solution is None:
-            raise BadInput("damping law contact needs the solved contact; solve the case, or take another law")
+            raise BadInput(
+                "damping law contact needs the solved contact; solve the case, or take another law"
+            )
         frequency_hz = float(np.sqrt(stiffness / mass) / (2.0 * np.pi))
-        own = ehl.dynamic_stiffness(solution, frequency_hz).damping_ratio
+        own = dynamic_stiffness(solution, frequency_hz).damping_ratio
         if own + damping_ratio <= 0.0:
             raise BadInput(
                 f"the contact's oil feeds a vibration of {frequency_hz:.0f} Hz (damping ratio {own:.2g}) more than the "

@@ -1,7 +1,7 @@
 """How a contact becomes a vibration: mass, laws and record as one value, and the two presets.
 
-A law can be chosen by its name, with its parameters beside it as the case file has them; what is stated for laws that
-are not in use is kept, so that another law can be tried.
+A law can be chosen by its name, with its parameters beside it as the case file has them; what is
+stated for laws that are not in use is kept, so that another law can be tried.
 """
 
 from collections.abc import Mapping
@@ -9,6 +9,9 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_origin, get_type_hints
 
+from asperity.core.errors import BadInput, require_choice
+from asperity.core.limits import require_affordable
+from asperity.core.quantities import Parameter, Parametric, parameters
 from asperity.coupling.excitations import (
     CONTACT_PATCHES,
     EXCITATIONS,
@@ -17,15 +20,21 @@ from asperity.coupling.excitations import (
     NoPatch,
     PatchLaw,
 )
-from asperity.coupling.laws import DAMPING_LAWS, STIFFNESS_LAWS, DampingLaw, HertzPoint, RatioDamping, StiffnessLaw
-from asperity.errors import BadInput, require_choice
-from asperity.limits import require_affordable
-from asperity.quantities import Parameter, Parametric, parameters
+from asperity.coupling.laws import (
+    DAMPING_LAWS,
+    STIFFNESS_LAWS,
+    DampingLaw,
+    HertzPoint,
+    RatioDamping,
+    StiffnessLaw,
+)
+from asperity.resonance import INDICATOR_METHODS, IndicatorMethod
 from asperity.vibration import RESPONSE_METHODS, SUBSTEPS, ResponseMethod, require_damping_ratio
-from asperity.wear import INDICATOR_METHODS, IndicatorMethod
 
 SAMPLE_BYTES, SAMPLE_S = 150.0, 1e-6  # what a sample of a record takes of memory and time
-SAMPLES_PER_PERIOD = 15.0  # below it the straight lines between samples cost the resonance over 3 % of its power
+SAMPLES_PER_PERIOD = (
+    15.0  # below it the straight lines between samples cost the resonance over 3 % of its power
+)
 LAWS: dict[str, Mapping[str, type[Any]]] = {
     "damping_law": DAMPING_LAWS,
     "stiffness_law": STIFFNESS_LAWS,
@@ -93,15 +102,25 @@ class VibrationModel(Parametric):
     duration_s: Annotated[float, Parameter("s", positive="vibration duration")] = 4.0
     seed: int = 1
     method: IndicatorMethod = "likelihood"
-    stated: Mapping[str, Any] = field(init=False, repr=False, compare=False)  # every keyword by name, used or not
+    stated: Mapping[str, Any] = field(
+        init=False, repr=False, compare=False
+    )  # every keyword by name, used or not
 
     def __init__(self, *, mass: float, damping_ratio: float, **choices: Any) -> None:
         choices = _by_name({"mass": mass, "damping_ratio": damping_ratio, **choices})
         stated = {name: value for name, value in choices.items() if value is not None}
         if unknown := sorted(stated.keys() - vibration_choices().keys()):
             raise TypeError(f"VibrationModel has no keyword {', '.join(unknown)}")
-        values = {entry.name: stated.get(entry.name, entry.default) for entry in fields(self) if entry.init}
-        for name, value in {**values, **{slot: _law(slot, stated) for slot in LAWS}, "stated": stated}.items():
+        values = {
+            entry.name: stated.get(entry.name, entry.default)
+            for entry in fields(self)
+            if entry.init
+        }
+        for name, value in {
+            **values,
+            **{slot: _law(slot, stated) for slot in LAWS},
+            "stated": stated,
+        }.items():
             object.__setattr__(self, name, value)
         self.__post_init__()
 
@@ -122,7 +141,9 @@ class VibrationModel(Parametric):
         if self.seed < 0:
             raise BadInput(f"vibration seed must be 0 or more, got {self.seed}")
         if self.substeps < 1:
-            raise BadInput(f"sub-steps must be 1 or more, got {self.substeps}; {SUBSTEPS} is the default")
+            raise BadInput(
+                f"sub-steps must be 1 or more, got {self.substeps}; {SUBSTEPS} is the default"
+            )
         require_choice("response", self.response, RESPONSE_METHODS)
         require_choice("indicator method", self.method, INDICATOR_METHODS)
         if not (self.linear or self.stiffness_law.point_spring):
@@ -155,11 +176,16 @@ class VibrationModel(Parametric):
 def preset_choices(name: str) -> Mapping[str, Any]:
     """Every choice that tells the presets apart, as `name` has it.
 
-    "paper": everything as the paper's section 2 did it, as far as it can be recovered (docs/theory/vibration.md);
-    "sound", the default: fine sampling, the true damping, the likeliest line.
+    "paper": everything as the paper's section 2 did it, as far as it can be recovered
+    (docs/theory/vibration.md); "sound", the default: fine sampling, the true damping, the
+    likeliest line.
     """
     if name == "sound":
-        return {key: choice.default for key, choice in vibration_choices().items() if key in PRESETS["paper"]}
+        return {
+            key: choice.default
+            for key, choice in vibration_choices().items()
+            if key in PRESETS["paper"]
+        }
     if name not in PRESETS:
         raise BadInput(f"vibration preset must be one of sound, {', '.join(PRESETS)}, got {name!r}")
     return PRESETS[name]
@@ -168,7 +194,8 @@ def preset_choices(name: str) -> Mapping[str, Any]:
 class Choice(NamedTuple):
     """A keyword of `VibrationModel`: its type (laws and methods by name), default and SI unit.
 
-    The default is MISSING (of dataclasses) where the keyword is required, None where it may be left out.
+    The default is MISSING (of dataclasses) where the keyword is required, None where it may be
+    left out.
     """
 
     kind: Any
@@ -180,7 +207,9 @@ def vibration_choices() -> Mapping[str, Choice]:
     """Every keyword that a model can be stated with by names and numbers, laws' parameters behind their law."""
     choices: dict[str, Choice] = {}
     for name, choice in _choices(VibrationModel):
-        choices[name] = choice._replace(kind=str, default=choice.default.name) if name in LAWS else choice
+        choices[name] = (
+            choice._replace(kind=str, default=choice.default.name) if name in LAWS else choice
+        )
         for law in LAWS.get(name, {}).values():
             for parameter, own in _choices(law):  # type: ignore[arg-type]  # classes are hashable
                 choices.pop(parameter, None)  # one that two laws share stands behind the latter
@@ -218,15 +247,27 @@ def _by_name(choices: Mapping[str, Any]) -> dict[str, Any]:
 
 def _law(slot: str, stated: Mapping[str, Any]) -> Any:
     """The law stated for a slot; parameters stated for its neighbours are checked too."""
-    default, thing, laws = getattr(VibrationModel, slot).name, _NAMES.get(slot, slot.replace("_", " ")), LAWS[slot]
+    default, thing, laws = (
+        getattr(VibrationModel, slot).name,
+        _NAMES.get(slot, slot.replace("_", " ")),
+        LAWS[slot],
+    )
     chosen = stated.get(slot, default)
     require_choice(thing, chosen, laws)
     made = {}
     for name, law in laws.items():
-        missing = [entry.name for entry in fields(law) if entry.default is MISSING and entry.name not in stated]
+        missing = [
+            entry.name
+            for entry in fields(law)
+            if entry.default is MISSING and entry.name not in stated
+        ]
         if not missing:
-            made[name] = law(**{entry.name: stated[entry.name] for entry in fields(law) if entry.name in stated})
+            made[name] = law(
+                **{entry.name: stated[entry.name] for entry in fields(law) if entry.name in stated}
+            )
         elif name == chosen:
             unit = parameters(law)[missing[0]].unit
-            raise BadInput(f"{thing} {name} needs {missing[0]}, in {unit}; add it, or take the law {default}")
+            raise BadInput(
+                f"{thing} {name} needs {missing[0]}, in {unit}; add it, or take the law {default}"
+            )
     return made[chosen]

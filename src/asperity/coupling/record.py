@@ -5,15 +5,16 @@ from functools import cached_property
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.core.arrays import Field
+from asperity.core.errors import NotConverged
+from asperity.core.signals import Signal, Spectrum, power_spectrum
 from asperity.coupling.band import band_about, require_sampling, search_band
 from asperity.coupling.laws import LoadedContact
 from asperity.coupling.model import VibrationModel
 from asperity.coupling.spring import oscillator
 from asperity.ehl import ContactSolution, ContactState
-from asperity.errors import NotConverged
-from asperity.signals import Signal, Spectrum, power_spectrum
+from asperity.resonance import Resonance, contact_resonance, line_shape, no_resonance
 from asperity.vibration import (
     ContactOscillator,
     Excitation,
@@ -22,22 +23,24 @@ from asperity.vibration import (
     expected_spectrum,
     mass_motion,
 )
-from asperity.wear import Resonance, contact_resonance, line_shape, no_resonance
 
 ALIASES = 3
-LINEAR_UP_TO = 0.2  # rms dynamic force over load; the CRF is then 0.4 % lower than the linear spring's
+LINEAR_UP_TO = (
+    0.2  # rms dynamic force over load; the CRF is then 0.4 % lower than the linear spring's
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
     """The vibration of a mass on a contact.
 
-    `resonance` was searched in `band_hz`, which follows from the contact alone; `full_load_crf_hz` is the resonance
-    with all load on asperities [Hz]. `profile` [m] is drawn from the `excitation`, and with `response` [m/s^2] and its
-    `spectrum` the record; `expected_crfa` is the continuous height of what `spectrum` scatters about at the
-    oscillator's own frequency [(m/s^2)^2/Hz]. `dynamic_load` is the rms dynamic force over the spring's load
-    (above 0.2 a linear spring misleads), `contact_loss` the share of the time in the air. When no asperity touches
-    there is no spring and no record: all of these are None and `resonance.reason` says so.
+    `resonance` was searched in `band_hz`, which follows from the contact alone; `full_load_crf_hz`
+    is the resonance with all load on asperities [Hz]. `profile` [m] is drawn from the
+    `excitation`, and with `response` [m/s^2] and its `spectrum` the record; `expected_crfa` is the
+    continuous height of what `spectrum` scatters about at the oscillator's own frequency
+    [(m/s^2)^2/Hz]. `dynamic_load` is the rms dynamic force over the spring's load (above 0.2 a
+    linear spring misleads), `contact_loss` the share of the time in the air. When no asperity
+    touches there is no spring and no record: all of these are None and `resonance.reason` says so.
     """
 
     resonance: Resonance
@@ -55,7 +58,12 @@ class Vibration:
     @cached_property
     def expected(self) -> Spectrum | None:
         """What `spectrum` scatters about, in closed form (of the linear spring); None without a record."""
-        if self.oscillator is None or self.excitation is None or self.profile is None or self.spectrum is None:
+        if (
+            self.oscillator is None
+            or self.excitation is None
+            or self.profile is None
+            or self.spectrum is None
+        ):
             return None
         rate_hz = self.profile.rate_hz
         heights = self.excitation.density(self.spectrum.frequency_hz, rate_hz)
@@ -67,8 +75,8 @@ class Vibration:
 class SampledLine:
     """What a record's own sampling makes of an oscillator's line over noise that is white in acceleration.
 
-    Straight lines between samples, their aliases included, and the digital filter that the noise is behind; see
-    `ContactOscillator.sampled_gain`.
+    Straight lines between samples, their aliases included, and the digital filter that the noise
+    is behind; see `ContactOscillator.sampled_gain`.
     """
 
     noise: FilteredNoise
@@ -77,10 +85,13 @@ class SampledLine:
     def __call__(self, frequency_hz: Field, f0_hz: float, damping_ratio: float) -> Field:
         """A factor on the line at each frequency [Hz], 1 at f0."""
         stiffness = (2.0 * np.pi * f0_hz) ** 2  # of a mass of 1 kg
-        spring = ContactOscillator(mass=1.0, stiffness=stiffness, damping_ratio=damping_ratio, load=1.0)
+        spring = ContactOscillator(
+            mass=1.0, stiffness=stiffness, damping_ratio=damping_ratio, load=1.0
+        )
         inside = np.clip(frequency_hz, 1e-3 * f0_hz, 0.5 * self.rate_hz)
         here, there = (
-            spring.sampled_gain(at, self.rate_hz) * self._sampled_noise(at) for at in (inside, np.array(f0_hz))
+            spring.sampled_gain(at, self.rate_hz) * self._sampled_noise(at)
+            for at in (inside, np.array(f0_hz))
         )
         return np.asarray(here / there / line_shape(inside, f0_hz, damping_ratio))
 
@@ -89,7 +100,10 @@ class SampledLine:
         density = self.noise.density(frequency_hz, self.rate_hz)
         if self.noise.filter == "continuous":
             for turn in range(1, ALIASES + 1):
-                for alias in (turn * self.rate_hz - frequency_hz, turn * self.rate_hz + frequency_hz):
+                for alias in (
+                    turn * self.rate_hz - frequency_hz,
+                    turn * self.rate_hz + frequency_hz,
+                ):
                     density = density + self.noise.density(alias, self.rate_hz)
         return np.asarray(density)
 
@@ -103,8 +117,9 @@ def excitation(
 ) -> Excitation:
     """What passes under the mass, by the model's excitation and averaged over its patch.
 
-    Raises BadInput for a flat surface, noise behind a contact without touching asperities, roughness that has to pass
-    at a speed and does not, a surface that is not known because there is no solution.
+    Raises BadInput for a flat surface, noise behind a contact without touching asperities,
+    roughness that has to pass at a speed and does not, a surface that is not known because there
+    is no solution.
     """
     contact = LoadedContact(state.clr, state, conditions, solution)
     return model.patch(model.excitation(contact), contact)
@@ -119,9 +134,9 @@ def contact_vibration(
 ) -> Vibration:
     """Ride over the contact, record the acceleration and look for its resonance.
 
-    The stiffness law "tangent" and the excitation "surface" need the `solution` itself. Raises BadInput for a sampling
-    rate below `samples_per_period` times the full-load resonance, or what `oscillator`, `excitation` and its records
-    refuse.
+    The stiffness law "tangent" and the excitation "surface" need the `solution` itself. Raises
+    BadInput for a sampling rate below `samples_per_period` times the full-load resonance, or what
+    `oscillator`, `excitation` and its records refuse.
     """
     full_load_crf_hz = require_sampling(conditions, model, state.sq)
     objection, spring = _objection(state, model), None
@@ -129,21 +144,31 @@ def contact_vibration(
         try:
             spring = oscillator(state, conditions, model, solution=solution)
         except NotConverged as unfinished:
-            objection = f"the tangent stiffness takes neighbouring loads, and at one of them: {unfinished}"
+            objection = (
+                f"the tangent stiffness takes neighbouring loads, and at one of them: {unfinished}"
+            )
     if model.stiffness_law.asperities_alone:
         band_hz = search_band(conditions, model)
     else:
-        band_hz = band_about(full_load_crf_hz if spring is None else spring.natural_frequency_hz, model.rate_hz / 2.0)
+        band_hz = band_about(
+            full_load_crf_hz if spring is None else spring.natural_frequency_hz, model.rate_hz / 2.0
+        )
     if spring is None:
         silent = no_resonance(objection or "", band_hz, model.method)
         return Vibration(resonance=silent, band_hz=band_hz, full_load_crf_hz=full_load_crf_hz)
     below = excitation(state, conditions, model, solution=solution)
     profile = below.profile(round(model.duration_s * model.rate_hz), model.rate_hz, model.seed)
     if model.linear:
-        response, contact_loss = acceleration(spring, profile, method=model.response, substeps=model.substeps), 0.0
+        response, contact_loss = (
+            acceleration(spring, profile, method=model.response, substeps=model.substeps),
+            0.0,
+        )
     else:
         motion = mass_motion(spring, profile, method=model.response, substeps=model.substeps)
-        response, contact_loss = Signal(motion.acceleration, profile.rate_hz, "m/s^2"), motion.contact_loss
+        response, contact_loss = (
+            Signal(motion.acceleration, profile.rate_hz, "m/s^2"),
+            motion.contact_loss,
+        )
     spectrum = power_spectrum(response, window="boxcar")
     f0 = np.array(spring.natural_frequency_hz)
     seen = None

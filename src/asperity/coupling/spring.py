@@ -1,10 +1,10 @@
 """The mass on the contact's spring, by a model's laws."""
 
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.core.errors import require_positive
 from asperity.coupling.laws import LoadedContact, StiffnessLaw
 from asperity.coupling.model import VibrationModel
 from asperity.ehl import ContactSolution, ContactState
-from asperity.errors import require_positive
 from asperity.vibration import ContactOscillator, require_damping_ratio
 
 
@@ -17,15 +17,19 @@ def oscillator(
 ) -> ContactOscillator:
     """The mass on the contact spring, by the model's stiffness and damping laws.
 
-    Raises BadInput when the law's spring is that of the asperities and they carry nothing, or when it needs the solved
-    contact and there is none.
+    Raises BadInput when the law's spring is that of the asperities and they carry nothing, or when
+    it needs the solved contact and there is none.
     """
     if model.stiffness_law.asperities_alone:
         require_positive("load share of the asperities (CLR)", state.clr)
-    return loaded_oscillator(model.stiffness_law, LoadedContact(state.clr, state, conditions, solution), model)
+    return loaded_oscillator(
+        model.stiffness_law, LoadedContact(state.clr, state, conditions, solution), model
+    )
 
 
-def resonance_at(clr: float, state: ContactState, conditions: ContactConditions, model: VibrationModel) -> float | None:
+def resonance_at(
+    clr: float, state: ContactState, conditions: ContactConditions, model: VibrationModel
+) -> float | None:
     """Natural frequency [Hz] at another load share of the same contact; None by a law that would need it solved.
 
     Without any load on asperities, a spring that is theirs alone leaves nothing to resonate: 0.
@@ -38,7 +42,9 @@ def resonance_at(clr: float, state: ContactState, conditions: ContactConditions,
     return natural_frequency_hz(law, LoadedContact(clr, state, conditions), model)
 
 
-def loaded_oscillator(law: StiffnessLaw, contact: LoadedContact, model: VibrationModel) -> ContactOscillator:
+def loaded_oscillator(
+    law: StiffnessLaw, contact: LoadedContact, model: VibrationModel
+) -> ContactOscillator:
     """The model's mass and damping on the spring that `law` makes of a contact."""
     load = contact.asperity_load if law.asperities_alone else contact.conditions.load
     return damped_oscillator(law(contact), load, model, solution=contact.solution)

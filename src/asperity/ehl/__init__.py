@@ -1,4 +1,4 @@
-"""Mixed elastohydrodynamic lubrication: dimensionless inside, SI at its border."""
+"""Mixed elastohydrodynamic lubrication solvers: dimensionless inside, SI at the border."""
 
 import lazy_loader
 

@@ -1,8 +1,9 @@
 """Oil between rigid walls that conserves mass where it ruptures: Jakobsson, Floberg and Olsson's cavitation.
 
-One signed unknown a cell: s >= 0 is a pressure in a full film, s < 0 the missing share of a ruptured one (film content
-1 + s, no pressure), so that one of the two always holds. The gap is given: what bends it stands in `conserving`.
-Source: H. G. Elrod, J. Lubr. Tech. 103 (1981) 350, for one universal unknown in both regions.
+One signed unknown a cell: s >= 0 is a pressure in a full film, s < 0 the missing share of a
+ruptured one (film content 1 + s, no pressure), so that one of the two always holds. The gap is
+given: what bends it stands in `conserving`. Source: H. G. Elrod, J. Lubr. Tech. 103 (1981) 350,
+for one universal unknown in both regions.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from asperity.arrays import Field, Mask
-from asperity.errors import BadInput, NotConverged, require_positive
+from asperity.core.arrays import Field, Mask
+from asperity.core.errors import BadInput, NotConverged, require_positive
 from asperity.lubricant import Barus, DensityLaw, Incompressible, ViscosityLaw
 
 MOST_STEPS = 200
@@ -27,9 +28,10 @@ TOLERANCE = 1e-11  # of the flow: what a cell may lose
 class FilmSolution:
     """An oil film between rigid walls.
 
-    `pressure` [Pa] above the cavitation pressure, `content` (share of the gap that is oil, 0 to 1) and `gap` [m] have
-    shape (nx,) or (nx, ny); `flux` [m^2/s], oil through the faces along x at ambient density and per width, has one
-    more along x; `spacing` [m] and `steps` of Newton's method.
+    `pressure` [Pa] above the cavitation pressure, `content` (share of the gap that is oil, 0 to 1)
+    and `gap` [m] have shape (nx,) or (nx, ny); `flux` [m^2/s], oil through the faces along x at
+    ambient density and per width, has one more along x; `spacing` [m] and `steps` of Newton's
+    method.
     """
 
     pressure: Field
@@ -55,18 +57,24 @@ class FilmSolution:
     def fronts(self) -> tuple[Field, Field]:
         """Where the film of a line of cells ruptures and where it forms again, distances [m] from its start.
 
-        Where it forms again the last cell that is not full holds more oil than streams through the cavity. None more
-        leaves the next cell without pressure, and all there is room for leaves its own at the onset of one: the front
-        lies between their centres.
+        Where it forms again the last cell that is not full holds more oil than streams through the
+        cavity. None more leaves the next cell without pressure, and all there is room for leaves
+        its own at the onset of one: the front lies between their centres.
         """
         if self.pressure.ndim != 1:
-            raise BadInput("fronts are those of a line of cells, got a field; ask for one of its lines")
+            raise BadInput(
+                "fronts are those of a line of cells, got a field; ask for one of its lines"
+            )
         full = ~self.cavitated
         dx = self.spacing[0]
         ruptures = np.flatnonzero(full[:-1] & ~full[1:]) + 1
-        forms = np.flatnonzero(~full[:-1] & full[1:])  # the last cell that is not full holds the front
+        forms = np.flatnonzero(
+            ~full[:-1] & full[1:]
+        )  # the last cell that is not full holds the front
         before = np.maximum(forms - 1, 0)
-        streaming = np.minimum(self.content[before] * self.gap[before] / self.gap[forms], self.content[forms])
+        streaming = np.minimum(
+            self.content[before] * self.gap[before] / self.gap[forms], self.content[forms]
+        )
         filled = (self.content[forms] - streaming) / (1.0 - streaming)
         return ruptures * dx, (forms + 1.5 - filled) * dx
 
@@ -134,7 +142,9 @@ def solve_film(
         residual=residual,
     )
     if strict and not residual < tolerance:
-        raise NotConverged(film, f"film not solved: a cell loses {residual:.1e} of the flow after {steps} steps")
+        raise NotConverged(
+            film, f"film not solved: a cell loses {residual:.1e} of the flow after {steps} steps"
+        )
     return film
 
 
@@ -208,7 +218,10 @@ class Channel:
 
     def limited(self, signed: Field, change: Field) -> Field:
         """A change no longer than the oil's laws are straight."""
-        steep = self.viscosity.log_slope(np.maximum(signed, 0.0) * self.pressure_scale) * self.pressure_scale
+        steep = (
+            self.viscosity.log_slope(np.maximum(signed, 0.0) * self.pressure_scale)
+            * self.pressure_scale
+        )
         longest = LONGEST_STEP / np.maximum(steep, 1e-12)
         return np.clip(change, -longest - np.abs(signed), longest + 1.0)
 
@@ -220,18 +233,25 @@ class Channel:
         density = self.density(pressure) / self.density.rho0
         d_density = self.density.slope(pressure) / self.density.rho0 * d_pressure
         conductance = density * self.gap**3 / (12.0 * self.viscosity(pressure))
-        d_conductance = conductance * (d_density / density - self.viscosity.log_slope(pressure) * d_pressure)
+        d_conductance = conductance * (
+            d_density / density - self.viscosity.log_slope(pressure) * d_pressure
+        )
         oil, d_oil = density * self.gap, d_density * self.gap
-        return Cells(pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance)
+        return Cells(
+            pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance
+        )
 
     def flows(self, signed: Field) -> Flows:
         """All flows and their derivatives.
 
-        A face joins two half cells of one gap each, which is exact where the gap steps. Its pressure is found from
-        equal flow on both sides, and where that were negative the film ruptures at the face.
+        A face joins two half cells of one gap each, which is exact where the gap steps. Its
+        pressure is found from equal flow on both sides, and where that were negative the film
+        ruptures at the face.
         """
         dx, u = self.spacing[0], self.speed
-        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = self._cells(signed)
+        pressure, d_pressure, content, d_content, oil, d_oil, conductance, d_conductance = (
+            self._cells(signed)
+        )
         half, d_half = 2.0 * conductance / dx, 2.0 * d_conductance / dx
         left, right = np.s_[:-1], np.s_[1:]
         both = half[left] + half[right]
@@ -248,7 +268,9 @@ class Channel:
             + joint * d_pressure[left]
         )
         by_right = (
-            u * content[left] * ((1.0 - share) * d_oil[right] - (1.0 - share) * step * d_half[right])
+            u
+            * content[left]
+            * ((1.0 - share) * d_oil[right] - (1.0 - share) * step * d_half[right])
             + (1.0 - share) ** 2 * d_half[right] * drop
             - joint * d_pressure[right]
         )
@@ -265,7 +287,13 @@ class Channel:
         by_right = np.where(ruptures, 0.0, by_right)
 
         inlet, outlet = self.ends
-        entering = u * self.inflow_content * self.density(np.array(inlet)) / self.density.rho0 * self.gap[0]
+        entering = (
+            u
+            * self.inflow_content
+            * self.density(np.array(inlet))
+            / self.density.rho0
+            * self.gap[0]
+        )
         entering = entering + half[0] * (inlet - pressure[0])
         d_entering = d_half[0] * (inlet - pressure[0]) - half[0] * d_pressure[0]
         leaving = u * content[-1] * oil[-1] + half[-1] * (pressure[-1] - outlet)
@@ -280,9 +308,15 @@ class Channel:
         own[0] -= d_entering
         own[1:] -= by_right
         index: Index = np.arange(self.gap.size, dtype=np.intp).reshape(self.gap.shape)
-        entries = [(index, index, own), (index[:-1], index[1:], by_right), (index[1:], index[:-1], -by_left)]
+        entries = [
+            (index, index, own),
+            (index[:-1], index[1:], by_right),
+            (index[1:], index[:-1], -by_left),
+        ]
         outflow += self._across(pressure, conductance, d_conductance, d_pressure, index, entries)
-        rows, columns = (np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1))
+        rows, columns = (
+            np.concatenate([entry[place].ravel() for entry in entries]) for place in (0, 1)
+        )
         slopes = np.concatenate([entry[2].ravel() for entry in entries])
         through = float(np.max(np.abs(along.mean(axis=1))))
         return Flows(along, outflow, through, rows, columns, slopes)
@@ -306,16 +340,26 @@ class Channel:
         drop = pressure - np.roll(pressure, -1, 1)
         flow = joint * drop  # through the northern face
         by_own = (b / (a + b)) ** 2 * d_half * drop + joint * d_pressure
-        by_next = (a / (a + b)) ** 2 * np.roll(d_half, -1, 1) * drop - joint * np.roll(d_pressure, -1, 1)
+        by_next = (a / (a + b)) ** 2 * np.roll(d_half, -1, 1) * drop - joint * np.roll(
+            d_pressure, -1, 1
+        )
         if self.sides is not None:
             for part in (flow, by_own, by_next):
                 part[:, -1] = 0.0
             for column, outside in ((0, self.sides[0]), (-1, self.sides[1])):
                 outflow[:, column] += half[:, column] * (pressure[:, column] - outside)
-                slope = d_half[:, column] * (pressure[:, column] - outside) + half[:, column] * d_pressure[:, column]
+                slope = (
+                    d_half[:, column] * (pressure[:, column] - outside)
+                    + half[:, column] * d_pressure[:, column]
+                )
                 entries.append((index[:, column], index[:, column], slope))
         north = np.roll(index, -1, 1)
-        entries += [(index, index, by_own), (index, north, by_next), (north, index, -by_own), (north, north, -by_next)]
+        entries += [
+            (index, index, by_own),
+            (index, north, by_next),
+            (north, index, -by_own),
+            (north, north, -by_next),
+        ]
         return outflow + flow - np.roll(flow, 1, 1)
 
 
@@ -333,19 +377,29 @@ def _solved(flows: Flows) -> Field:
 def _check(channel: Channel, *, line: bool, field_spacing: bool) -> None:
     gap = channel.gap
     if gap.ndim != 2 or len(gap) < 2:
-        raise BadInput(f"gap must have shape (nx,) or (nx, ny) with two cells or more along x, got {gap.shape}")
+        raise BadInput(
+            f"gap must have shape (nx,) or (nx, ny) with two cells or more along x, got {gap.shape}"
+        )
     if line == field_spacing:
         wanted = "one size of cell" if line else "(dx, dy)"
-        raise BadInput(f"spacing must be {wanted} for a gap of shape {gap.shape[: 1 if line else 2]}")
+        raise BadInput(
+            f"spacing must be {wanted} for a gap of shape {gap.shape[: 1 if line else 2]}"
+        )
     if not np.all((gap > 0.0) & (gap < np.inf)):
-        raise BadInput(f"gap must be positive and finite everywhere, got {np.min(gap):g} m; part the walls")
+        raise BadInput(
+            f"gap must be positive and finite everywhere, got {np.min(gap):g} m; part the walls"
+        )
     for name, size in zip(("dx", "dy"), channel.spacing, strict=True):
         require_positive(f"spacing {name}", size, "m")
     for name, pressure in (("ends", channel.ends), ("sides", channel.sides or (0.0, 0.0))):
         if not all(0.0 <= value < np.inf for value in pressure):
-            raise BadInput(f"{name} must be pressures above that of cavitation, got {pressure} Pa; count them from it")
+            raise BadInput(
+                f"{name} must be pressures above that of cavitation, got {pressure} Pa; count them from it"
+            )
     if not 0.0 < channel.inflow_content <= 1.0:
-        raise BadInput(f"inflow content must lie between 0 and 1, got {channel.inflow_content:g}; 1 is a full gap")
+        raise BadInput(
+            f"inflow content must lie between 0 and 1, got {channel.inflow_content:g}; 1 is a full gap"
+        )
     if channel.inflow_content < 1.0 and channel.ends[0] > 0.0:
         raise BadInput(
             f"oil that enters at {channel.ends[0]:g} Pa fills the gap, got inflow content "

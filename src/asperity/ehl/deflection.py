@@ -1,9 +1,10 @@
 """How an elastic half-space gives way under pressure: an exact cell-to-cell convolution by FFT.
 
-V = c ∫∫ P/distance, every cell's pressure constant. Aperiodic axes are zero padded. Where y repeats, wavenumber 0 in
-y is the plane-strain logarithm averaged over a cell and every other wavenumber q the cell's integral of 2 K₀(q|X|),
-summed over all aliases that a pressure constant over each cell excites; else Love's closed form for a rectangle.
-Source: K. L. Johnson, Contact Mechanics (1985), eqs 2.24b and 3.25; the Fourier transform of 1/r along y.
+V = c ∫∫ P/distance, every cell's pressure constant. Aperiodic axes are zero padded. Where y
+repeats, wavenumber 0 in y is the plane-strain logarithm averaged over a cell and every other
+wavenumber q the cell's integral of 2 K₀(q|X|), summed over all aliases that a pressure constant
+over each cell excites; else Love's closed form for a rectangle. Source: K. L. Johnson, Contact
+Mechanics (1985), eqs 2.24b and 3.25; the Fourier transform of 1/r along y.
 """
 
 from collections.abc import Iterator
@@ -14,10 +15,16 @@ from typing import Any, Literal
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 
-BETWEEN, THROUGH = 1, 2  # where a mirror across y stands: behind the last line of cells, or in its middle
-COSINES: dict[int, Literal[2, 3]] = {BETWEEN: 2, THROUGH: 3}  # transforms into those counted from the mirror on
+BETWEEN, THROUGH = (
+    1,
+    2,
+)  # where a mirror across y stands: behind the last line of cells, or in its middle
+COSINES: dict[int, Literal[2, 3]] = {
+    BETWEEN: 2,
+    THROUGH: 3,
+}  # transforms into those counted from the mirror on
 FAR = 8  # cells along x beyond which the compliance counts as a background
 ALL_OF_K0 = 32.0  # to which its integral from 0 is π/2 to 3e-15
 SMALL, DEGREE = 3.0, 14  # argument from which a polynomial gives it, of that degree
@@ -28,9 +35,9 @@ ALIASES = 18  # on either side, for the sum of all
 class Deflection:
     """Compliance of every cell on every other.
 
-    `spectrum` is the transformed kernel, in double and in single precision, `padded` the lengths it was transformed at
-    and `row` the compliance of cells 0, 1, ... along x on one line, shape (nx,). With a `mirror` (0 for none) cells end
-    there, and their image presses too.
+    `spectrum` is the transformed kernel, in double and in single precision, `padded` the lengths
+    it was transformed at and `row` the compliance of cells 0, 1, ... along x on one line, shape
+    (nx,). With a `mirror` (0 for none) cells end there, and their image presses too.
     """
 
     cells: tuple[int, int]
@@ -48,7 +55,9 @@ class Deflection:
     def undone(self, displacement: Field) -> Field:
         """About the pressure that displaces the surface so and leaves all around it where it was, shape (nx, ny)."""
         waves = self._waves(displacement)
-        waves /= np.abs(self.spectrum[displacement.dtype == np.float32])  # a line contact's mean has a sign of its own
+        waves /= np.abs(
+            self.spectrum[displacement.dtype == np.float32]
+        )  # a line contact's mean has a sign of its own
         return self._field(waves)
 
     def _waves(self, field: Field) -> np.ndarray:
@@ -57,15 +66,23 @@ class Deflection:
         if self.mirror:
             cosines = scipy.fft.dct(field[:, ::-1], type=COSINES[self.mirror], n=wide, axis=1)
             return np.asarray(scipy.fft.rfft(cosines, n=long, axis=0))
-        return np.asarray(scipy.fft.fft(scipy.fft.rfft(field, n=wide, axis=1), n=long, axis=0, overwrite_x=True))
+        return np.asarray(
+            scipy.fft.fft(scipy.fft.rfft(field, n=wide, axis=1), n=long, axis=0, overwrite_x=True)
+        )
 
     def _field(self, waves: np.ndarray) -> Field:
         """What has these waves, (nx, ny)."""
         (nx, ny), (long, wide) = self.cells, self.padded
         if self.mirror:
             cosines = scipy.fft.irfft(waves, n=long, axis=0, overwrite_x=True)[:nx]
-            return np.ascontiguousarray(scipy.fft.idct(cosines, type=COSINES[self.mirror], axis=1)[:, ny - 1 :: -1])
-        return np.asarray(scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[:, :ny])
+            return np.ascontiguousarray(
+                scipy.fft.idct(cosines, type=COSINES[self.mirror], axis=1)[:, ny - 1 :: -1]
+            )
+        return np.asarray(
+            scipy.fft.irfft(scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx], n=wide, axis=1)[
+                :, :ny
+            ]
+        )
 
     def among(self, lines: int) -> "Deflection":
         """The same among that many neighbouring lines along x, none longer than the grid is."""
@@ -73,7 +90,9 @@ class Deflection:
         kernel = scipy.fft.ifft(self.spectrum[0], axis=0)[:lines].real
         long = scipy.fft.next_fast_len(2 * lines - 1)
         spectrum = np.ascontiguousarray(scipy.fft.fft(_mirrored(kernel, long), axis=0).real)
-        return Deflection((lines, ny), (long, wide), (spectrum, spectrum.astype(np.float32)), self.row[:lines])
+        return Deflection(
+            (lines, ny), (long, wide), (spectrum, spectrum.astype(np.float32)), self.row[:lines]
+        )
 
     @property
     def near(self) -> Field:
@@ -83,18 +102,30 @@ class Deflection:
 
 @lru_cache(maxsize=16)
 def deflection(
-    cells: tuple[int, int], spacing: tuple[float, float], compliance: float, periodic: bool, mirror: int = 0
+    cells: tuple[int, int],
+    spacing: tuple[float, float],
+    compliance: float,
+    periodic: bool,
+    mirror: int = 0,
 ) -> Deflection:
     """Compliance of a grid, up to a mirror if there is one; spacing in Hertz half-widths."""
     nx, ny = cells
     # zero padded to no less than twice the length: the outlet must not feel the inlet
-    padded = scipy.fft.next_fast_len(2 * nx - 1), ny if periodic else scipy.fft.next_fast_len(2 * ny - 1, real=True)
+    padded = (
+        scipy.fft.next_fast_len(2 * nx - 1),
+        ny if periodic else scipy.fft.next_fast_len(2 * ny - 1, real=True),
+    )
     if mirror:
         lines = 2 * ny + 1 - mirror
-        padded = scipy.fft.next_fast_len(2 * nx - 1, real=True), scipy.fft.next_fast_len(lines, real=True)
+        padded = (
+            scipy.fft.next_fast_len(2 * nx - 1, real=True),
+            scipy.fft.next_fast_len(lines, real=True),
+        )
         kernel = compliance * _love_kernel((nx, lines), spacing)
         row = kernel[:, 0].copy()
-        spectrum = scipy.fft.rfft(_mirrored(_cosines(kernel, padded[1], mirror), padded[0]), axis=0).real
+        spectrum = scipy.fft.rfft(
+            _mirrored(_cosines(kernel, padded[1], mirror), padded[0]), axis=0
+        ).real
     elif periodic:
         kernel = 2.0 * compliance * _line_kernel(cells, spacing)
         row = scipy.fft.irfft(kernel, n=ny, axis=1)[:, 0]
@@ -131,7 +162,9 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
     edges = (np.arange(nx + 1) - 0.5) * dx
     kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
     wave = np.arange(1, ny // 2 + 1) / ny  # waves a cell
-    beyond = np.zeros((nx + 1, wave.size))  # the middle of the first cell, then each cell's far edge
+    beyond = np.zeros(
+        (nx + 1, wave.size)
+    )  # the middle of the first cell, then each cell's far edge
     for alias, weight in _aliases(wave):
         beyond[0] += (np.pi / 2.0) * weight
         wavenumber = alias * (2.0 * np.pi / dy)
@@ -149,9 +182,10 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
 def _aliases(wave: Field) -> Iterator[tuple[Field, Field]]:
     """Of waves, up to half a one a cell, all that a pressure constant over each cell excites, and each one's weight.
 
-    The transform of a cell over the wavenumber is sin(π wave) dy/(2 π²) times 1/(wave + n)² with the sign of
-    (-1)^n (wave + n). Both tails, n to ±∞, alternate, and what they are weights of falls so smoothly that ALIASES terms
-    tell the sum to (3 + √8)^-ALIASES. Source: H. Cohen, F. Rodriguez Villegas, D. Zagier, Exp. Math. 9 (2000) 3.
+    The transform of a cell over the wavenumber is sin(π wave) dy/(2 π²) times 1/(wave + n)² with
+    the sign of (-1)^n (wave + n). Both tails, n to ±∞, alternate, and what they are weights of
+    falls so smoothly that ALIASES terms tell the sum to (3 + √8)^-ALIASES. Source: H. Cohen, F.
+    Rodriguez Villegas, D. Zagier, Exp. Math. 9 (2000) 3.
     """
     yield wave, 1.0 / wave**2
     whole = (3.0 + np.sqrt(8.0)) ** ALIASES
@@ -183,7 +217,8 @@ def _k0_beyond(argument: Field) -> Field:
 def _large_arguments() -> tuple[float, float, Field]:
     """√z exp(z) ∫ K₀ from z on, as a polynomial: of 1/z less the first number, over the second, the coefficients.
 
-    Interpolated (to 3e-14 of the integral from 0) between ∫ exp(z - z cosh t)/cosh t dt, t from 0 on, by trapezoids.
+    Interpolated (to 3e-14 of the integral from 0) between ∫ exp(z - z cosh t)/cosh t dt, t from 0
+    on, by trapezoids.
     """
     centre, reach = 0.5 * (1.0 / SMALL + 1.0 / ALL_OF_K0), 0.5 * (1.0 / SMALL - 1.0 / ALL_OF_K0)
     cosh = np.cosh(0.125 * np.arange(40))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Literal, get_args
 
+from asperity.core.errors import BadInput, require_positive
 from asperity.ehl.uncertainty import ContactError
-from asperity.errors import BadInput, require_positive
 
 ContactModel = Literal["unified", "paper", "mixed", "conserving"]
 UNIFIED, PAPER, MIXED, CONSERVING = MODELS = get_args(ContactModel)  # the first two are one
@@ -37,7 +37,9 @@ class Options:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 0.1:
-            raise BadInput(f"tolerance must lie between 0 and 0.1, got {self.tolerance:g}; 1e-4 is the default")
+            raise BadInput(
+                f"tolerance must lie between 0 and 0.1, got {self.tolerance:g}; 1e-4 is the default"
+            )
         if self.max_iterations < 1:
             raise BadInput(f"max_iterations must be at least 1, got {self.max_iterations}")
         require_positive("contact film", self.contact_film, "m")
@@ -48,7 +50,8 @@ class Options:
 # what is tried, one after the other, until one converges
 ATTEMPTS = (
     "coarse to fine",
-    "with the second-order wedge of rough bodies",  # smooth bodies only: they have a better one at first
+    # smooth bodies only: they have a better one at first
+    "with the second-order wedge of rough bodies",
     "with the bodies held while their distance was searched",
 )
 FROM_DRY = "from the dry contact"  # of two pressures only
@@ -80,7 +83,8 @@ class Iteration:
 class Figures:
     """What a solution is asked for first: CAR in the Hertz zone, CLR, least and central film [m]; or their errors.
 
-    Of a roller also the largest pressure [Pa] and the least gap [m] at its ends; None of other contacts.
+    Of a roller also the largest pressure [Pa] and the least gap [m] at its ends; None of other
+    contacts.
     """
 
     car: float
@@ -116,7 +120,9 @@ class Figures:
 
     def _each(self, other: "Figures", merge: Callable[[float, float], float]) -> "Figures":
         pairs = ((name, getattr(self, name), getattr(other, name)) for name in FIGURES)
-        return Figures(**{name: merge(mine, its) for name, mine, its in pairs if None not in (mine, its)})
+        return Figures(
+            **{name: merge(mine, its) for name, mine, its in pairs if None not in (mine, its)}
+        )
 
 
 FIGURES = tuple(field.name for field in fields(Figures))
@@ -126,8 +132,8 @@ FIGURES = tuple(field.name for field in fields(Figures))
 class GridError(Figures):
     """What the cells' size may have done to the figures: half-widths of 90 % intervals.
 
-    `lean` is how far the middle of each interval lies above the figure: a finer grid mostly goes on the way that the
-    figures took from the coarser one.
+    `lean` is how far the middle of each interval lies above the figure: a finer grid mostly goes
+    on the way that the figures took from the coarser one.
     """
 
     lean: Figures
@@ -142,9 +148,10 @@ class GridError(Figures):
 class Convergence:
     """How the solve went: status, every step on every grid level, and the time it took [s].
 
-    `attempt` is the manner that led here: the first, unless what was tried before it failed. `iteration_error` is how
-    far the last step moved the figures, `discretisation_error` what the cells' size may have done to them, from the
-    solutions on coarser grids: None on a grid too small to have a coarser one. A warm start hands on its own.
+    `attempt` is the manner that led here: the first, unless what was tried before it failed.
+    `iteration_error` is how far the last step moved the figures, `discretisation_error` what the
+    cells' size may have done to them, from the solutions on coarser grids: None on a grid too
+    small to have a coarser one. A warm start hands on its own.
     """
 
     status: SolveStatus
@@ -189,20 +196,22 @@ class Convergence:
 class ContactState:
     """Scalars of a solved contact, SI.
 
-    The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others. `car` contact cells in it
-    over all cells there; `car_domain` contact area of the whole domain over the Hertz area; `clr` load on contact cells
-    over the load; `capped_oil_load_ratio` load on cells that stand at the pressure cap without touching, over the load:
-    oil that the model holds at the hardness, which a coarser contact threshold would count as contact; `sq` composite
-    roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies touch), `h_central` mean
-    over a tenth of the Hertz zone's half-widths, `h_mean` mean over the zone; `lambda_ratio` the smooth contact's least
-    film, by the fit of its regime, over Sq (`least_film`; None for a smooth surface or a dry contact); `p_max` [Pa];
-    `reynolds_residual` root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
-    relative; `mass_flux_imbalance` oil that vanishes or appears in the cells of the Hertz zone, of one pressure in
-    those where Reynolds' equation does not hold, in sum, over the oil that the surfaces carry through the zone, u times
-    mean film (0 when dry). The cavity behind the contact is left out: the model refills it, which changes nothing
-    upstream;
-    `contact_slope` mean slope of the undeformed roughness over touching cells (None where none touch);
-    `error` how far load share and resonance may be off, and why (None for a mean over the steps of a history).
+    The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others.
+    `car` contact cells in it over all cells there; `car_domain` contact area of the whole domain
+    over the Hertz area; `clr` load on contact cells over the load; `capped_oil_load_ratio` load on
+    cells that stand at the pressure cap without touching, over the load: oil that the model holds
+    at the hardness, which a coarser contact threshold would count as contact; `sq` composite
+    roughness [m]; films [m]: `h_min` smallest gap of the domain (the contact film where bodies
+    touch), `h_central` mean over a tenth of the Hertz zone's half-widths, `h_mean` mean over the
+    zone; `lambda_ratio` the smooth contact's least film, by the fit of its regime, over Sq
+    (`least_film`; None for a smooth surface or a dry contact); `p_max` [Pa]; `reynolds_residual`
+    root mean square of what is left of every cell's equation, as a share of p_h; `load_error`
+    relative; `mass_flux_imbalance` oil that vanishes or appears in the cells of the Hertz zone, of
+    one pressure in those where Reynolds' equation does not hold, in sum, over the oil that the
+    surfaces carry through the zone, u times mean film (0 when dry). The cavity behind the contact
+    is left out: the model refills it, which changes nothing upstream; `contact_slope` mean slope
+    of the undeformed roughness over touching cells (None where none touch); `error` how far load
+    share and resonance may be off, and why (None for a mean over the steps of a history).
     """
 
     car: float

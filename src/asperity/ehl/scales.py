@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
 from asperity.lubricant import Lubricant
 
 
@@ -18,6 +18,15 @@ class Scales:
     @classmethod
     def of(cls, conditions: ContactConditions, lubricant: Lubricant | None) -> "Scales":
         """Scales of a contact; a and R are those along rolling."""
-        a, p_h, radius = conditions.hertz.half_widths[0], conditions.hertz.p_max, conditions.radius_along_rolling
+        a, p_h, radius = (
+            conditions.hertz.half_widths[0],
+            conditions.hertz.p_max,
+            conditions.radius_along_rolling,
+        )
         eta0 = lubricant.viscosity.eta0 if lubricant else 0.0
-        return cls(a, p_h, a**2 / radius, 12.0 * eta0 * conditions.entrainment_speed * radius**2 / (a**3 * p_h))
+        return cls(
+            a,
+            p_h,
+            a**2 / radius,
+            12.0 * eta0 * conditions.entrainment_speed * radius**2 / (a**3 * p_h),
+        )

@@ -6,20 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.conditions import ContactConditions
-from asperity.ehl.elastic import elastic_contact
-from asperity.ehl.films import central_film
-from asperity.ehl.iterate import Step, newton
-from asperity.ehl.mixed_solve import solve_mixed
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, NotConverged
+from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.film_formulas import central_film
+from asperity.ehl.models.elastic_dry import elastic_contact
+from asperity.ehl.models.single_pressure import Problem
+from asperity.ehl.newton.single_pressure import Step, newton
 from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
-from asperity.ehl.posing import contact_problem, first_guess, least_part, levels_in_reach
-from asperity.ehl.problem import Problem
+from asperity.ehl.problem_setup import contact_problem, first_guess, least_part, levels_in_reach
 from asperity.ehl.scales import Scales
-from asperity.ehl.search import COARSE_TOLERANCE, Progress, Search
-from asperity.ehl.solution import ContactSolution
-from asperity.errors import BadInput, NotConverged
-from asperity.grid import Grid
+from asperity.ehl.strategies.grid_continuation import COARSE_TOLERANCE, Progress, Search
+from asperity.ehl.strategies.mixed_search import solve_mixed
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
@@ -64,7 +64,9 @@ def solve_contact(
         require_liquid(lubricant.viscosity, conditions.hertz.p_max)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
-    solve = SOLVERS[options.model if lubricant else PAPER]  # without oil there is one pressure, and nothing to lose
+    solve = SOLVERS[
+        options.model if lubricant else PAPER
+    ]  # without oil there is one pressure, and nothing to lose
     solution = solve(
         conditions,
         lubricant,
@@ -125,12 +127,18 @@ def solve_unified(
 class ElasticSearch(Search):
     """Dry elastic bodies coarse to fine; a step of Newton's on the finest grid says whether it is solved."""
 
-    def climb(self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool) -> Step:
+    def climb(
+        self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool
+    ) -> Step:
         """Solve on grid after grid; by Newton's steps alone where the bodies are `held`."""
         if held:
             return super().climb(levels, pressure, approach, held=True)
         options, start = self.options, pressure
-        self.figures, self.smooth, self.cell = [], not np.any(levels[0].roughness), levels[0].spacing[0]
+        self.figures, self.smooth, self.cell = (
+            [],
+            not np.any(levels[0].roughness),
+            levels[0].spacing[0],
+        )
         for problem in reversed(levels):
             finest = problem is levels[0]
             tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
@@ -140,13 +148,21 @@ class ElasticSearch(Search):
             if not met:
                 return super().climb(levels, start, approach, held=False)
             step = self.run(
-                problem, newton(problem, pressure, near), tolerance, options.max_iterations if finest else 0
+                problem,
+                newton(problem, pressure, near),
+                tolerance,
+                options.max_iterations if finest else 0,
             )
             self.figures.append(self._figures(step))
         return step
 
 
-SOLVERS = {"unified": solve_unified, "paper": solve_unified, "mixed": solve_mixed, "conserving": solve_mixed}
+SOLVERS = {
+    "unified": solve_unified,
+    "paper": solve_unified,
+    "mixed": solve_mixed,
+    "conserving": solve_mixed,
+}
 
 
 def _warm_start(start: ContactSolution, problem: Problem, scales: Scales) -> tuple[Field, float]:
@@ -154,7 +170,9 @@ def _warm_start(start: ContactSolution, problem: Problem, scales: Scales) -> tup
     if cells[1] == 1:
         pressure = pressure.mean(axis=1, keepdims=True)
     if pressure.shape != cells:
-        raise BadInput(f"start has {start.grid.cells} cells, the surface {cells}; solve without start")
+        raise BadInput(
+            f"start has {start.grid.cells} cells, the surface {cells}; solve without start"
+        )
     return np.ascontiguousarray(pressure[:, : problem.cells[1]]), start.rigid_approach / scales.gap
 
 
@@ -166,11 +184,15 @@ def _check_factor(factor: Field, surface: Surface) -> None:
         )
 
 
-def _check_grid(conditions: ContactConditions, lubricant: Lubricant | None, surface: Surface) -> None:
+def _check_grid(
+    conditions: ContactConditions, lubricant: Lubricant | None, surface: Surface
+) -> None:
     grid, line = surface.grid, conditions.endless
     if grid.periodic != (False, line):
         which = "an elliptic" if conditions.geometry == "elliptic" else f"a {conditions.geometry}"
-        raise BadInput(f"{which} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}")
+        raise BadInput(
+            f"{which} contact needs a grid with periodic=(False, {line}), got periodic={grid.periodic}"
+        )
     a, b = conditions.hertz.half_widths
     if conditions.geometry == "roller":
         if lubricant is not None:
@@ -207,7 +229,9 @@ def _check_cap(conditions: ContactConditions, grid: Grid) -> None:
 def _check_weight(conditions: ContactConditions, lubricant: Lubricant) -> None:
     """A roller must be pressed so that it deforms: the solver counts in Hertz's half-widths."""
     film = central_film(conditions, lubricant)
-    wide = float(np.sqrt(film * conditions.radius_along_rolling))  # where a rigid roller's pressure is
+    wide = float(
+        np.sqrt(film * conditions.radius_along_rolling)
+    )  # where a rigid roller's pressure is
     if wide > RIGID * conditions.hertz.half_widths[0]:
         raise BadInput(
             f"the roller's load of {conditions.load:.3g} N floats on a film of {film * 1e6:.3g} um, which bears it on "

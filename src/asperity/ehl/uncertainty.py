@@ -45,16 +45,22 @@ class Uncertainty:
         if self.numerical is None or self.record is None:
             return None
         below, above = (
-            math.hypot(*parts) for parts in zip(self.numerical, self.surfaces or NONE, self.record, strict=True)
+            math.hypot(*parts)
+            for parts in zip(self.numerical, self.surfaces or NONE, self.record, strict=True)
         )
         least, most = self.range
-        return min(max(self.value - below, least), self.value), max(min(self.value + above, most), self.value)
+        return min(max(self.value - below, least), self.value), max(
+            min(self.value + above, most), self.value
+        )
 
     @property
     def halves(self) -> dict[str, float | None]:
         """Half-width of each part, mean of both sides; None where it is not known."""
         parts = {"numerical": self.numerical, "surfaces": self.surfaces, "record": self.record}
-        return {name: None if sides is None else 0.5 * (sides[0] + sides[1]) for name, sides in parts.items()}
+        return {
+            name: None if sides is None else 0.5 * (sides[0] + sides[1])
+            for name, sides in parts.items()
+        }
 
     @property
     def low(self) -> float | None:
@@ -71,9 +77,9 @@ class Uncertainty:
 class ContactError:
     """How far the figures of a contact may be off.
 
-    `clr` of the load share, `crf_hz` of the contact resonance (None where none was looked for, or none found);
-    `surfaces` how many were solved. `choices` are in no interval: what was chosen, and would move the numbers if it
-    were chosen otherwise, a few words each.
+    `clr` of the load share, `crf_hz` of the contact resonance (None where none was looked for, or
+    none found); `surfaces` how many were solved. `choices` are in no interval: what was chosen,
+    and would move the numbers if it were chosen otherwise, a few words each.
     """
 
     clr: Uncertainty

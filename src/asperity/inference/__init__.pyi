@@ -10,8 +10,6 @@ from .emulator import build_emulator as build_emulator
 from .emulator import emulators_folder as emulators_folder
 from .emulator import extend_emulator as extend_emulator
 from .estimates import Estimate as Estimate
-from .following import Follower as Follower
-from .following import Foreseen as Foreseen
 from .forecast import Forecast as Forecast
 from .forecast import Interval as Interval
 from .forecast import Limit as Limit
@@ -22,6 +20,7 @@ from .forward import LAWS as LAWS
 from .forward import Forward as Forward
 from .forward import Law as Law
 from .forward import Shown as Shown
+from .gaussian_process import Process as Process
 from .infer import SAMPLERS as SAMPLERS
 from .infer import forecast_heard as forecast_heard
 from .infer import infer_contact as infer_contact
@@ -34,9 +33,7 @@ from .infer import with_observation as with_observation
 from .inference import CRUCIAL as CRUCIAL
 from .inference import Inference as Inference
 from .inference import PointEstimates as PointEstimates
-from .listening import Listened as Listened
-from .listening import listen as listen
-from .measured import with_measured as with_measured
+from .measured_surface import with_measured as with_measured
 from .next_point import NextPoint as NextPoint
 from .observations import Heard as Heard
 from .observations import Observation as Observation
@@ -45,8 +42,11 @@ from .posterior import Draws as Draws
 from .posterior import Model as Model
 from .posterior import Sampler as Sampler
 from .priors import Unknown as Unknown
-from .process import Process as Process
+from .recording_input import Listened as Listened
+from .recording_input import listen as listen
 from .sampling import Pool as Pool
+from .series_forecast import Follower as Follower
+from .series_forecast import Foreseen as Foreseen
 from .settings import Setting as Setting
 from .settings import setting_of as setting_of
 from .visits import Series as Series

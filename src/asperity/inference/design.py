@@ -7,14 +7,14 @@ from typing import Any, Literal
 import numpy as np
 from scipy.special import ndtr
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity
 from asperity.inference.forward import Forward
 from asperity.inference.observations import Point
 from asperity.inference.outputs import CLR, OUTPUTS
 from asperity.inference.priors import Unknown
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
-from asperity.quantities import quantity
 
 SURELY = 0.95
 VALUES = 25  # of each lever, along its range
@@ -29,8 +29,8 @@ Way = Literal["at most", "at least", "any", "none"]
 class Lever:
     """What one quantity alone must be for the load share to stay below a value, all else as it is known.
 
-    `way` is "at most" or "at least" `bound` [SI]; "any" or "none" where all of the range does, or nothing of it.
-    `values` [SI] and `chances` are the probabilities over the whole range.
+    `way` is "at most" or "at least" `bound` [SI]; "any" or "none" where all of the range does, or
+    nothing of it. `values` [SI] and `chances` are the probabilities over the whole range.
     """
 
     key: str
@@ -49,8 +49,13 @@ class Lever:
 
     def scalars(self) -> dict[str, Any]:
         """As JSON has it."""
-        return {"key": self.key, "way": self.way, "bound": self.bound, "values": self.values.tolist(),
-                "chances": self.chances.tolist()}  # fmt: skip
+        return {
+            "key": self.key,
+            "way": self.way,
+            "bound": self.bound,
+            "values": self.values.tolist(),
+            "chances": self.chances.tolist(),
+        }
 
 
 @dataclass(frozen=True)
@@ -72,8 +77,13 @@ class Design:
 
     def scalars(self) -> dict[str, Any]:
         """As JSON has it."""
-        return {"clr": self.clr, "probability": SURELY, "now": self.now, "sentence": self.sentence(),
-                "levers": [lever.scalars() for lever in self.levers]}  # fmt: skip
+        return {
+            "clr": self.clr,
+            "probability": SURELY,
+            "now": self.now,
+            "sentence": self.sentence(),
+            "levers": [lever.scalars() for lever in self.levers],
+        }
 
 
 def require_share(name: str, clr: float) -> None:
@@ -85,7 +95,8 @@ def require_share(name: str, clr: float) -> None:
 def design_contact(forward: Forward, z: Field, *, clr: float) -> Design:
     """Which load, speed, viscosity (or temperature) or roughness keeps CLR below a value, at the first point.
 
-    Each alone is put to values along its range, in all contacts that are possible; the rest of them stays.
+    Each alone is put to values along its range, in all contacts that are possible; the rest of
+    them stays.
 
     Parameters
     ----------
@@ -116,11 +127,16 @@ def _lever(forward: Forward, z: Field, lever: Unknown, clr: float) -> Lever:
     shares = np.linspace(0.0, 1.0, VALUES)
     values = lever.to_si(np.array([lever.range.value(share) for share in shares]))
     if lever.range.key in NAMES:
-        asked = replace(forward, points=tuple(_moved(forward.points[0], lever.range.key, float(v)) for v in values))
+        asked = replace(
+            forward,
+            points=tuple(_moved(forward.points[0], lever.range.key, float(v)) for v in values),
+        )
         chances = _chances(asked, z, clr)
     else:
         column = forward.setting.unknowns.index(lever)
-        chances = np.array([_chances(forward, _put(z, column, at), clr)[0] for at in lever.at_share(shares)])
+        chances = np.array(
+            [_chances(forward, _put(z, column, at), clr)[0] for at in lever.at_share(shares)]
+        )
     enough = chances >= SURELY
     if enough.all() or not enough.any():
         return Lever(lever.key, "any" if enough.all() else "none", None, values, chances)
@@ -136,7 +152,9 @@ def _lever(forward: Forward, z: Field, lever: Unknown, clr: float) -> Lever:
 def _between(values: Field, chances: Field, place: int) -> float:
     """Where the chance is enough, between two values."""
     order = np.argsort(chances[place : place + 2])
-    return float(np.interp(SURELY, chances[place : place + 2][order], values[place : place + 2][order]))
+    return float(
+        np.interp(SURELY, chances[place : place + 2][order], values[place : place + 2][order])
+    )
 
 
 def _chances(forward: Forward, z: Field, clr: float) -> Field:
@@ -149,7 +167,11 @@ def _chances(forward: Forward, z: Field, clr: float) -> Field:
 def _moved(point: Point, key: str, value: float) -> Point:
     if key == LOAD:
         return replace(point, load_n=value)
-    return replace(point, entrainment_m_s=value) if key == SPEED else replace(point, temperature_k=value)
+    return (
+        replace(point, entrainment_m_s=value)
+        if key == SPEED
+        else replace(point, temperature_k=value)
+    )
 
 
 def _put(z: Field, column: int, at: float) -> Field:

@@ -1,7 +1,8 @@
 """The contact emulated: a Sobol study of solved contacts on disk, and Gaussian processes through its means.
 
-Several surfaces a point tell the mean over patches, which a recording shows, from the scatter of patches, which it
-averages away. How far the emulator is off is found on points that its processes did not see.
+Several surfaces a point tell the mean over patches, which a recording shows, from the scatter of
+patches, which it averages away. How far the emulator is off is found on points that its processes
+did not see.
 """
 
 import hashlib
@@ -16,15 +17,23 @@ from typing import Any
 import numpy as np
 import pandas
 
-from asperity.arrays import Field
 from asperity.case import MOST_POINTS
-from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.files import make_folder, user_cache
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
+from asperity.core.files import make_folder, user_cache
+from asperity.core.storage import read_json, write_json
+from asperity.inference.gaussian_process import Process, fit_process, require_learning
 from asperity.inference.outputs import CLR, OUTPUTS, Output
-from asperity.inference.process import Process, fit_process, require_learning
 from asperity.inference.settings import LOAD, SPEED, TEMPERATURE, Setting
-from asperity.kept import read_json, write_json
-from asperity.study import ParameterRange, StudyPlan, StudyProgress, StudyResult, overrides_at, plan_points, run_study
+from asperity.study import (
+    ParameterRange,
+    StudyPlan,
+    StudyProgress,
+    StudyResult,
+    overrides_at,
+    plan_points,
+    run_study,
+)
 
 FOLDS = 5  # of the points: each is held out of the processes that foretell it
 LAYOUT = 1  # counts up when what an emulator keeps or means changes
@@ -33,16 +42,22 @@ FITTED = "emulator.json"
 FURTHER, SHARES = "further", "shares.json"
 FINER, FINER_POINTS = "finer", 24  # points solved on twice the cells too
 NORMAL_90 = 1.6448536269514722
-FILM_EXPONENTS = {"viscosity": 0.7, "alpha": 0.54, "load": -0.13, "sq": -1.0}  # ln Λ: Dowson and Higginson's film
+FILM_EXPONENTS = {
+    "viscosity": 0.7,
+    "alpha": 0.54,
+    "load": -0.13,
+    "sq": -1.0,
+}  # ln Λ: Dowson and Higginson's film
 
 
 @dataclass(frozen=True)
 class Quality:
     """How far an emulator is off, found on points held out, in the output's own unit.
 
-    `error` is the rms of held-out means against emulated ones; `coverage` the share of them within the stated 90 %;
-    `scatter` that of one surface about its point's mean; `scatter_of_mean` that of a point's mean. Both are in every
-    error: a perfect emulator has `error` equal to `scatter_of_mean`.
+    `error` is the rms of held-out means against emulated ones; `coverage` the share of them within
+    the stated 90 %; `scatter` that of one surface about its point's mean; `scatter_of_mean` that
+    of a point's mean. Both are in every error: a perfect emulator has `error` equal to
+    `scatter_of_mean`.
     """
 
     error: float
@@ -55,7 +70,8 @@ class Quality:
 class GridError:
     """What twice the cells change of an output, on its scale: in the mean, and by rms over points.
 
-    Both are of the same surfaces on both grids. Finer grids still are taken to change it as much again, or nothing.
+    Both are of the same surfaces on both grids. Finer grids still are taken to change it as much
+    again, or nothing.
     """
 
     shift: float = 0.0
@@ -115,7 +131,11 @@ class Emulator:
         """How good it is, in words."""
         clr, grid = self.quality[CLR], self.grid.get(CLR, GridError())
         moved = OUTPUTS[CLR].back(np.array([0.0, grid.shift]))
-        finer = f" On twice the cells CLR 50 % is {100 * moved[1]:.0f} %, which is corrected for." if self.grid else ""
+        finer = (
+            f" On twice the cells CLR 50 % is {100 * moved[1]:.0f} %, which is corrected for."
+            if self.grid
+            else ""
+        )
         where = f" ({self.further} of them where posteriors were)" if self.further else ""
         return (
             f"Emulator of {self.points} contacts{where}, {self.surfaces} surfaces each: CLR of points held out is off "
@@ -128,12 +148,14 @@ class Emulator:
 class Features:
     """Shares of the ranges with one of them, that of the speed, replaced by an estimated film ratio.
 
-    Film and contact hang on the product of viscosity and speed, by powers that are known nearly; what they are not is
-    left to the process, which has the other shares.
+    Film and contact hang on the product of viscosity and speed, by powers that are known nearly;
+    what they are not is left to the process, which has the other shares.
     """
 
     ranges: tuple[ParameterRange, ...]
-    oil: tuple[Field, Field, Field] | None = None  # shares of a temperature's range; ln viscosity; ln alpha there
+    oil: tuple[Field, Field, Field] | None = (
+        None  # shares of a temperature's range; ln viscosity; ln alpha there
+    )
 
     def __call__(self, shares: Field) -> Field:
         """Points for the processes, shape (n, d)."""
@@ -177,7 +199,8 @@ def features_of(setting: Setting) -> Features:
     return Features(ranges, (at, viscosity - viscosity.mean(), alpha - alpha.mean()))
 
 
-# Built and kept ------------------------------------------------------------------------------------------------------
+# Built and kept
+# ------------------------------------------------------------------------------------------------------
 
 
 def emulators_folder() -> Path:
@@ -211,14 +234,18 @@ def build_emulator(
     sobol = sobol_shares(setting)
     plan = _plan(setting, sobol)
     identity = hashlib.sha256(
-        json.dumps([plan.design, [case.id for case in plan.cases], version("asperity"), LAYOUT]).encode()
+        json.dumps(
+            [plan.design, [case.id for case in plan.cases], version("asperity"), LAYOUT]
+        ).encode()
     ).hexdigest()
     home = emulators_folder() / identity[:16] if folder is None else Path(folder)
     fitted = home / FITTED
     if not fitted.exists():
         require_learning()
     elif read_json(fitted, "delete it, and it is fitted again").get("identity") != identity:
-        raise BadInput(f"{home} holds the emulator of another case, range or version; choose another folder")
+        raise BadInput(
+            f"{home} holds the emulator of another case, range or version; choose another folder"
+        )
     make_folder(home)
     how: dict[str, Any] = {"executor": executor, "workers": workers, "progress": progress}
     result = run_study(plan, out=home, **how)
@@ -235,10 +262,19 @@ def build_emulator(
     finer = _finer(setting, sobol, home=home, **how)
     processes, quality = _processes(means, features(shares[means.points]), fitted, identity)
     return Emulator(
-        setting.ranges, features, processes, quality, len(means.points), setting.surfaces, failed, home,
-        float(table["seconds"].sum()), setting.case.grid.cells, _grid_errors(result.table, finer),
+        setting.ranges,
+        features,
+        processes,
+        quality,
+        len(means.points),
+        setting.surfaces,
+        failed,
+        home,
+        float(table["seconds"].sum()),
+        setting.case.grid.cells,
+        _grid_errors(result.table, finer),
         int(np.sum(means.points >= len(sobol))),
-    )  # fmt: skip
+    )
 
 
 def extend_emulator(setting: Setting, emulator: Emulator, shares: Field, **how: Any) -> Emulator:
@@ -252,12 +288,16 @@ def extend_emulator(setting: Setting, emulator: Emulator, shares: Field, **how: 
         for more points than an emulator may have, or one that is not on disk.
     """
     if not (emulator.folder / FITTED).exists():
-        raise BadInput(f"{emulator.folder} holds no emulator; only one that is kept can be extended")
+        raise BadInput(
+            f"{emulator.folder} holds no emulator; only one that is kept can be extended"
+        )
     if emulator.points + len(shares) > MOST_POINTS:
         raise BadInput(
             f"an emulator has {MOST_POINTS} points at most, got {emulator.points} and {len(shares)}; extend it by less"
         )
-    last = max((int(path.name) for path in (emulator.folder / FURTHER).glob("[0-9][0-9][0-9]")), default=-1)
+    last = max(
+        (int(path.name) for path in (emulator.folder / FURTHER).glob("[0-9][0-9][0-9]")), default=-1
+    )
     place = emulator.folder / FURTHER / f"{last + 1:03d}"
     make_folder(place)
     write_json(place / SHARES, {"shares": np.asarray(shares, dtype=float).tolist()})
@@ -294,7 +334,9 @@ def _finer(setting: Setting, sobol: Field, *, home: Path, **how: Any) -> pandas.
         {"grid.cells": [2 * count if count > 1 else 1 for count in setting.case.grid.cells]}
     )
     points = [overrides_at(twice, setting.ranges, shares) for shares in sobol[:FINER_POINTS]]
-    return run_study(plan_points(twice, points, seeds=setting.surfaces, kind="still"), out=home / FINER, **how).table
+    return run_study(
+        plan_points(twice, points, seeds=setting.surfaces, kind="still"), out=home / FINER, **how
+    ).table
 
 
 def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, GridError]:
@@ -315,7 +357,9 @@ def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, 
     return errors
 
 
-def _processes(means: "_Means", x: Field, fitted: Path, identity: str) -> tuple[dict[str, Process], dict[str, Quality]]:
+def _processes(
+    means: "_Means", x: Field, fitted: Path, identity: str
+) -> tuple[dict[str, Process], dict[str, Quality]]:
     """A process for each output and how good it is: as they were kept, or fitted now, and kept."""
     processes, quality = {}, {}
     known = read_json(fitted, "delete it, and it is fitted again") if fitted.exists() else None
@@ -329,8 +373,12 @@ def _processes(means: "_Means", x: Field, fitted: Path, identity: str) -> tuple[
         else:
             processes[output.key], quality[output.key] = _as_kept(known, output.key, x, y, noise)
     if known is None:
-        kept = {key: {**processes[key].settings(), "quality": vars(quality[key])} for key in OUTPUTS}
-        write_json(fitted, {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": kept})
+        kept = {
+            key: {**processes[key].settings(), "quality": vars(quality[key])} for key in OUTPUTS
+        }
+        write_json(
+            fitted, {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": kept}
+        )
     return processes, quality
 
 
@@ -343,14 +391,18 @@ def sobol_shares(setting: Setting) -> Field:
     return np.asarray(points[: setting.points])
 
 
-def _as_kept(known: Mapping[str, Any], key: str, x: Field, y: Field, noise: Field) -> tuple[Process, Quality]:
+def _as_kept(
+    known: Mapping[str, Any], key: str, x: Field, y: Field, noise: Field
+) -> tuple[Process, Quality]:
     try:
         entry = known["outputs"][key]
         lengths = np.asarray(entry["lengths"], dtype=float)
         process = Process(x, y, noise, lengths, float(entry["level"]), float(entry["rough"]))
         return process, Quality(**entry["quality"])
     except (KeyError, TypeError, ValueError):
-        raise UnreadableFile(f"{FITTED} says nothing of {key}; delete it, and it is fitted again") from None
+        raise UnreadableFile(
+            f"{FITTED} says nothing of {key}; delete it, and it is fitted again"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -371,8 +423,13 @@ class _Means:
         whole = groups.size() == surfaces
         mean = groups.mean()[whole]
         spread = groups.var(ddof=1)[whole] if surfaces > 1 else mean * 0.0
-        smoothed = {key: _smoothed(OUTPUTS[key], mean[key].to_numpy(), spread[key].to_numpy()) for key in keys}
-        return cls(mean.index.to_numpy(), mean, pandas.DataFrame(smoothed, index=mean.index), surfaces)
+        smoothed = {
+            key: _smoothed(OUTPUTS[key], mean[key].to_numpy(), spread[key].to_numpy())
+            for key in keys
+        }
+        return cls(
+            mean.index.to_numpy(), mean, pandas.DataFrame(smoothed, index=mean.index), surfaces
+        )
 
     def scaled(self, output: Output) -> tuple[Field, Field]:
         """Means on an output's scale, and their variance there."""

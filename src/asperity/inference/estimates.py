@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 
 ENDS = (0.05, 0.5, 0.95)
 BINS = 20  # of what was known before, equally probable
@@ -20,7 +20,8 @@ CROWDED = 5.0  # how many times as much of the posterior must lie there to lie a
 class Estimate:
     """Median and ends of the 90 % interval, SI, and what was learned against the prior.
 
-    `against` is "low" or "high" where the posterior lies against an end of its prior, which then decides the interval.
+    `against` is "low" or "high" where the posterior lies against an end of its prior, which then
+    decides the interval.
     """
 
     median: float
@@ -49,27 +50,40 @@ class Estimate:
 def estimate(values: Field, prior: Field, effective: float, *, bounded: bool = False) -> Estimate:
     """Of equally probable draws after and before, which are worth `effective` independent ones."""
     low, median, high = (float(end) for end in np.quantile(values, ENDS))
-    return Estimate(median, low, high, bits(values, prior, effective), _against(values, prior) if bounded else "")
+    return Estimate(
+        median,
+        low,
+        high,
+        bits(values, prior, effective),
+        _against(values, prior) if bounded else "",
+    )
 
 
 def estimates(
-    after: Mapping[str, Field], before: Mapping[str, Field], effective: float, bounded: frozenset[str]
+    after: Mapping[str, Field],
+    before: Mapping[str, Field],
+    effective: float,
+    bounded: frozenset[str],
 ) -> dict[str, Estimate]:
     """`estimate` of several quantities by their keys."""
-    return {key: estimate(after[key], before[key], effective, bounded=key in bounded) for key in after}
+    return {
+        key: estimate(after[key], before[key], effective, bounded=key in bounded) for key in after
+    }
 
 
 def bits(values: Field, prior: Field, effective: float) -> float:
     """Kullback and Leibler's information of the posterior over the prior, in bits; 0 where chance makes as much.
 
-    By histogram over classes that were equally probable before, less what so few draws make of nothing (Miller and
-    Madow).
+    By histogram over classes that were equally probable before, less what so few draws make of
+    nothing (Miller and Madow).
     """
     ordered = np.sort(prior)
     inner = np.quantile(ordered, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
     edges: Field = np.unique(inner)
     places = edges.size + 1
-    after = np.bincount(np.searchsorted(edges, values, side="right"), minlength=places) / len(values)
+    after = np.bincount(np.searchsorted(edges, values, side="right"), minlength=places) / len(
+        values
+    )
     before = np.bincount(np.searchsorted(edges, prior, side="right"), minlength=places) / len(prior)
     told = after > 0.0
     found = float(np.sum(after[told] * np.log2(after[told] / np.maximum(before[told], 1e-12))))

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import logsumexp
 
-from asperity.arrays import Field
 from asperity.case import read_amount
-from asperity.errors import AsperityError, BadInput
-from asperity.inference.course import Course, Extra, Walked, between_knots, tabulated
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput
+from asperity.core.quantities import quantity
+from asperity.inference.drifting_contact import Course, Extra, Walked, between_knots, tabulated
 from asperity.inference.emulator import Emulator
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law
 from asperity.inference.observations import Observation
@@ -21,14 +22,18 @@ from asperity.inference.priors import si
 from asperity.inference.sampling import RULED_OUT, Pool, Sampled, importance
 from asperity.inference.settings import Setting
 from asperity.inference.visits import Series, series_of
-from asperity.quantities import quantity
-from asperity.tracking import Bands
+from asperity.monitoring import Bands
 
 ENOUGH, COURSES = 400.0, 1500  # effective draws of each model; courses that are let run on
-FEWEST, ROUGH = 20.0, 60.0  # draws that any model is worth, at least; fewer than the second are told
+FEWEST, ROUGH = (
+    20.0,
+    60.0,
+)  # draws that any model is worth, at least; fewer than the second are told
 LONGEST = 120  # rounds of drawing, where the usual number leaves fewer
 HORIZON, STEPS = 2.0, 80  # how far, over the span of the series; in so many steps
-ODDS = 100.0  # of a change over none, from which on it is told: by chance once in a hundred series that are as modelled
+# of a change over none, from which on it is told: by chance once in a hundred series that are as
+# modelled
+ODDS = 100.0
 ENDS = (0.05, 0.5, 0.95)
 WORSE_ABOVE = (CLR, "sq_m")  # what may fall as far as it likes: running in is no alarm
 
@@ -101,7 +106,8 @@ class Forecast:
     def alarm(self) -> bool:
         """Whether it changes, and is past the limit or more likely than not to cross it within the horizon.
 
-        Load share and Sq are past a limit above it: one that falls is an alarm as long as it has not fallen below.
+        Load share and Sq are past a limit above it: one that falls is an alarm as long as it has
+        not fallen below.
         """
         if not self.told:
             return False
@@ -130,7 +136,11 @@ class Forecast:
         if self.within < 0.05:
             return said + "."
         said += f", if so after {self.time.low:.3g} to {self.time.high:.3g} (90 %; {self.time.median:.3g})"
-        rough = f"; roughly, as it rests on {self.effective:.0f} courses" if self.effective < ROUGH else ""
+        rough = (
+            f"; roughly, as it rests on {self.effective:.0f} courses"
+            if self.effective < ROUGH
+            else ""
+        )
         return f"{said}{rough}."
 
     def scalars(self) -> dict[str, Any]:
@@ -169,14 +179,20 @@ def read_limit(text: str, setting: Setting) -> Limit:
     name, _, amount = (part.strip() for part in text.partition("="))
     known = {unknown.range.key.rpartition(".")[2]: unknown.key for unknown in setting.contact}
     if name not in (CLR, *known):
-        raise BadInput(f"--forecast takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}")
+        raise BadInput(
+            f"--forecast takes a limit such as clr=0.5, of clr, {' or '.join(known)}, got {text!r}"
+        )
     if name != CLR:
-        limit = Limit(known[name], read_amount(f"--forecast {name}", quantity(known[name]).unit, amount))
+        limit = Limit(
+            known[name], read_amount(f"--forecast {name}", quantity(known[name]).unit, amount)
+        )
     else:
         try:
             limit = Limit(CLR, float(amount))
         except ValueError:
-            raise BadInput(f"--forecast clr takes a share of the load such as clr=0.5, got {text!r}") from None
+            raise BadInput(
+                f"--forecast clr takes a share of the load such as clr=0.5, got {text!r}"
+            ) from None
     require_limit(setting, limit)
     return limit
 
@@ -230,7 +246,9 @@ def forecast_observations(
         course = Course(forward, series, law, drifting, *([drift] if drift else []))
         pool = Pool(course, joined, taken, course.dims, seed)
         for moving in (True, False):
-            sampled = importance(pool, _target(moving=moving), enough=ENOUGH, best=best, least=ROUGH, longest=LONGEST)
+            sampled = importance(
+                pool, _target(moving=moving), enough=ENOUGH, best=best, least=ROUGH, longest=LONGEST
+            )
             best = max(best, sampled.log_evidence)
             models.append(_Model(course, moving, sampled))
     for model in models:
@@ -242,12 +260,16 @@ def forecast_observations(
     return replace(_forecast(models, limit, seed), x_name=x_name)
 
 
-def require_limit(setting: Setting, limit: Limit, drifting: str | None = None, *, worn: bool = False) -> None:
+def require_limit(
+    setting: Setting, limit: Limit, drifting: str | None = None, *, worn: bool = False
+) -> None:
     """BadInput for a limit of something else than what drifts, or that it cannot reach within the emulator's range."""
     if limit.key not in (CLR, drifting or limit.key):
         raise BadInput(f"a limit must be of {CLR} or {drifting}, which changes, got {limit.key!r}")
     if worn and limit.key not in (CLR, "sq_m"):
-        raise BadInput(f"--worn says how Sq drifts, and the limit is of {limit.key}; leave --worn out")
+        raise BadInput(
+            f"--worn says how Sq drifts, and the limit is of {limit.key}; leave --worn out"
+        )
     if limit.key == CLR and not 0.0 < limit.value < 1.0:
         raise BadInput(f"a limit of CLR must lie between 0 and 1, got {limit.value:g}")
     unknown = next((one for one in setting.contact if one.key == limit.key), None)
@@ -272,7 +294,11 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
     changing = np.array([model.moving for model in models])
     odds = float(logsumexp(logs[changing]) - logsumexp(logs[~changing]))
     counts = np.round(COURSES * np.exp(logs - logsumexp(logs))).astype(int)
-    parts = [_let_run(model, int(count), limit, rng) for model, count in zip(models, counts, strict=True) if count >= 1]
+    parts = [
+        _let_run(model, int(count), limit, rng)
+        for model, count in zip(models, counts, strict=True)
+        if count >= 1
+    ]
     past, ahead, clr, value = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     series = models[0].course.series
     rising = bool(np.mean(ahead[:, -1] >= past[:, 0]) >= 0.5)
@@ -298,12 +324,22 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
         horizon=HORIZON * series.span,
         clr=Interval.of(clr),
         value=Interval.of(value),
-        effective=float(1.0 / np.sum((np.exp(logs - logsumexp(logs))) ** 2 / [m.sampled.effective for m in models])),
-        bands=Bands(*limit, np.concatenate([series.x, x_ahead]), series.x[-1], np.quantile(whole, ENDS, axis=0)),
+        effective=float(
+            1.0
+            / np.sum((np.exp(logs - logsumexp(logs))) ** 2 / [m.sampled.effective for m in models])
+        ),
+        bands=Bands(
+            *limit,
+            np.concatenate([series.x, x_ahead]),
+            series.x[-1],
+            np.quantile(whole, ENDS, axis=0),
+        ),
     )
 
 
-def _let_run(model: _Model, count: int, limit: Limit, rng: np.random.Generator) -> tuple[Field, Field, Field, Field]:
+def _let_run(
+    model: _Model, count: int, limit: Limit, rng: np.random.Generator
+) -> tuple[Field, Field, Field, Field]:
     """The limit's quantity at the visits and ahead, (count, times); load share and what drifts, at the last visit."""
     course, weights = model.course, model.sampled.weights
     places = (rng.random() + np.arange(count)) / count
@@ -351,7 +387,13 @@ def _run_on(share: Field, speed: Field, restless: Field, rng: np.random.Generato
 
 
 def _offset(
-    course: Course, scale: Field, std: Field, share: Field, error: Field, size: Field, rng: np.random.Generator
+    course: Course,
+    scale: Field,
+    std: Field,
+    share: Field,
+    error: Field,
+    size: Field,
+    rng: np.random.Generator,
 ) -> Field:
     """By how much the emulator is off in the load share: its part of the error that CRF showed, and what is left."""
     lever = np.zeros(len(share))

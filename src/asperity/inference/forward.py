@@ -1,7 +1,8 @@
 """From unknowns to what a recording shows of them, by two laws of the contact's spring, for many at once.
 
-"hertz-point" is the paper's: a sphere's spring under the asperities' load alone, with a damping that is the machine's.
-"own" is the solved contact's: its tangent stiffness, and its own damping beside the machine's.
+"hertz-point" is the paper's: a sphere's spring under the asperities' load alone, with a damping
+that is the machine's. "own" is the solved contact's: its tangent stiffness, and its own damping
+beside the machine's.
 """
 
 import math
@@ -12,16 +13,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.contact.hertz import point_stiffness
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity
 from asperity.coupling import NoiseExcitation
-from asperity.errors import BadInput
-from asperity.hertz import point_stiffness
 from asperity.inference.emulator import Emulator, GridError
 from asperity.inference.observations import Point
 from asperity.inference.outputs import CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
 from asperity.inference.priors import Unknown, share_of
 from asperity.inference.settings import GRID_ERROR, LOAD, OFFSET, SPEED, TEMPERATURE, Setting
-from asperity.quantities import quantity
 
 Law = Literal["hertz-point", "own"]
 LAWS: tuple[Law, ...] = ("hertz-point", "own")
@@ -32,7 +33,8 @@ LEAST_DAMPING = 1e-4
 class Shown(NamedTuple):
     """What a law says that recordings show: arrays of (unknowns, operating points); logarithms, and their deviations.
 
-    That of CRFA is the emulator's of CAR. `lever` is by how much ln CRF moves with the law's exponent of the load.
+    That of CRFA is the emulator's of CAR. `lever` is by how much ln CRF moves with the law's
+    exponent of the load.
     """
 
     crf: Field
@@ -93,11 +95,15 @@ class Forward:
         for number, entry in enumerate(self.setting.operating, contact.shape[1]):
             for place, point in enumerate(self.points):
                 stated = _operating_value(self.setting, point, entry.key)
-                value = Unknown("", entry).from_si(stated + (offset if entry.key == TEMPERATURE else 0.0))
+                value = Unknown("", entry).from_si(
+                    stated + (offset if entry.key == TEMPERATURE else 0.0)
+                )
                 shares[:, place, number] = np.clip(share_of(entry, value), 0.0, 1.0)
         return shares
 
-    def emulated(self, z: Field, keys: Sequence[str], *, deviations: bool = True) -> dict[str, tuple[Field, Field]]:
+    def emulated(
+        self, z: Field, keys: Sequence[str], *, deviations: bool = True
+    ) -> dict[str, tuple[Field, Field]]:
         """Mean and deviation of outputs, on their scales, shape (n, points); zeros where no `deviations` are wanted."""
         shares = self.shares(z)
         rows, places, ranges = shares.shape
@@ -105,7 +111,10 @@ class Forward:
         if deviations:
             answers = self.emulator(flat, keys)
         else:
-            answers = {key: (mean, np.zeros(len(mean))) for key, mean in self.emulator.means(flat, keys).items()}
+            answers = {
+                key: (mean, np.zeros(len(mean)))
+                for key, mean in self.emulator.means(flat, keys).items()
+            }
         z_grid = self.unknown(z, GRID_ERROR, 0.0)[:, None]
         found: dict[str, tuple[Field, Field]] = {}
         for key, (mean, std) in answers.items():
@@ -120,8 +129,13 @@ class Forward:
         keys = {"crf": stiff, "damping": damped, "crfa": CAR}
         if places == 1:
             return dict.fromkeys(keys, np.ones((count, 1, 1)))
-        x = self.emulator.features(self.shares(z).reshape(count * places, -1)).reshape(count, places, -1)
-        found = {key: self.emulator.processes[key].correlations(x) for key in dict.fromkeys(keys.values())}
+        x = self.emulator.features(self.shares(z).reshape(count * places, -1)).reshape(
+            count, places, -1
+        )
+        found = {
+            key: self.emulator.processes[key].correlations(x)
+            for key in dict.fromkeys(keys.values())
+        }
         return {channel: found[key] for channel, key in keys.items()}
 
     def states(self, z: Field, keys: Sequence[str]) -> dict[str, Field]:
@@ -148,7 +162,12 @@ class Forward:
         return self.shown_by(z, law, emulated, heights=heights)
 
     def shown_by(
-        self, z: Field, law: Law, emulated: Mapping[str, tuple[Field, Field]], *, heights: bool = True
+        self,
+        z: Field,
+        law: Law,
+        emulated: Mapping[str, tuple[Field, Field]],
+        *,
+        heights: bool = True,
     ) -> Shown:
         """The same of outputs that are emulated already: those of `outputs` at least."""
         model = self.setting.case.vibration
@@ -178,11 +197,19 @@ class Forward:
         share = OUTPUTS[CLR].back(mean)
         borne = np.maximum(share, LEAST_SHARE)
         conditions = self.setting.case.conditions
-        one_newton = point_stiffness(1.0, conditions.radius_along_rolling, conditions.pair.reduced_modulus)
+        one_newton = point_stiffness(
+            1.0, conditions.radius_along_rolling, conditions.pair.reduced_modulus
+        )
         lever = np.log(borne * loads)
-        return math.log(one_newton) + lever / 3.0, std / OUTPUTS[CLR].slope(share) / borne / 3.0, lever
+        return (
+            math.log(one_newton) + lever / 3.0,
+            std / OUTPUTS[CLR].slope(share) / borne / 3.0,
+            lever,
+        )
 
-    def _height(self, z: Field, crf: Field, damping: Field, emulated: tuple[Field, Field]) -> tuple[Field, Field]:
+    def _height(
+        self, z: Field, crf: Field, damping: Field, emulated: tuple[Field, Field]
+    ) -> tuple[Field, Field]:
         """Logarithm of CRFA but for a gain, and its deviation by CAR's.
 
         Sq^2 fc^p f^(4 - 2n) / 4 ζ^2, over noise behind a low pass of order n.
@@ -199,7 +226,13 @@ class Forward:
             sq = np.ones((len(z), 1))
         car = np.maximum(OUTPUTS[CAR].back(emulated[0]), LEAST_SHARE)
         cutoff = exponent * np.log(car / law.car_reference)
-        height = 2.0 * np.log(sq) + power * cutoff + (4 - 2 * order) * crf - 2.0 * damping - math.log(4.0)
+        height = (
+            2.0 * np.log(sq)
+            + power * cutoff
+            + (4 - 2 * order) * crf
+            - 2.0 * damping
+            - math.log(4.0)
+        )
         return np.asarray(height), power * exponent * emulated[1] / (OUTPUTS[CAR].slope(car) * car)
 
 
@@ -216,7 +249,9 @@ def _operating_value(setting: Setting, point: Point, key: str) -> float:
 
 def require_inside(setting: Setting, point: Point) -> None:
     """BadInput for an operating point that the emulator does not reach, or a temperature that its oil has not."""
-    if point.temperature_k is not None and all(entry.key != TEMPERATURE for entry in setting.operating):
+    if point.temperature_k is not None and all(
+        entry.key != TEMPERATURE for entry in setting.operating
+    ):
         raise BadInput(
             "a recording's temperature needs an oil by its data sheet, whose viscosity over temperature is known; "
             "state [lubricant] by grade and temperature, or leave the column temperature_degc out"
@@ -224,7 +259,9 @@ def require_inside(setting: Setting, point: Point) -> None:
     names = {LOAD: "load_n", SPEED: "entrainment_speed_m_s", TEMPERATURE: "oil_temperature_k"}
     for entry in setting.operating:
         value = _operating_value(setting, point, entry.key)
-        low, high = (float(end) for end in Unknown("", entry).to_si(np.array([entry.low, entry.high])))
+        low, high = (
+            float(end) for end in Unknown("", entry).to_si(np.array([entry.low, entry.high]))
+        )
         if not low * (1.0 - 1e-9) <= value <= high * (1.0 + 1e-9):
             shown = quantity(names[entry.key])
             whose = f" of {point.names[0]}" if point.names and point.names[0] else ""

@@ -6,14 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from asperity.ageing import WearHistory, load_wear
 from asperity.case import Case
-from asperity.errors import BadInput, require_choice
+from asperity.core.errors import BadInput, require_choice
 from asperity.inference.emulator import Emulator, build_emulator, extend_emulator
 from asperity.inference.forecast import Forecast, Limit, forecast_observations, require_limit
 from asperity.inference.forward import Forward, Law
 from asperity.inference.inference import Inference
-from asperity.inference.listening import Listened, listen
 from asperity.inference.next_point import candidate_points, expected_information
 from asperity.inference.observations import Observation, Point, points_of
 from asperity.inference.posterior import (
@@ -28,15 +26,20 @@ from asperity.inference.posterior import (
     with_point,
 )
 from asperity.inference.priors import share_of
+from asperity.inference.recording_input import Listened, listen
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting, setting_of
 from asperity.inference.visits import series_of
+from asperity.simulation import WearHistory, load_wear
 from asperity.study import StudyProgress
 
-MATERIAL = 0.1  # share of CLR's variance over the posterior, from which on the emulator's own is worth reducing
+# share of CLR's variance over the posterior, from which on the emulator's own is worth reducing
+MATERIAL = 0.1
 LATELY = 0.1  # of a series: recordings of one state of a contact that changes
 ROUND = 16  # points by which an emulator is extended before the next posterior
-LEAST_DRIFT_STD = 0.02  # of a first drift that a wear model foretells, in shares of the range over the series
+LEAST_DRIFT_STD = (
+    0.02  # of a first drift that a wear model foretells, in shares of the range over the series
+)
 SAMPLERS: tuple[Sampler, ...] = ("importance", "nested")
 
 
@@ -79,21 +82,29 @@ def infer_contact(
     given = [one for one in recordings if isinstance(one, Observation)]
     files = [one for one in recordings if not isinstance(one, Observation)]
     if given and files:
-        raise BadInput("recordings must be files or observations, got both; infer one after the other")
+        raise BadInput(
+            "recordings must be files or observations, got both; infer one after the other"
+        )
     heard = listen(files, setting, table=table) if files else Listened(observations=tuple(given))
     if not isinstance(emulator, Emulator):
-        emulator = build_emulator(setting, folder=emulator, executor=executor, workers=workers, progress=progress)
+        emulator = build_emulator(
+            setting, folder=emulator, executor=executor, workers=workers, progress=progress
+        )
     found = infer_heard(setting, emulator, heard, sampler=sampler, seed=seed)
-    return with_further(found, extend, sampler=sampler, executor=executor, workers=workers, progress=progress)
+    return with_further(
+        found, extend, sampler=sampler, executor=executor, workers=workers, progress=progress
+    )
 
 
-def with_further(found: Inference, most: int, *, sampler: Sampler = "importance", **how: Any) -> Inference:
+def with_further(
+    found: Inference, most: int, *, sampler: Sampler = "importance", **how: Any
+) -> Inference:
     """The same with an emulator that is extended where the posterior is, by up to `most` points; and a note of it.
 
-    In rounds, each a posterior, as long as the emulator's own variance is more than a tenth of CLR's over the
-    posterior, on its scale, at the case's own operating point. Further points are contacts drawn from the posterior, at
-    this operating point and those that were heard in turn; they are kept with the emulator. `how` is as
-    `build_emulator` takes it.
+    In rounds, each a posterior, as long as the emulator's own variance is more than a tenth of
+    CLR's over the posterior, on its scale, at the case's own operating point. Further points are
+    contacts drawn from the posterior, at this operating point and those that were heard in turn;
+    they are kept with the emulator. `how` is as `build_emulator` takes it.
 
     Raises
     ------
@@ -106,10 +117,18 @@ def with_further(found: Inference, most: int, *, sampler: Sampler = "importance"
         count = min(most - added, ROUND)
         shares = posterior_shares(found.forward, found.draws, count, found.seed + added)
         emulator = extend_emulator(found.setting, found.emulator, shares, **how)
-        found, added = infer_observations(
-            found.setting, emulator, found.observations, sampler=sampler, seed=found.seed, silent=found.silent,
-            notes=first.notes,
-        ), added + count  # fmt: skip
+        found, added = (
+            infer_observations(
+                found.setting,
+                emulator,
+                found.observations,
+                sampler=sampler,
+                seed=found.seed,
+                silent=found.silent,
+                notes=first.notes,
+            ),
+            added + count,
+        )
         share = emulated_share(found.forward, found.draws)
     if most == 0 or not found.observations:
         return found
@@ -122,11 +141,22 @@ def with_further(found: Inference, most: int, *, sampler: Sampler = "importance"
 
 
 def infer_heard(
-    setting: Setting, emulator: Emulator, heard: Listened, *, sampler: Sampler = "importance", seed: int = 0
+    setting: Setting,
+    emulator: Emulator,
+    heard: Listened,
+    *,
+    sampler: Sampler = "importance",
+    seed: int = 0,
 ) -> Inference:
     """The same, of what `listen` heard."""
     return infer_observations(
-        setting, emulator, heard.observations, sampler=sampler, seed=seed, silent=heard.silent, notes=heard.notes
+        setting,
+        emulator,
+        heard.observations,
+        sampler=sampler,
+        seed=seed,
+        silent=heard.silent,
+        notes=heard.notes,
     )
 
 
@@ -142,7 +172,8 @@ def forecast_heard(
 ) -> Forecast:
     """`forecast_observations` of what `listen` heard; `worn` is a history of `asperity wear`, whose drift is expected.
 
-    Its hours are those of x, from the first recording on. `x_name` is what x is, that of the track where it has one.
+    Its hours are those of x, from the first recording on. `x_name` is what x is, that of the track
+    where it has one.
     """
     x_name = heard.track.x_name if heard.track is not None else x_name
     times = [one.x for one in heard.observations]
@@ -172,8 +203,13 @@ def wear_drift(setting: Setting, history: WearHistory, hours: float) -> tuple[fl
         raise BadInput("the case knows its Sq, which cannot drift; leave --worn out")
     end = min(hours, history.hours)
     if end <= 0.0:
-        raise BadInput("the wear history has no hours, and says nothing of a drift; leave --worn out")
-    first, last = (float(share_of(unknown.range, unknown.from_si(history.at(time)["sq_m"]))) for time in (0.0, end))
+        raise BadInput(
+            "the wear history has no hours, and says nothing of a drift; leave --worn out"
+        )
+    first, last = (
+        float(share_of(unknown.range, unknown.from_si(history.at(time)["sq_m"])))
+        for time in (0.0, end)
+    )
     mean = (last - first) * hours / end
     return mean, max(abs(mean), LEAST_DRIFT_STD)
 
@@ -207,7 +243,9 @@ def infer_observations(
     conditions = setting.case.conditions
     own = Point(conditions.load, conditions.entrainment_speed)
     forward = Forward(setting, emulator, (own, *points_of(observations)))
-    return _inferred(forward, tuple(observations), new_pools(forward, seed), sampler, seed, silent, notes)
+    return _inferred(
+        forward, tuple(observations), new_pools(forward, seed), sampler, seed, silent, notes
+    )
 
 
 def with_observation(inference: Inference, observation: Observation) -> Inference:
@@ -227,9 +265,13 @@ def with_observation(inference: Inference, observation: Observation) -> Inferenc
     elif len(points) > len(before.points):
         pools = with_point(pools, forward, replace(before, points=points[-1:]))
     else:
-        pools = {law: pool.with_columns(_again(forward, law), pool.shown) for law, pool in pools.items()}
+        pools = {
+            law: pool.with_columns(_again(forward, law), pool.shown) for law, pool in pools.items()
+        }
     told = inference.silent, inference.notes
-    return _inferred(forward, observations, pools, "importance", inference.seed, *told, prior=inference.prior)
+    return _inferred(
+        forward, observations, pools, "importance", inference.seed, *told, prior=inference.prior
+    )
 
 
 def _again(forward: Forward, law: Law) -> Callable[..., object]:
@@ -247,7 +289,9 @@ def _inferred(
     *,
     prior: Draws | None = None,
 ) -> Inference:
-    models, sampled = sample_models(forward, pools, sampler=sampler, seed=seed, quickly=prior is not None)
+    models, sampled = sample_models(
+        forward, pools, sampler=sampler, seed=seed, quickly=prior is not None
+    )
     draws = posterior_draws(forward, sampled, discrepancy=True, seed=seed)
     candidates = expected_information(forward, draws, candidate_points(forward.setting), seed=seed)
     return Inference(

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.inference.emulator import Emulator
 from asperity.inference.estimates import Estimate, estimates
 from asperity.inference.forward import LAWS, Forward, Law
@@ -16,12 +17,13 @@ from asperity.inference.outputs import CLR, FILM, OUTPUTS
 from asperity.inference.posterior import Draws, Model
 from asperity.inference.sampling import Pool
 from asperity.inference.settings import Setting
-from asperity.quantities import quantity
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW
 
 STAGES = ("full film", "mixed lubrication", "boundary lubrication")
 CRUCIAL = (CLR, "sq_m")  # what the product is asked for
-TOLD_BITS = 1.0  # of CLR or Sq, from which on it is called told: half of what was possible is ruled out
+TOLD_BITS = (
+    1.0  # of CLR or Sq, from which on it is called told: half of what was possible is ruled out
+)
 TIED = 0.7  # correlation from which on two unknowns are said to stand in for one another
 LAW_OFF = 0.05  # of CRF, in the mean: before any recording 0.035
 UNLIKELY = 0.1  # probability of the case's law, below which it is said to be wrong
@@ -31,7 +33,14 @@ UNLIKELY = 0.1  # probability of the case's law, below which it is said to be wr
 class PointEstimates:
     """An operating point: its conditions, the contact's state there, and the stage with its probabilities."""
 
-    HEADS: ClassVar[tuple[str, ...]] = ("load", "speed", "recordings", "CLR, 90 %", "mean film, 90 %", "stage")
+    HEADS: ClassVar[tuple[str, ...]] = (
+        "load",
+        "speed",
+        "recordings",
+        "CLR, 90 %",
+        "mean film, 90 %",
+        "stage",
+    )
 
     point: Point
     state: Mapping[str, Estimate]
@@ -109,7 +118,8 @@ class Inference:
         """Every quantity of possible contacts by its key, SI: states at a point, and unknowns."""
         states = {key: columns[:, place] for key, columns in draws.states.items()}
         unknowns = {
-            unknown.key: unknown.value(draws.z[:, number]) for number, unknown in enumerate(self.setting.unknowns)
+            unknown.key: unknown.value(draws.z[:, number])
+            for number, unknown in enumerate(self.setting.unknowns)
         }
         if "sq_m" in unknowns:
             states["lambda_ratio"] = states[FILM] / unknowns["sq_m"]
@@ -130,7 +140,10 @@ class Inference:
             after, before = self.values(self.draws, place), self.values(self.prior, place)
             keys = [*self.draws.states, *(["lambda_ratio"] if "lambda_ratio" in after else [])]
             state = estimates(
-                {key: after[key] for key in keys}, {key: before[key] for key in keys}, self.draws.effective, frozenset()
+                {key: after[key] for key in keys},
+                {key: before[key] for key in keys},
+                self.draws.effective,
+                frozenset(),
             )
             found.append(PointEstimates(point, state, stages(after[CLR])))
         return tuple(found)
@@ -175,7 +188,9 @@ class Inference:
             return ""
         places = len({point.names for point in self.forward.points if point.names})
         names = " and ".join(quantity(key).short for key in untold)
-        said = [f"{names}: {' and '.join(f'{known[key].information_bits:.1f}' for key in untold)} bits learned"]
+        said = [
+            f"{names}: {' and '.join(f'{known[key].information_bits:.1f}' for key in untold)} bits learned"
+        ]
         if places == 1:
             said.append("one operating point is one frequency, which many contacts have in common")
         tied = self._tied()
@@ -194,7 +209,9 @@ class Inference:
         first, second = np.unravel_index(int(np.argmax(alike)), alike.shape)
         if alike[first, second] < TIED:
             return None
-        names = [quantity(self.setting.unknowns[int(number)].key).name for number in (first, second)]
+        names = [
+            quantity(self.setting.unknowns[int(number)].key).name for number in (first, second)
+        ]
         return names[0], names[1]
 
     @property
@@ -203,7 +220,9 @@ class Inference:
         one, scale = self.posterior()[CLR], OUTPUTS[CLR]
         moved = self.emulator.grid[CLR].rms if CLR in self.emulator.grid else 0.0
         at = scale.forward(np.array(one.median))
-        return float(abs(scale.back(at + moved) - scale.back(at - moved)) / 2.0), 0.5 * (one.high - one.low)
+        return float(abs(scale.back(at + moved) - scale.back(at - moved)) / 2.0), 0.5 * (
+            one.high - one.low
+        )
 
     def warnings(self) -> tuple[str, ...]:
         """What makes the intervals doubtful: a posterior against its prior's end, a law that does not fit."""
@@ -247,7 +266,9 @@ class Inference:
                 one, shown = known[key], quantity(key)
                 interval = shown.interval(one.low, one.high)
                 value = (
-                    f"{shown.text(one.median)} ({interval}, 90 %)" if one.information_bits >= TOLD_BITS else "not told"
+                    f"{shown.text(one.median)} ({interval}, 90 %)"
+                    if one.information_bits >= TOLD_BITS
+                    else "not told"
                 )
                 parts.append(f"{shown.short} {value}")
         told = [key for key in CRUCIAL if key in known and known[key].information_bits >= TOLD_BITS]
@@ -267,7 +288,9 @@ class Inference:
             "identifiable": self.identifiable,
             "reason": self.reason,
             "posterior": {key: one.scalars() for key, one in self.posterior().items()},
-            "without_discrepancy": {key: one.scalars() for key, one in self.posterior(discrepancy=False).items()},
+            "without_discrepancy": {
+                key: one.scalars() for key, one in self.posterior(discrepancy=False).items()
+            },
             "stages": stages(self.values(self.draws)[CLR]),
             "load_n": conditions.load,
             "entrainment_m_s": conditions.entrainment_speed,

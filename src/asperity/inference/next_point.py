@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.special import logsumexp
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 from asperity.inference.forward import LAWS, Forward
 from asperity.inference.likelihood import SIZES, Foretold, foretold
 from asperity.inference.observations import Point
@@ -18,7 +18,10 @@ from asperity.inference.settings import LOAD, SPEED, Setting
 
 ACROSS = 5  # loads and speeds that are asked
 CONTACTS = 400  # possible ones that a point is to tell apart
-USUAL: Mapping[str, float] = {"crf": 2e-3, "damping": 0.05}  # relative deviations of what is to be heard
+USUAL: Mapping[str, float] = {
+    "crf": 2e-3,
+    "damping": 0.05,
+}  # relative deviations of what is to be heard
 SILENT = 0.01  # CLR below which asperities alone make no line that anybody hears
 
 
@@ -44,7 +47,12 @@ def candidate_points(setting: Setting, across: int = ACROSS) -> tuple[tuple[floa
     axes = []
     for key in (LOAD, SPEED):
         entry = next(entry for entry in setting.operating if entry.key == key)
-        axes.append([float(Unknown("", entry).to_si(np.array(entry.value(s)))) for s in np.linspace(0.0, 1.0, across)])
+        axes.append(
+            [
+                float(Unknown("", entry).to_si(np.array(entry.value(s))))
+                for s in np.linspace(0.0, 1.0, across)
+            ]
+        )
     return tuple((load, speed) for load in axes[0] for speed in axes[1])
 
 
@@ -84,10 +92,10 @@ def expected_information(
 ) -> list[NextPoint]:
     """What one more recording at each candidate is expected to tell of all unknowns together, in bits.
 
-    By nested Monte Carlo: the mean of ln p(heard | contact) - ln p(heard) over possible contacts and what they would
-    show, with errors of measurement, emulator and law; times the probability that there is a line to be heard. What
-    was heard says of each contact how far emulator and law are off there: that is no news, nor is it how large the
-    law's error is.
+    By nested Monte Carlo: the mean of ln p(heard | contact) - ln p(heard) over possible contacts
+    and what they would show, with errors of measurement, emulator and law; times the probability
+    that there is a line to be heard. What was heard says of each contact how far emulator and law
+    are off there: that is no news, nor is it how large the law's error is.
     """
     rng = np.random.default_rng([seed, 6])
     rows = rng.choice(len(draws.z), min(CONTACTS, len(draws.z)), replace=False)
@@ -98,9 +106,16 @@ def expected_information(
         measured["crf"] = float(np.median([point.crf.std for point in known]))
     places = [Point(load, speed, temperature) for load, speed in candidates]
     shown = would_show(forward, draws.taken(rows), places)
-    chances = {key: (rng.random(len(rows)), rng.standard_normal(len(rows))) for key in USUAL}  # the same everywhere
+    chances = {
+        key: (rng.random(len(rows)), rng.standard_normal(len(rows))) for key in USUAL
+    }  # the same everywhere
     gains = [
-        _information([(at_place(one, number), measured[key], chances[key]) for key, one in shown.channels.items()])
+        _information(
+            [
+                (at_place(one, number), measured[key], chances[key])
+                for key, one in shown.channels.items()
+            ]
+        )
         for number in range(len(places))
     ]
     shares = shown.heard.mean(axis=0)
@@ -118,12 +133,16 @@ def at_place(whole: Foretold, place: int) -> Foretold:
 def _information(channels: Sequence[tuple[Foretold, float, tuple[Field, Field]]]) -> float:
     """Mutual information, in bits, of a contact's number and what it shows, of independent channels.
 
-    Each is what contacts would show, what a measurement adds, and chance: uniform and normal numbers, one a contact.
+    Each is what contacts would show, what a measurement adds, and chance: uniform and normal
+    numbers, one a contact.
     """
     count = channels[0][0].mean.shape[1]
     total = np.zeros((count, count))
     for one, measured, (uniform, normal) in channels:
-        size = np.sum(np.cumsum(np.exp(one.log_share[:-1]), axis=0) < uniform, axis=0), np.arange(count)
+        size = (
+            np.sum(np.cumsum(np.exp(one.log_share[:-1]), axis=0) < uniform, axis=0),
+            np.arange(count),
+        )
         heard = one.mean[size] + np.hypot(one.std[size], measured) * normal
         total += one.log_density(heard[:, None], measured)
     told = np.diag(total) - (logsumexp(total, axis=1) - np.log(count))

@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 
 LEAST_STD = 1e-4  # relative, of a frequency: no machine is steadier
 LOST = math.nan
-ALIKE = np.array([0.03, 0.03, 1.5])  # load and speed, relative, and temperature [K], that are as good as one place
+ALIKE = np.array(
+    [0.03, 0.03, 1.5]
+)  # load and speed, relative, and temperature [K], that are as good as one place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +50,10 @@ class Observation:
         require_positive(f"{what}entrainment_m_s", self.entrainment_m_s, "m/s")
         require_positive(f"{what}crf_hz", self.crf_hz, "Hz")
         require_positive(f"{what}crf_std_hz", self.crf_std_hz, "Hz")
-        for name, value, std in (("crfa", self.crfa, self.crfa_std),
-                                 ("damping_ratio", self.damping_ratio, self.damping_std)):  # fmt: skip
+        for name, value, std in (
+            ("crfa", self.crfa, self.crfa_std),
+            ("damping_ratio", self.damping_ratio, self.damping_std),
+        ):
             if not math.isnan(value):
                 require_positive(f"{what}{name}", value)
                 require_positive(f"{what}standard deviation of {name}", std)
@@ -103,7 +107,9 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
     return tuple(
         Point(
             *place,
-            crf=_together([(one.crf_hz, one.crf_std_hz, one.crf_shared_std_hz) for one in group], LEAST_STD),
+            crf=_together(
+                [(one.crf_hz, one.crf_std_hz, one.crf_shared_std_hz) for one in group], LEAST_STD
+            ),
             damping=_together([(one.damping_ratio, one.damping_std, 0.0) for one in group]),
             crfa=_together([(one.crfa, one.crfa_std, 0.0) for one in group]),
             names=tuple(one.name for one in group),
@@ -114,7 +120,9 @@ def points_of(observations: Sequence[Observation]) -> tuple[Point, ...]:
 
 def conditions(point: Point) -> Field:
     """Logarithms of load and speed, and temperature [K]."""
-    return np.array([math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0])
+    return np.array(
+        [math.log(point.load_n), math.log(point.entrainment_m_s), point.temperature_k or 0.0]
+    )
 
 
 def likeness(points: Sequence[Point]) -> Field:
@@ -126,17 +134,24 @@ def likeness(points: Sequence[Point]) -> Field:
 def require_temperatures(observations: Sequence[Observation]) -> None:
     """BadInput where only some of them say how warm the oil was."""
     if len({one.temperature_k is None for one in observations}) > 1:
-        raise BadInput("some recordings have a temperature and some have none; give it of all, or of none")
+        raise BadInput(
+            "some recordings have a temperature and some have none; give it of all, or of none"
+        )
 
 
 def _together(heard: Sequence[tuple[float, float, float]], least: float = 0.0) -> Heard:
     """The logarithm that repeats measure, of values, deviations, and what of these is common to all of them.
 
-    Their weighted mean, and no surer of it than their scatter lets them be, nor than what they have in common.
+    Their weighted mean, and no surer of it than their scatter lets them be, nor than what they
+    have in common.
     """
     known = np.array(
         [
-            (math.log(value), max(math.sqrt(max(std**2 - common**2, 0.0)) / value, least), common / value)
+            (
+                math.log(value),
+                max(math.sqrt(max(std**2 - common**2, 0.0)) / value, least),
+                common / value,
+            )
             for value, std, common in heard
             if not math.isnan(value)
         ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 
 SHARE_FLOOR = 0.005  # of load or area: below it, recordings and grids tell nothing
 AREA_FLOOR = 0.002
@@ -53,8 +53,13 @@ def _signed(key: str, floor: float) -> Output:
 
 
 CLR, CAR, FILM, FRICTION, STIFFNESS, DAMPING = (
-    "clr", "car", "h_mean_m", "friction_coefficient", "contact_stiffness_n_m", "contact_damping_ratio",
-)  # fmt: skip
+    "clr",
+    "car",
+    "h_mean_m",
+    "friction_coefficient",
+    "contact_stiffness_n_m",
+    "contact_damping_ratio",
+)
 OUTPUTS: Mapping[str, Output] = {
     output.key: output
     for output in (

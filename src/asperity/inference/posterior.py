@@ -1,6 +1,7 @@
 """Posteriors of all models, and what contacts they leave possible: draws of unknowns with the contact's state.
 
-A model is a law of the contact's spring, with or without a term for its error. Models are weighed by their evidence.
+A model is a law of the contact's spring, with or without a term for its error. Models are weighed
+by their evidence.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,18 +11,35 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from scipy.special import logsumexp
 
-from asperity.arrays import Field
-from asperity.errors import AsperityError
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError
 from asperity.inference.forward import LAWS, LEAST_SHARE, Forward, Law, Shown
-from asperity.inference.likelihood import SIZES, WEIGHTS, emulated_errors, law_errors, log_at_sizes, log_likelihood
+from asperity.inference.likelihood import (
+    SIZES,
+    WEIGHTS,
+    emulated_errors,
+    law_errors,
+    log_at_sizes,
+    log_likelihood,
+)
 from asperity.inference.observations import Point, likeness
 from asperity.inference.outputs import CAR, CLR, FILM, FRICTION, OUTPUTS
-from asperity.inference.sampling import FEWEST, QUICKLY, RULED_OUT, Pool, Sampled, importance, nested
+from asperity.inference.sampling import (
+    FEWEST,
+    QUICKLY,
+    RULED_OUT,
+    Pool,
+    Sampled,
+    importance,
+    nested,
+)
 
 Sampler = Literal["importance", "nested"]
 DRAWS = 2000  # equally probable ones, of each posterior
 STATE = (CLR, CAR, FILM, FRICTION)
-MODELS: tuple[tuple[Law, bool], ...] = tuple((law, discrepancy) for law in LAWS for discrepancy in (True, False))
+MODELS: tuple[tuple[Law, bool], ...] = tuple(
+    (law, discrepancy) for law in LAWS for discrepancy in (True, False)
+)
 
 
 @dataclass(frozen=True)
@@ -48,8 +66,8 @@ class Model:
 class Draws:
     """Equally probable contacts: unknowns z (n, dims), states (n, points) in their own units, which law each is by.
 
-    `sizes` are the law's errors that each has in ln CRF, ln ζ and ln CRFA; `effective` how many independent ones they
-    are worth.
+    `sizes` are the law's errors that each has in ln CRF, ln ζ and ln CRFA; `effective` how many
+    independent ones they are worth.
     """
 
     z: Field
@@ -60,12 +78,19 @@ class Draws:
 
     def taken(self, rows: Any) -> "Draws":
         """Some of them."""
-        sizes, states = ({key: one[rows] for key, one in whole.items()} for whole in (self.sizes, self.states))
+        sizes, states = (
+            {key: one[rows] for key, one in whole.items()} for whole in (self.sizes, self.states)
+        )
         return replace(self, z=self.z[rows], law=self.law[rows], sizes=sizes, states=states)
 
 
 def sample_models(
-    forward: Forward, pools: Mapping[Law, Pool], *, sampler: Sampler, seed: int, quickly: bool = False
+    forward: Forward,
+    pools: Mapping[Law, Pool],
+    *,
+    sampler: Sampler,
+    seed: int,
+    quickly: bool = False,
 ) -> tuple[tuple[Model, ...], dict[tuple[Law, bool], Sampled]]:
     """Every model sampled, with its evidence; `quickly` is enough where draws were learnt before.
 
@@ -93,10 +118,19 @@ def sample_models(
             )
     total = logsumexp([one.log_evidence for one in sampled.values()])
     models = tuple(
-        Model(law, discrepancy, one.log_evidence, one.log_evidence_std, float(np.exp(one.log_evidence - total)),
-              one.information_bits, one.effective)
-        for (law, discrepancy), one in sorted(sampled.items(), key=lambda entry: MODELS.index(entry[0]))
-    )  # fmt: skip
+        Model(
+            law,
+            discrepancy,
+            one.log_evidence,
+            one.log_evidence_std,
+            float(np.exp(one.log_evidence - total)),
+            one.information_bits,
+            one.effective,
+        )
+        for (law, discrepancy), one in sorted(
+            sampled.items(), key=lambda entry: MODELS.index(entry[0])
+        )
+    )
     return models, sampled
 
 
@@ -119,7 +153,9 @@ def _evaluate(forward: Forward, law: Law) -> Callable[[Field], Shown]:
 
 def new_pools(forward: Forward, seed: int) -> dict[Law, Pool]:
     """Draws from the prior, for each law."""
-    return {law: Pool(_evaluate(forward.heard, law), joined, taken, forward.dims, seed) for law in LAWS}
+    return {
+        law: Pool(_evaluate(forward.heard, law), joined, taken, forward.dims, seed) for law in LAWS
+    }
 
 
 def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> dict[Law, Pool]:
@@ -127,7 +163,9 @@ def with_point(pools: Mapping[Law, Pool], forward: Forward, added: Forward) -> d
     extended, forward = {}, forward.heard
     before = forward.points[: -len(added.points)]
     for law, whole in pools.items():
-        pool = whole.reduced([_target(before, discrepancy=flag)(whole.shown) for flag in (True, False)])
+        pool = whole.reduced(
+            [_target(before, discrepancy=flag)(whole.shown) for flag in (True, False)]
+        )
         more = added.shown(pool.z, law)
         columns = Shown(*(np.hstack(pair) for pair in zip(pool.shown, more, strict=True)))
         extended[law] = pool.with_columns(_evaluate(forward, law), columns)
@@ -147,7 +185,8 @@ def joined(first: Columns, second: Columns) -> Columns:
     return type(first)(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
 
 
-# Draws ---------------------------------------------------------------------------------------------------------------
+# Draws
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def posterior_draws(
@@ -164,7 +203,9 @@ def posterior_draws(
         for law, one, count in zip(LAWS, both, counts, strict=True)
         if count
     ]
-    effective = float(1.0 / np.sum([share**2 / one.effective for share, one in zip(shares, both, strict=True)]))
+    effective = float(
+        1.0 / np.sum([share**2 / one.effective for share, one in zip(shares, both, strict=True)])
+    )
     whole = _joined_draws(parts)
     return replace(whole, effective=effective)
 
@@ -191,18 +232,32 @@ def prior_draws(forward: Forward, seed: int, known: Draws | None = None) -> Draw
     states = {}
     if there < len(forward.points):
         emulated = replace(forward, points=forward.points[there:]).emulated(z, STATE)
-        states = {key: OUTPUTS[key].back(mean + std * rng.standard_normal(mean.shape))
-                  for key, (mean, std) in emulated.items()}  # fmt: skip
+        states = {
+            key: OUTPUTS[key].back(mean + std * rng.standard_normal(mean.shape))
+            for key, (mean, std) in emulated.items()
+        }
     if known is not None:
-        states = {key: np.hstack([known.states[key], *([states[key]] if states else [])]) for key in STATE}
-    return Draws(z, np.zeros(DRAWS, int), dict.fromkeys(WEIGHTS, np.zeros(DRAWS)), states, float(DRAWS))
+        states = {
+            key: np.hstack([known.states[key], *([states[key]] if states else [])]) for key in STATE
+        }
+    return Draws(
+        z, np.zeros(DRAWS, int), dict.fromkeys(WEIGHTS, np.zeros(DRAWS)), states, float(DRAWS)
+    )
 
 
 def _drawn(
-    forward: Forward, law: Law, sampled: Sampled, count: int, rng: np.random.Generator, *, discrepancy: bool
+    forward: Forward,
+    law: Law,
+    sampled: Sampled,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    discrepancy: bool,
 ) -> Draws:
     places = (rng.random() + np.arange(count)) / count
-    chosen = np.minimum(np.searchsorted(np.cumsum(sampled.weights), places), len(sampled.weights) - 1)
+    chosen = np.minimum(
+        np.searchsorted(np.cumsum(sampled.weights), places), len(sampled.weights) - 1
+    )
     z = sampled.z[chosen]
     emulated = forward.emulated(z, tuple(dict.fromkeys((*STATE, *forward.outputs(law)))))
     shown = forward.shown_by(z, law, emulated)
@@ -231,11 +286,17 @@ def _sizes(shown: Shown, points: tuple[Point, ...], rng: np.random.Generator) ->
 
 
 def _corrected(
-    mean: Field, std: Field, shown: Shown, points: tuple[Point, ...], size: Field, rng: np.random.Generator
+    mean: Field,
+    std: Field,
+    shown: Shown,
+    points: tuple[Point, ...],
+    size: Field,
+    rng: np.random.Generator,
 ) -> Field:
     """Load shares that the emulator left open, drawn with what all CRF together say of them: on CLR's scale.
 
-    By Matheron's rule: a joint draw of shares and frequencies, moved by what the frequencies heard differ from it.
+    By Matheron's rule: a joint draw of shares and frequencies, moved by what the frequencies heard
+    differ from it.
     """
     heard = np.array([point.crf.value for point in points])
     here = ~np.isnan(heard)
@@ -245,10 +306,14 @@ def _corrected(
     if not here.any():
         return mean + errors
     share = OUTPUTS[CLR].back(mean)
-    slope = 1.0 / (6.0 * np.maximum(share, LEAST_SHARE) * OUTPUTS[CLR].slope(share))  # d ln CRF / d scale
+    slope = 1.0 / (
+        6.0 * np.maximum(share, LEAST_SHARE) * OUTPUTS[CLR].slope(share)
+    )  # d ln CRF / d scale
     slope = slope[:, here]
     measured = np.array([point.crf.std for point in points])[here]
-    rest = law_errors("crf", shown.lever[:, here], size, near[np.ix_(here, here)]) + np.diag(measured**2)
+    rest = law_errors("crf", shown.lever[:, here], size, near[np.ix_(here, here)]) + np.diag(
+        measured**2
+    )
     across = emulator[:, :, here] * slope[:, None]  # of shares and frequencies
     whole = across[:, here] * slope[:, :, None] + rest
     off = heard[here] - shown.crf[:, here] - slope * errors[:, here] - _drawn_normal(rest, rng)

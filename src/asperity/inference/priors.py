@@ -1,6 +1,7 @@
 """What is known of a quantity before any recording, as a standard normal number.
 
-Every prior is a map from such a number z, so that samplers and proposals need to know one distribution only.
+Every prior is a map from such a number z, so that samplers and proposals need to know one
+distribution only.
 """
 
 import math
@@ -9,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from asperity.arrays import Field
 from asperity.case import to_si
+from asperity.core.arrays import Field
 from asperity.study import ParameterRange
 
 REACH = 3.5  # standard deviations of a stated value that its range goes to
@@ -34,7 +35,9 @@ class Unknown:
     std: float = math.nan
 
     @classmethod
-    def stated(cls, key: str, case_key: str, mean: float, std: float, unit: str, reason: str = "") -> "Unknown":
+    def stated(
+        cls, key: str, case_key: str, mean: float, std: float, unit: str, reason: str = ""
+    ) -> "Unknown":
         """A value with its standard deviation."""
         if mean - REACH * std > 0.0 or mean <= 0.0:
             low, high = mean - REACH * std, mean + REACH * std
@@ -53,7 +56,9 @@ class Unknown:
         low, high = self.range.low, self.range.high
         if self.bounded:
             share = ndtr(z)
-            return np.asarray(low * (high / low) ** share if self.range.log else low + share * (high - low))
+            return np.asarray(
+                low * (high / low) ** share if self.range.log else low + share * (high - low)
+            )
         if self.mean - REACH * self.std > 0.0 or self.mean <= 0.0:
             values = self.mean + self.std * z
         else:

@@ -1,7 +1,7 @@
 """Samples of a posterior: importance sampling that learns where the posterior is, and nested sampling to check it by.
 
-Unknowns are standard normal before any recording. What a proposal costs is the emulator; so every draw is kept, and
-counts for each target that is asked of it.
+Unknowns are standard normal before any recording. What a proposal costs is the emulator; so every
+draw is kept, and counts for each target that is asked of it.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp, ndtri
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
 
 FIRST, BATCH, ROUNDS = 4096, 2048, 30  # draws from the prior, and of each round after it
 ENOUGH = 1000.0  # effective samples: a quantile is then known to a twentieth of the width
 QUICKLY = 200.0  # of one recording more
 FEWEST = 60.0  # below it a posterior was not found
 CENTRES = 40  # of a proposal
-LEARNT_FROM = 150.0  # effective samples that a proposal is learnt from, at least: the target is flattened until then
+# effective samples that a proposal is learnt from, at least: the target is flattened until then
+LEARNT_FROM = 150.0
 NARROWER = 0.6  # width of a proposal's parts over the width of the whole
 FROM_PRIOR = 0.1
 HOPELESS = 40.0  # in ln evidence below another model, and no more draws are spent on it
@@ -30,7 +31,9 @@ NEGLIGIBLE = 1e-5  # weight over the largest, of a draw that need not be kept
 LIVE = 400  # points of nested sampling
 
 Target = Callable[[Any], Field]  # what was computed for draws, to the logarithm of their likelihood
-Evaluate = Callable[[Field], Any]  # unknowns (n, d) to whatever a target is computed from; indexable by rows
+Evaluate = Callable[
+    [Field], Any
+]  # unknowns (n, d) to whatever a target is computed from; indexable by rows
 
 
 @dataclass
@@ -88,7 +91,9 @@ class Pool:
 
     def log_weights(self, log_target: Field) -> Field:
         """Logarithms of importance weights, whose mean is the evidence."""
-        return np.asarray(log_target + _log_normal(self.z) - (self._log_proposed - np.log(self.drawn)))
+        return np.asarray(
+            log_target + _log_normal(self.z) - (self._log_proposed - np.log(self.drawn))
+        )
 
     def learn(self, log_weights: Field) -> None:
         """Draw another batch where the weights are."""
@@ -121,7 +126,12 @@ class Sampled:
     def information_bits(self) -> float:
         """What was learned of all unknowns together: the mean of ln L over the posterior, less ln evidence."""
         told = self.weights > 0.0
-        return max(float((self.weights[told] @ self.log_likelihood[told] - self.log_evidence) / np.log(2.0)), 0.0)
+        return max(
+            float(
+                (self.weights[told] @ self.log_likelihood[told] - self.log_evidence) / np.log(2.0)
+            ),
+            0.0,
+        )
 
 
 def importance(
@@ -137,8 +147,9 @@ def importance(
 ) -> Sampled:
     """Sample a target from better and better proposals, until the draws are worth `enough` or for so many rounds.
 
-    `best` is the ln evidence of another model: beside one that is far better, no draws are spent after `probed` rounds.
-    Where draws are worth less than `least` after all rounds, and the model is not ruled out, it goes on for `longest`.
+    `best` is the ln evidence of another model: beside one that is far better, no draws are spent
+    after `probed` rounds. Where draws are worth less than `least` after all rounds, and the model
+    is not ruled out, it goes on for `longest`.
     """
     target: Field = np.empty(0)
     for number in range(max(rounds, longest) + 1):
@@ -168,7 +179,9 @@ def nested(evaluate: Evaluate, log_target: Target, dims: int, seed: int) -> Samp
     try:
         import dynesty
     except ModuleNotFoundError:
-        raise BadInput("nested sampling needs dynesty, which is not installed; pip install 'asperity[infer]'") from None
+        raise BadInput(
+            "nested sampling needs dynesty, which is not installed; pip install 'asperity[infer]'"
+        ) from None
     sampler = dynesty.NestedSampler(
         lambda z: float(log_target(evaluate(z[None]))[0]),
         lambda share: ndtri(np.clip(share, 1e-9, 1.0 - 1e-9)),
@@ -205,7 +218,9 @@ def _flattened(log_weights: Field) -> Field:
     return np.asarray(np.exp(power * log_weights - logsumexp(power * log_weights)))
 
 
-def _proposal(z: Field, weights: Field, rng: np.random.Generator) -> tuple[Callable[[Field], Field], Field]:
+def _proposal(
+    z: Field, weights: Field, rng: np.random.Generator
+) -> tuple[Callable[[Field], Field], Field]:
     """Normals about draws taken by their weights, the prior beside them; its density's logarithm, and a batch of it."""
     mean = weights @ z
     covariance = (weights[:, None] * (z - mean)).T @ (z - mean)
@@ -224,9 +239,14 @@ def _proposal(z: Field, weights: Field, rng: np.random.Generator) -> tuple[Calla
         peak = minus.max(axis=1)
         minus -= peak[:, None]
         parts = peak + np.log(np.exp(minus, out=minus).mean(axis=1)) + log_norm
-        return np.asarray(np.logaddexp(np.log1p(-FROM_PRIOR) + parts, np.log(FROM_PRIOR) + _log_normal(at)))
+        return np.asarray(
+            np.logaddexp(np.log1p(-FROM_PRIOR) + parts, np.log(FROM_PRIOR) + _log_normal(at))
+        )
 
-    drawn = centres[rng.integers(CENTRES, size=BATCH)] + rng.standard_normal((BATCH, len(mean))) @ lower.T
+    drawn = (
+        centres[rng.integers(CENTRES, size=BATCH)]
+        + rng.standard_normal((BATCH, len(mean))) @ lower.T
+    )
     anywhere = rng.random(BATCH) < FROM_PRIOR
     drawn[anywhere] = rng.standard_normal((int(anywhere.sum()), len(mean)))
     return density, drawn

@@ -6,17 +6,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from asperity.case import Case, InferSection, PriorSection, SheetSection, split_amount
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.inference.priors import Unknown
 from asperity.study import ParameterRange, full_key, overrides_at, require_ranges, stated_value
 
 LOAD, SPEED, TEMPERATURE = "contact.load", "contact.entrainment_speed", "lubricant.temperature"
 OFFSET, GRID_ERROR = "temperature_offset_k", "grid_error"
-OPERATING: Mapping[str, tuple[float, float]] = {LOAD: (0.4, 2.0), SPEED: (0.25, 2.0)}  # of the case's own
+OPERATING: Mapping[str, tuple[float, float]] = {
+    LOAD: (0.4, 2.0),
+    SPEED: (0.25, 2.0),
+}  # of the case's own
 TEMPERATURE_SPAN_K = 25.0  # either side of the case's own
 OFFSET_STD_K = 3.0
 CELLS_OF_A_LENGTH = 2.0  # correlation lengths shorter than that are none on the grid
-LENGTHS = ("surface.correlation_length", "surface.correlation_length[0]", "surface.correlation_length[1]")
+LENGTHS = (
+    "surface.correlation_length",
+    "surface.correlation_length[0]",
+    "surface.correlation_length[1]",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +43,29 @@ UNKNOWNS: Mapping[str, _Default] = {
     LENGTHS[0]: _Default("correlation_length_x_m", 1.6, reason="a factor 1.6 either way"),
     LENGTHS[1]: _Default("correlation_length_x_m", 1.6, reason="a factor 1.6 either way"),
     LENGTHS[2]: _Default("correlation_length_y_m", 1.6, reason="a factor 1.6 either way"),
-    "material.hardness": _Default("hardness_pa", 2.0, reason="a factor 2 either way: it is seldom stated"),
+    "material.hardness": _Default(
+        "hardness_pa", 2.0, reason="a factor 2 either way: it is seldom stated"
+    ),
     "lubricant.viscosity.eta0": _Default("oil_viscosity_pa_s", 2.0, reason="15 to 20 K either way"),
-    "lubricant.viscosity.alpha": _Default("oil_alpha_1_pa", 1.25, reason="what estimates of alpha differ by"),
-    "vibration.mass": _Default("mass_kg", relative_std=0.1, reason="a mass is weighed, its effective share is not",
-                               emulated=False),
-    "vibration.damping_ratio": _Default("damping_ratio", 3.0, reason="dry joints to damped ones", emulated=False),
-    "vibration.cutoff_exponent": _Default("cutoff_exponent", ends=(0.0, 0.5), emulated=False,
-                                          reason="from a cut-off that ignores CAR to one that goes with its root"),
-}  # fmt: skip
+    "lubricant.viscosity.alpha": _Default(
+        "oil_alpha_1_pa", 1.25, reason="what estimates of alpha differ by"
+    ),
+    "vibration.mass": _Default(
+        "mass_kg",
+        relative_std=0.1,
+        reason="a mass is weighed, its effective share is not",
+        emulated=False,
+    ),
+    "vibration.damping_ratio": _Default(
+        "damping_ratio", 3.0, reason="dry joints to damped ones", emulated=False
+    ),
+    "vibration.cutoff_exponent": _Default(
+        "cutoff_exponent",
+        ends=(0.0, 0.5),
+        emulated=False,
+        reason="from a cut-off that ignores CAR to one that goes with its root",
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -89,13 +110,19 @@ def setting_of(case: Case) -> Setting:
         cannot carry.
     """
     if case.vibration is None:
-        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+        raise BadInput(
+            f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio"
+        )
     if case.lubricant is None:
-        raise BadInput(f"{case.source}: the contact is dry, and shares no load with oil; state a lubricant")
+        raise BadInput(
+            f"{case.source}: the contact is dry, and shares no load with oil; state a lubricant"
+        )
     if stated_value(case, "surface.kind") == "flat":
         raise BadInput(f"{case.source}: surface is flat, and nothing touches; take a rough one")
     section = case.contents.infer or InferSection()
-    base = case.with_overrides({"infer": "none", "study": "none", "grid.cells": list(section.cells)})
+    base = case.with_overrides(
+        {"infer": "none", "study": "none", "grid.cells": list(section.cells)}
+    )
     stated = {_key_of(case, name): prior for name, prior in section.axes.items()}
     operating = _operating(base, stated)
     unknowns = [
@@ -104,13 +131,25 @@ def setting_of(case: Case) -> Setting:
         if (unknown := _unknown(base, key, default, stated.get(key), operating)) is not None
     ]
     if not any(unknown.key == "sq_m" for unknown in unknowns) and "surface.sq" not in stated:
-        raise BadInput(f"{case.source}: surface has no sq to infer; take a generated one, kind gaussian")
+        raise BadInput(
+            f"{case.source}: surface has no sq to infer; take a generated one, kind gaussian"
+        )
     if any(entry.key == TEMPERATURE for entry in operating):
-        unknowns.append(Unknown.stated(OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil against that stated"))
-    unknowns.append(Unknown.stated(GRID_ERROR, "grid.cells", 0.0, 1.0, "", "of the emulator's grid"))
-    contact = tuple(u for u in unknowns if u.range.key in UNKNOWNS and UNKNOWNS[u.range.key].emulated)
+        unknowns.append(
+            Unknown.stated(
+                OFFSET, TEMPERATURE, 0.0, OFFSET_STD_K, "K", "of the oil against that stated"
+            )
+        )
+    unknowns.append(
+        Unknown.stated(GRID_ERROR, "grid.cells", 0.0, 1.0, "", "of the emulator's grid")
+    )
+    contact = tuple(
+        u for u in unknowns if u.range.key in UNKNOWNS and UNKNOWNS[u.range.key].emulated
+    )
     others = tuple(u for u in unknowns if u not in contact)
-    setting = Setting(base, contact, others, operating, section.points, section.surfaces, section.seed)
+    setting = Setting(
+        base, contact, others, operating, section.points, section.surfaces, section.seed
+    )
     require_ranges(base, setting.ranges, {})
     return setting
 
@@ -119,7 +158,9 @@ def _key_of(case: Case, name: str) -> str:
     """The case key that a name in [infer] means; BadInput for one that is neither an unknown nor an operating one."""
     key = name if name in UNKNOWNS else full_key(case, name, "infer")
     if key not in UNKNOWNS and key not in (*OPERATING, TEMPERATURE):
-        known = ", ".join(sorted({entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING, TEMPERATURE)}))
+        known = ", ".join(
+            sorted({entry.rpartition(".")[2] for entry in (*UNKNOWNS, *OPERATING, TEMPERATURE)})
+        )
         raise BadInput(f"{case.source}: infer.{name} cannot be inferred; what can is {known}")
     return key
 
@@ -128,7 +169,9 @@ def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, .
     ranges = []
     for key, (low, high) in OPERATING.items():
         own, unit = split_amount(stated_value(case, key))
-        default = ParameterRange(key, low * float(own), high * float(own), unit, "about the case's own")
+        default = ParameterRange(
+            key, low * float(own), high * float(own), unit, "about the case's own"
+        )
         ranges.append(_stated_range(case, key, stated.get(key)) or default)
     if isinstance(case.contents.lubricant, SheetSection):
         own, unit = split_amount(stated_value(case, TEMPERATURE))
@@ -136,7 +179,9 @@ def _operating(case: Case, stated: Mapping[str, Any]) -> tuple[ParameterRange, .
         default = ParameterRange(TEMPERATURE, *ends, unit, "about the case's own")
         ranges.append(_stated_range(case, TEMPERATURE, stated.get(TEMPERATURE)) or default)
     elif TEMPERATURE in stated:
-        raise BadInput(f"{case.source}: infer.temperature needs an oil by its data sheet; state grade and temperature")
+        raise BadInput(
+            f"{case.source}: infer.temperature needs an oil by its data sheet; state grade and temperature"
+        )
     return tuple(ranges)
 
 
@@ -146,7 +191,9 @@ def _stated_range(case: Case, key: str, prior: Any) -> ParameterRange | None:
         return None
     if not isinstance(prior, PriorSection) or prior.start is None:
         name = key.rpartition(".")[2]
-        raise BadInput(f"{case.source}: infer.{name} is where the contact may be run; give from and to")
+        raise BadInput(
+            f"{case.source}: infer.{name} is where the contact may be run; give from and to"
+        )
     return _range(case, key, prior.start, prior.to)
 
 
@@ -156,7 +203,9 @@ def _range(case: Case, key: str, start: Any, to: Any, reason: str = "as stated")
     return ParameterRange(key, low, high, unit, reason)
 
 
-def _amount(case: Case, key: str, entry: str, value: Any, unit: str | None = None) -> tuple[float, str]:
+def _amount(
+    case: Case, key: str, entry: str, value: Any, unit: str | None = None
+) -> tuple[float, str]:
     try:
         number, own = split_amount(value, unit)
     except BadInput as error:
@@ -175,13 +224,17 @@ def _unknown(
         own = None
     if prior == "known" or own is None:
         if isinstance(prior, PriorSection):
-            raise BadInput(f"{case.source}: infer.{key} has a prior, and the case has no such quantity")
+            raise BadInput(
+                f"{case.source}: infer.{key} has a prior, and the case has no such quantity"
+            )
         return None
     if isinstance(prior, PriorSection) and prior.start is None:
         mean, unit = _amount(case, key, "value", prior.value)
         std, _ = _amount(case, key, "std", prior.std, unit)
         if not 0.0 < std < math.inf:
-            raise BadInput(f'{case.source}: infer.{key}.std must be positive, got {prior.std}; what is sure is "known"')
+            raise BadInput(
+                f'{case.source}: infer.{key}.std must be positive, got {prior.std}; what is sure is "known"'
+            )
         return Unknown.stated(default.key, key, mean, std, unit, "as stated")
     if isinstance(prior, PriorSection):
         stated = _range(case, key, prior.start, prior.to)
@@ -195,7 +248,9 @@ def _unknown(
     number, unit = split_amount(own)
     mean = float(number)
     if not math.isnan(default.relative_std):
-        return Unknown.stated(default.key, key, mean, default.relative_std * mean, unit, default.reason)
+        return Unknown.stated(
+            default.key, key, mean, default.relative_std * mean, unit, default.reason
+        )
     low, high = default.ends or (mean / default.factor, mean * default.factor)
     entry = ParameterRange(key, float(f"{low:.4g}"), float(f"{high:.4g}"), unit, default.reason)
     return Unknown(default.key, _carried(case, entry, operating) if key in LENGTHS else entry)
@@ -206,14 +261,19 @@ def _isotropic(case: Case) -> bool:
     return not isinstance(lengths, list) or lengths[0] == lengths[1]
 
 
-def _carried(case: Case, lengths: ParameterRange, operating: tuple[ParameterRange, ...]) -> ParameterRange:
+def _carried(
+    case: Case, lengths: ParameterRange, operating: tuple[ParameterRange, ...]
+) -> ParameterRange:
     """The part of a range of correlation lengths that the grid carries at every load."""
     loads = next(entry for entry in operating if entry.key == LOAD)
     grids = [case.with_overrides(overrides_at(case, [loads], [end])).grid for end in (0.0, 1.0)]
     scale = 1.0 / float(Unknown("", lengths).to_si(1.0))  # type: ignore[arg-type]
     low = CELLS_OF_A_LENGTH * scale * max(max(grid.spacing) for grid in grids)
     high = 0.49 * scale * min(min(grid.extent) for grid in grids)
-    low, high = max(lengths.low, float(f"{1.005 * low:.3g}")), min(lengths.high, float(f"{0.995 * high:.3g}"))
+    low, high = (
+        max(lengths.low, float(f"{1.005 * low:.3g}")),
+        min(lengths.high, float(f"{0.995 * high:.3g}")),
+    )
     if low >= high:
         raise BadInput(
             f"{case.source}: the emulator's grid carries no correlation length from {lengths.low:g} to "

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.inference.observations import (
     ALIKE,
     Heard,
@@ -75,7 +75,9 @@ def series_of(observations: Sequence[Observation]) -> Series:
     """
     for one in observations:
         if not math.isfinite(one.x):
-            raise BadInput(f"{one.name or 'a recording'} has no place in time; give a column x (hours) in --table")
+            raise BadInput(
+                f"{one.name or 'a recording'} has no place in time; give a column x (hours) in --table"
+            )
     times = sorted({one.x for one in observations})
     if len(times) < FEWEST:
         raise BadInput(
@@ -84,7 +86,8 @@ def series_of(observations: Sequence[Observation]) -> Series:
         )
     require_temperatures(observations)
     observations = sorted(
-        observations, key=lambda one: (one.x, one.load_n, one.entrainment_m_s, one.temperature_k or 0.0)
+        observations,
+        key=lambda one: (one.x, one.load_n, one.entrainment_m_s, one.temperature_k or 0.0),
     )
     groups = np.array_split(np.array(times), min(MOST, len(times)))
     x = tuple(float(group.mean()) for group in groups)
@@ -112,7 +115,9 @@ def _places(points: Sequence[Point]) -> tuple[Point, ...]:
             if all(np.any(np.abs(conditions(point) - conditions(one)) > near) for one in places):
                 places.append(point)
         if len(places) <= MOST_PLACES:
-            return tuple(Point(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places)
+            return tuple(
+                Point(one.load_n, one.entrainment_m_s, one.temperature_k) for one in places
+            )
         near = WIDER * near
 
 

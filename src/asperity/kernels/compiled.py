@@ -1,10 +1,12 @@
 """numba's compilation with a cache that can be damaged, emptied or nowhere to be kept: then kernels compile anew.
 
-numba loads what its cache holds as it stands, machine code included, and raises where it holds nothing sensible. Here
-a digest follows everything in it; what does not fit is thrown away. Against others who may write there it is no guard.
+numba loads what its cache holds as it stands, machine code included, and raises where it holds
+nothing sensible. Here a digest follows everything in it; what does not fit is thrown away. Against
+others who may write there it is no guard.
 
-A kernel holds what it calls and constants of modules beside its own: it is stale when any of them has changed. numba
-numbers what it keeps, and two processes may take one number for two signatures: so all of it says what it is.
+A kernel holds what it calls and constants of modules beside its own: it is stale when any of them
+has changed. numba numbers what it keeps, and two processes may take one number for two signatures:
+so all of it says what it is.
 """
 
 import pickle
@@ -39,11 +41,15 @@ class _CheckedFile(IndexDataCacheFile):
         return body + sha256(body).digest()
 
     def _load_index(self) -> dict[Any, str]:
-        kept: dict[Any, str] = self._checked(Path(self._index_path), super()._load_index, versioned=True) or {}
+        kept: dict[Any, str] = (
+            self._checked(Path(self._index_path), super()._load_index, versioned=True) or {}
+        )
         return kept
 
     def _load_data(self, name: str) -> Any:
-        return self._checked(Path(self._data_path(name)), lambda: super(_CheckedFile, self)._load_data(name))
+        return self._checked(
+            Path(self._data_path(name)), lambda: super(_CheckedFile, self)._load_data(name)
+        )
 
     def _checked(self, path: Path, load: Callable[[], Any], *, versioned: bool = False) -> Any:
         """What a file of the cache gives; None, and no file, where it is not what was written."""

@@ -1,17 +1,18 @@
 """The finite-volume Reynolds equation on arrays: net outflow of each cell, and its derivative.
 
-x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and periodic. The wedge
-leans upstream, face value m + a (m_next - m) + b (m - m_upstream): second order with (a, b) = (0, 1/2), third with
-(3/8, 1/8). Poiseuille faces carry the arithmetic mean of two node mobilities or their logarithmic one, which is exact
-for a viscosity that grows exponentially under a given flow; those at the ends carry the mean of their cell's and what
-that would be at zero pressure. Knows no units, no oil and no tolerance.
+x is the first axis and aperiodic with zero pressure on both end faces; y is the second axis and
+periodic. The wedge leans upstream, face value m + a (m_next - m) + b (m - m_upstream): second
+order with (a, b) = (0, 1/2), third with (3/8, 1/8). Poiseuille faces carry the arithmetic mean of
+two node mobilities or their logarithmic one, which is exact for a viscosity that grows
+exponentially under a given flow; those at the ends carry the mean of their cell's and what that
+would be at zero pressure. Knows no units, no oil and no tolerance.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Codes, Field, Mask
+from asperity.core.arrays import Codes, Field, Mask
 from asperity.kernels.compiled import njit
 
 RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # what decides a cell
@@ -20,7 +21,8 @@ RUPTURED, TOUCHING, LUBRICATED, CAPPED = 0, 1, 2, 3  # what decides a cell
 class Film(NamedTuple):
     """Oil content m = rho H with its slopes in H and P, Poiseuille mobility eps with those of its logarithm.
 
-    `ambient` is the mobility that the first and the last cells along x would have at ambient pressure, shape (2, ny).
+    `ambient` is the mobility that the first and the last cells along x would have at ambient
+    pressure, shape (2, ny).
     """
 
     content: Field
@@ -50,9 +52,10 @@ class Film(NamedTuple):
 class Faces(NamedTuple):
     """Mobility of the faces east and north of each cell, and its slopes in the logarithms of both nodes' mobilities.
 
-    The last face to the east is the outlet; `inlet` holds the first one to the west, shape (ny,); `wedge` is (a, b).
-    `behind` is the line of cells behind the north faces of the last one: the first, where lines go round, or by a
-    mirror the last or the one before. With a mirror no equation of the first line is the oil's.
+    The last face to the east is the outlet; `inlet` holds the first one to the west, shape (ny,);
+    `wedge` is (a, b). `behind` is the line of cells behind the north faces of the last one: the
+    first, where lines go round, or by a mirror the last or the one before. With a mirror no
+    equation of the first line is the oil's.
     """
 
     east: Field
@@ -77,7 +80,8 @@ class Rows(NamedTuple):
 class Liquid(NamedTuple):
     """Oil by its laws at each cell's pressure: density over the ambient one, viscosity, and what shear leaves of it.
 
-    With the slopes of density and of the viscosity's logarithm in P, and of the thinning's logarithm in that of shear.
+    With the slopes of density and of the viscosity's logarithm in P, and of the thinning's
+    logarithm in that of shear.
     """
 
     density: Field
@@ -92,20 +96,33 @@ class Liquid(NamedTuple):
 def fill_film(liquid: Liquid, height: Field, conductance: float, least: float, film: Film) -> None:
     """Fill the cells of `film` in; `conductance` is the mobility per content and squared height, times the viscosity.
 
-    No cell moves its oil less easily than `least` over its cubed height, as if that were constant: Newton's steps do
-    not converge with its slope in H.
+    No cell moves its oil less easily than `least` over its cubed height, as if that were constant:
+    Newton's steps do not converge with its slope in H.
     """
     nx, ny = height.shape
     for i in range(nx):
         for j in range(ny):
-            h, rho, rho_p, bent = height[i, j], liquid.density[i, j], liquid.density_slope[i, j], liquid.exponent[i, j]
+            h, rho, rho_p, bent = (
+                height[i, j],
+                liquid.density[i, j],
+                liquid.density_slope[i, j],
+                liquid.exponent[i, j],
+            )
             content, cubed = rho * h, h * h * h
-            mobility = conductance * content * h * h / (liquid.viscosity[i, j] * liquid.thinning[i, j])
+            mobility = (
+                conductance * content * h * h / (liquid.viscosity[i, j] * liquid.thinning[i, j])
+            )
             stiff = mobility * cubed < least
-            film.content[i, j], film.content_by_gap[i, j], film.content_by_pressure[i, j] = content, rho, rho_p * h
+            film.content[i, j], film.content_by_gap[i, j], film.content_by_pressure[i, j] = (
+                content,
+                rho,
+                rho_p * h,
+            )
             film.mobility[i, j] = least / cubed if stiff else mobility
             film.log_mobility_by_gap[i, j] = 0.0 if stiff else (3.0 + bent) / h
-            film.log_mobility_by_pressure[i, j] = 0.0 if stiff else rho_p / rho - (1.0 + bent) * liquid.log_slope[i, j]
+            film.log_mobility_by_pressure[i, j] = (
+                0.0 if stiff else rho_p / rho - (1.0 + bent) * liquid.log_slope[i, j]
+            )
 
 
 @njit(cache=True)
@@ -119,11 +136,13 @@ def _log_mean(own: float, following: float, log_ratio: float) -> tuple[float, fl
 
 
 @njit(cache=True, error_model="numpy")
-def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces) -> None:
+def face_mobilities(
+    film: Film, log_mobility: Field, logarithmic: bool, ends: Mask, faces: Faces
+) -> None:
     """Fill `faces` in; `log_mobility` is the natural logarithm of the film's mobility.
 
-    Arithmetic means unless `logarithmic`; across `ends`, which tell of each line whether its north face is one, always
-    logarithmic ones.
+    Arithmetic means unless `logarithmic`; across `ends`, which tell of each line whether its north
+    face is one, always logarithmic ones.
     """
     nx, ny = log_mobility.shape
     eps = film.mobility
@@ -162,7 +181,13 @@ def face_mobilities(film: Film, log_mobility: Field, logarithmic: bool, ends: Ma
 
 @njit(cache=True, error_model="numpy")
 def net_outflow(
-    pressure: Field, content: Field, faces: Faces, inlet_content: Field, dx: float, dy: float, out: Field
+    pressure: Field,
+    content: Field,
+    faces: Faces,
+    inlet_content: Field,
+    dx: float,
+    dy: float,
+    out: Field,
 ) -> None:
     """Couette plus Poiseuille outflow minus inflow of each cell, per cell area."""
     nx, ny = pressure.shape
@@ -186,8 +211,12 @@ def net_outflow(
         last = ny - 1
         for j in range(last):
             north[j] = over_dy2 * faces.north[i, j] * (pressure[i, j] - pressure[i, j + 1])
-        north[last] = over_dy2 * faces.north[i, last] * (pressure[i, last] - pressure[i, faces.behind])
-        out[i, 0] += north[0] - over_dy2 * faces.north[i, last] * (pressure[i, last] - pressure[i, 0])
+        north[last] = (
+            over_dy2 * faces.north[i, last] * (pressure[i, last] - pressure[i, faces.behind])
+        )
+        out[i, 0] += north[0] - over_dy2 * faces.north[i, last] * (
+            pressure[i, last] - pressure[i, 0]
+        )
         for j in range(1, ny):
             out[i, j] += north[j] - north[j - 1]
 
@@ -211,7 +240,9 @@ def leaning_outflow(content: Field, own: Field, upstream: Field, dx: float, out:
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
-def _through_north(faces: Faces, pressure: Field, d_pressure: Field, d_log: Field, i: int, j: int, jn: int) -> float:
+def _through_north(
+    faces: Faces, pressure: Field, d_pressure: Field, d_log: Field, i: int, j: int, jn: int
+) -> float:
     """Linearised Poiseuille flow from cell (i, j) to (i, jn)."""
     d_face = faces.north_by_own[i, j] * d_log[j] + faces.north_by_next[i, j] * d_log[jn]
     d_flow = faces.north[i, j] * (d_pressure[i, j] - d_pressure[i, jn])
@@ -233,8 +264,8 @@ def jacobian_product(
 ) -> None:
     """Every cell's scaled equation, linearised, applied to a change of pressure and the gap change it causes.
 
-    A lubricated cell also stores `storing` times the oil content it gains: the inverse of a time step. All arrays in
-    one precision, which is also that of the arithmetic.
+    A lubricated cell also stores `storing` times the oil content it gains: the inverse of a time
+    step. All arrays in one precision, which is also that of the arithmetic.
     """
     nx, ny = pressure.shape
     real = pressure.dtype.type
@@ -244,7 +275,11 @@ def jacobian_product(
     log_h, log_p = film.log_mobility_by_gap, film.log_mobility_by_pressure
     m_h, m_p = film.content_by_gap, film.content_by_pressure
     d_log, d_log_east = np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
-    before, here, after = np.zeros(ny, pressure.dtype), np.empty(ny, pressure.dtype), np.empty(ny, pressure.dtype)
+    before, here, after = (
+        np.zeros(ny, pressure.dtype),
+        np.empty(ny, pressure.dtype),
+        np.empty(ny, pressure.dtype),
+    )
     upstream = np.empty(ny, pressure.dtype)
     for j in range(ny):
         d_log[j] = log_h[0, j] * d_gap[0, j] + log_p[0, j] * d_pressure[0, j]
@@ -256,11 +291,15 @@ def jacobian_product(
         if i < nx - 1:
             upwind, downwind = (faces.wedge[1], faces.wedge[0]) if i > 0 else (real(0.0), real(0.0))
             for j in range(ny):
-                d_log_east[j] = log_h[i + 1, j] * d_gap[i + 1, j] + log_p[i + 1, j] * d_pressure[i + 1, j]
+                d_log_east[j] = (
+                    log_h[i + 1, j] * d_gap[i + 1, j] + log_p[i + 1, j] * d_pressure[i + 1, j]
+                )
                 after[j] = m_h[i + 1, j] * d_gap[i + 1, j] + m_p[i + 1, j] * d_pressure[i + 1, j]
             for j in range(ny):
                 flux = here[j] + downwind * (after[j] - here[j]) + upwind * (here[j] - before[j])
-                d_face = faces.east_by_own[i, j] * d_log[j] + faces.east_by_next[i, j] * d_log_east[j]
+                d_face = (
+                    faces.east_by_own[i, j] * d_log[j] + faces.east_by_next[i, j] * d_log_east[j]
+                )
                 flux -= over_dx * (
                     faces.east[i, j] * (d_pressure[i + 1, j] - d_pressure[i, j])
                     + d_face * (pressure[i + 1, j] - pressure[i, j])
@@ -270,8 +309,15 @@ def jacobian_product(
         else:
             for j in range(ny):
                 flux = here[j] + half * (here[j] - before[j])
-                d_face = faces.east_by_own[i, j] * d_log[j] + half * film.ambient_by_gap[1, j] * d_gap[i, j]
-                flux += real(2.0) * over_dx * (faces.east[i, j] * d_pressure[i, j] + d_face * pressure[i, j])
+                d_face = (
+                    faces.east_by_own[i, j] * d_log[j]
+                    + half * film.ambient_by_gap[1, j] * d_gap[i, j]
+                )
+                flux += (
+                    real(2.0)
+                    * over_dx
+                    * (faces.east[i, j] * d_pressure[i, j] + d_face * pressure[i, j])
+                )
                 out[i, j] = (flux - upstream[j]) * over_dx + kept * here[j]
         # y faces: what leaves a line through its north face enters the next
         last = ny - 1

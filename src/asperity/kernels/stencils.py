@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 from asperity.kernels.compiled import njit
 from asperity.kernels.reynolds import LUBRICATED, TOUCHING, Faces, Film, Rows
 
@@ -31,11 +31,18 @@ class Far(NamedTuple):
 
 @njit(cache=True)
 def local_stencil(
-    rows: Rows, film: Film, faces: Faces, near: Field, spacing: tuple[float, float], storing: float, out: Stencil
+    rows: Rows,
+    film: Film,
+    faces: Faces,
+    near: Field,
+    spacing: tuple[float, float],
+    storing: float,
+    out: Stencil,
 ) -> None:
     """Fill the five-point approximation of the scaled Jacobian, in the precision of `out`.
 
-    `near` holds the compliance of cells 0, 1, 2 along x and, last, that of the cell from which on it counts as far.
+    `near` holds the compliance of cells 0, 1, 2 along x and, last, that of the cell from which on
+    it counts as far.
     """
     nx, ny = out.centre.shape
     real = out.centre.dtype.type
@@ -46,7 +53,9 @@ def local_stencil(
     touching_own = real((near[0] - near[3]) * rows.contact_scale)
     touching_next = real((near[1] - near[3]) * rows.contact_scale)
     m_h, m_p = film.content_by_gap, film.content_by_pressure
-    across = np.empty(ny + 1, out.centre.dtype)  # of the y faces, each between its southern and northern cell
+    across = np.empty(
+        ny + 1, out.centre.dtype
+    )  # of the y faces, each between its southern and northern cell
     for i in range(nx):
         west_of, at_inlet, at_outlet = max(i - 1, 0), i == 0, i == nx - 1
         for j in range(ny):
@@ -62,7 +71,9 @@ def local_stencil(
             wedge = here * near0 - above * near1 + m_p[i, j]
             own_kept, next_kept = kept * (here * near0 + m_p[i, j]), kept * here * near1
             centre = (east + west + across[j] + across[j + 1] + wedge * over_dx + own_kept) * scale
-            upstream = (-west + (here * near1 - above * near0 - above_p) * over_dx + next_kept) * scale
+            upstream = (
+                -west + (here * near1 - above * near0 - above_p) * over_dx + next_kept
+            ) * scale
             downstream = (-east + (here * near1 - above * near2) * over_dx + next_kept) * scale
             out.centre[i, j] = centre if wet else (touching_own if touching else one)
             out.west[i, j] = upstream if wet else (touching_next if touching else none)
@@ -83,13 +94,17 @@ def own_stencil(
 ) -> None:
     """Fill an approximation of the scaled Jacobian in which a gap gives way to its own cell's pressure alone.
 
-    By its `compliance`; the wedge is of first order, and mobilities of the inner faces follow both. Rows that are not
-    the oil's are those of an identity. In the precision of `out`.
+    By its `compliance`; the wedge is of first order, and mobilities of the inner faces follow
+    both. Rows that are not the oil's are those of an identity. In the precision of `out`.
     """
     nx, ny = pressure.shape
     real = out.centre.dtype.type
     zero, one, two = real(0.0), real(1.0), real(2.0)
-    over_dx, over_dx2, over_dy2 = real(1.0 / spacing[0]), real(1.0 / spacing[0] ** 2), real(1.0 / spacing[1] ** 2)
+    over_dx, over_dx2, over_dy2 = (
+        real(1.0 / spacing[0]),
+        real(1.0 / spacing[0] ** 2),
+        real(1.0 / spacing[1] ** 2),
+    )
     own, last = real(compliance), ny - 1
     m_h, m_p, log_h, log_p = (
         film.content_by_gap,
@@ -98,7 +113,8 @@ def own_stencil(
         film.log_mobility_by_pressure,
     )
     slope, slope_next, carried = np.empty((3, ny), out.centre.dtype)
-    # of the flow through each face, east and north and before them west: its slopes in the cells on both sides
+    # of the flow through each face, east and north and before them west: its slopes in the cells on
+    # both sides
     by_here, by_east, by_before, by_west, across, over = np.zeros((6, ny), out.centre.dtype)
     for j in range(ny):
         slope_next[j] = log_p[0, j] + own * log_h[0, j]
@@ -119,13 +135,18 @@ def own_stencil(
                 by_here[j], by_east[j] = two * over_dx2 * faces.east[i, j], zero
         for j in range(ny):
             jn = j + 1 if j < last else faces.behind
-            through, falling = over_dy2 * faces.north[i, j], over_dy2 * (pressure[i, j] - pressure[i, jn])
+            through, falling = (
+                over_dy2 * faces.north[i, j],
+                over_dy2 * (pressure[i, j] - pressure[i, jn]),
+            )
             across[j] = through + falling * faces.north_by_own[i, j] * slope[j]
             over[j] = falling * faces.north_by_next[i, j] * slope[jn] - through
         for j in range(ny):
             wet = rows.state[i, j] == LUBRICATED
             scale = rows.fluid_scale[i, j] if wet else zero
-            out.centre[i, j] = scale * (by_here[j] - by_west[j] + across[j] + carried[j]) if wet else one
+            out.centre[i, j] = (
+                scale * (by_here[j] - by_west[j] + across[j] + carried[j]) if wet else one
+            )
             out.west[i, j] = -scale * by_before[j]
             out.east[i, j] = scale * by_east[j]
             out.north[i, j] = scale * over[j]
@@ -134,7 +155,9 @@ def own_stencil(
             out.centre[i, j] -= scale * over[j - 1]
             out.south[i, j] = -scale * across[j - 1]
         scale = rows.fluid_scale[i, 0] if rows.state[i, 0] == LUBRICATED else zero
-        before, beyond = (over[last], across[last]) if faces.behind == 0 else _first_line(faces, i, over_dy2)
+        before, beyond = (
+            (over[last], across[last]) if faces.behind == 0 else _first_line(faces, i, over_dy2)
+        )
         out.centre[i, 0] -= scale * before
         out.south[i, 0] = -scale * beyond
         for j in range(ny):
@@ -161,15 +184,22 @@ def wedge_stencil(
 ) -> None:
     """Fill an approximation of the scaled Jacobian that follows wedge and mobilities, in the precision of `out`.
 
-    A gap gives way to the pressure of its own cell and of the next ones along x, by the compliances `near`; across x
-    to its own alone. What the wedge then has of cells three upstream is left out.
+    A gap gives way to the pressure of its own cell and of the next ones along x, by the
+    compliances `near`; across x to its own alone. What the wedge then has of cells three upstream
+    is left out.
     """
     nx, ny = pressure.shape
     real = out.centre.dtype.type
     zero, one = real(0.0), real(1.0)
-    n0, n1, over_dx, over_dy2 = real(near[0]), real(near[1]), real(1.0 / spacing[0]), real(1.0 / spacing[1] ** 2)
-    # of the flow through a face: its slopes in gap and pressure of the cells upstream, here and downstream, and from
-    # these in the pressures of the cells -2 ... 2 from here; the face to the east, and the one to the west
+    n0, n1, over_dx, over_dy2 = (
+        real(near[0]),
+        real(near[1]),
+        real(1.0 / spacing[0]),
+        real(1.0 / spacing[1] ** 2),
+    )
+    # of the flow through a face: its slopes in gap and pressure of the cells upstream, here and
+    # downstream, and from these in the pressures of the cells -2 ... 2 from here; the face to the
+    # east, and the one to the west
     by_gap, by_pressure = np.zeros((3, ny), out.centre.dtype), np.zeros((3, ny), out.centre.dtype)
     flow, before = np.zeros((5, ny), out.centre.dtype), np.zeros((5, ny), out.centre.dtype)
     for i in range(-1, nx):
@@ -199,7 +229,13 @@ def wedge_stencil(
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def _flow_slopes(
-    film: Film, faces: Faces, pressure: Field, over_dx: float, i: int, by_gap: Field, by_pressure: Field
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    over_dx: float,
+    i: int,
+    by_gap: Field,
+    by_pressure: Field,
 ) -> None:
     """Slopes of the flow through the faces east of cells `i`, -1 for the inlet's, in what is upstream, here and next.
 
@@ -217,21 +253,34 @@ def _flow_slopes(
     if i < 0:
         for j in range(ny):
             gone = over_dx * pressure[0, j]
-            by_gap[2, j] = m_h[0, j] - gone * (film.mobility[0, j] * log_h[0, j] + film.ambient_by_gap[0, j])
-            by_pressure[2, j] = -two * over_dx * faces.inlet[j] - gone * film.mobility[0, j] * log_p[0, j]
+            by_gap[2, j] = m_h[0, j] - gone * (
+                film.mobility[0, j] * log_h[0, j] + film.ambient_by_gap[0, j]
+            )
+            by_pressure[2, j] = (
+                -two * over_dx * faces.inlet[j] - gone * film.mobility[0, j] * log_p[0, j]
+            )
     elif i == nx - 1:
         for j in range(ny):
             gone = two * over_dx * pressure[i, j]
             own = gone * faces.east_by_own[i, j]
             by_gap[0, j], by_pressure[0, j] = -half * m_h[i - 1, j], -half * m_p[i - 1, j]
-            by_gap[1, j] = (one + half) * m_h[i, j] + own * log_h[i, j] + gone * half * film.ambient_by_gap[1, j]
-            by_pressure[1, j] = (one + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
+            by_gap[1, j] = (
+                (one + half) * m_h[i, j]
+                + own * log_h[i, j]
+                + gone * half * film.ambient_by_gap[1, j]
+            )
+            by_pressure[1, j] = (
+                (one + half) * m_p[i, j] + own * log_p[i, j] + two * over_dx * faces.east[i, j]
+            )
             by_gap[2, j], by_pressure[2, j] = real(0.0), real(0.0)
     else:
         inner = real(i > 0)
         ahead, back, upstream = inner * faces.wedge[0], inner * faces.wedge[1], max(i - 1, 0)
         for j in range(ny):
-            falling, through = over_dx * (pressure[i, j] - pressure[i + 1, j]), over_dx * faces.east[i, j]
+            falling, through = (
+                over_dx * (pressure[i, j] - pressure[i + 1, j]),
+                over_dx * faces.east[i, j],
+            )
             own, following = falling * faces.east_by_own[i, j], falling * faces.east_by_next[i, j]
             by_gap[0, j], by_pressure[0, j] = -back * m_h[upstream, j], -back * m_p[upstream, j]
             by_gap[1, j] = (one - ahead + back) * m_h[i, j] + own * log_h[i, j]
@@ -242,13 +291,23 @@ def _flow_slopes(
 
 @njit(cache=True, fastmath={"reassoc", "contract", "arcp"})
 def _add_across(
-    rows: Rows, film: Film, faces: Faces, pressure: Field, own: float, over_dy2: float, i: int, out: Stencil
+    rows: Rows,
+    film: Film,
+    faces: Faces,
+    pressure: Field,
+    own: float,
+    over_dy2: float,
+    i: int,
+    out: Stencil,
 ) -> None:
     """Add the flows between the x lines, the gap answering to each cell's `own` pressure, to row `i` of a stencil."""
     ny = pressure.shape[1]
     for j in range(ny):
         jn = j + 1 if j < ny - 1 else faces.behind
-        through, falling = over_dy2 * faces.north[i, j], over_dy2 * (pressure[i, j] - pressure[i, jn])
+        through, falling = (
+            over_dy2 * faces.north[i, j],
+            over_dy2 * (pressure[i, j] - pressure[i, jn]),
+        )
         slope = film.log_mobility_by_pressure[i, j] + own * film.log_mobility_by_gap[i, j]
         slope_next = film.log_mobility_by_pressure[i, jn] + own * film.log_mobility_by_gap[i, jn]
         by_own = through + falling * faces.north_by_own[i, j] * slope

@@ -5,8 +5,8 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.quantities import Parameter, Parametric
+from asperity.core.arrays import Field
+from asperity.core.quantities import Parameter, Parametric
 
 
 class DensityLaw(Protocol):
@@ -53,4 +53,7 @@ class Incompressible(Parametric):
         return np.zeros_like(pressure)
 
 
-DENSITY_LAWS: dict[str, type[DensityLaw]] = {"dowson-higginson": DowsonHigginson, "incompressible": Incompressible}
+DENSITY_LAWS: dict[str, type[DensityLaw]] = {
+    "dowson-higginson": DowsonHigginson,
+    "incompressible": Incompressible,
+}

@@ -1,7 +1,7 @@
 """The shear stress of the oil film, from which friction comes: one frozen, callable law a class.
 
-What thins the film inside Reynolds' equation is `rheology`; the paper too takes one law there (Eq 9) and another for
-friction (Eq 14).
+What thins the film inside Reynolds' equation is `rheology`; the paper too takes one law there (Eq
+9) and another for friction (Eq 14).
 """
 
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.quantities import Parameter, Parametric
+from asperity.core.arrays import Field
+from asperity.core.quantities import Parameter, Parametric
 
 FREEZING = 273.15  # of water [K]
 
@@ -19,8 +19,9 @@ FREEZING = 273.15  # of water [K]
 class ShearedFilm:
     """A film on its way through the contact; fields of shape (nx, ny), x along rolling.
 
-    `rate` of shear, not negative [1/s]; `viscosity` at the film's own pressure and temperature [Pa s]; `pressure` [Pa];
-    `temperature` [K]; `transit` the time that oil at the mean of the surface speeds takes from cell to cell [s].
+    `rate` of shear, not negative [1/s]; `viscosity` at the film's own pressure and temperature [Pa
+    s]; `pressure` [Pa]; `temperature` [K]; `transit` the time that oil at the mean of the surface
+    speeds takes from cell to cell [s].
     """
 
     rate: Field
@@ -61,10 +62,11 @@ class EyringShear(Parametric):
 class BairWiner(Parametric):
     """Shear stress with a limit: γ' = (dτ/dt)/G - (τ_L/η) ln(1 - τ/τ_L). Source: the paper's Eq 14.
 
-    dτ/dt is that of oil carried through the contact at the mean of the surface speeds. Limits are Dyson's for mineral
-    oils, G = 1.2 p/(2.52 + 0.024 T) - 1e8 with T in degrees Celsius and G and p in pascals, and τ_L = 0.25 G; they are
-    negative below about 0.3 GPa, where `floor` stands for τ_L. Source of the limits: A. Dyson, Phil. Trans. R. Soc. A
-    266 (1970) 1, as used by Zhu and Hu, Tribol. Trans. 44 (2001) 383; recollected, not checked against either.
+    dτ/dt is that of oil carried through the contact at the mean of the surface speeds. Limits are
+    Dyson's for mineral oils, G = 1.2 p/(2.52 + 0.024 T) - 1e8 with T in degrees Celsius and G and
+    p in pascals, and τ_L = 0.25 G; they are negative below about 0.3 GPa, where `floor` stands for
+    τ_L. Source of the limits: A. Dyson, Phil. Trans. R. Soc. A 266 (1970) 1, as used by Zhu and
+    Hu, Tribol. Trans. 44 (2001) 383; recollected, not checked against either.
     """
 
     # τ_L of mineral oils at ambient: 1 to 5 MPa
@@ -89,9 +91,13 @@ class LinearBairWiner(Parametric):
     For measured limits: ξ of mineral oils lies between 0.03 and 0.1.
     """
 
-    tau_l0: Annotated[float, Parameter("Pa", "τ_L0", "limiting stress tau_l0")]  # at ambient pressure
+    tau_l0: Annotated[
+        float, Parameter("Pa", "τ_L0", "limiting stress tau_l0")
+    ]  # at ambient pressure
     slope: Annotated[float, Parameter("", "ξ", "slope of the limiting stress")]
-    softening: Annotated[float | None, Parameter("1/K", "b", "softening of the limiting stress")] = None  # None: 0
+    softening: Annotated[
+        float | None, Parameter("1/K", "b", "softening of the limiting stress")
+    ] = None  # None: 0
     ratio: Annotated[float, Parameter("", "τ_L/G", "ratio of limiting stress to modulus")] = 0.25
 
     def limits(self, pressure: Field, temperature: Field) -> tuple[Field, Field]:
@@ -106,7 +112,7 @@ class LinearBairWiner(Parametric):
 
 
 def _carried(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
-    from asperity.kernels.shear import carried_stress  # numba, for solved films only
+    from asperity.kernels.shear_stress import carried_stress  # numba, for solved films only
 
     stress = np.empty_like(film.pressure)
     carried_stress(film.rate, film.viscosity, limit, modulus, film.transit, stress)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Literal
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.lubricant.density import DENSITY_LAWS
 from asperity.lubricant.friction import FRICTION_LAWS
 from asperity.lubricant.rheology import RHEOLOGY_LAWS
@@ -26,7 +26,9 @@ def law_name(family: LawFamily, law: object) -> str:
     """What its family's table calls a law; raises BadInput for one that is not in it."""
     name = next((name for name, kind in LAWS[family].items() if type(law) is kind), None)
     if name is None:
-        raise BadInput(f"{type(law).__name__} is not a {family} law that can be kept; add it to its table of laws")
+        raise BadInput(
+            f"{type(law).__name__} is not a {family} law that can be kept; add it to its table of laws"
+        )
     return name
 
 
@@ -37,4 +39,6 @@ def describe_law(family: LawFamily, law: Any) -> dict[str, Any]:
 
 def make_law(family: LawFamily, description: Mapping[str, Any]) -> Any:
     """The law that `describe_law` describes."""
-    return LAWS[family][description["law"]](**{name: value for name, value in description.items() if name != "law"})
+    return LAWS[family][description["law"]](
+        **{name: value for name, value in description.items() if name != "law"}
+    )

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
+from asperity.lubricant.data_sheet import OilSheet
 from asperity.lubricant.friction import FREEZING
-from asperity.lubricant.sheet import OilSheet
 from asperity.lubricant.walther import HOT, WARM, Walther
 
 SOURCE = "Stachowiak and Batchelor, Engineering Tribology, table 2.3"
@@ -18,7 +18,8 @@ _CELSIUS = (30, 60, 100)  # where they were measured
 class MeasuredOil:
     """A mineral oil at 30, 60 and 100 °C: dynamic viscosities [Pa s] and alphas at ambient pressure [1/Pa].
 
-    `index` says of which kind it is: of high, medium or low viscosity index. An alpha that was not measured is None.
+    `index` says of which kind it is: of high, medium or low viscosity index. An alpha that was not
+    measured is None.
     """
 
     name: str
@@ -34,7 +35,11 @@ class MeasuredOil:
         celsius = temperature - FREEZING
         for low in (0, 1):
             first, last = self.alphas[low], self.alphas[low + 1]
-            if first is None or last is None or not _CELSIUS[low] <= round(celsius, 9) <= _CELSIUS[low + 1]:
+            if (
+                first is None
+                or last is None
+                or not _CELSIUS[low] <= round(celsius, 9) <= _CELSIUS[low + 1]
+            ):
                 continue
             share = (celsius - _CELSIUS[low]) / (_CELSIUS[low + 1] - _CELSIUS[low])
             line = self._line(low)
@@ -54,7 +59,9 @@ class MeasuredOil:
         """D341 through two of its viscosities; kinematic ones take the density, which takes the one at 40 °C."""
         density = OilSheet(grade="VG 100").density
         for _ in range(8):  # a decade of viscosity is 5 % of density: settled to 1e-12
-            points = [(t + FREEZING, self.viscosities[i] / density(t + FREEZING)) for i, t in _pair(low)]
+            points = [
+                (t + FREEZING, self.viscosities[i] / density(t + FREEZING)) for i, t in _pair(low)
+            ]
             line = Walther.through(points[0], points[1])
             density = OilSheet(viscosity_40=line(WARM), viscosity_100=line(HOT)).density
         return line

@@ -31,4 +31,10 @@ def describe_lubricant(lubricant: Lubricant) -> dict[str, dict[str, Any]]:
 
 def make_lubricant(description: Mapping[str, Mapping[str, Any]]) -> Lubricant:
     """The oil that `describe_lubricant` describes."""
-    return Lubricant(**{family: make_law(family, description[family]) for family in _FAMILIES if family in description})
+    return Lubricant(
+        **{
+            family: make_law(family, description[family])
+            for family in _FAMILIES
+            if family in description
+        }
+    )

@@ -5,8 +5,8 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.quantities import Parameter, Parametric
+from asperity.core.arrays import Field
+from asperity.core.quantities import Parameter, Parametric
 
 
 class RheologyLaw(Protocol):
@@ -29,8 +29,9 @@ class Newtonian:
 class ReeEyring(Parametric):
     """Viscosity that falls once shear passes a stress: 1/η* = (1/η)(τ₀/τ₁) sinh(τ₁/τ₀). Source: the paper's Eq 9.
 
-    τ₁ is the shear stress on the surface that sliding alone would cause, τ₁ = τ₀ asinh(η Δu/(τ₀ h)): the part of the
-    pressure gradient is left out, so that η* = η asinh(S)/S with S = η Δu/(τ₀ h). In pure rolling the oil is Newtonian.
+    τ₁ is the shear stress on the surface that sliding alone would cause, τ₁ = τ₀ asinh(η Δu/(τ₀
+    h)): the part of the pressure gradient is left out, so that η* = η asinh(S)/S with S = η Δu/(τ₀
+    h). In pure rolling the oil is Newtonian.
     """
 
     tau0: Annotated[float, Parameter("Pa", "τ₀", "Eyring stress tau0")]  # where thinning sets in

@@ -9,10 +9,10 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.quantities import Parameter, Parametric
 from asperity.lubricant.friction import FREEZING
-from asperity.quantities import Parameter, Parametric
 
 AMBIENT = 313.15  # 40 °C [K]
 ROELANDS_ZERO = 138.0  # temperature that Roelands counts from [K]
@@ -29,7 +29,8 @@ class WarmthLaw(Protocol):
 class ExponentialWarmth(Parametric):
     """Viscosity that falls at one rate at every pressure: η(p, T) = η(p, T₀) exp(-β (T - T₀)). Source: Reynolds (1886).
 
-    An ISO VG 100 mineral oil falls from 100 to 11 mm²/s between 40 and 100 °C: ln(100/11)/60 K = 0.037/K.
+    An ISO VG 100 mineral oil falls from 100 to 11 mm²/s between 40 and 100 °C: ln(100/11)/60 K =
+    0.037/K.
     """
 
     beta: Annotated[float, Parameter("1/K", "β", "temperature coefficient beta")] = 0.037
@@ -54,14 +55,18 @@ class RoelandsWarmth(Parametric):
         return np.asarray(np.exp((np.log(viscosity) + 9.67) * (warmer**-self.s0 - 1.0)))
 
 
-WARMTH_LAWS: dict[str, type[WarmthLaw]] = {"exponential": ExponentialWarmth, "roelands": RoelandsWarmth}
+WARMTH_LAWS: dict[str, type[WarmthLaw]] = {
+    "exponential": ExponentialWarmth,
+    "roelands": RoelandsWarmth,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solid(Parametric):
     """A body that takes up heat: conductivity, density and heat capacity; default 45 steel.
 
-    Density is the paper's; the others are handbook values of plain carbon steels, which lie within 10 % of them.
+    Density is the paper's; the others are handbook values of plain carbon steels, which lie within
+    10 % of them.
     """
 
     conductivity: Annotated[float, Parameter("W/m/K", "k", "thermal conductivity")] = 46.0
@@ -100,7 +105,9 @@ class Thermal(Parametric):
 
     ambient: Annotated[float, Parameter("K", "T₀")] = AMBIENT
     bulk: Annotated[tuple[float, float] | None, Parameter("K")] = None
-    oil_conductivity: Annotated[float, Parameter("W/m/K", positive="conductivity of the oil")] = 0.14
+    oil_conductivity: Annotated[float, Parameter("W/m/K", positive="conductivity of the oil")] = (
+        0.14
+    )
     warmth: WarmthLaw = ExponentialWarmth()
     solids: tuple[Solid, Solid] = (Solid(), Solid())
     feedback: bool = False

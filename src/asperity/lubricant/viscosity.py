@@ -5,11 +5,13 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
-from asperity.quantities import Parameter, Parametric
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.quantities import Parameter, Parametric
 
-LARGEST_EXPONENT = 400.0  # of an exponential law: glass long before, and e^709 is no longer a number
+LARGEST_EXPONENT = (
+    400.0  # of an exponential law: glass long before, and e^709 is no longer a number
+)
 
 
 class ViscosityLaw(Protocol):
@@ -50,7 +52,9 @@ class Roelands(Parametric):
     """
 
     eta0: Annotated[float, Parameter("Pa s", "η₀", "viscosity eta0")]  # at ambient pressure
-    alpha: Annotated[float, Parameter("1/Pa", "α", "pressure-viscosity coefficient alpha")]  # at ambient pressure
+    alpha: Annotated[
+        float, Parameter("1/Pa", "α", "pressure-viscosity coefficient alpha")
+    ]  # at ambient pressure
     p0: Annotated[float, Parameter("Pa", "p₀", "Roelands' reference pressure p0")] = 1.96e8
 
     @property

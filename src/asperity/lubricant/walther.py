@@ -7,13 +7,14 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 
 WARM, HOT = 313.15, 373.15  # 40 and 100 °C, where data sheets state viscosities [K]
 MM2 = 1e-6  # mm^2/s [m^2/s]
 THINNEST = 0.21 * MM2  # where D341 ends [m^2/s]
 LEAST_OF_INDEX = 2.0 * MM2  # viscosity at 100 °C from which D2270 counts [m^2/s]
-# D2270's table as its appendix fits it: from a viscosity at 100 °C [mm^2/s] on, L and H as a Y² + b Y + c
+# D2270's table as its appendix fits it: from a viscosity at 100 °C [mm^2/s] on, L and H as a Y² + b
+# Y + c
 _BASIC_OILS = (
     (2.0, (1.14673, 1.7576, -0.109), (0.84155, 1.5521, -0.077)),
     (3.8, (3.38095, -15.4952, 33.196), (0.78571, 1.7929, -0.183)),
@@ -53,7 +54,8 @@ class Walther:
     def through(cls, first: tuple[float, float], second: tuple[float, float]) -> "Walther":
         """The line through two pairs of temperature [K] and kinematic viscosity [m^2/s]."""
         (x1, w1), (x2, w2) = (
-            (math.log10(t), math.log10(math.log10(nu / MM2 + 0.7 + _thin(nu / MM2)))) for t, nu in (first, second)
+            (math.log10(t), math.log10(math.log10(nu / MM2 + 0.7 + _thin(nu / MM2))))
+            for t, nu in (first, second)
         )
         b = (w1 - w2) / (x2 - x1)
         return cls(w1 + b * x1, b)
@@ -86,7 +88,8 @@ def _basic_oils(hot: float) -> tuple[float, float]:
 def viscosity_index(viscosity_40: float, viscosity_100: float) -> float:
     """The viscosity index of kinematic viscosities [m^2/s] at 40 and 100 °C. Source: ASTM D2270, ISO 2909.
 
-    L and H are the standard's own fits to its table, within 0.1 % of it. Raises BadInput below 2 mm²/s at 100 °C.
+    L and H are the standard's own fits to its table, within 0.1 % of it. Raises BadInput below 2
+    mm²/s at 100 °C.
     """
     warm, hot = viscosity_40 / MM2, viscosity_100 / MM2
     if viscosity_100 < LEAST_OF_INDEX:
@@ -109,9 +112,20 @@ def viscosity_100_of(viscosity_40: float, index: float) -> float:
     from scipy.optimize import brentq  # here: an oil of two viscosities needs no search
 
     least, most = LEAST_OF_INDEX, viscosity_40
-    if not (most > least and viscosity_index(viscosity_40, least) <= index <= viscosity_index(viscosity_40, most)):
+    if not (
+        most > least
+        and viscosity_index(viscosity_40, least) <= index <= viscosity_index(viscosity_40, most)
+    ):
         raise BadInput(
             f"viscosity_index of {index:g} belongs to no oil of {viscosity_40 / MM2:.4g} mm^2/s at 40 degC and at "
             "least 2 mm^2/s at 100 degC; give viscosity_100 in its place"
         )
-    return float(brentq(lambda hot: viscosity_index(viscosity_40, hot) - index, least, most, xtol=1e-15, rtol=1e-12))
+    return float(
+        brentq(
+            lambda hot: viscosity_index(viscosity_40, hot) - index,
+            least,
+            most,
+            xtol=1e-15,
+            rtol=1e-12,
+        )
+    )

@@ -1,7 +1,7 @@
 """A ball bearing under radial and axial load: every ball's load and contact angle, deep groove or angular contact.
 
-Rings are rigid (ISO 16281): the shaft holds the inner one at a tilt, or lets it tilt until it bears no moment. Spin of
-the balls and gyroscopic moments are not covered.
+Rings are rigid (ISO 16281): the shaft holds the inner one at a tilt, or lets it tilt until it
+bears no moment. Spin of the balls and gyroscopic moments are not covered.
 """
 
 import math
@@ -13,18 +13,25 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.conditions import ElasticPair
-from asperity.errors import AsperityError, BadInput, require_positive
-from asperity.hertz import elliptic_contact
+from asperity.contact.conditions import ElasticPair
+from asperity.contact.hertz import elliptic_contact
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.machine.element import MachineContact
 from asperity.machine.roller import require_carried
-from asperity.machine.rolling import STEEL_DENSITY, RollingKinematics, centrifugal_notes, grown, load_zone_notes
+from asperity.machine.rolling import (
+    STEEL_DENSITY,
+    RollingKinematics,
+    centrifugal_notes,
+    grown,
+    load_zone_notes,
+)
 
 EXPONENT = 1.5
 STEEPEST = math.radians(60.0)  # contact angle
 LARGEST_TILT = 0.02  # rad
-HALF_ZONE = 1.22  # thrust from which half of the balls bear over radial load times tan α: Sjövall's integrals
+# thrust from which half of the balls bear over radial load times tan α: Sjövall's integrals
+HALF_ZONE = 1.22
 OSCULATION = 0.52, 0.53  # groove radius over ball diameter, of inner and outer ring: ISO 281's
 RINGS = "inner ring", "outer ring"
 
@@ -67,7 +74,9 @@ class BallBearing:
     def __post_init__(self) -> None:
         for groove in self.osculation:
             if not 0.5 < groove <= 0.6:
-                raise BadInput(f"osculation must lie above 0.5 and at most at 0.6, got {groove:g}; 0.52 is usual")
+                raise BadInput(
+                    f"osculation must lie above 0.5 and at most at 0.6, got {groove:g}; 0.52 is usual"
+                )
         if not 0.0 <= self.contact_angle <= math.radians(60.0):
             raise BadInput(
                 f"contact_angle must lie between 0 and 60 deg, got {math.degrees(self.contact_angle):g} deg; correct it"
@@ -80,14 +89,25 @@ class BallBearing:
             )
         self._require_shape()
         if not 0.0 <= self.axial_load < math.inf:
-            raise BadInput(f"axial_load must not be negative, got {self.axial_load:g} N; leave out its sign")
+            raise BadInput(
+                f"axial_load must not be negative, got {self.axial_load:g} N; leave out its sign"
+            )
         if not 0.0 <= self.radial_load < math.inf:
-            raise BadInput(f"radial_load must not be negative, got {self.radial_load:g} N; leave out its sign")
+            raise BadInput(
+                f"radial_load must not be negative, got {self.radial_load:g} N; leave out its sign"
+            )
         if self.radial_load == self.axial_load == 0.0 <= self.clearance:
-            raise BadInput("radial_load and axial_load are both 0 N, no ball carries; give one of them")
+            raise BadInput(
+                "radial_load and axial_load are both 0 N, no ball carries; give one of them"
+            )
         if self.contact_angle > 0.0 and self.axial_load == 0.0:
             raise BadInput(self._apart(f"radial_load of {self.radial_load:g} N alone"))
-        require_carried(math.hypot(self.radial_load, self.axial_load), self.clearance, self.ball_diameter, "ball")
+        require_carried(
+            math.hypot(self.radial_load, self.axial_load),
+            self.clearance,
+            self.ball_diameter,
+            "ball",
+        )
         _ = self._kinematics(0.0)
 
     def _require_shape(self) -> None:
@@ -99,7 +119,9 @@ class BallBearing:
                 f"it must be at most {1e6 * widest:.1f} um, or the osculation wider"
             )
         if self.tilt is not None and not abs(self.tilt) <= LARGEST_TILT:
-            raise BadInput(f"tilt must lie between -20 and 20 mrad, got {1e3 * self.tilt:g} mrad; bearings bear 1 or 2")
+            raise BadInput(
+                f"tilt must lie between -20 and 20 mrad, got {1e3 * self.tilt:g} mrad; bearings bear 1 or 2"
+            )
 
     def _apart(self, under: str) -> str:
         """That an angular-contact bearing comes apart, and what would hold it."""
@@ -159,8 +181,8 @@ class BallBearing:
     def _balanced(self, stiffness: float, elastic: float) -> Field:
         """Shifts over `elastic` under both loads: the least of a convex energy, so that there is one balance.
 
-        Balls' approaches are distances less a constant, convex in the shifts, and so is their power 5/2. A tilt that
-        the shaft holds is no unknown.
+        Balls' approaches are distances less a constant, convex in the shifts, and so is their
+        power 5/2. A tilt that the shaft holds is no unknown.
         """
         free = 3 if self.tilt is None else 2
         held = np.array([0.0, 0.0, (self.tilt or 0.0) * self._arm / elastic])
@@ -176,13 +198,17 @@ class BallBearing:
             return float(0.4 * loads @ approaches / elastic - wanted @ shifts) / force
 
         def excess(shifts: Field) -> Field:
-            return np.asarray((self._forces(elastic * whole(shifts), stiffness)[:free] - wanted) / force)
+            return np.asarray(
+                (self._forces(elastic * whole(shifts), stiffness)[:free] - wanted) / force
+            )
 
         pressed = (max(self.play, 0.0) / 2.0 + elastic) / elastic
         aside = self.groove_distance * math.sqrt(1.0 - self._held_cosine**2) / elastic
         manner: Any = {
             "jac": excess,
-            "hess": lambda shifts: self._stiffnesses(whole(shifts), stiffness, elastic)[:free, :free],
+            "hess": lambda shifts: self._stiffnesses(whole(shifts), stiffness, elastic)[
+                :free, :free
+            ],
             "method": "trust-exact",
             "options": {"gtol": 1e-8, "maxiter": 2000},
         }
@@ -203,7 +229,10 @@ class BallBearing:
         place, across, along = np.cos(self.angles), np.cos(angles), np.sin(angles)
         pressing = np.stack([across * place, along, along * place])
         turning = np.stack([-along * place, across, across * place])
-        stiff = EXPONENT * stiffness * np.sqrt(approaches), loads / (self.groove_distance + approaches)
+        stiff = (
+            EXPONENT * stiffness * np.sqrt(approaches),
+            loads / (self.groove_distance + approaches),
+        )
         slopes = (pressing * stiff[0]) @ pressing.T + (turning * stiff[1]) @ turning.T
         return np.asarray(slopes * elastic / max(self.radial_load, self.axial_load))
 
@@ -218,7 +247,9 @@ class BallBearing:
             return float(self._forces(at(shift), stiffness)[axis]) - load
 
         enough = grown(elastic + abs(self.play), lambda shift: excess(shift) > 0.0)
-        return self._moved(at(float(scipy.optimize.brentq(excess, 0.0, enough, xtol=1e-18, rtol=1e-14))))
+        return self._moved(
+            at(float(scipy.optimize.brentq(excess, 0.0, enough, xtol=1e-18, rtol=1e-14)))
+        )
 
     def _moved(self, shifts: Field) -> tuple[float, float, float]:
         return float(shifts[0]), float(shifts[1]), float(shifts[2]) / self._arm
@@ -232,15 +263,21 @@ class BallBearing:
             for an angular-contact bearing whose thrust does not hold its balls.
         """
         radial, axial, tilt = self.shifts(pair)
-        loads, angles = self._balls(np.array([radial, axial, tilt * self._arm]), self.stiffness(pair))
+        loads, angles = self._balls(
+            np.array([radial, axial, tilt * self._arm]), self.stiffness(pair)
+        )
         if self.contact_angle > 0.0 and np.any(angles[loads > 0.0] <= 0.0):
-            raise BadInput(self._apart(f"thrust of {self.axial_load:g} N beside {self.radial_load:g} N across"))
+            raise BadInput(
+                self._apart(f"thrust of {self.axial_load:g} N beside {self.radial_load:g} N across")
+            )
         return loads, angles
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
         """Both contacts of every loaded ball."""
         found, (loads, contact_angles) = [], self.loads(pair)
-        for number, (place, load, angle) in enumerate(zip(self.angles, loads, contact_angles, strict=True)):
+        for number, (place, load, angle) in enumerate(
+            zip(self.angles, loads, contact_angles, strict=True)
+        ):
             kinematics = self._kinematics(float(angle))
             rings = zip(RINGS, self._radii(float(angle)), kinematics.overrolling_hz, strict=True)
             for ring, radii, passages in rings if load > 0.0 else ():
@@ -267,7 +304,8 @@ class BallBearing:
     def free_angle(self) -> float:
         """Contact angle at which the grooves just hold the balls under thrust [rad]; 0 under radial load alone.
 
-        Loads change it a little; a bearing's characteristic frequencies are usually given for this one.
+        Loads change it a little; a bearing's characteristic frequencies are usually given for this
+        one.
         """
         return self.contact_angle if self.axial_load == 0.0 else math.acos(self._held_cosine)
 
@@ -279,7 +317,9 @@ class BallBearing:
         said += self._tilting(pair)
         largest = float(angles[np.argmax(loads)])
         if largest > 1e-6:
-            said.append(f"The most loaded ball bears at a contact angle of {math.degrees(largest):.2f} deg.")
+            said.append(
+                f"The most loaded ball bears at a contact angle of {math.degrees(largest):.2f} deg."
+            )
         mass = STEEL_DENSITY * math.pi / 6.0 * self.ball_diameter**3
         centrifugal = centrifugal_notes(self._kinematics(largest).centrifugal_load(mass), contacts)
         return (*said, *load_zone_notes(loads.tolist(), "ball"), *centrifugal)
@@ -347,5 +387,8 @@ class BallBearing:
     def _radii(self, angle: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """(R_x, R_y) at the inner and the outer ring [m]."""
         inner, outer = self._kinematics(angle).radii
-        across = [1.0 / (2.0 / self.ball_diameter - 1.0 / (f * self.ball_diameter)) for f in self.osculation]
+        across = [
+            1.0 / (2.0 / self.ball_diameter - 1.0 / (f * self.ball_diameter))
+            for f in self.osculation
+        ]
         return (inner, across[0]), (outer, across[1])

@@ -10,8 +10,8 @@ from typing import ClassVar, Self
 
 import scipy
 
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput, require_positive
+from asperity.contact.conditions import ElasticPair
+from asperity.core.errors import BadInput, require_positive
 from asperity.machine.element import STILL, MachineContact, turns
 
 PLACES = 9  # angles from the nose to where the lift begins
@@ -61,7 +61,9 @@ class Cam(ABC):
             require_positive(name, value, unit)
         if not 0.0 < self.half_angle <= math.pi:
             degrees = math.degrees(self.half_angle)
-            raise BadInput(f"half_angle must lie above 0 and at most at 180 deg, got {degrees:g} deg; correct it")
+            raise BadInput(
+                f"half_angle must lie above 0 and at most at 180 deg, got {degrees:g} deg; correct it"
+            )
         self._require_shape()
         for angle in self.angles:
             if self.follower_force(angle) <= 0.0:
@@ -96,16 +98,24 @@ class Cam(ABC):
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """Where the surfaces run against each other, and where no oil is drawn in."""
         contacts = self.contacts(pair)
-        said = ["Each angle is taken as steady; squeeze and what the film remembers are not covered."]
+        said = [
+            "Each angle is taken as steady; squeeze and what the film remembers are not covered."
+        ]
         against = [
-            contact.name for contact in contacts if contact.surface_speeds[1] < -STILL * abs(contact.surface_speeds[0])
+            contact.name
+            for contact in contacts
+            if contact.surface_speeds[1] < -STILL * abs(contact.surface_speeds[0])
         ]
         if against:
-            said.append(f"Cam and follower run against each other from {against[0]} to {against[-1]}.")
+            said.append(
+                f"Cam and follower run against each other from {against[0]} to {against[-1]}."
+            )
         signs = [contact.entrainment_speed > 0.0 for contact in contacts]
         said += [
             f"Between {first.name} and {second.name} entrainment passes zero: no steady film there."
-            for first, second, before, after in zip(contacts, contacts[1:], signs, signs[1:], strict=False)
+            for first, second, before, after in zip(
+                contacts, contacts[1:], signs, signs[1:], strict=False
+            )
             if before != after
         ]
         return tuple(said)
@@ -148,7 +158,10 @@ class FlatCam(Cam):
                 geometry="line",
                 radius=self.radius_at(angle),
                 length=self.width,
-                surface_speeds=(self.speed * self.radius_at(angle), self.speed * self._lift_bend(angle)),
+                surface_speeds=(
+                    self.speed * self.radius_at(angle),
+                    self.speed * self._lift_bend(angle),
+                ),
                 overrolling_hz=(turns(self.speed), turns(self.speed)),
             )
             for angle in self.angles
@@ -171,9 +184,10 @@ class FlatCam(Cam):
 class CamPoint:
     """Where a roller follower touches its cam, of the pitch curve ρ0(θ) that the roller's centre runs on.
 
-    `pressure_angle` φ between follower's way and contact normal: tan φ = ρ0'/ρ0 [rad]; `pitch_radius`: of curvature of
-    the pitch curve, (ρ0² + ρ0'²)^(3/2)/(ρ0² + 2 ρ0'² - ρ0 ρ0''); `cam_radius`: of the cam, less by the roller's,
-    negative where it is hollow; `path` : of the cam passed a radian of its turn [m].
+    `pressure_angle` φ between follower's way and contact normal: tan φ = ρ0'/ρ0 [rad];
+    `pitch_radius`: of curvature of the pitch curve, (ρ0² + ρ0'²)^(3/2)/(ρ0² + 2 ρ0'² - ρ0 ρ0'');
+    `cam_radius`: of the cam, less by the roller's, negative where it is hollow; `path` : of the
+    cam passed a radian of its turn [m].
     """
 
     pressure_angle: float
@@ -188,7 +202,9 @@ class CamPoint:
         curved = (reach**2 + 2.0 * slope**2 - reach * bend) / across**3
         bent = 1.0 - roller_radius * curved  # of the pitch curve's path, what the cam has
         pitch_radius = math.inf if curved == 0.0 else 1.0 / curved
-        return cls(math.atan2(slope, reach), pitch_radius, pitch_radius - roller_radius, across * bent)
+        return cls(
+            math.atan2(slope, reach), pitch_radius, pitch_radius - roller_radius, across * bent
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,17 +232,22 @@ class RollerCam(Cam):
     def at(self, angle: float) -> CamPoint:
         """The contact's geometry."""
         reach = self.base_radius + self.roller_radius + self.lift_at(angle)
-        return CamPoint.of(reach, self._lift_slope(angle), self._lift_bend(angle), self.roller_radius)
+        return CamPoint.of(
+            reach, self._lift_slope(angle), self._lift_bend(angle), self.roller_radius
+        )
 
     def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
         """From the nose to where the lift begins. 1/R = 1/ρ + 1/r, F = follower's force/cos φ, u1 = ω times the path.
 
-        The cam's way past the contact is a matter of its shape alone: a roller that slips is the slower for it.
+        The cam's way past the contact is a matter of its shape alone: a roller that slips is the
+        slower for it.
         """
         found = []
         for angle in self.angles:
             point = self.at(angle)
-            curvature = 1.0 / self.roller_radius + (0.0 if math.isinf(point.cam_radius) else 1.0 / point.cam_radius)
+            curvature = 1.0 / self.roller_radius + (
+                0.0 if math.isinf(point.cam_radius) else 1.0 / point.cam_radius
+            )
             speed = self.speed * point.path
             contact = MachineContact(
                 name=f"{math.degrees(angle):.4g} deg from the nose",
@@ -245,7 +266,9 @@ class RollerCam(Cam):
     @property
     def frequencies(self) -> dict[str, float]:
         """Of the cam, and of the roller in the mean of a turn of it [Hz]."""
-        way = 2.0 * float(scipy.integrate.quad(lambda angle: self.at(angle).path, 0.0, self.half_angle)[0])
+        way = 2.0 * float(
+            scipy.integrate.quad(lambda angle: self.at(angle).path, 0.0, self.half_angle)[0]
+        )
         way += 2.0 * (math.pi - self.half_angle) * self.base_radius
         return {
             "cam_hz": turns(self.speed),
@@ -259,12 +282,16 @@ class RollerCam(Cam):
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """What the model leaves out, and a guide that is pressed hard aside."""
-        said = ["The follower's guide is without friction; the roller's own inertia and its bearing are not covered."]
+        said = [
+            "The follower's guide is without friction; the roller's own inertia and its bearing are not covered."
+        ]
         if self.slip == 0.0:
             said.append("Cam and roller are taken to roll without slip.")
         steepest = max(math.degrees(abs(self.at(angle).pressure_angle)) for angle in self.angles)
         if steepest > STEEP:
-            said.append(f"The pressure angle reaches {steepest:.0f} deg; above {STEEP:.0f} deg a guide may jam.")
+            said.append(
+                f"The pressure angle reaches {steepest:.0f} deg; above {STEEP:.0f} deg a guide may jam."
+            )
         return (*super().notes(pair), *said)
 
     def title(self) -> str:
@@ -273,7 +300,8 @@ class RollerCam(Cam):
 
     def _require_shape(self) -> None:
         sharpest = min(
-            (radius for angle in self.angles if (radius := self.at(angle).pitch_radius) > 0.0), default=math.inf
+            (radius for angle in self.angles if (radius := self.at(angle).pitch_radius) > 0.0),
+            default=math.inf,
         )
         if sharpest <= self.roller_radius:
             raise BadInput(

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput, require_positive
+from asperity.contact.conditions import ElasticPair
+from asperity.core.errors import BadInput, require_positive
 from asperity.machine.element import MachineContact, turns
 
 
@@ -45,7 +45,9 @@ class TwinDisc:
         require_positive("load", self.load, "N")
         if (self.length is None) == (self.crown_radius is None):
             both = "both are" if self.length is not None else "neither is"
-            raise BadInput(f"discs have length (cylinders) or crown_radius (one is crowned), {both} given; give one")
+            raise BadInput(
+                f"discs have length (cylinders) or crown_radius (one is crowned), {both} given; give one"
+            )
         for name, value in (("length", self.length), ("crown_radius", self.crown_radius)):
             if value is not None:
                 require_positive(name, value, "m")
@@ -80,10 +82,14 @@ class TwinDisc:
     def _require_speeds(self) -> None:
         if (self.speeds is None) == (self.entrainment_speed is None):
             both = "both are" if self.speeds is not None else "neither is"
-            raise BadInput(f"discs have speeds, or entrainment_speed with slide_to_roll, {both} given; give one")
+            raise BadInput(
+                f"discs have speeds, or entrainment_speed with slide_to_roll, {both} given; give one"
+            )
         if self.speeds is not None:
             if self.slide_to_roll is not None:
-                raise BadInput("slide_to_roll is that of both speeds, which are given; leave it out")
+                raise BadInput(
+                    "slide_to_roll is that of both speeds, which are given; leave it out"
+                )
             if min(self.speeds) < 0.0 or max(self.speeds) <= 0.0:
                 raise BadInput(
                     f"speeds must not be negative nor both 0, got {self.speeds[0]:g} and {self.speeds[1]:g} rad/s; one "

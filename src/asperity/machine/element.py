@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from asperity.conditions import ContactConditions, ElasticPair, Geometry
-from asperity.errors import BadInput
-from asperity.hertz import HertzContact
+from asperity.contact.conditions import ContactConditions, ElasticPair, Geometry
+from asperity.contact.hertz import HertzContact
+from asperity.core.errors import BadInput
 
 ROUNDING = 1e-12  # between speeds that are the same
 STILL = 1e-6  # entrainment over the faster surface, below which no oil is drawn in
@@ -44,7 +44,9 @@ class MachineContact:
         """Load per length that the contact is solved for, the heaviest [N/m]; None for a point or an ellipse."""
         if self.length is None:
             return None
-        return self.load / self.length if self.heaviest_line_load is None else self.heaviest_line_load
+        return (
+            self.load / self.length if self.heaviest_line_load is None else self.heaviest_line_load
+        )
 
     @property
     def entrainment_speed(self) -> float:
@@ -71,7 +73,9 @@ class MachineContact:
         Raises BadInput where the surfaces draw no oil in.
         """
         if self.stands_still:
-            raise BadInput(f"{self.name}: the surfaces draw no oil in here, there is no steady film; leave it out")
+            raise BadInput(
+                f"{self.name}: the surfaces draw no oil in here, there is no steady film; leave it out"
+            )
         first, second = self.surface_speeds
         side = math.copysign(1.0, self.entrainment_speed)
         return self._conditions(pair, (side * first, side * second), hardness)
@@ -88,7 +92,9 @@ class MachineContact:
             geometry=self.geometry,
             radius=self.radius,
             length=self.length,
-            load=self.load if self.length is None or self.line_load is None else self.line_load * self.length,
+            load=self.load
+            if self.length is None or self.line_load is None
+            else self.line_load * self.length,
             surface_speeds=surface_speeds,
             hardness=hardness,
         )

@@ -1,7 +1,8 @@
 """A pair of external spur gears: contacts along the line of action, load shared between pairs of teeth.
 
-Geometry, speeds and radii are exact for rigid involutes. How load is shared is ISO/TR 15144-1's unmodified profile
-(1/3 to 2/3 on two pairs, 1 on one); tip relief, tooth stiffness and dynamic loads are not covered.
+Geometry, speeds and radii are exact for rigid involutes. How load is shared is ISO/TR 15144-1's
+unmodified profile (1/3 to 2/3 on two pairs, 1 on one); tip relief, tooth stiffness and dynamic
+loads are not covered.
 """
 
 import math
@@ -12,14 +13,17 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 import scipy
 
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput, require_positive
+from asperity.contact.conditions import ElasticPair
+from asperity.core.errors import BadInput, require_positive
 from asperity.machine.element import MachineContact, require_count, turns
 
 PathPoint = Literal["A", "AB", "B", "C", "D", "DE", "E"]
-JAMMED = 0.002  # modules by which the shifts may exceed what the centre distance leaves, for rounded catalogue values
+# modules by which the shifts may exceed what the centre distance leaves, for rounded catalogue
+# values
+JAMMED = 0.002
 DEDENDUM = 1.25  # of the same, down to the roots that it cuts
-ADDENDUM = 1.0  # of the basic rack over the module; its straight flank ends as far below the reference line
+# of the basic rack over the module; its straight flank ends as far below the reference line
+ADDENDUM = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +72,9 @@ class SpurGear:
             require_count("teeth", count, 5)
         if not 10.0 <= math.degrees(self.pressure_angle) <= 35.0:
             degrees = math.degrees(self.pressure_angle)
-            raise BadInput(f"pressure_angle must lie between 10 and 35 deg, got {degrees:g} deg; 20 deg is usual")
+            raise BadInput(
+                f"pressure_angle must lie between 10 and 35 deg, got {degrees:g} deg; 20 deg is usual"
+            )
         self._require_mesh()
         for body in (0, 1):
             self._require_whole_teeth(body)
@@ -76,7 +82,9 @@ class SpurGear:
     @cached_property
     def base_radii(self) -> tuple[float, float]:
         """Of pinion and wheel [m]."""
-        first, second = (0.5 * self.module * count * math.cos(self.pressure_angle) for count in self.teeth)
+        first, second = (
+            0.5 * self.module * count * math.cos(self.pressure_angle) for count in self.teeth
+        )
         return first, second
 
     @cached_property
@@ -99,8 +107,12 @@ class SpurGear:
         wanted = _involute(self.pressure_angle) + shift
         if wanted <= 0.0:
             total = sum(self.profile_shift)
-            raise BadInput(f"profile_shift {total:g} in sum leaves no room between the axes; raise it")
-        angle = float(scipy.optimize.brentq(lambda trial: _involute(trial) - wanted, 1e-6, 1.5, xtol=1e-15))
+            raise BadInput(
+                f"profile_shift {total:g} in sum leaves no room between the axes; raise it"
+            )
+        angle = float(
+            scipy.optimize.brentq(lambda trial: _involute(trial) - wanted, 1e-6, 1.5, xtol=1e-15)
+        )
         return sum(self.base_radii) / math.cos(angle)
 
     @cached_property
@@ -122,8 +134,8 @@ class SpurGear:
     def path(self) -> dict[PathPoint, float]:
         """Points of the path of contact by their distance from the pinion's base circle [m], in the order of contact.
 
-        A begins, E ends; one pair bears from B to D; C is the pitch point, AB and DE lie half way. C is left out where
-        the teeth do not meet there.
+        A begins, E ends; one pair bears from B to D; C is the pitch point, AB and DE lie half way.
+        C is left out where the teeth do not meet there.
         """
         start, end = self._ends
         points: dict[PathPoint, float] = {
@@ -133,7 +145,10 @@ class SpurGear:
             "D": start + self.base_pitch,
             "E": end,
         }
-        points["AB"], points["DE"] = (points["A"] + points["B"]) / 2.0, (points["D"] + points["E"]) / 2.0
+        points["AB"], points["DE"] = (
+            (points["A"] + points["B"]) / 2.0,
+            (points["D"] + points["E"]) / 2.0,
+        )
         inside = (name for name in get_args(PathPoint) if start <= points[name] <= end)
         return dict(sorted(((name, points[name]) for name in inside), key=lambda entry: entry[1]))
 
@@ -212,7 +227,9 @@ class SpurGear:
     @cached_property
     def _ends(self) -> tuple[float, float]:
         (tip_1, tip_2), (base_1, base_2) = self.tip_radii, self.base_radii
-        return self.line_of_action - math.sqrt(tip_2**2 - base_2**2), math.sqrt(tip_1**2 - base_1**2)
+        return self.line_of_action - math.sqrt(tip_2**2 - base_2**2), math.sqrt(
+            tip_1**2 - base_1**2
+        )
 
     def _require_mesh(self) -> None:
         millimetres, bases = 1e3, sum(self.base_radii)
@@ -228,11 +245,18 @@ class SpurGear:
                 f"profile_shift {sum(self.profile_shift):.4g} in sum jams the teeth: at this centre distance at most "
                 f"{room:.4f} leaves backlash; lower it or set the axes further apart"
             )
-        for name, tip, base in zip(("pinion", "wheel"), self.tip_radii, self.base_radii, strict=True):
+        for name, tip, base in zip(
+            ("pinion", "wheel"), self.tip_radii, self.base_radii, strict=True
+        ):
             if tip <= base:
-                raise BadInput(f"tip_diameters: the {name}'s {2e3 * tip:g} mm lies inside its base circle; raise it")
+                raise BadInput(
+                    f"tip_diameters: the {name}'s {2e3 * tip:g} mm lies inside its base circle; raise it"
+                )
         start, end = self._ends
-        for name, other, beyond in (("wheel", "pinion", start <= 0.0), ("pinion", "wheel", end >= self.line_of_action)):
+        for name, other, beyond in (
+            ("wheel", "pinion", start <= 0.0),
+            ("pinion", "wheel", end >= self.line_of_action),
+        ):
             if beyond:
                 raise BadInput(
                     f"the {name}'s tip reaches below the {other}'s base circle, the teeth cannot mesh; lower the "
@@ -241,8 +265,16 @@ class SpurGear:
         self._require_room()
         if not 1.0 <= self.contact_ratio < 2.0:
             few = self.contact_ratio < 1.0
-            remedy = "raise the tip diameters or bring the axes closer" if few else "lower the tip diameters"
-            why = "the teeth lose contact" if few else "three pairs bear, which the load sharing does not cover"
+            remedy = (
+                "raise the tip diameters or bring the axes closer"
+                if few
+                else "lower the tip diameters"
+            )
+            why = (
+                "the teeth lose contact"
+                if few
+                else "three pairs bear, which the load sharing does not cover"
+            )
             raise BadInput(f"the contact ratio is {self.contact_ratio:.3f}: {why}; {remedy}")
 
     def _require_room(self) -> None:
@@ -291,14 +323,16 @@ def _involute(angle: float) -> float:
 def _undercut_radius(count: int, shift: float, module: float, angle: float) -> float:
     """Radius [m] up to which the rack's corner cuts the involute away; 0 where it does not.
 
-    The corner, at a depth h below the pitch line, runs on a trochoid; what it cuts ends where that meets the involute.
+    The corner, at a depth h below the pitch line, runs on a trochoid; what it cuts ends where that
+    meets the involute.
     """
     pitch = 0.5 * module * count
     base, depth = pitch * math.cos(angle), (ADDENDUM - shift) * module
     if depth <= pitch * math.sin(angle) ** 2:
         return 0.0
-    # the rack has moved by `travel` from where its flank passes the pitch point, the gear has turned by travel/pitch;
-    # a flank bounds the tooth until it touches at the base circle, at -pitch tan(angle)
+    # the rack has moved by `travel` from where its flank passes the pitch point, the gear has
+    # turned by travel/pitch; a flank bounds the tooth until it touches at the base circle, at
+    # -pitch tan(angle)
     travel = np.linspace(-2.0 * pitch, -pitch * math.tan(angle), 4000)
     across, up = travel + depth * math.tan(angle), pitch - depth
     radius = np.hypot(across, up)

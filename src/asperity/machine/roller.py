@@ -1,7 +1,7 @@
 """A cylindrical roller bearing under radial load: load zone with clearance, rollers in slices (ISO 16281).
 
-Rings are rigid and parallel. ISO's stiffness is that of steel on steel, of both contacts of a roller together. Ribs,
-misalignment and the edge stress of roller ends are not covered.
+Rings are rigid and parallel. ISO's stiffness is that of steel on steel, of both contacts of a
+roller together. Ribs, misalignment and the edge stress of roller ends are not covered.
 """
 
 import math
@@ -12,16 +12,24 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.conditions import ElasticPair
-from asperity.errors import BadInput, require_choice, require_positive
+from asperity.contact.conditions import ElasticPair
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.machine.element import MachineContact
-from asperity.machine.rolling import STEEL_DENSITY, RollingKinematics, centrifugal_notes, grown, load_zone_notes
+from asperity.machine.rolling import (
+    STEEL_DENSITY,
+    RollingKinematics,
+    centrifugal_notes,
+    grown,
+    load_zone_notes,
+)
 
 RollerProfile = Literal["straight", "iso"]
 SLICES = 30  # the fewest that ISO 16281 takes
 EXPONENT = 10.0 / 9.0  # of a line contact's load over its deflection
-STIFFNESS = 35948.0  # N/mm^(10/9) at an effective length of 1 mm; grows with its power 8/9 (ISO 16281)
+STIFFNESS = (
+    35948.0  # N/mm^(10/9) at an effective length of 1 mm; grows with its power 8/9 (ISO 16281)
+)
 STEEL = 226.4e9, 0.05  # E' that the stiffness is for [Pa], and how far another may be off
 WIDEST_PLAY = 0.05  # of the roller's diameter
 
@@ -66,13 +74,18 @@ class CylindricalRollerBearing:
         _ = self.kinematics
         require_carried(self.radial_load, self.clearance, self.roller_diameter, "roller")
         if self.slices < SLICES:
-            raise BadInput(f"slices must be at least {SLICES}, as ISO 16281 has it, got {self.slices}; raise it")
+            raise BadInput(
+                f"slices must be at least {SLICES}, as ISO 16281 has it, got {self.slices}; raise it"
+            )
 
     @cached_property
     def kinematics(self) -> RollingKinematics:
         """What turns how fast."""
         return RollingKinematics(
-            count=self.rollers, diameter=self.roller_diameter, pitch_diameter=self.pitch_diameter, speed=self.speed
+            count=self.rollers,
+            diameter=self.roller_diameter,
+            pitch_diameter=self.pitch_diameter,
+            speed=self.speed,
         )
 
     @property
@@ -97,7 +110,9 @@ class CylindricalRollerBearing:
         """Of the inner ring against the outer one, along the load [m]: where the rollers carry the load."""
 
         def excess(shift: float) -> float:
-            return float(np.cos(self.angles) @ self._slice_loads(shift).sum(axis=1)) - self.radial_load
+            return (
+                float(np.cos(self.angles) @ self._slice_loads(shift).sum(axis=1)) - self.radial_load
+            )
 
         if excess(0.0) >= 0.0:
             return 0.0
@@ -120,7 +135,10 @@ class CylindricalRollerBearing:
         found, kinematics, per_length = [], self.kinematics, self.slices / self.roller_length
         for number, (angle, slices) in enumerate(zip(self.angles, self.slice_loads, strict=True)):
             for ring, radius, passages in zip(
-                ("inner ring", "outer ring"), kinematics.radii, kinematics.overrolling_hz, strict=True
+                ("inner ring", "outer ring"),
+                kinematics.radii,
+                kinematics.overrolling_hz,
+                strict=True,
             ):
                 if slices.sum() > 0.0:
                     contact = MachineContact(
@@ -146,9 +164,13 @@ class CylindricalRollerBearing:
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """What the model leaves out, and where it does not hold."""
         mass = STEEL_DENSITY * math.pi / 4.0 * self.roller_diameter**2 * self.roller_length
-        said = ["Rings are rigid and parallel; ribs, misalignment and the stress at roller ends are not covered."]
+        said = [
+            "Rings are rigid and parallel; ribs, misalignment and the stress at roller ends are not covered."
+        ]
         if abs(pair.effective_modulus / STEEL[0] - 1.0) > STEEL[1]:
-            said.append("The load zone is that of steel rollers and rings (ISO 16281), whatever [material] says.")
+            said.append(
+                "The load zone is that of steel rollers and rings (ISO 16281), whatever [material] says."
+            )
         centrifugal = centrifugal_notes(self.kinematics.centrifugal_load(mass), self.contacts(pair))
         return (*said, *load_zone_notes(self.loads.tolist(), "roller"), *centrifugal)
 
@@ -166,7 +188,8 @@ class CylindricalRollerBearing:
 def iso_profile(along: Field, length: float, diameter: float) -> Field:
     """ISO 16281's drop of a cylindrical roller [m], `along` its axis from the middle; infinite at its very end.
 
-    0.35e-3 D ln(1/(1 - (2x/L)²)); of rollers longer than 2.5 D the middle is straight and the factor 0.5e-3.
+    0.35e-3 D ln(1/(1 - (2x/L)²)); of rollers longer than 2.5 D the middle is straight and the
+    factor 0.5e-3.
     """
     ends = 2.5 * diameter
     if length <= ends:

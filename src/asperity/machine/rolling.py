@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from asperity.errors import BadInput, require_positive
+from asperity.core.errors import BadInput, require_positive
 from asperity.machine.element import MachineContact, require_count, turns
 
 STEEL_DENSITY = 7800.0  # kg/m^3
@@ -94,7 +94,9 @@ def centrifugal_notes(load: float, contacts: tuple[MachineContact, ...]) -> tupl
     largest = max(contact.load for contact in contacts)
     if load <= WORTH_SAYING * largest:
         return ()
-    return (f"The centrifugal load of {load:.3g} N on the outer ring is left out (largest load {largest:.4g} N).",)
+    return (
+        f"The centrifugal load of {load:.3g} N on the outer ring is left out (largest load {largest:.4g} N).",
+    )
 
 
 def load_zone_notes(loads: list[float], element: str) -> tuple[str, ...]:
@@ -103,7 +105,9 @@ def load_zone_notes(loads: list[float], element: str) -> tuple[str, ...]:
         return (f"One {element} alone carries the whole load.",)
     if max(loads) == min(loads):
         return ()
-    return (f"{element.capitalize()} 0 stands under the radial load; where it passes between two, they bear less.",)
+    return (
+        f"{element.capitalize()} 0 stands under the radial load; where it passes between two, they bear less.",
+    )
 
 
 def grown(start: float, enough: Callable[[float], bool]) -> float:

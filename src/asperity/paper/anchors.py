@@ -11,16 +11,27 @@ import pandas
 from pydantic import Field as Entry
 
 from asperity.case import Length, Section, parse_section
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.paper.numbers import CRF_ENDS_HZ, SAMPLES_SQ_UM, SAMPLES_STD_UM
 from asperity.paper.rig import TRENDS
-from asperity.wear import Stages
+from asperity.trend import Stages
 
 AnchorSense = Literal["about", "at least", "at most"]
 COMPARED = (  # columns of the table of anchors
-    "anchor", "quantity", "sq_um", "sense", "printed", "tolerance", "ours", "low", "high", "miss", "met", "possible",
+    "anchor",
+    "quantity",
+    "sq_um",
+    "sense",
+    "printed",
+    "tolerance",
+    "ours",
+    "low",
+    "high",
+    "miss",
+    "met",
+    "possible",
     "source",
-)  # fmt: skip
+)
 SPLIT_ANCHOR = "split"  # the quantity of an anchor that is a break between stages
 
 
@@ -65,7 +76,11 @@ class Anchor:
         """What the curve has in its place, and the interval over seeds; nan where the curve does not reach."""
         if self.quantity == SPLIT_ANCHOR:
             stages = curve.stages.get("sound")
-            return (np.nan,) * 3 if stages is None or not stages.found else (stages.split, *stages.interval)
+            return (
+                (np.nan,) * 3
+                if stages is None or not stages.found
+                else (stages.split, *stages.interval)
+            )
         assert self.sq is not None
         here = curve.at(self.sq, self.quantity)
         if self.since is None:
@@ -83,11 +98,14 @@ class Anchor:
         return max(off, 0.0) if self.sense == "at most" else off
 
 
-def compare_with_anchors(curve: CurveOverSq, anchors: Sequence[Anchor] | None = None) -> pandas.DataFrame:
+def compare_with_anchors(
+    curve: CurveOverSq, anchors: Sequence[Anchor] | None = None
+) -> pandas.DataFrame:
     """A row an anchor, the paper's unless given: what is printed, ours with its 90 % interval, the miss, whether met.
 
-    `met` is True where the miss is within the tolerance, and `possible` where some value of the interval would be.
-    Both are False where the curve has no value (a Sq that was not computed, stages that are not there).
+    `met` is True where the miss is within the tolerance, and `possible` where some value of the
+    interval would be. Both are False where the curve has no value (a Sq that was not computed,
+    stages that are not there).
     """
     rows = []
     for anchor in PAPER_ANCHORS if anchors is None else anchors:
@@ -114,8 +132,9 @@ def rig_prediction(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> pandas
 def rig_deviation(curve: CurveOverSq, quantity: str = "crf_sound_hz") -> dict[str, float]:
     """Root mean square of our CRF less the rig's [Hz]; nan where the curve does not reach over all of its Sq.
 
-    "ends": over the two values that are printed. "knee", "smooth": over all twelve Sq, between those ends along a bent
-    or a saturating line; its Fig 13 has no numbers, so that the shape between the ends is ours.
+    "ends": over the two values that are printed. "knee", "smooth": over all twelve Sq, between
+    those ends along a bent or a saturating line; its Fig 13 has no numbers, so that the shape
+    between the ends is ours.
     """
     predicted = rig_prediction(curve, quantity)
     ours, sq = predicted["crf_hz"].to_numpy(dtype=float), 1e-6 * np.array(SAMPLES_SQ_UM)
@@ -158,7 +177,9 @@ def load_anchors(path: str | Path) -> tuple[Anchor, ...]:
     sections = parse_section(_AnchorFile, tables, str(path)).anchor
     for section in sections:
         if (section.sq is None) != (section.quantity == SPLIT_ANCHOR):
-            raise BadInput(f"{path}: anchor {section.name!r} needs sq, a length; only a split has none")
+            raise BadInput(
+                f"{path}: anchor {section.name!r} needs sq, a length; only a split has none"
+            )
     return tuple(Anchor(**dict(section)) for section in sections)
 
 

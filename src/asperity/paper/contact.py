@@ -3,17 +3,20 @@
 from importlib.resources import files
 
 from asperity.case import Case, load_case
-from asperity.conditions import ContactConditions, ElasticPair
+from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.paper.numbers import RADIUS, RIG_LOAD
 
-# Section 4's steel: the printed 219.78 GPa as Hertz's modulus would give 4147 Hz at 200 N, half of it 3292 Hz
+# Section 4's steel: the printed 219.78 GPa as Hertz's modulus would give 4147 Hz at 200 N, half of
+# it 3292 Hz
 PAIR = ElasticPair((207e9, 207e9), (0.3, 0.3))
 NEAR = 0.1  # of the rig's own values: the paper prints speed and radius in more than one way
 
 
 def papers_contact(load: float) -> ContactConditions:
     """Section 2's contact: a sphere on a plane that slides at the rig's 0.42 m/s."""
-    return ContactConditions(pair=PAIR, geometry="point", radius=RADIUS, load=load, surface_speeds=(2.12, 1.70))
+    return ContactConditions(
+        pair=PAIR, geometry="point", radius=RADIUS, load=load, surface_speeds=(2.12, 1.70)
+    )
 
 
 def papers_text() -> str:
@@ -37,5 +40,12 @@ def is_papers_contact(case: Case) -> bool:
     conditions = case.conditions
     if conditions.geometry != "line" or case.lubricant is None:
         return False
-    rigs = {"radius_along_rolling": RADIUS, "length": 10e-3, "load": RIG_LOAD, "entrainment_speed": 1.91}
-    return all(abs(getattr(conditions, name) - value) <= NEAR * value for name, value in rigs.items())
+    rigs = {
+        "radius_along_rolling": RADIUS,
+        "length": 10e-3,
+        "load": RIG_LOAD,
+        "entrainment_speed": 1.91,
+    }
+    return all(
+        abs(getattr(conditions, name) - value) <= NEAR * value for name, value in rigs.items()
+    )

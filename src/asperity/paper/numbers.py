@@ -46,5 +46,8 @@ RIG_LOAD = 500.0  # [N]
 SHAFT_HZ = (3375.0 / 60.0, 300.0 / 60.0)  # roller, ring
 SAMPLES_SQ_UM = (0.54, 0.87, 1.25, 1.31, 1.64, 1.68, 1.92, 2.17, 2.43, 2.90, 3.06, 3.49)
 SAMPLES_STD_UM = (0.10, 0.08, 0.05, 0.05, 0.10, 0.06, 0.10, 0.08, 0.05, 0.05, 0.10, 0.06)
-CRF_ENDS_HZ = (2921.93, 3811.88)  # smoothest and roughest sample; the others are drawn without numbers
+CRF_ENDS_HZ = (
+    2921.93,
+    3811.88,
+)  # smoothest and roughest sample; the others are drawn without numbers
 RIG_SPLIT_UM = (1.68, 1.92)  # between these samples wear turns severe

@@ -1,7 +1,8 @@
 """The paper's rig, simulated: recordings of worn rings whose contact resonance is known, to judge methods by.
 
-The contact is asperity's own oscillator over its own rough profile. What an accelerometer picks up besides, and what
-fools a search for the highest point, is drawn anew for each rig: structural modes, shaft and mains lines, noise.
+The contact is asperity's own oscillator over its own rough profile. What an accelerometer picks up
+besides, and what fools a search for the highest point, is drawn anew for each rig: structural
+modes, shaft and mains lines, noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,23 +16,42 @@ import numpy as np
 import scipy
 
 from asperity import ehl
-from asperity.arrays import Field
 from asperity.case import Case
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_choice, require_positive
+from asperity.core.files import whole_file, write_text
+from asperity.core.limits import require_affordable
+from asperity.core.signals import Signal
 from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, oscillator, search_band
 from asperity.ehl import ContactState
-from asperity.errors import BadInput, require_choice, require_positive
-from asperity.files import whole_file, write_text
-from asperity.limits import require_affordable
 from asperity.paper.contact import papers_contact, rig_case
-from asperity.paper.numbers import CRF_ENDS_HZ, DAMPING_RATIO, MASS, RIG_LOAD, SAMPLES_SQ_UM, SAMPLES_STD_UM, SHAFT_HZ
-from asperity.paper.rig_recording import GRID_HZ, Disturbance, RigRecording, RigTest, contact_line, draw_background
-from asperity.signals import Signal
+from asperity.paper.numbers import (
+    CRF_ENDS_HZ,
+    DAMPING_RATIO,
+    MASS,
+    RIG_LOAD,
+    SAMPLES_SQ_UM,
+    SAMPLES_STD_UM,
+    SHAFT_HZ,
+)
+from asperity.paper.rig_recording import (
+    GRID_HZ,
+    Disturbance,
+    RigRecording,
+    RigTest,
+    contact_line,
+    draw_background,
+)
+from asperity.solution import contact_state
 
 RigTrend = Literal["knee", "smooth", "constant"]
 RecordingFormat = Literal["h5", "wav"]
 
-KNEE_UM, KNEE_HZ = 1.8, 3640.0  # in the printed split; the height is ours, the paper's figure has no numbers
+KNEE_UM, KNEE_HZ = (
+    1.8,
+    3640.0,
+)  # in the printed split; the height is ours, the paper's figure has no numbers
 SATURATION_UM = 0.8
 CONSTANT_HZ = 3400.0
 RATE_PER_BAND = 3.0  # sampling rate over the upper end of the search band, at least
@@ -72,9 +92,10 @@ class Moment(NamedTuple):
 class Rig:
     """Recordings and what is true of them all.
 
-    `band_hz` is the contact's search band, in which SNR is counted; `full_load_crf_hz` the resonance with all load on
-    asperities; `split_sq_m` where the trend has its knee, None where it has none; `case_text` a case file of the
-    contact. `hours` of each sample, where one contact was recorded as it wore.
+    `band_hz` is the contact's search band, in which SNR is counted; `full_load_crf_hz` the
+    resonance with all load on asperities; `split_sq_m` where the trend has its knee, None where it
+    has none; `case_text` a case file of the contact. `hours` of each sample, where one contact was
+    recorded as it wore.
     """
 
     recordings: tuple[RigRecording, ...]
@@ -137,12 +158,23 @@ def simulate_rig(
     recordings = []
     for number, draw in enumerate(draws):
         rng = np.random.default_rng(draw)
-        true_sq = max(float(sq[number] + sq_std[number] * rng.standard_normal()), 0.1 * float(sq[number]))
+        true_sq = max(
+            float(sq[number] + sq_std[number] * rng.standard_normal()), 0.1 * float(sq[number])
+        )
         state, ridden = _on_trend(trend, true_sq, conditions, full_load_crf_hz), model
         if case is not None:
-            state, ridden = _touching(moments[number], model) if moments else _solved(case, true_sq, model)
+            state, ridden = (
+                _touching(moments[number], model) if moments else _solved(case, true_sq, model)
+            )
         for repeat in range(repeats):
-            test = RigTest(number + 1, repeat + 1, float(sq[number]), float(sq_std[number]), rate_hz, duration_s)
+            test = RigTest(
+                number + 1,
+                repeat + 1,
+                float(sq[number]),
+                float(sq_std[number]),
+                rate_hz,
+                duration_s,
+            )
             tested = _shifted(state, repeat_std_hz * rng.standard_normal() / full_load_crf_hz)
             line = contact_line(tested, conditions, ridden, frequency, rate_hz)
             recordings.append(background.recorded(test, line, disturbance, rng))
@@ -162,10 +194,14 @@ def simulate_rig(
 def _full_load_crf_hz(conditions: ContactConditions, model: VibrationModel, sq: float) -> float:
     """The resonance with all load on asperities [Hz]."""
     whole = replace(dry_full_load(conditions, sq), clr=1.0)
-    return oscillator(whole, conditions, model.with_choices(damping_law="ratio")).natural_frequency_hz
+    return oscillator(
+        whole, conditions, model.with_choices(damping_law="ratio")
+    ).natural_frequency_hz
 
 
-def _on_trend(trend: RigTrend, sq: float, conditions: ContactConditions, full_load_crf_hz: float) -> ContactState:
+def _on_trend(
+    trend: RigTrend, sq: float, conditions: ContactConditions, full_load_crf_hz: float
+) -> ContactState:
     """A contact whose load share gives the trend's CRF."""
     clr = min((float(TRENDS[trend](np.array(sq))) / full_load_crf_hz) ** 6, 1.0)
     return replace(dry_full_load(conditions, sq), clr=clr)
@@ -179,11 +215,17 @@ def _shifted(state: ContactState, shift: float) -> ContactState:
 def _measured(samples: int, moments: Sequence[Moment] | None, seed: int) -> tuple[Field, Field]:
     """What a profilometer says of each sample's Sq, and its deviation [m]: the paper's rings, or a contact that wears.
 
-    Of the paper's rings the true Sq is drawn about it, of a contact that wears it is drawn about the true one.
+    Of the paper's rings the true Sq is drawn about it, of a contact that wears it is drawn about
+    the true one.
     """
     if moments is None:
-        positions = np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
-        sq, std = (np.interp(positions, range(len(um)), um) * 1e-6 for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM))
+        positions = (
+            np.linspace(0.0, len(SAMPLES_SQ_UM) - 1.0, samples) if samples > 1 else np.zeros(1)
+        )
+        sq, std = (
+            np.interp(positions, range(len(um)), um) * 1e-6
+            for um in (SAMPLES_SQ_UM, SAMPLES_STD_UM)
+        )
         return sq, std
     off = MEASURED_STD * np.random.default_rng([seed, samples]).standard_normal(samples)
     true = np.array([moment.state.sq for moment in moments])
@@ -201,7 +243,13 @@ def _touching(moment: Moment, model: VibrationModel) -> tuple[ContactState, Vibr
 
 
 def _require_settings(
-    samples: int, repeats: int, trend: str, repeat_std_hz: float, seed: int, duration_s: float, rate_hz: float
+    samples: int,
+    repeats: int,
+    trend: str,
+    repeat_std_hz: float,
+    seed: int,
+    duration_s: float,
+    rate_hz: float,
 ) -> None:
     if samples < 1 or repeats < 1:
         raise BadInput(f"a rig needs at least 1 sample and 1 repeat, got {samples} and {repeats}")
@@ -221,10 +269,14 @@ def _require_settings(
     )
     if round(length) < SHORTEST_RECORD:
         record = f"{duration_s:g} s at {rate_hz:g} Hz"
-        raise BadInput(f"a rig recording needs at least {SHORTEST_RECORD} samples, got {record}; lengthen it")
+        raise BadInput(
+            f"a rig recording needs at least {SHORTEST_RECORD} samples, got {record}; lengthen it"
+        )
 
 
-def _band(conditions: ContactConditions, model: VibrationModel, rate_hz: float) -> tuple[float, float]:
+def _band(
+    conditions: ContactConditions, model: VibrationModel, rate_hz: float
+) -> tuple[float, float]:
     """The search band [Hz], which the sampling rate must be able to show."""
     band_hz = search_band(conditions, model)
     if rate_hz < RATE_PER_BAND * band_hz[1]:
@@ -239,7 +291,9 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
         return papers_contact(RIG_LOAD), VibrationModel(mass=MASS, damping_ratio=DAMPING_RATIO)
     model = case.vibration
     if model is None:
-        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+        raise BadInput(
+            f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio"
+        )
     if not model.stiffness_law.asperities_alone:
         usable = " or ".join(name for name, law in STIFFNESS_LAWS.items() if law.asperities_alone)
         raise BadInput(
@@ -252,14 +306,18 @@ def _contact(case: Case | None) -> tuple[ContactConditions, VibrationModel]:
 def _solved(case: Case, sq: float, model: VibrationModel) -> tuple[ContactState, VibrationModel]:
     """The case's contact at another roughness; and the model with that contact's damping, where it is to have it."""
     rough = case.with_overrides({"surface.sq": f"{sq * 1e6!r} um"})
-    solution = ehl.solve_contact(rough.conditions, rough.lubricant, rough.surface(), options=rough.options)
-    state = ehl.contact_state(solution)
+    solution = ehl.solve_contact(
+        rough.conditions, rough.lubricant, rough.surface(), options=rough.options
+    )
+    state = contact_state(solution)
     if state.clr <= 0.0 or state.car <= 0.0:
         raise BadInput(
             f"{case.source}: no asperity touches at Sq {sq * 1e6:.2f} um, and a rig without contact has no truth to "
             "tell; roughen the surface or thin the oil"
         )
-    if model.damping_law.needs_solution:  # of the ring: its tests scatter in load share, not in damping
+    if (
+        model.damping_law.needs_solution
+    ):  # of the ring: its tests scatter in load share, not in damping
         damped = oscillator(state, rough.conditions, model, solution=solution).damping_ratio
         model = model.with_choices(damping_law="ratio", damping_ratio=damped)
     return state, model
@@ -274,8 +332,9 @@ def write_rig(
 ) -> list[Path]:
     """Write every recording, what is known of it, and the truth; return the recordings' paths.
 
-    Beside the recordings stand table.csv (file, Sq and its deviation in um, load, roller speed: what a test engineer
-    knows), truth.csv (what nobody knows: CRF, CRFA, damping, CLR, true Sq, SNR) and rig.toml, the case behind it.
+    Beside the recordings stand table.csv (file, Sq and its deviation in um, load, roller speed:
+    what a test engineer knows), truth.csv (what nobody knows: CRF, CRFA, damping, CLR, true Sq,
+    SNR) and rig.toml, the case behind it.
 
     Parameters
     ----------
@@ -288,14 +347,20 @@ def write_rig(
         for an unknown format, a folder that is not empty or cannot be made.
     """
     if file_format not in WRITERS:
-        raise BadInput(f"a rig's recordings are written as {' or '.join(WRITERS)}, got {file_format!r}")
+        raise BadInput(
+            f"a rig's recordings are written as {' or '.join(WRITERS)}, got {file_format!r}"
+        )
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise BadInput(f"{folder} is not empty, and other files would be taken for recordings; name a new folder")
+            raise BadInput(
+                f"{folder} is not empty, and other files would be taken for recordings; name a new folder"
+            )
     except OSError as error:
-        raise BadInput(f"cannot make the folder {folder}: {error.strerror}; choose another") from None
+        raise BadInput(
+            f"cannot make the folder {folder}: {error.strerror}; choose another"
+        ) from None
     paths = [folder / f"{recording.name}.{file_format}" for recording in rig.recordings]
 
     def write(recording: RigRecording, path: Path) -> None:
@@ -318,14 +383,49 @@ def _write_tables(rig: Rig, paths: Sequence[Path], folder: Path) -> None:
     when = () if rig.hours is None else ("hours",)
     known: list[tuple[str, ...]] = [("file", *when, "sq_um", "sq_um_std", "load_n", "speed_hz")]
     truth: list[tuple[str, ...]] = [
-        ("file", "sample", "repeat", "true_sq_um", "clr", "crf_hz", "crfa", "damping_ratio", "snr_db")
+        (
+            "file",
+            "sample",
+            "repeat",
+            "true_sq_um",
+            "clr",
+            "crf_hz",
+            "crfa",
+            "damping_ratio",
+            "snr_db",
+        )
     ]
     for recording, path in zip(rig.recordings, paths, strict=True):
-        sq, sq_std, true_sq = (1e6 * m for m in (recording.sq_m, recording.sq_std_m, recording.true_sq_m))
+        sq, sq_std, true_sq = (
+            1e6 * m for m in (recording.sq_m, recording.sq_std_m, recording.true_sq_m)
+        )
         at = () if rig.hours is None else (f"{rig.hours[recording.sample - 1]:.6g}",)
-        known.append((path.name, *at, f"{sq:.4g}", f"{sq_std:.3g}", f"{rig.load_n:g}", f"{rig.shaft_hz[0]:g}"))
-        figures = (true_sq, recording.clr, recording.crf_hz, recording.crfa, recording.damping_ratio, recording.snr_db)
-        truth.append((path.name, str(recording.sample), str(recording.repeat), *(f"{value:.6g}" for value in figures)))
+        known.append(
+            (
+                path.name,
+                *at,
+                f"{sq:.4g}",
+                f"{sq_std:.3g}",
+                f"{rig.load_n:g}",
+                f"{rig.shaft_hz[0]:g}",
+            )
+        )
+        figures = (
+            true_sq,
+            recording.clr,
+            recording.crf_hz,
+            recording.crfa,
+            recording.damping_ratio,
+            recording.snr_db,
+        )
+        truth.append(
+            (
+                path.name,
+                str(recording.sample),
+                str(recording.repeat),
+                *(f"{value:.6g}" for value in figures),
+            )
+        )
     for name, rows in (("table.csv", known), ("truth.csv", truth)):
         write_text(folder / name, "".join(",".join(row) + "\n" for row in rows))
 
@@ -343,8 +443,13 @@ def _write_hdf5(path: Path, signal: Signal) -> None:
 
 def _write_wav(path: Path, signal: Signal) -> None:
     if signal.rate_hz != round(signal.rate_hz):
-        raise BadInput(f"a wav file holds a whole number of samples a second, got {signal.rate_hz:g} Hz; take h5")
+        raise BadInput(
+            f"a wav file holds a whole number of samples a second, got {signal.rate_hz:g} Hz; take h5"
+        )
     scipy.io.wavfile.write(path, round(signal.rate_hz), signal.values.astype(np.float32))
 
 
-WRITERS: dict[RecordingFormat, Callable[[Path, Signal], None]] = {"h5": _write_hdf5, "wav": _write_wav}
+WRITERS: dict[RecordingFormat, Callable[[Path, Signal], None]] = {
+    "h5": _write_hdf5,
+    "wav": _write_wav,
+}

@@ -7,18 +7,21 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from asperity.arrays import Field, Mask
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.core.arrays import Field, Mask
+from asperity.core.errors import BadInput
+from asperity.core.signals import Signal, Spectrum, power_spectrum, taper
 from asperity.coupling import VibrationModel, excitation, oscillator
 from asperity.ehl import ContactState
-from asperity.errors import BadInput
 from asperity.paper.numbers import SHAFT_HZ
-from asperity.signals import Signal, Spectrum, power_spectrum, taper
 
 MAINS_HZ = 50.0
 RING_HARMONICS, MAINS_HARMONICS = 40, 20
 LOWPASS = 0.45  # corner of the anti-aliasing filter over the sampling rate
-MOUNTED_HZ, MOUNTED_DAMPING = 46e3, 0.02  # resonance of the accelerometer on its stud: + 5 % at 10 kHz, as printed
+MOUNTED_HZ, MOUNTED_DAMPING = (
+    46e3,
+    0.02,
+)  # resonance of the accelerometer on its stud: + 5 % at 10 kHz, as printed
 FLAT_BELOW_HZ = 100.0  # machine noise, which falls with frequency above
 GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten times as wide
 
@@ -27,10 +30,11 @@ GRID_HZ = 0.25  # on which densities are worked out; the sharpest mode is ten ti
 class Disturbance:
     """What the accelerometer picks up besides the contact.
 
-    `snr_db`: power of the contact's line over that of everything else, both within the contact's search band, in the
-    mean over recordings. `modes` structural modes share most of that band with it. `gain_db` is the standard
-    deviation of the level of everything else from recording to recording, `mode_gain_db` that of each mode beside it,
-    `mode_drift` that of the modes' frequencies (all together, relative), `speed_drift` that of the shafts' speeds.
+    `snr_db`: power of the contact's line over that of everything else, both within the contact's
+    search band, in the mean over recordings. `modes` structural modes share most of that band with
+    it. `gain_db` is the standard deviation of the level of everything else from recording to
+    recording, `mode_gain_db` that of each mode beside it, `mode_drift` that of the modes'
+    frequencies (all together, relative), `speed_drift` that of the shafts' speeds.
     """
 
     snr_db: float = 10.0
@@ -42,12 +46,16 @@ class Disturbance:
 
     def __post_init__(self) -> None:
         if not -60.0 <= self.snr_db <= 60.0:
-            raise BadInput(f"SNR must lie between -60 and 60 dB, got {self.snr_db:g} dB; 10 dB is the default")
+            raise BadInput(
+                f"SNR must lie between -60 and 60 dB, got {self.snr_db:g} dB; 10 dB is the default"
+            )
         if not 0 <= self.modes <= 20:
             raise BadInput(f"structural modes must be 0 to 20, got {self.modes}; 4 is the default")
         for name in ("gain_db", "mode_gain_db", "mode_drift", "speed_drift"):
             if not getattr(self, name) >= 0.0:
-                raise BadInput(f"{name.replace('_', ' ')} must be 0 or more, got {getattr(self, name):g}")
+                raise BadInput(
+                    f"{name.replace('_', ' ')} must be 0 or more, got {getattr(self, name):g}"
+                )
 
 
 class Tones(NamedTuple):
@@ -61,9 +69,10 @@ class Tones(NamedTuple):
 class RigRecording:
     """One test of one ring: the truth, and records and spectra of it.
 
-    `sq_m` with `sq_std_m` is what a profilometer says, `true_sq_m` what the ring has; `crf_hz`, `crfa` and
-    `damping_ratio` are the contact line's true ones, the accelerometer's response included in `crfa`.
-    `contact_density` and `other_density` are one-sided [(m/s^2)^2/Hz] on `frequency_hz`.
+    `sq_m` with `sq_std_m` is what a profilometer says, `true_sq_m` what the ring has; `crf_hz`,
+    `crfa` and `damping_ratio` are the contact line's true ones, the accelerometer's response
+    included in `crfa`. `contact_density` and `other_density` are one-sided [(m/s^2)^2/Hz] on
+    `frequency_hz`.
     """
 
     sample: int
@@ -92,12 +101,17 @@ class RigRecording:
     def signal(self) -> Signal:
         """The record [m/s^2]: Gaussian, with exactly these densities, and the tones; one seed, one record."""
         samples = round(self.duration_s * self.rate_hz)
-        length = scipy.fft.next_fast_len(samples + samples // 64, real=True)  # cut off: no end meets the beginning
+        length = scipy.fft.next_fast_len(
+            samples + samples // 64, real=True
+        )  # cut off: no end meets the beginning
         frequency = np.arange(length // 2 + 1) * (self.rate_hz / length)
         scale = self.rate_hz * length / 4.0
         rng = np.random.default_rng(self.seed)
         waves = rng.standard_normal(2 * frequency.size).view(complex)
-        waves *= np.sqrt(scale * np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density))
+        waves *= np.sqrt(
+            scale
+            * np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
+        )
         turns = np.exp(2j * np.pi * rng.random(self.tones.amplitude.size))
         at = np.rint(self.tones.frequency_hz * (length / self.rate_hz)).astype(int)
         np.add.at(waves, at, 0.5 * length * self.tones.amplitude * turns)
@@ -112,14 +126,17 @@ class RigRecording:
         """
         samples = round(self.duration_s * self.rate_hz)
         if not 8 <= segment <= samples:
-            raise BadInput(f"a spectrum's segment must have 8 to {samples} samples (the record), got {segment}")
+            raise BadInput(
+                f"a spectrum's segment must have 8 to {samples} samples (the record), got {segment}"
+            )
         weights = taper("hann", segment)
         spacing = self.rate_hz / segment
         frequency = np.arange(segment // 2 + 1) * spacing
         smooth = np.interp(frequency, self.frequency_hz, self.contact_density + self.other_density)
         averages = _averages_of(segment, samples)
         rng = np.random.default_rng(self.seed)
-        # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as those behind a Hann taper do
+        # weights (1/6, 2/3, 1/6) over independent gammas: neighbours correlate by 4/9, as those
+        # behind a Hann taper do
         drawn = rng.gamma(averages, 1.0 / averages, frequency.size + 2)
         scatter = (drawn[:-2] + 4.0 * drawn[1:-1] + drawn[2:]) / 6.0
         mean_square = 2.0 / (self.rate_hz * float(np.sum(weights**2)))
@@ -180,7 +197,11 @@ class ContactLine(NamedTuple):
 
 
 def contact_line(
-    state: ContactState, conditions: ContactConditions, model: VibrationModel, frequency: Field, rate_hz: float
+    state: ContactState,
+    conditions: ContactConditions,
+    model: VibrationModel,
+    frequency: Field,
+    rate_hz: float,
 ) -> ContactLine:
     """|H|^2 of the oscillator times the spectrum of what it rides over."""
     spring = oscillator(state, conditions, model)
@@ -188,11 +209,15 @@ def contact_line(
     f0 = spring.natural_frequency_hz
 
     def density(at: Field) -> Field:
-        return np.asarray(spring.gain(at) * ridden_over.density(at, rate_hz) * _accelerometer(at, rate_hz))
+        return np.asarray(
+            spring.gain(at) * ridden_over.density(at, rate_hz) * _accelerometer(at, rate_hz)
+        )
 
     measured = np.zeros(frequency.size)
     measured[1:] = density(frequency[1:])
-    return ContactLine(state.sq, state.clr, f0, float(density(np.array(f0))), spring.damping_ratio, measured)
+    return ContactLine(
+        state.sq, state.clr, f0, float(density(np.array(f0))), spring.damping_ratio, measured
+    )
 
 
 def _accelerometer(frequency: Field, rate_hz: float) -> Field:
@@ -216,7 +241,11 @@ class Background(NamedTuple):
     power: Field  # and mean squares
 
     def recorded(
-        self, test: RigTest, contact: ContactLine, disturbance: Disturbance, rng: np.random.Generator
+        self,
+        test: RigTest,
+        contact: ContactLine,
+        disturbance: Disturbance,
+        rng: np.random.Generator,
     ) -> RigRecording:
         """The contact before all this, as loud as the SNR says give or take a little, its modes moved each time."""
         inside = self._in_band(self.frequency)
@@ -226,10 +255,19 @@ class Background(NamedTuple):
         gains = 10.0 ** (disturbance.mode_gain_db * rng.standard_normal(self.mode_hz.size) / 10.0)
         mode_hz = self.mode_hz * (1.0 + disturbance.mode_drift * rng.standard_normal())
         other = self.floor.copy()
-        for f0, damping, loud in zip(mode_hz, self.mode_damping, self.mode_power * gains, strict=True):
+        for f0, damping, loud in zip(
+            mode_hz, self.mode_damping, self.mode_power * gains, strict=True
+        ):
             # inertance of a mode under a white force; ∫ = π f0/(4ζ) near the peak
             x2 = (self.frequency / f0) ** 2
-            other += loud * 4.0 * damping / (np.pi * f0) * x2**2 / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
+            other += (
+                loud
+                * 4.0
+                * damping
+                / (np.pi * f0)
+                * x2**2
+                / ((1.0 - x2) ** 2 + 4.0 * damping**2 * x2)
+            )
         sources = np.array([*SHAFT_HZ, MAINS_HZ])
         sources[:2] *= 1.0 + disturbance.speed_drift * rng.standard_normal(2)
         at = self.order * sources[self.source]
@@ -239,7 +277,9 @@ class Background(NamedTuple):
         return RigRecording(
             **test._asdict(),
             **contact._asdict(),
-            snr_db=float(10.0 * np.log10(power / (np.sum(measured_other[inside]) * GRID_HZ + tonal))),
+            snr_db=float(
+                10.0 * np.log10(power / (np.sum(measured_other[inside]) * GRID_HZ + tonal))
+            ),
             frequency_hz=self.frequency,
             other_density=measured_other,
             tones=Tones(at, np.sqrt(2.0 * level * self.power * response)),
@@ -251,17 +291,26 @@ class Background(NamedTuple):
 
 
 def draw_background(
-    frequency: Field, band_hz: tuple[float, float], disturbance: Disturbance, rng: np.random.Generator
+    frequency: Field,
+    band_hz: tuple[float, float],
+    disturbance: Disturbance,
+    rng: np.random.Generator,
 ) -> Background:
     """Modes, noise and tones, drawn: their shares of the power in the band 0.6, 0.3 and 0.1, give or take."""
     low, high = band_hz
     # as many modes below and above the band as within it
-    spans = ((low, high), (0.2 * low, 0.95 * low), (1.05 * high, max(0.9 * float(frequency[-1]), 1.1 * high)))
+    spans = (
+        (low, high),
+        (0.2 * low, 0.95 * low),
+        (1.05 * high, max(0.9 * float(frequency[-1]), 1.1 * high)),
+    )
     mode_hz = np.concatenate([rng.uniform(start, end, disturbance.modes) for start, end in spans])
     damping = np.exp(rng.uniform(np.log(0.004), np.log(0.03), mode_hz.size))
     shares = rng.gamma([6.0 if disturbance.modes else 1e-9, 3.0, 1.0])
     shares /= np.sum(shares)
-    heights = 10.0 ** rng.uniform(-1.2, 0.0, mode_hz.size)  # of the peaks, 12 dB between the lowest and the highest
+    heights = 10.0 ** rng.uniform(
+        -1.2, 0.0, mode_hz.size
+    )  # of the peaks, 12 dB between the lowest and the highest
     power = heights * damping * mode_hz
     power *= shares[0] / max(float(np.sum(power[: disturbance.modes])), np.finfo(float).tiny)
     inside = (frequency >= low) & (frequency <= high)
@@ -270,7 +319,9 @@ def draw_background(
 
     roller_hz = SHAFT_HZ[0]
     roller = np.arange(1.0, np.floor(0.8 * frequency[-1] / roller_hz))
-    order = np.concatenate([roller, np.arange(1.0, RING_HARMONICS), np.arange(1.0, MAINS_HARMONICS)])
+    order = np.concatenate(
+        [roller, np.arange(1.0, RING_HARMONICS), np.arange(1.0, MAINS_HARMONICS)]
+    )
     source = np.repeat([0, 1, 2], [roller.size, RING_HARMONICS - 1, MAINS_HARMONICS - 1])
     tone_power = rng.exponential(1.0, order.size) / order
     in_band = (source == 0) & (order * roller_hz > low) & (order * roller_hz < high)

@@ -11,7 +11,9 @@ def rig_verdict(rig: Rig) -> str:
     """How many recordings, and from where to where the true CRF goes."""
     first, last = rig.recordings[0], rig.recordings[-1]
     knee = "" if rig.split_sq_m is None else f", with a knee at Sq {rig.split_sq_m * 1e6:g} um"
-    ends = " to ".join(f"{test.crf_hz:.0f} Hz at Sq {test.sq_m * 1e6:.2f} um" for test in (first, last))
+    ends = " to ".join(
+        f"{test.crf_hz:.0f} Hz at Sq {test.sq_m * 1e6:.2f} um" for test in (first, last)
+    )
     length = f"{first.duration_s:g} s at {first.rate_hz:g} Hz"
     return f"{len(rig.recordings)} recordings of {length}: true CRF from {ends}{knee}."
 

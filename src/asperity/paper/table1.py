@@ -9,14 +9,21 @@ from functools import cache, partial
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.coupling import NoiseExcitation, VibrationModel, dry_full_load, excitation, oscillator, search_band
-from asperity.errors import BadInput
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.signals import power_spectrum
+from asperity.coupling import (
+    NoiseExcitation,
+    VibrationModel,
+    dry_full_load,
+    excitation,
+    oscillator,
+    search_band,
+)
 from asperity.paper.contact import papers_contact
 from asperity.paper.numbers import DAMPING_RATIO, MASS, TABLE1_PRINTED
-from asperity.signals import power_spectrum
+from asperity.resonance import contact_resonance
 from asperity.vibration import ContactOscillator, Excitation, acceleration
-from asperity.wear import contact_resonance
 
 SHORTEST_TRANSFORM = 16384  # the paper's, it seems: 1.6 s at 10 kHz and the next power of two
 FEWEST_RECORDS = 20
@@ -47,11 +54,14 @@ class Table1Row:
         return self.crfa_low <= self.paper_crfa <= self.crfa_high
 
 
-def reproduce_table1(*, preset: str = "paper", records: int | None = None, seed: int = 1) -> list[Table1Row]:
+def reproduce_table1(
+    *, preset: str = "paper", records: int | None = None, seed: int = 1
+) -> list[Table1Row]:
     """All twelve rows, each from `records` records of the preset's own kind, seeds `seed` and on, the same in each row.
 
-    A record is read as the paper reads it, by the highest point of its raw periodogram, where the preset's method is
-    "peak" (200 records by default), and else by the preset's method (20, it scatters less).
+    A record is read as the paper reads it, by the highest point of its raw periodogram, where the
+    preset's method is "peak" (200 records by default), and else by the preset's method (20, it
+    scatters less).
 
     Raises
     ------
@@ -61,8 +71,12 @@ def reproduce_table1(*, preset: str = "paper", records: int | None = None, seed:
     model = VibrationModel.preset(preset, mass=MASS, damping_ratio=DAMPING_RATIO)
     records = (200 if model.method == "peak" else FEWEST_RECORDS) if records is None else records
     if records < FEWEST_RECORDS:
-        raise BadInput(f"records must be at least {FEWEST_RECORDS} for a 5 % quantile, got {records}; 200 are usual")
-    read = cache(partial(_records, model, records, seed))  # the table has one case in three of its rows
+        raise BadInput(
+            f"records must be at least {FEWEST_RECORDS} for a 5 % quantile, got {records}; 200 are usual"
+        )
+    read = cache(
+        partial(_records, model, records, seed)
+    )  # the table has one case in three of its rows
     rows = []
     for cutoff, height_um, load, paper_crf, paper_crfa in TABLE1_PRINTED:
         crf, crfa = read(cutoff, height_um * 1e-6, load)
@@ -83,14 +97,18 @@ def reproduce_table1(*, preset: str = "paper", records: int | None = None, seed:
     return rows
 
 
-def riding(model: VibrationModel, cutoff_hz: float, height: float, load: float) -> tuple[ContactOscillator, Excitation]:
+def riding(
+    model: VibrationModel, cutoff_hz: float, height: float, load: float
+) -> tuple[ContactOscillator, Excitation]:
     """The oscillator under `load` [N], and noise of `height` [m] behind `cutoff_hz` that it rides over."""
     conditions = papers_contact(load)
     state = dry_full_load(conditions, height)
     noise = model.excitation
     assert isinstance(noise, NoiseExcitation)  # of either preset
     # CAR is 1: the cut-off is the reference's times (1/CAR_ref)^q
-    law = model.with_choices(car_reference=noise.cutoff_reference_hz / cutoff_hz, cutoff_exponent=1.0)
+    law = model.with_choices(
+        car_reference=noise.cutoff_reference_hz / cutoff_hz, cutoff_exponent=1.0
+    )
     return oscillator(state, conditions, model), excitation(state, conditions, law)
 
 
@@ -108,7 +126,9 @@ def continuous_crfa(model: VibrationModel, cutoff_hz: float, height: float, load
     return float(spring.gain(f0) * ridden_over.density(f0, model.rate_hz))
 
 
-def _records(model: VibrationModel, records: int, seed: int, cutoff: float, height: float, load: float) -> Field:
+def _records(
+    model: VibrationModel, records: int, seed: int, cutoff: float, height: float, load: float
+) -> Field:
     """CRF [Hz] and CRFA of each record, shape (2, records)."""
     spring, ridden_over = riding(model, cutoff, height, load)
     samples = round(model.duration_s * model.rate_hz)
@@ -120,7 +140,9 @@ def _records(model: VibrationModel, records: int, seed: int, cutoff: float, heig
             readings[:, number] = highest_point(response.values, model.rate_hz)
         else:
             band = search_band(papers_contact(load), model)
-            fit = contact_resonance(power_spectrum(response, window="boxcar"), band_hz=band, method=model.method)
+            fit = contact_resonance(
+                power_spectrum(response, window="boxcar"), band_hz=band, method=model.method
+            )
             readings[:, number] = fit.crf_hz, fit.crfa
     return readings
 
@@ -128,9 +150,12 @@ def _records(model: VibrationModel, records: int, seed: int, cutoff: float, heig
 def highest_point(values: Field, rate_hz: float) -> tuple[float, float]:
     """Frequency [Hz] and height of the highest line of a raw periodogram, zero-padded to a power of two.
 
-    The axis is linspace(0, rate/2, n/2), one line too long, as the printed frequencies suggest: 0.4 Hz at 3.3 kHz.
+    The axis is linspace(0, rate/2, n/2), one line too long, as the printed frequencies suggest:
+    0.4 Hz at 3.3 kHz.
     """
     length = max(SHORTEST_TRANSFORM, 1 << (values.size - 1).bit_length())
-    density = 2.0 * np.abs(scipy.fft.rfft(values, length)[: length // 2]) ** 2 / (rate_hz * values.size)
+    density = (
+        2.0 * np.abs(scipy.fft.rfft(values, length)[: length // 2]) ** 2 / (rate_hz * values.size)
+    )
     highest = int(np.argmax(density))
     return highest * rate_hz / 2.0 / (length // 2 - 1), float(density[highest])

@@ -1,6 +1,7 @@
 """Rolling bearings rated as ISO 281 and ISO/TS 16281 have it: viscosity ratio, life factor, reference rating life.
 
-Ratings already hold roughness, by statistics of bearings that failed: nothing of a solved contact goes into them.
+Ratings already hold roughness, by statistics of bearings that failed: nothing of a solved contact
+goes into them.
 """
 
 import math
@@ -8,13 +9,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 
 RollingElement = Literal["ball", "roller"]
 
 SLOW = 1000.0  # r/min, below which the reference viscosity has another law
-THICKEST, THINNEST = 4.0, 0.1  # viscosity ratio beyond which nothing is gained, and below which nothing is rated
+THICKEST, THINNEST = (
+    4.0,
+    0.1,
+)  # viscosity ratio beyond which nothing is gained, and below which nothing is rated
 LARGEST_FACTOR = 50.0
 ROLLER_REDUCTION = 0.83  # λν of radial roller bearings, ISO/TS 16281
 STRAIGHT_EDGE = 0.01, 1.985  # of the factor on the load of a straight roller's slices, ISO/TS 16281
@@ -58,7 +62,9 @@ def life_factor(element: RollingElement, kappa: float, contamination: float) -> 
         for a contamination that is negative.
     """
     if contamination < 0.0:
-        raise BadInput(f"contamination times fatigue load limit over load must not be negative, got {contamination:g}")
+        raise BadInput(
+            f"contamination times fatigue load limit over load must not be negative, got {contamination:g}"
+        )
     if kappa < THINNEST:
         return None
     kappa, law = min(kappa, THICKEST), _FACTORS[element]
@@ -96,7 +102,9 @@ def ball_life(loads: Field, rating: float, raceway: BallRaceway) -> float:
     per_ball = rating / (loads.size * math.cos(raceway.contact_angle) ** 0.7)
     turning = per_ball / 0.407 * (1.0 + both ** (10.0 / 3.0)) ** 0.3
     standing = per_ball / 0.389 * (1.0 + both ** (-10.0 / 3.0)) ** 0.3
-    worn = (_mean(loads, 3.0) / turning) ** (10.0 / 3.0) + (_mean(loads, 10.0 / 3.0) / standing) ** (10.0 / 3.0)
+    worn = (_mean(loads, 3.0) / turning) ** (10.0 / 3.0) + (
+        _mean(loads, 10.0 / 3.0) / standing
+    ) ** (10.0 / 3.0)
     return float(1e6 * worn**-0.9)
 
 
@@ -129,7 +137,11 @@ def edge_factors(slices: int) -> Field:
     number = np.arange(1, slices + 1)
     place = np.abs((2.0 * number - slices - 1.0) / (2.0 * slices - 2.0))
     middle = place == 0.0  # of an odd number: the factor's limit there is 1
-    return np.where(middle, 1.0, 1.0 - STRAIGHT_EDGE[0] / np.log(STRAIGHT_EDGE[1] * np.where(middle, 0.1, place)))
+    return np.where(
+        middle,
+        1.0,
+        1.0 - STRAIGHT_EDGE[0] / np.log(STRAIGHT_EDGE[1] * np.where(middle, 0.1, place)),
+    )
 
 
 def _mean(loads: Field, power: float) -> Field:

@@ -1,14 +1,15 @@
 """Dang Van's measure of fatigue under stress that rolls by: shear about its own centre, and hydrostatic stress.
 
-max over time of τ(t) + a σ_h(t), against a limit b = τ₋₁ of the material: τ is half of Tresca's difference of the
-deviator less the centre of the smallest hypersphere round its path. Source: K. Dang Van et al. (1989).
+max over time of τ(t) + a σ_h(t), against a limit b = τ₋₁ of the material: τ is half of Tresca's
+difference of the deviator less the centre of the smallest hypersphere round its path. Source: K.
+Dang Van et al. (1989).
 """
 
 import numpy as np
 import numpy.typing as npt
 
-from asperity.arrays import Field
-from asperity.errors import AsperityError, BadInput
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput
 
 ROUND = 1e-10  # below which a weight, or a way over a sphere's radius, is none
 STEPS = 1000  # far more than a path takes
@@ -57,8 +58,9 @@ def dang_van(stresses: Field, slope: float) -> float:
 def dang_van_of_each(stresses: Field, slope: float, *, above: float = -np.inf) -> Field:
     """The measure of every path [Pa], shape (paths,), for as many as a surface has.
 
-    Like `dang_van` but for the spheres, whose centres are walked to, all paths at once: they are 1 % too large, or two,
-    at most. A path that cannot exceed `above` [Pa] is given a bound that does not either.
+    Like `dang_van` but for the spheres, whose centres are walked to, all paths at once: they are 1
+    % too large, or two, at most. A path that cannot exceed `above` [Pa] is given a bound that does
+    not either.
     """
     hydrostatic = stresses[:3].mean(axis=0)
     deviators = _as_vectors(stresses)
@@ -82,8 +84,9 @@ def _bounds(deviators: Field, hydrostatic: Field, slope: float) -> Field:
 def _centres(points: Field) -> Field:
     """About the centres of the smallest spheres round paths of shape (paths, times, dimensions).
 
-    The middle of two points that are far apart is one where all others lie between. Else the centre goes ever shorter
-    ways towards the furthest point; the best of all places is kept. Source: M. Bădoiu, K. L. Clarkson (2003).
+    The middle of two points that are far apart is one where all others lie between. Else the
+    centre goes ever shorter ways towards the furthest point; the best of all places is kept.
+    Source: M. Bădoiu, K. L. Clarkson (2003).
     """
     squares = np.square(points).sum(axis=2)
     one, _ = _furthest(points, squares, points[:, 0])
@@ -91,7 +94,12 @@ def _centres(points: Field) -> Field:
     best = 0.5 * (one + other)
     _, least = _furthest(points, squares, best)
     walking = np.flatnonzero(least > 0.25 * apart * (1.0 + ROUND) + np.finfo(float).tiny)
-    points, squares, centre, closest = points[walking], squares[walking], best[walking], least[walking]
+    points, squares, centre, closest = (
+        points[walking],
+        squares[walking],
+        best[walking],
+        least[walking],
+    )
     kept = centre.copy()
     for step in range(WALK):
         furthest, distance = _furthest(points, squares, centre)
@@ -113,15 +121,23 @@ def _as_vectors(stresses: Field) -> Field:
     """Deviators as five numbers whose squares add up to those of all nine components, shape (5, ...)."""
     xx, yy, zz, xy, yz, xz = stresses
     root = np.sqrt(2.0)
-    return np.stack([_HALF * (xx - yy), _SIXTH * (2.0 * zz - xx - yy), root * xy, root * yz, root * xz])
+    return np.stack(
+        [_HALF * (xx - yy), _SIXTH * (2.0 * zz - xx - yy), root * xy, root * yz, root * xz]
+    )
 
 
 def _half_tresca(vectors: Field) -> Field:
     """Half the difference of the largest and the smallest principal value of deviators, (times, 5) to (times,)."""
     first, second, xy, yz, xz = vectors.T
-    xx, yy, zz = _HALF * first - _SIXTH * second, -_HALF * first - _SIXTH * second, 2.0 * _SIXTH * second
+    xx, yy, zz = (
+        _HALF * first - _SIXTH * second,
+        -_HALF * first - _SIXTH * second,
+        2.0 * _SIXTH * second,
+    )
     xy, yz, xz = _HALF * xy, _HALF * yz, _HALF * xz
-    tensors = np.stack([np.stack([xx, xy, xz], -1), np.stack([xy, yy, yz], -1), np.stack([xz, yz, zz], -1)], -1)
+    tensors = np.stack(
+        [np.stack([xx, xy, xz], -1), np.stack([xy, yy, yz], -1), np.stack([xz, yz, zz], -1)], -1
+    )
     values = np.linalg.eigvalsh(tensors)
     return np.asarray(0.5 * (values[:, 2] - values[:, 0]))
 
@@ -129,8 +145,9 @@ def _half_tresca(vectors: Field) -> Field:
 def smallest_sphere(points: Field) -> tuple[Field, float]:
     """Centre and radius of the smallest sphere round points, shape (count, dimensions).
 
-    The centre walks towards the circumcentre of the points that it is furthest from, until another is as far; those
-    that hold it back no longer are let go. Source: K. Fischer, B. Gärtner, M. Kutz (2003).
+    The centre walks towards the circumcentre of the points that it is furthest from, until another
+    is as far; those that hold it back no longer are let go. Source: K. Fischer, B. Gärtner, M.
+    Kutz (2003).
     """
     centre = points[0].copy()
     held = [int(np.argmax(np.square(points - centre).sum(axis=1)))]
@@ -144,7 +161,9 @@ def smallest_sphere(points: Field) -> tuple[Field, float]:
             return centre, float(np.sqrt(np.square(points - centre).sum(axis=1).max()))
         else:
             held.pop(int(np.argmin(weights)))
-    raise AsperityError("the smallest hypersphere round a path of stress was not found; please report the case")
+    raise AsperityError(
+        "the smallest hypersphere round a path of stress was not found; please report the case"
+    )
 
 
 def _circumcentre(held: Field, centre: Field) -> tuple[Field, Field]:
@@ -156,7 +175,9 @@ def _circumcentre(held: Field, centre: Field) -> tuple[Field, Field]:
     return base + parts @ edges, np.concatenate([[1.0 - parts.sum()], parts])
 
 
-def _until_stopped(points: Field, held: list[int], centre: Field, goal: Field) -> tuple[float, int | None]:
+def _until_stopped(
+    points: Field, held: list[int], centre: Field, goal: Field
+) -> tuple[float, int | None]:
     """How far towards the goal until a further point is as far away as those held, and which it is."""
     way = goal - centre
     inside = points[held[0]] - centre

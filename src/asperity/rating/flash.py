@@ -1,15 +1,18 @@
 """Flash temperature by Blok's closed form, and the temperature at which a gear oil's film is taken to scuff.
 
-ISO/TS 6336-20 (ISO/TR 13989-1) judges the sum of bulk and flash temperature against a limit of the oil's FZG test.
+ISO/TS 6336-20 (ISO/TR 13989-1) judges the sum of bulk and flash temperature against a limit of the
+oil's FZG test.
 """
 
 import math
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 
 HERTZ_HEAT = 1.1115  # of the largest rise, for heat of Hertz' shape
 UNIFORM_HEAT = 2.0 / math.sqrt(math.pi)  # for even heat, as ISO/TR 15144-1 has it
-STEEL_EFFUSIVITY = 13756.0  # sqrt(k ρ c) [J/(m² K s^0.5)]: the standards' B_M of 435 N/(mm^0.5 m^0.5 s^0.5 K)
+STEEL_EFFUSIVITY = (
+    13756.0  # sqrt(k ρ c) [J/(m² K s^0.5)]: the standards' B_M of 435 N/(mm^0.5 m^0.5 s^0.5 K)
+)
 STAGES = 1, 13  # FZG load stages of A/8.3/90
 
 
@@ -24,8 +27,9 @@ def flash_rise(
 ) -> float:
     """Largest rise of the surfaces in a fast line contact [K].
 
-    c μ w' |u1 - u2|/((B1 sqrt u1 + B2 sqrt u2) sqrt(2 a)), of Peclet numbers above 5 and surfaces that move the same
-    way. Source: H. Blok (1937), A. Cameron (1966); c is 1.1115 for heat of Hertz' shape, 2/sqrt(π) for even heat.
+    c μ w' |u1 - u2|/((B1 sqrt u1 + B2 sqrt u2) sqrt(2 a)), of Peclet numbers above 5 and surfaces
+    that move the same way. Source: H. Blok (1937), A. Cameron (1966); c is 1.1115 for heat of
+    Hertz' shape, 2/sqrt(π) for even heat.
 
     Parameters
     ----------
@@ -47,7 +51,13 @@ def flash_rise(
             f"Blok's flash temperature is of surfaces that run the same way, got {first:g} and {second:g} m/s"
         )
     taken_up = effusivities[0] * math.sqrt(first) + effusivities[1] * math.sqrt(second)
-    return shape * friction * line_load * abs(first - second) / (taken_up * math.sqrt(2.0 * half_width))
+    return (
+        shape
+        * friction
+        * line_load
+        * abs(first - second)
+        / (taken_up * math.sqrt(2.0 * half_width))
+    )
 
 
 def scuffing_temperature(stage: float, oil_factor: float, structure: float = 1.0) -> float:
@@ -65,5 +75,7 @@ def scuffing_temperature(stage: float, oil_factor: float, structure: float = 1.0
         for a stage that the test has not.
     """
     if not STAGES[0] <= stage <= STAGES[1]:
-        raise BadInput(f"scuffing_stage must be an FZG load stage from {STAGES[0]} to {STAGES[1]}, got {stage:g}")
+        raise BadInput(
+            f"scuffing_stage must be an FZG load stage from {STAGES[0]} to {STAGES[1]}, got {stage:g}"
+        )
     return 80.0 + (0.85 + 1.4 * structure) * oil_factor * stage**2

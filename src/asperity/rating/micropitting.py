@@ -1,6 +1,7 @@
 """Gears rated as ISO/TR 15144-1:2014 (predecessor of ISO/TS 6336-22) has it: friction, temperatures, specific film.
 
-Roughness enters once here, as Ra: below the smooth film, and in the friction. Nothing of a solved rough contact does.
+Roughness enters once here, as Ra: below the smooth film, and in the friction. Nothing of a solved
+rough contact does.
 """
 
 import math
@@ -8,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 from asperity.rating.flash import UNIFORM_HEAT, flash_rise
 
 OIL_FACTORS = {"mineral": 1.0, "pao": 0.8}  # X_L of the bases whose factor needs no speed
@@ -18,7 +19,8 @@ OIL_FACTORS = {"mineral": 1.0, "pao": 0.8}  # X_L of the bases whose factor need
 class GearOil:
     """An oil as the rating asks for it: `viscosity` [Pa s] and `alpha` [1/Pa] of a temperature [K].
 
-    The standard takes alpha from the viscosity at 38 °C (`OilSheet` with the estimate "iso"). `base` is mineral or pao.
+    The standard takes alpha from the viscosity at 38 °C (`OilSheet` with the estimate "iso").
+    `base` is mineral or pao.
 
     Raises
     ------
@@ -32,7 +34,9 @@ class GearOil:
 
     def __post_init__(self) -> None:
         if self.base not in OIL_FACTORS:
-            raise BadInput(f"gears are rated with oils of base {' or '.join(OIL_FACTORS)}, got {self.base}")
+            raise BadInput(
+                f"gears are rated with oils of base {' or '.join(OIL_FACTORS)}, got {self.base}"
+            )
 
     @property
     def factor(self) -> float:
@@ -43,7 +47,8 @@ class GearOil:
 class Mesh(NamedTuple):
     """What does not change along the path of contact.
 
-    `ra` : mean arithmetic roughness of both flanks [m]; `modulus` : E' [Pa]; `effusivities` : of pinion and wheel.
+    `ra` : mean arithmetic roughness of both flanks [m]; `modulus` : E' [Pa]; `effusivities` : of
+    pinion and wheel.
     """
 
     ra: float
@@ -61,7 +66,9 @@ class MeshPoint(NamedTuple):
     speeds: tuple[float, float]
 
 
-def mesh_friction(line_load: float, radius: float, sum_speed: float, ra: float, viscosity: float, oil: float) -> float:
+def mesh_friction(
+    line_load: float, radius: float, sum_speed: float, ra: float, viscosity: float, oil: float
+) -> float:
     """Mean coefficient of friction, of the pitch point: 0.045 (w'/(v ρ))^0.2 η^-0.05 X_R X_L, X_R = 2.2 (Ra/ρ)^0.25.
 
     In N/mm, m/s, mm, mPa s and um, as ISO/TR 15144-1:2014 prints it.
@@ -87,7 +94,9 @@ def loss_factor(path: tuple[float, float], ratio: float, teeth: tuple[int, int])
     return math.pi * (after**2 + before**2 + 1.0 - ratio) * (1.0 / teeth[0] + 1.0 / teeth[1])
 
 
-def bulk_temperature(oil: float, loss: float, centres: float, face_width: float, *, spray: bool = False) -> float:
+def bulk_temperature(
+    oil: float, loss: float, centres: float, face_width: float, *, spray: bool = False
+) -> float:
     """θ_M of the teeth [K] = θ_oil + 7400 (P μ H_v/(a b))^0.72 X_S/1.2, P in kW, a and b in mm; without tip relief.
 
     Parameters
@@ -98,7 +107,9 @@ def bulk_temperature(oil: float, loss: float, centres: float, face_width: float,
     spray : oil is sprayed (X_S = 1.2), not dipped into (1.0)
     """
     supplied = 1.2 if spray else 1.0
-    return float(oil + 7400.0 * (1e-3 * loss / (1e6 * centres * face_width)) ** 0.72 * supplied / 1.2)
+    return float(
+        oil + 7400.0 * (1e-3 * loss / (1e6 * centres * face_width)) ** 0.72 * supplied / 1.2
+    )
 
 
 def specific_film(
@@ -108,11 +119,18 @@ def specific_film(
 
     None for a flash so hot that the oil has no alpha left.
 
-    `bulk` is the teeth's temperature [K]. G = α_M E', U = η_M (v1 + v2)/(2 E' ρ), W = 2 π p²/E'², and S is the same
-    α η at the contact's temperature over that at the bulk's. Source: ISO/TR 15144-1:2014; the film is Dowson's of
-    1968, a least one.
+    `bulk` is the teeth's temperature [K]. G = α_M E', U = η_M (v1 + v2)/(2 E' ρ), W = 2 π p²/E'²,
+    and S is the same α η at the contact's temperature over that at the bulk's. Source: ISO/TR
+    15144-1:2014; the film is Dowson's of 1968, a least one.
     """
-    rise = flash_rise(friction, point.line_load, point.half_width, point.speeds, mesh.effusivities, shape=UNIFORM_HEAT)
+    rise = flash_rise(
+        friction,
+        point.line_load,
+        point.half_width,
+        point.speeds,
+        mesh.effusivities,
+        shape=UNIFORM_HEAT,
+    )
     contact = bulk + rise
     viscosity, alpha = oil.viscosity(bulk), oil.alpha(bulk)
     if oil.alpha(contact) <= 0.0:

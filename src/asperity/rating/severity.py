@@ -1,17 +1,21 @@
 """How severe a machine's vibration is by its velocity: zones A to D of ISO 20816-3:2022, of rms from 10 to 1000 Hz.
 
-The standard is for machines above 15 kW in their place, measured on bearing housings. For those below 600 1/min its
-range begins at 2 Hz, which is not worked out here.
+The standard is for machines above 15 kW in their place, measured on bearing housings. For those
+below 600 1/min its range begins at 2 Hz, which is not worked out here.
 """
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import require_choice
+from asperity.core.arrays import Field
+from asperity.core.errors import require_choice
 
 LOWEST_HZ, HIGHEST_HZ = 10.0, 1000.0
-COARSEST_HZ = 2.5  # spacing of lines with a Hann taper: at the lower end part of a line falls out of the band
-LIMITS = {  # ends of zones A, B and C [m/s]: ISO 20816-3:2022, tables A.1 and A.2, the same as in ISO 10816-3:2009
+COARSEST_HZ = (
+    2.5  # spacing of lines with a Hann taper: at the lower end part of a line falls out of the band
+)
+# ends of zones A, B and C [m/s]: ISO 20816-3:2022, tables A.1 and A.2, the same as in ISO
+# 10816-3:2009
+LIMITS = {
     "large-rigid": (2.3e-3, 4.5e-3, 7.1e-3),
     "large-flexible": (3.5e-3, 7.1e-3, 11.0e-3),
     "medium-rigid": (1.4e-3, 2.8e-3, 4.5e-3),
@@ -36,7 +40,9 @@ def velocity_rms(frequency_hz: Field, density: Field) -> float:
     if spacing > COARSEST_HZ or frequency_hz[-1] < HIGHEST_HZ:
         return float("nan")
     inside = (frequency_hz >= LOWEST_HZ) & (frequency_hz <= HIGHEST_HZ)
-    return float(np.sqrt(np.sum(density[inside] / (2.0 * np.pi * frequency_hz[inside]) ** 2) * spacing))
+    return float(
+        np.sqrt(np.sum(density[inside] / (2.0 * np.pi * frequency_hz[inside]) ** 2) * spacing)
+    )
 
 
 def severity_zone(velocity: float, machine_class: str) -> str:

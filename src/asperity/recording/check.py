@@ -1,6 +1,7 @@
 """Whether a recording can be used: length, gaps, clipping, offset, a machine that stood still.
 
-Sample statistics only, gathered while the blocks go by to the spectrum; what the spectrum says is left to others.
+Sample statistics only, gathered while the blocks go by to the spectrum; what the spectrum says is
+left to others.
 """
 
 from collections.abc import Iterable, Iterator
@@ -10,11 +11,13 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.arrays import Field, Mask
+from asperity.core.arrays import Field, Mask
 from asperity.recording.model import UNKNOWN, OpenRecording
 
 QUIET = 0.01  # m/s^2 rms: the noise of an accelerometer, not a machine
-STEPS_OF_NOISE = 1.5  # standard deviation in steps of the converter, below which only its last digit moves
+STEPS_OF_NOISE = (
+    1.5  # standard deviation in steps of the converter, below which only its last digit moves
+)
 CLIPPED_RUN = 3  # equal extreme samples in a row that make clipping
 CLIPPED_SHARE = 1e-3  # from which CRFA is off
 HEIGHTS = 1024  # steps in which heights are counted
@@ -32,10 +35,10 @@ USABLE_BAND = 0.4  # of the sampling rate: above, the anti-alias filter has cut
 class Quality:
     """What the samples of a recording are like.
 
-    `rms` (about the mean), `peak` (from the mean), `offset` in the recording's unit; `kurtosis` is 3 for Gaussian
-    noise; `missing`, `clipped`, `stuck`
-    shares of the samples, 0 to 1. `faults` are sentences for which it must not be used, `remarks` such that a reader
-    of its numbers has to know.
+    `rms` (about the mean), `peak` (from the mean), `offset` in the recording's unit; `kurtosis` is
+    3 for Gaussian noise; `missing`, `clipped`, `stuck` shares of the samples, 0 to 1. `faults` are
+    sentences for which it must not be used, `remarks` such that a reader of its numbers has to
+    know.
     """
 
     samples: int
@@ -72,7 +75,9 @@ class Gauge:
     """Gathers statistics of blocks as they pass through `watch`."""
 
     def __init__(self) -> None:
-        self.samples = self.finite = self.gaps = self.clipped_low = self.clipped_high = self.stuck = 0
+        self.samples = self.finite = self.gaps = self.clipped_low = self.clipped_high = (
+            self.stuck
+        ) = 0
         self.mean = self.squares = self.cubes = self.fourths = 0.0  # sums of powers about the mean
         self.low, self.high = np.inf, -np.inf
         self.step: float | None = None
@@ -118,7 +123,8 @@ class Gauge:
         centred = values - mean
         square = centred**2
         squares, cubes, fourths = (  # BLAS would wake its threads
-            float(np.einsum("i,i->", *pair)) for pair in ((centred, centred), (square, centred), (square, square))
+            float(np.einsum("i,i->", *pair))
+            for pair in ((centred, centred), (square, centred), (square, square))
         )
         before, here = self.finite, values.size
         both, apart = before + here, mean - self.mean
@@ -172,8 +178,9 @@ class Gauge:
     def without_stuck(self, blocks: Iterable[Field]) -> Iterator[Field]:
         """Pass the blocks on with stretches that stand still as missing: samples were lost there, and held or filled.
 
-        A box of held values raises the spectrum below the inverse of its length, and boxes in turns make lines. What
-        stands still for most of the time is left as it is, and refused by `quality`.
+        A box of held values raises the spectrum below the inverse of its length, and boxes in
+        turns make lines. What stands still for most of the time is left as it is, and refused by
+        `quality`.
         """
         for block in blocks:
             hit = _stuck(block)
@@ -186,7 +193,11 @@ class Gauge:
             self.stuck += int(hit.sum())
 
     def quality(
-        self, recording: OpenRecording, *, width_hz: float | None, band_hz: tuple[float, float] | None
+        self,
+        recording: OpenRecording,
+        *,
+        width_hz: float | None,
+        band_hz: tuple[float, float] | None,
     ) -> Quality:
         """What was gathered, judged for a resonance `width_hz` wide (half power) somewhere in `band_hz`."""
         rms = float(np.sqrt(self.squares / self.finite)) if self.finite else 0.0
@@ -212,7 +223,9 @@ class Gauge:
                 f"{ceil(band_hz[1] / USABLE_BAND)} Hz"
             )
         if not off and self.stuck > MOST_STUCK * self.finite:
-            faults.append(f"it stands still for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?")
+            faults.append(
+                f"it stands still for {100 * self.stuck / self.finite:.4g} % of the time: a dead sensor?"
+            )
         missing = (self.samples - self.finite) / max(self.samples, 1)
         if missing > 0.5 and self.finite >= 2:
             faults.append(f"{100 * missing:.0f} % of its samples are missing")
@@ -223,7 +236,9 @@ class Gauge:
         if not off:
             if clipped > 0.0:
                 worth = "CRFA is too low" if clipped > CLIPPED_SHARE else "hardly matters"
-                remarks.append(f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {worth}")
+                remarks.append(
+                    f"clipped at its extremes: {100 * clipped:.2g} % of the samples, {worth}"
+                )
             elif self.piled:
                 remarks.append(
                     "values pile up below the largest: soft clipping, which makes CRFA too low, or a tone alone"
@@ -237,7 +252,11 @@ class Gauge:
                     f"offset of {self.mean:.3g} {unit}, {abs(self.mean) / rms:.1f} times the rms; it is removed"
                 )
         if not recording.comparable:
-            what = "are of unknown unit" if recording.unit == UNKNOWN else f"in {unit} are no accelerations"
+            what = (
+                "are of unknown unit"
+                if recording.unit == UNKNOWN
+                else f"in {unit} are no accelerations"
+            )
             remarks.append(f"amplitudes {what}: CRF can be used, CRFA is not comparable")
         return Quality(
             samples=self.samples,
@@ -257,7 +276,10 @@ class Gauge:
 
 
 def check_recording(
-    recording: OpenRecording, *, width_hz: float | None = None, band_hz: tuple[float, float] | None = None
+    recording: OpenRecording,
+    *,
+    width_hz: float | None = None,
+    band_hz: tuple[float, float] | None = None,
 ) -> Quality:
     """Read a recording to its end and say what it is like.
 
@@ -287,7 +309,11 @@ def _piled(heights: NDArray[np.int64]) -> bool:
 
 def _off(rms: float, step: float | None, *, comparable: bool) -> bool:
     """Nothing moves but the converter's last digit, or less than any machine."""
-    return rms == 0.0 or (step is not None and rms < STEPS_OF_NOISE * step) or (comparable and rms < QUIET)
+    return (
+        rms == 0.0
+        or (step is not None and rms < STEPS_OF_NOISE * step)
+        or (comparable and rms < QUIET)
+    )
 
 
 def _converter_step(values: Field) -> float | None:

@@ -1,6 +1,7 @@
 """HDF5 (and MATLAB 7.3, which is HDF5), by h5py: every data set of numbers is a channel or several.
 
-Rate, unit and start may stand as attributes on the data set or a group above it, or as scalars beside it.
+Rate, unit and start may stand as attributes on the data set or a group above it, or as scalars
+beside it.
 """
 
 from collections.abc import Iterator
@@ -9,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from asperity.errors import UnreadableFile
-from asperity.recording.common import columns, facts_in, numeric, refused_as
+from asperity.core.errors import UnreadableFile
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import columns, facts_in, numeric, refused_as
 
 _DEEPEST = 8  # groups in groups
 
@@ -30,7 +31,9 @@ def read(path: Path) -> Contents:
         file = h5py.File(path, "r")
     with file, refused_as(path, "a damaged HDF5 file"):
         channels = list(_channels(path, file, "", {}, notes, set()))
-        matlab = any(str(key).startswith("MATLAB") for member in file.values() for key in member.attrs)
+        matlab = any(
+            str(key).startswith("MATLAB") for member in file.values() for key in member.attrs
+        )
     return Contents(format="mat v7.3" if matlab else "hdf5", channels=channels, notes=notes)
 
 
@@ -51,24 +54,35 @@ def _channels(
         inner = f"{name}/{key}" if name else key
         if isinstance(member, h5py.Group):
             yield from _channels(path, member, inner, around, notes, seen)
-        elif isinstance(member, h5py.Dataset) and numeric(member) and member.size is not None and member.size > 64:
+        elif (
+            isinstance(member, h5py.Dataset)
+            and numeric(member)
+            and member.size is not None
+            and member.size > 64
+        ):
             facts = facts_in(path.name, around | dict(member.attrs))
             packed = _packing(member, "scale_factor", 1.0), _packing(member, "add_offset", 0.0)
-            yield from columns(inner, _OnDisk(path, member.name, member.shape, packed), notes, **facts)
+            yield from columns(
+                inner, _OnDisk(path, member.name, member.shape, packed), notes, **facts
+            )
 
 
 def _packing(member: Any, name: str, usual: float) -> float:
     """An attribute by which values were packed into integers (CF conventions 8.1)."""
     value = np.asarray(member.attrs.get(name, usual)).reshape(-1)
     if value.size != 1 or value.dtype.kind not in "iuf" or not np.isfinite(value[0]):
-        raise UnreadableFile(f"{member.name} states {name} = {value}, which is no number; export it again")
+        raise UnreadableFile(
+            f"{member.name} states {name} = {value}, which is no number; export it again"
+        )
     return float(value[0])
 
 
 class _OnDisk:
     """A data set whose file is opened at its first slice and closed after its last."""
 
-    def __init__(self, path: Path, name: str, shape: tuple[int, ...], packed: tuple[float, float]) -> None:
+    def __init__(
+        self, path: Path, name: str, shape: tuple[int, ...], packed: tuple[float, float]
+    ) -> None:
         self.path, self.name, self.shape = path, name, shape
         self._along = int(np.argmax(shape))
         self._packed = packed

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from asperity.recording.common import refused_as, sliced
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import refused_as, sliced
 
 
 def is_ide(head: bytes) -> bool:
@@ -50,4 +50,8 @@ def _slice(events: Any, first: int, last: int) -> Any:
 
 def _utc(seconds: Any) -> datetime | None:
     """None for a recorder whose clock was never set, and began at 1970."""
-    return datetime.fromtimestamp(float(seconds), UTC).replace(tzinfo=None) if seconds and seconds > 1e9 else None
+    return (
+        datetime.fromtimestamp(float(seconds), UTC).replace(tzinfo=None)
+        if seconds and seconds > 1e9
+        else None
+    )

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from asperity.recording.common import columns, facts_in, numeric, refused_as
 from asperity.recording.model import Contents
+from asperity.recording.reader import columns, facts_in, numeric, refused_as
 
 _DEEPEST = 8
 
@@ -29,10 +29,14 @@ def read(path: Path) -> Contents:
     """Channels named by variable and field: bearing.gs."""
     notes: list[str] = []
     with refused_as(path, "no readable MATLAB file"):
-        held = scipy.io.loadmat(path, struct_as_record=False, squeeze_me=True, chars_as_strings=True)
+        held = scipy.io.loadmat(
+            path, struct_as_record=False, squeeze_me=True, chars_as_strings=True
+        )
         held = {key: value for key, value in held.items() if not key.startswith("__")}
         rows = list(_rows(path.name, held, "", {}))
-    channels = [channel for name, values, facts in rows for channel in columns(name, values, notes, **facts)]
+    channels = [
+        channel for name, values, facts in rows for channel in columns(name, values, notes, **facts)
+    ]
     return Contents(format="mat v5", channels=channels, notes=notes)
 
 
@@ -42,7 +46,9 @@ Row = tuple[str, Any, dict[str, Any]]  # name, array, and what the file states o
 def _rows(file: str, held: dict[str, Any], name: str, above: dict[str, Any]) -> Iterator[Row]:
     if name.count(".") > _DEEPEST:
         return
-    around = above | {key: value for key, value in held.items() if np.size(value) == 1 and not _fields(value)}
+    around = above | {
+        key: value for key, value in held.items() if np.size(value) == 1 and not _fields(value)
+    }
     for key, value in held.items():
         inner = f"{name}.{key}" if name else key
         if fields := _fields(value):

@@ -1,6 +1,7 @@
 """What a recording is: channels that can be read piece by piece, and facts with the place that states each.
 
-Formats are left to one module each beside this one; which channel is meant and in what unit to `read`.
+Formats are left to one module each beside this one; which channel is meant and in what unit to
+`read`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import UnreadableFile
-from asperity.quiet import quietly
-from asperity.signals import Signal
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.signals import Signal
+from asperity.core.third_party import quietly
 
 ACCELERATION = "m/s^2"
 UNKNOWN = "unknown"  # unit of values where nothing states one
@@ -35,8 +36,9 @@ class Fact:
 class Channel:
     """One row of samples in a file, not read yet.
 
-    `blocks(n)` yields its values, n at a time, as they are stored, NaN where samples are missing; what it finds wrong
-    on the way it says in the `notes` of the file. None stands for what the file does not say.
+    `blocks(n)` yields its values, n at a time, as they are stored, NaN where samples are missing;
+    what it finds wrong on the way it says in the `notes` of the file. None stands for what the
+    file does not say.
     """
 
     name: str
@@ -74,9 +76,9 @@ class ReadOptions:
 class Recording(Signal):
     """A signal read from a file, with its facts.
 
-    `facts` holds "rate", "unit", "channel", "format" and, where known, "started" and "scale", each with its source.
-    Accelerations are in m/s^2 whatever the file's unit, which stays in `facts`. `notes` say in a sentence each what
-    was wrong with the file.
+    `facts` holds "rate", "unit", "channel", "format" and, where known, "started" and "scale", each
+    with its source. Accelerations are in m/s^2 whatever the file's unit, which stays in `facts`.
+    `notes` say in a sentence each what was wrong with the file.
     """
 
     path: Path
@@ -93,7 +95,8 @@ class Recording(Signal):
 class OpenRecording:
     """A recording whose samples are still in the file.
 
-    `samples` is None where only reading to the end would tell; there may be more `notes` once `blocks` were read.
+    `samples` is None where only reading to the end would tell; there may be more `notes` once
+    `blocks` were read.
     """
 
     path: Path
@@ -113,7 +116,11 @@ class OpenRecording:
     @property
     def rate_doubt(self) -> float:
         """Relative standard deviation of the rate: that of the file's times, where they state it."""
-        return self.channel.rate_doubt if self.facts["rate"].source == self.channel.rate_source else 0.0
+        return (
+            self.channel.rate_doubt
+            if self.facts["rate"].source == self.channel.rate_source
+            else 0.0
+        )
 
     @property
     def samples(self) -> int | None:
@@ -160,5 +167,7 @@ class OpenRecording:
         parts = list(self.blocks())
         values = np.concatenate(parts) if parts else np.empty(0)
         if values.size < 2:
-            raise UnreadableFile(f"{self.path.name} holds {values.size} samples; a recording needs at least 2")
+            raise UnreadableFile(
+                f"{self.path.name} holds {values.size} samples; a recording needs at least 2"
+            )
         return Recording(values, self.rate_hz, self.unit, self.path, self.facts, self.notes)

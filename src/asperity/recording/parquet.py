@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, facts_in, refused_as
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import REMEDY, facts_in, refused_as
 from asperity.recording.timing import Clock, Filling, clock_of, is_time, timed
 from asperity.recording.units import name_and_unit
 
@@ -30,17 +30,27 @@ def read(path: Path) -> Contents:
     channels = []
     with refused_as(path, "no readable parquet file"), pyarrow.parquet.ParquetFile(path) as file:
         schema, rows = file.schema_arrow, file.metadata.num_rows
-        table = {k: v for k, v in _decoded(schema.metadata).items() if k not in ("pandas", "ARROW:schema")}
+        table = {
+            k: v
+            for k, v in _decoded(schema.metadata).items()
+            if k not in ("pandas", "ARROW:schema")
+        }
         types = pyarrow.types
         numbers = [
             entry.name
             for entry in schema
-            if types.is_floating(entry.type) or types.is_integer(entry.type) or types.is_timestamp(entry.type)
+            if types.is_floating(entry.type)
+            or types.is_integer(entry.type)
+            or types.is_timestamp(entry.type)
         ]
         labels = [(label, *name_and_unit(label)) for label in numbers]
         dated = {entry.name for entry in schema if types.is_timestamp(entry.type)}
-        clock, name, unit = next((label for label in labels if is_time(label[1]) or label[0] in dated), ("", "", None))
-        first = next(file.iter_batches(batch_size=1 << 16, columns=[clock]), None) if clock else None
+        clock, name, unit = next(
+            (label for label in labels if is_time(label[1]) or label[0] in dated), ("", "", None)
+        )
+        first = (
+            next(file.iter_batches(batch_size=1 << 16, columns=[clock]), None) if clock else None
+        )
         times = None if first is None else _values(first)
         rate = {} if times is None else timed(name, "s" if clock in dated else unit, times)
         grid = None if times is None or "rate_hz" not in rate else clock_of(times)
@@ -64,7 +74,9 @@ def _values(batch: Any, column: int = 0) -> Field:
     return np.asarray(values, dtype=np.float64)
 
 
-def _column(path: Path, label: str, on: tuple[str, Clock] | None, notes: list[str], size: int) -> Iterator[Field]:
+def _column(
+    path: Path, label: str, on: tuple[str, Clock] | None, notes: list[str], size: int
+) -> Iterator[Field]:
     """A column, block by block, on the grid of the column of times where that is one."""
     import pyarrow.parquet
 
@@ -72,21 +84,30 @@ def _column(path: Path, label: str, on: tuple[str, Clock] | None, notes: list[st
     filling = None if on is None else Filling(on[1])
     try:
         with pyarrow.parquet.ParquetFile(path) as file:
-            for batch in file.iter_batches(batch_size=size, columns=[label] if on is None else [label, on[0]]):
+            for batch in file.iter_batches(
+                batch_size=size, columns=[label] if on is None else [label, on[0]]
+            ):
                 values = _values(batch, batch.schema.get_field_index(label))
                 done += values.size
                 if filling is not None and on is not None:
-                    values = filling.spread(_values(batch, batch.schema.get_field_index(on[0])), values)
+                    values = filling.spread(
+                        _values(batch, batch.schema.get_field_index(on[0])), values
+                    )
                 yield values
     except UnreadableFile:
         raise
     except Exception as error:
         if done == 0:
-            raise UnreadableFile(f"{path.name} cannot be read ({first_line(error)}); {REMEDY}") from error
+            raise UnreadableFile(
+                f"{path.name} cannot be read ({first_line(error)}); {REMEDY}"
+            ) from error
         notes.append(f"damaged after sample {done}; what comes before was read")
     if filling is not None and filling.note:
         notes.append(filling.note)
 
 
 def _decoded(metadata: dict[bytes, bytes] | None) -> dict[str, str]:
-    return {k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in (metadata or {}).items()}
+    return {
+        k.decode("utf-8", "replace"): v.decode("utf-8", "replace")
+        for k, v in (metadata or {}).items()
+    }

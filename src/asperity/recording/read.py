@@ -1,6 +1,7 @@
 """Reading recordings: which format a file has, which channel is meant, and what states its rate and unit.
 
-Nothing is guessed: what neither the file, nor a sidecar beside it, nor the caller states is asked for.
+Nothing is guessed: what neither the file, nor a sidecar beside it, nor the caller states is asked
+for.
 """
 
 import math
@@ -12,12 +13,13 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
-from asperity.errors import BadInput, UnreadableFile, require_positive
-from asperity.files import require_file
-from asperity.limits import require_unpacked
-from asperity.quiet import first_line, quietly
-from asperity.recording import foreign, hdf5, ide, matlab, numpys, parquet, tdms, text, uff, wav
-from asperity.recording.common import MOST_CHANNELS, REMEDY, parse_time
+from asperity.core.errors import BadInput, UnreadableFile, require_positive
+from asperity.core.files import require_file
+from asperity.core.limits import require_unpacked
+from asperity.core.third_party import first_line, quietly
+from asperity.recording import hdf5, ide, matlab, parquet, tdms, text, uff, wav
+from asperity.recording import numpy_files as numpys
+from asperity.recording import sandboxed as foreign
 from asperity.recording.model import (
     ACCELERATION,
     FULL_SCALE,
@@ -29,6 +31,7 @@ from asperity.recording.model import (
     ReadOptions,
     Recording,
 )
+from asperity.recording.reader import MOST_CHANNELS, REMEDY, parse_time
 from asperity.recording.sidecar import OF_THE_MACHINE, OPERATING, stated_beside
 from asperity.recording.units import acceleration_scale
 
@@ -40,7 +43,8 @@ _HEAD = 4096
 class _Format:
     """How a format is known, by its first bytes; which names promise it; who reads it.
 
-    `library` is somebody else's that reads it, in a process of its own; `package` is where that comes from.
+    `library` is somebody else's that reads it, in a process of its own; `package` is where that
+    comes from.
     """
 
     known: Callable[[bytes], bool]
@@ -51,7 +55,11 @@ class _Format:
 
     def contents(self, path: Path) -> Contents:
         """All channels of a file, by its own reader."""
-        return self.read(path) if self.library is None else foreign.contents(path, self.read.__module__, self.library)
+        return (
+            self.read(path)
+            if self.library is None
+            else foreign.contents(path, self.read.__module__, self.library)
+        )
 
 
 FORMATS = (  # in the order in which they are tried; text comes after all of them
@@ -108,10 +116,20 @@ def open_channels(path: str | Path, **stated: Any) -> list[OpenRecording]:
     path, options = Path(path), ReadOptions(**stated)
     with quietly():
         contents = read_contents(path)
-        if options.channel is not None or "channel" in stated_beside(path)[0] or len(contents.channels) == 1:
+        if (
+            options.channel is not None
+            or "channel" in stated_beside(path)[0]
+            or len(contents.channels) == 1
+        ):
             return [_chosen(path, contents, options)]
-        every = [_chosen(path, contents, replace(options, channel=channel.name)) for channel in contents.channels]
-    return [replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")}) for opened in every]
+        every = [
+            _chosen(path, contents, replace(options, channel=channel.name))
+            for channel in contents.channels
+        ]
+    return [
+        replace(opened, facts=opened.facts | {"channel": Fact(opened.channel.name, "file")})
+        for opened in every
+    ]
 
 
 def other_channel(path: Path, name: str) -> Channel:
@@ -135,7 +153,9 @@ def read_contents(path: Path) -> Contents:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError as error:
-        raise UnreadableFile(f"{path} cannot be opened: {error.strerror}; check its permissions") from None
+        raise UnreadableFile(
+            f"{path} cannot be opened: {error.strerror}; check its permissions"
+        ) from None
     if not head:
         raise UnreadableFile(f"{path.name} is empty; {REMEDY}")
     suffix = path.suffix[1:].lower()
@@ -146,7 +166,9 @@ def read_contents(path: Path) -> Contents:
         if suffix == "mat" and not text.looks_like_text(head):
             chosen = FORMATS[1]  # MATLAB 4 has no header
         elif any(suffix in form.suffixes for form in FORMATS):
-            raise UnreadableFile(f"{path.name} is named {suffix} but does not begin like one; {REMEDY}")
+            raise UnreadableFile(
+                f"{path.name} is named {suffix} but does not begin like one; {REMEDY}"
+            )
         elif not text.looks_like_text(head):
             raise UnreadableFile(
                 f"{path.name} is in no format of recordings that asperity knows; export it as wav or csv"
@@ -161,14 +183,20 @@ def read_contents(path: Path) -> Contents:
             f"{path.name} needs {chosen.package} to be read; pip install 'asperity[recordings]'"
         ) from None
     except MemoryError:
-        raise UnreadableFile(f"{path.name} claims more data than fits into memory; {REMEDY}") from None
+        raise UnreadableFile(
+            f"{path.name} claims more data than fits into memory; {REMEDY}"
+        ) from None
     except Exception as error:
         raise UnreadableFile(f"{path.name} is damaged ({first_line(error)}); {REMEDY}") from error
     if len(contents.channels) > MOST_CHANNELS:
-        raise UnreadableFile(f"{path.name} holds {len(contents.channels)} channels, {MOST_CHANNELS} at most; {REMEDY}")
+        raise UnreadableFile(
+            f"{path.name} holds {len(contents.channels)} channels, {MOST_CHANNELS} at most; {REMEDY}"
+        )
     require_unpacked(path, 8.0 * sum(channel.samples or 0 for channel in contents.channels), REMEDY)
     if not contents.channels:
-        raise UnreadableFile(f"{path.name} holds no row of samples; give a file with a recording in it")
+        raise UnreadableFile(
+            f"{path.name} holds no row of samples; give a file with a recording in it"
+        )
     return contents
 
 
@@ -197,7 +225,9 @@ def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecordi
     if "scale" in stated:
         total = float(stated["scale"].value)
         if not 0.0 < abs(total) < math.inf:
-            raise BadInput(f"scale must be finite and not 0, got {total:g}; give scale, what a stored 1 stands for")
+            raise BadInput(
+                f"scale must be finite and not 0, got {total:g}; give scale, what a stored 1 stands for"
+            )
         facts["scale"] = Fact(total, stated["scale"].source)
     facts["unit"] = _unit(path, selected, stated.get("unit"), scaled="scale" in stated)
     unit_text = str(facts["unit"].value)
@@ -212,7 +242,9 @@ def _chosen(path: Path, contents: Contents, options: ReadOptions) -> OpenRecordi
     if "started" in stated:
         facts["started"] = stated["started"]
     elif selected.started is not None or named is not None:
-        facts["started"] = Fact(selected.started or named, "file" if selected.started is not None else "file name")
+        facts["started"] = Fact(
+            selected.started or named, "file" if selected.started is not None else "file name"
+        )
     return OpenRecording(
         path=path,
         channel=selected,
@@ -255,7 +287,10 @@ def _channel(path: Path, contents: Contents, requested: str | None) -> Channel:
 
 def _short_names(name: str) -> set[str]:
     """What else a channel may be called: COF for 1/COF, gs for bearing.gs, 8.0 for 8.0 X (100g)."""
-    return {part.lower() for part in (name.split("/")[-1], name.split("/")[-1].split(".")[-1], name.split(" ")[0])}
+    return {
+        part.lower()
+        for part in (name.split("/")[-1], name.split("/")[-1].split(".")[-1], name.split(" ")[0])
+    }
 
 
 def _listed(names: list[str]) -> str:

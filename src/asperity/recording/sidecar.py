@@ -6,18 +6,36 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import BadInput
-from asperity.recording.common import parse_time
+from asperity.core.errors import BadInput
+from asperity.recording.reader import parse_time
 
 FOLDER_WIDE = "recordings"
-OPERATING = ("load_n", "entrainment_m_s", "temperature_degc", "speed_hz")  # what a recording was made at
+OPERATING = (
+    "load_n",
+    "entrainment_m_s",
+    "temperature_degc",
+    "speed_hz",
+)  # what a recording was made at
 RATES = ("faults_hz", "faults_per_turn")
 SUCH = {"faults_hz": 87.3, "faults_per_turn": 3.58}
-OF_THE_MACHINE = ("sensor", "machine_class", *RATES, "bands_hz", "tacho", "pulses_per_turn", "condition_channels")
+OF_THE_MACHINE = (
+    "sensor",
+    "machine_class",
+    *RATES,
+    "bands_hz",
+    "tacho",
+    "pulses_per_turn",
+    "condition_channels",
+)
 KEYS = ("rate_hz", "unit", "channel", "scale", "started", *OF_THE_MACHINE, *OPERATING)
 SUFFIXES = (".toml", ".json")
 NAMES = ("channel", "tacho", "sensor")  # which may be numbers
-MACHINE_CLASSES = ("large-rigid", "large-flexible", "medium-rigid", "medium-flexible")  # of ISO 20816-3
+MACHINE_CLASSES = (
+    "large-rigid",
+    "large-flexible",
+    "medium-rigid",
+    "medium-flexible",
+)  # of ISO 20816-3
 
 
 def is_sidecar(path: Path) -> bool:
@@ -53,7 +71,9 @@ def _checked(path: Path) -> dict[str, Any]:
         text = path.read_text("utf-8-sig")
         stated = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
     except (OSError, ValueError, RecursionError) as error:
-        raise BadInput(f"{path.name} cannot be read as {path.suffix[1:]} ({error}); correct it") from None
+        raise BadInput(
+            f"{path.name} cannot be read as {path.suffix[1:]} ({error}); correct it"
+        ) from None
     if not isinstance(stated, dict):
         raise BadInput(f"{path.name} must hold keys such as rate_hz, got {type(stated).__name__}")
     for key, value in stated.items():
@@ -66,7 +86,9 @@ def _checked(path: Path) -> dict[str, Any]:
             number and 0.0 < abs(value) < float("inf") and (value > 0 or key == "scale")
         ):
             raise BadInput(f"{path.name}: {key} must be a positive number, got {value!r}")
-        if key in OPERATING and not (number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING[2])):
+        if key in OPERATING and not (
+            number and -273.15 < value < float("inf") and (value > 0 or key == OPERATING[2])
+        ):
             what = "a temperature in degC" if key == OPERATING[2] else "a positive number"
             raise BadInput(f"{path.name}: {key} must be {what}, got {value!r}")
         if key in RATES:
@@ -78,13 +100,21 @@ def _checked(path: Path) -> dict[str, Any]:
         if key == "pulses_per_turn" and not (number and 0.0 < value < float("inf")):
             raise BadInput(f"{path.name}: pulses_per_turn must be a positive number, got {value!r}")
         if key == "machine_class" and value not in MACHINE_CLASSES:
-            raise BadInput(f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got {value!r}")
-        if key in ("unit", *NAMES) and not isinstance(value, str) and not (key != "unit" and number):
+            raise BadInput(
+                f"{path.name}: machine_class must be one of {', '.join(MACHINE_CLASSES)}, got {value!r}"
+            )
+        if (
+            key in ("unit", *NAMES)
+            and not isinstance(value, str)
+            and not (key != "unit" and number)
+        ):
             raise BadInput(f"{path.name}: {key} must be text, got {value!r}")
     if "started" in stated:
         started = parse_time(stated["started"])
         if started is None:
-            raise BadInput(f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00")
+            raise BadInput(
+                f"{path.name}: started must be a date and time such as 2025-01-31 12:00:00"
+            )
         stated["started"] = started
     for key in NAMES:
         if key in stated:
@@ -97,7 +127,12 @@ def _require_bands(path: Path, value: Any) -> None:
     numbers = isinstance(value, dict) and value
     for ends in value.values() if numbers else ():
         two = isinstance(ends, list) and len(ends) == 2
-        numbers = numbers and two and all(type(end) in (int, float) for end in ends) and 0.0 <= ends[0] < ends[1]
+        numbers = (
+            numbers
+            and two
+            and all(type(end) in (int, float) for end in ends)
+            and 0.0 <= ends[0] < ends[1]
+        )
     if not numbers:
         raise BadInput(
             f"{path.name}: bands_hz must be two frequencies by name, such as {{ housing = [2000, 5000] }}, "
@@ -107,7 +142,9 @@ def _require_bands(path: Path, value: Any) -> None:
 
 def _require_channels(path: Path, value: Any) -> None:
     """Channels by the condition that they hold, such as temperature_degc = "oil"."""
-    known = isinstance(value, dict) and value and all(isinstance(name, str) for name in value.values())
+    known = (
+        isinstance(value, dict) and value and all(isinstance(name, str) for name in value.values())
+    )
     if not known or not set(value) <= set(OPERATING):
         raise BadInput(
             f"{path.name}: condition_channels must name channels by {', '.join(OPERATING)}, such as "
@@ -121,7 +158,9 @@ def _require_rates(path: Path, key: str, value: Any) -> None:
         isinstance(value, dict)
         and value
         and all(
-            isinstance(rate, int | float) and not isinstance(rate, bool) and 0.0 < rate < float("inf")
+            isinstance(rate, int | float)
+            and not isinstance(rate, bool)
+            and 0.0 < rate < float("inf")
             for rate in value.values()
         )
     )

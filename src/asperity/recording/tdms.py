@@ -4,8 +4,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from asperity.recording.common import facts_in, numeric, refused_as, sliced
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import facts_in, numeric, refused_as, sliced
 
 
 def is_tdms(head: bytes) -> bool:
@@ -26,9 +26,13 @@ def read(path: Path) -> Contents:
             for channel in group.channels():
                 if channel.data_type is None or len(channel) == 0 or not numeric(channel):
                     continue
-                facts = facts_in(path.name, {**opened.properties, **group.properties, **channel.properties})
+                facts = facts_in(
+                    path.name, {**opened.properties, **group.properties, **channel.properties}
+                )
                 name, samples = f"{group.name}/{channel.name}", len(channel)
-                blocks = sliced(partial(_slice, path, group.name, channel.name), samples, notes, name)
+                blocks = sliced(
+                    partial(_slice, path, group.name, channel.name), samples, notes, name
+                )
                 channels.append(Channel(name=name, blocks=blocks, samples=samples, **facts))
     return Contents(format="tdms", channels=channels, notes=notes)
 

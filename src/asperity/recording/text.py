@@ -1,7 +1,7 @@
 """Recordings as text: any separator, decimal points or commas, header lines, several blocks of rows in one file.
 
-pandas parses the numbers; this module finds out what they are: dialect, names, units, declared rate, column of times.
-Small files are read at once, large ones piece by piece.
+pandas parses the numbers; this module finds out what they are: dialect, names, units, declared
+rate, column of times. Small files are read at once, large ones piece by piece.
 """
 
 import re
@@ -15,11 +15,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.dialect import MISSING, Dialect, sniff_dialect
-from asperity.errors import UnreadableFile
-from asperity.recording.common import MOST_CHANNELS, facts_in, parse_time
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.text_dialect import MISSING, Dialect, sniff_dialect
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import MOST_CHANNELS, facts_in, parse_time
 from asperity.recording.timing import Filling, clock_of, is_time, timed
 from asperity.recording.units import known_unit, name_and_unit
 
@@ -27,7 +27,9 @@ SUFFIXES = {"", "txt", "csv", "tsv", "asc", "dat", "lvm", "prn"}
 _LARGE = 64 << 20  # bytes, from which a file is read piece by piece
 _HEAD = 1 << 18  # bytes, in which the header and the first rows must lie
 _CHUNK = 1 << 22
-_WORTH_PANDAS = 1 << 20  # bytes of rows, below which they are read line by line before pandas is even loaded
+_WORTH_PANDAS = (
+    1 << 20
+)  # bytes of rows, below which they are read line by line before pandas is even loaded
 _LONGEST_HEADER = 400  # lines
 _MOST_BLOCKS = 64
 _FEWEST_ROWS = 8  # of a block; fewer are a table in a header
@@ -83,7 +85,9 @@ def read(path: Path) -> Contents:
                 tables.append(table)
             at = table.end
     if not tables:
-        raise UnreadableFile(f"{path.name} holds no rows of numbers; give a recording, or name it after its format")
+        raise UnreadableFile(
+            f"{path.name} holds no rows of numbers; give a recording, or name it after its format"
+        )
     channels: list[Channel] = []
     for number, table in enumerate(tables, 1):
         prefix = f"{number}/" if len(tables) > 1 else ""
@@ -104,7 +108,8 @@ def _opener(path: Path) -> Callable[[], BinaryIO]:
     return lambda: BytesIO(content)
 
 
-# The header ----------------------------------------------------------------------------------------------------------
+# The header
+# ----------------------------------------------------------------------------------------------------------
 
 
 def _header(stream: BinaryIO, at: int) -> _Table | None:
@@ -120,11 +125,17 @@ def _header(stream: BinaryIO, at: int) -> _Table | None:
         row, stamped = _row(fields, dialect)
         if row is None:
             continue
-        following = next((dialect.fields(later) for later in texts[number + 1 :] if later.strip()), None)
-        if following is not None and (len(following) != len(fields) or _row(following, dialect)[0] is None):
+        following = next(
+            (dialect.fields(later) for later in texts[number + 1 :] if later.strip()), None
+        )
+        if following is not None and (
+            len(following) != len(fields) or _row(following, dialect)[0] is None
+        ):
             continue
         if len(row) > MOST_CHANNELS:
-            raise UnreadableFile(f"a row of {len(row)} numbers is no row of samples; give one column a channel")
+            raise UnreadableFile(
+                f"a row of {len(row)} numbers is no row of samples; give one column a channel"
+            )
         names, units = _labels(texts[:number], len(row), dialect)
         return _Table(
             offset=at + sum(map(len, lines[:number])),
@@ -149,7 +160,11 @@ def _decoded(line: bytes) -> str:
 def _row(fields: list[str], dialect: Dialect) -> tuple[list[float] | None, bool]:
     """The numbers of a line, or None; and whether its first field is a date."""
     values = [dialect.number(field) for field in fields]
-    stamped = len(values) > 1 and values[0] is None and parse_time(fields[0].strip().strip('"')) is not None
+    stamped = (
+        len(values) > 1
+        and values[0] is None
+        and parse_time(fields[0].strip().strip('"')) is not None
+    )
     if stamped:
         values[0] = np.nan
     numbers = [value for value in values if value is not None]
@@ -163,7 +178,9 @@ def _labels(header: list[str], count: int, dialect: Dialect) -> tuple[list[str],
     fitting = []
     for line in [line for line in header if line.strip()][-3:]:
         bare = line.lstrip("#%/ ")
-        alone = count == 1 and not re.search("[:=]", bare)  # a blank in the label of an only column separates nothing
+        alone = count == 1 and not re.search(
+            "[:=]", bare
+        )  # a blank in the label of an only column separates nothing
         fields = [label.strip().strip('"') for label in ([bare] if alone else dialect.fields(bare))]
         if len(fields) + (line.rstrip().endswith(dialect.separator or "\0")) in (count, count + 1):
             fitting.append((fields + [""] * count)[:count])
@@ -171,9 +188,15 @@ def _labels(header: list[str], count: int, dialect: Dialect) -> tuple[list[str],
         return [str(number + 1) for number in range(count)], [None] * count
     below: list[str] = fitting[-1]
     are_units = [known_unit(label) for label in below]
-    if len(fitting) > 1 and any(are_units) and all(known_unit(label) or len(label) < 9 for label in below):
+    if (
+        len(fitting) > 1
+        and any(are_units)
+        and all(known_unit(label) or len(label) < 9 for label in below)
+    ):
         names = [name or str(k + 1) for k, name in enumerate(fitting[-2])]
-        return names, [label if known else None for label, known in zip(below, are_units, strict=True)]
+        return names, [
+            label if known else None for label, known in zip(below, are_units, strict=True)
+        ]
     if any(dialect.number(label) is not None for label in below if label):
         return [str(number + 1) for number in range(count)], [None] * count
     pairs = [name_and_unit(label) for label in below]
@@ -184,10 +207,15 @@ def _declared(header: list[str]) -> dict[str, str]:
     """Key: value, key = value and key;value lines of a header, with hertz and seconds as plain numbers."""
     declared = {}
     for line in header:
-        pair = re.match(r"[#%/\s\"]*([A-Za-z][^:=;\t]{0,40}?)\"?\s*[:=;\t]\s*\"?(.+?)\"?[;\t,\s]*$", line)
+        pair = re.match(
+            r"[#%/\s\"]*([A-Za-z][^:=;\t]{0,40}?)\"?\s*[:=;\t]\s*\"?(.+?)\"?[;\t,\s]*$", line
+        )
         if not pair:
             continue
-        key, value = re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I), pair[2].strip()
+        key, value = (
+            re.sub(r"\s*[\[(]\s*(hz|s|sec)\s*[\])]\s*$", "", pair[1].strip(), flags=re.I),
+            pair[2].strip(),
+        )
         several = {part.strip() for part in re.split(r"[\t;]", value) if part.strip()}
         if len(several) == 1:  # lvm states each for every channel
             (value,) = several
@@ -197,7 +225,9 @@ def _declared(header: list[str]) -> dict[str, str]:
                 number = float(scaled[1].replace(",", "."))
             except ValueError:
                 continue
-            value = repr(number * {"kHz": 1e3, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(scaled[2] or "", 1.0))
+            value = repr(
+                number * {"kHz": 1e3, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}.get(scaled[2] or "", 1.0)
+            )
         declared[key] = value
     return declared
 
@@ -212,7 +242,8 @@ def _started(header: list[str]) -> datetime | None:
     return None
 
 
-# The rows ------------------------------------------------------------------------------------------------------------
+# The rows
+# ------------------------------------------------------------------------------------------------------------
 
 
 def _parsed(chunk: bytes, table: _Table, picked: tuple[int, ...] | None = None) -> Field | None:
@@ -243,7 +274,9 @@ def _parsed(chunk: bytes, table: _Table, picked: tuple[int, ...] | None = None) 
     return frame[list(wanted)].to_numpy()
 
 
-def _tables(stream: BinaryIO, table: _Table, picked: tuple[int, ...] | None = None) -> Iterator[Field]:
+def _tables(
+    stream: BinaryIO, table: _Table, picked: tuple[int, ...] | None = None
+) -> Iterator[Field]:
     """The rows of a block, chunk by chunk, until lines follow that are no rows; where those begin goes to `end`."""
     stream.seek(table.offset)
     at, rest = table.offset, b""
@@ -254,7 +287,9 @@ def _tables(stream: BinaryIO, table: _Table, picked: tuple[int, ...] | None = No
         chunk, rest = chunk[:cut], chunk[cut:]
         if len(rest) > _CHUNK:
             return  # no line is as long as that
-        rows = None if table.stamped or len(chunk) < _WORTH_PANDAS else _parsed(chunk, table, picked)
+        rows = (
+            None if table.stamped or len(chunk) < _WORTH_PANDAS else _parsed(chunk, table, picked)
+        )
         if rows is None:
             rows, ended = _line_by_line(chunk, table, at, picked)
             yield rows
@@ -268,7 +303,9 @@ def _tables(stream: BinaryIO, table: _Table, picked: tuple[int, ...] | None = No
             return
 
 
-def _line_by_line(chunk: bytes, table: _Table, at: int, picked: tuple[int, ...] | None) -> tuple[Field, int | None]:
+def _line_by_line(
+    chunk: bytes, table: _Table, at: int, picked: tuple[int, ...] | None
+) -> tuple[Field, int | None]:
     """Rows up to two lines in a row that are none; a single odd line is a missing row. And where it ended, if so."""
     rows: list[list[float]] = []
     waiting: int | None = None  # where an odd line began
@@ -304,15 +341,24 @@ def _picked(rows: list[list[float]], table: _Table, picked: tuple[int, ...] | No
     return array if picked is None else array[:, list(picked)]
 
 
-# Channels ------------------------------------------------------------------------------------------------------------
+# Channels
+# ------------------------------------------------------------------------------------------------------------
 
 
 def _channels(
-    path: Path, table: _Table, prefix: str, notes: list[str], open_bytes: Callable[[], BinaryIO] | None
+    path: Path,
+    table: _Table,
+    prefix: str,
+    notes: list[str],
+    open_bytes: Callable[[], BinaryIO] | None,
 ) -> Iterator[Channel]:
     rows = table.rows
     assert rows is not None
-    clock_at = 0 if table.stamped else next((k for k, name in enumerate(table.names) if is_time(name)), None)
+    clock_at = (
+        0
+        if table.stamped
+        else next((k for k, name in enumerate(table.names) if is_time(name)), None)
+    )
     clock: dict[str, Any] = {}
     spread: Callable[[Field], Field] = _as_they_are
     if clock_at is not None:
@@ -324,14 +370,18 @@ def _channels(
         if table.stamps:
             clock.setdefault("started", table.stamps[0])
     if table.odd:
-        notes.append(f"{prefix}{table.odd} rows hold text instead of numbers; they count as missing")
+        notes.append(
+            f"{prefix}{table.odd} rows hold text instead of numbers; they count as missing"
+        )
     facts = facts_in(path.name, table.declared)
     if table.started is not None:
         facts["started"] = table.started
-    if "rate_hz" in clock and "rate_hz" in facts and abs(facts["rate_hz"] / clock["rate_hz"] - 1.0) > _SAME_RATE:
-        stated = (
-            f"its header states {facts['rate_hz']:g} Hz ({facts['rate_source']}), its times {clock['rate_hz']:g} Hz"
-        )
+    if (
+        "rate_hz" in clock
+        and "rate_hz" in facts
+        and abs(facts["rate_hz"] / clock["rate_hz"] - 1.0) > _SAME_RATE
+    ):
+        stated = f"its header states {facts['rate_hz']:g} Hz ({facts['rate_source']}), its times {clock['rate_hz']:g} Hz"
         notes.append(f"{prefix}{stated}; the times are taken")
     facts = clock | facts if "rate_hz" not in clock else facts | clock
     names = _unique(table.names)
@@ -341,7 +391,12 @@ def _channels(
         known = facts | ({"unit": table.units[k]} if table.units[k] else {})
         if open_bytes is None:
             values = spread(rows[:, k])
-            yield Channel(name=prefix + names[k], blocks=partial(_pieces, values), samples=values.size, **known)
+            yield Channel(
+                name=prefix + names[k],
+                blocks=partial(_pieces, values),
+                samples=values.size,
+                **known,
+            )
         else:
             at = None if "rate_hz" not in clock else clock_at
             blocks = partial(_streamed, open_bytes, table, (k, at), notes)
@@ -358,7 +413,11 @@ def _pieces(values: Field, size: int) -> Iterator[Field]:
 
 
 def _streamed(
-    open_bytes: Callable[[], BinaryIO], table: _Table, place: tuple[int, int | None], notes: list[str], size: int
+    open_bytes: Callable[[], BinaryIO],
+    table: _Table,
+    place: tuple[int, int | None],
+    notes: list[str],
+    size: int,
 ) -> Iterator[Field]:
     """A column of a large file, on the grid of its column of times where that is one."""
     column, clock_at = place
@@ -395,7 +454,9 @@ def _onto_grid(times: Field, prefix: str, notes: list[str]) -> Callable[[Field],
     step = float(np.median(steps))
     gaps = int(np.count_nonzero(steps > _GAP * step))
     if np.any(steps <= 0.0):
-        notes.append(f"{prefix}its times go back or stand still; rows were taken in the order of the file")
+        notes.append(
+            f"{prefix}its times go back or stand still; rows were taken in the order of the file"
+        )
         return _as_they_are
     elapsed = (times[known] - times[known[0]]) / step
     place = np.round(elapsed)
@@ -412,8 +473,12 @@ def _onto_grid(times: Field, prefix: str, notes: list[str]) -> Callable[[Field],
 
         return spread
     if gaps:
-        notes.append(f"{prefix}{gaps} gaps in its times, too many to be filled; take the spectrum with care")
+        notes.append(
+            f"{prefix}{gaps} gaps in its times, too many to be filled; take the spectrum with care"
+        )
     elif stray > 0.25 and float(np.max(np.abs(steps - step))) > 0.1 * step:
         least, most = steps.min() / step, steps.max() / step
-        notes.append(f"{prefix}its times are uneven: steps from {least:.2f} to {most:.2f} of the median")
+        notes.append(
+            f"{prefix}its times are uneven: steps from {least:.2f} to {most:.2f} of the median"
+        )
     return _as_they_are

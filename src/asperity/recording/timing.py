@@ -5,19 +5,36 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import UnreadableFile
-from asperity.recording.common import whole_rate
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.recording.reader import whole_rate
 from asperity.recording.units import time_scale
 
-TIME_NAMES = {"t", "time", "times", "zeit", "temps", "timestamp", "timestamps", "elapsed", "elapsed time", "seconds",
-              "time stamp", "x_time"}  # fmt: skip
-_EVEN = 0.05  # of a step, by which times may stray from an even grid, beyond what their printing rounds away
-MOST_LOST, WORTH = 4, 1 << 16  # samples missing for each that is there, beyond some: more is no recording
+TIME_NAMES = {
+    "t",
+    "time",
+    "times",
+    "zeit",
+    "temps",
+    "timestamp",
+    "timestamps",
+    "elapsed",
+    "elapsed time",
+    "seconds",
+    "time stamp",
+    "x_time",
+}
+# of a step, by which times may stray from an even grid, beyond what their printing rounds away
+_EVEN = 0.05
+MOST_LOST, WORTH = (
+    4,
+    1 << 16,
+)  # samples missing for each that is there, beyond some: more is no recording
 _HALF = 1.5  # steps, between one and a gap of one sample
 _DIGITS = 12
 _KNOWN = sorted(  # rates [Hz] that converters have, of which the one within the doubt is taken
-    {base / 2**k for base in (102400.0, 131072.0, 100e3, 96e3, 88200.0) for k in range(9)} | {20e3, 10e3, 40e3, 30e3}
+    {base / 2**k for base in (102400.0, 131072.0, 100e3, 96e3, 88200.0) for k in range(9)}
+    | {20e3, 10e3, 40e3, 30e3}
 )
 
 
@@ -30,8 +47,9 @@ def is_time(name: str) -> bool:
 class Clock:
     """An even grid behind a column of times.
 
-    `step` between samples and `rounding` of the printed times, in the column's unit; `doubt` is the relative standard
-    deviation of the step; `even` whether the times keep to the grid, gaps apart.
+    `step` between samples and `rounding` of the printed times, in the column's unit; `doubt` is
+    the relative standard deviation of the step; `even` whether the times keep to the grid, gaps
+    apart.
     """
 
     step: float
@@ -67,7 +85,9 @@ def clock_of(times: Field) -> Clock | None:
             break
         even = stray < 0.6 * rounding + _EVEN * slope and _telling(slope, rounding)
         doubt = 2.0 * stray / (slope * number[-1]) if even else 1e-4
-        clock = Clock(step=float(slope) if even else usual, rounding=rounding, doubt=doubt + 1e-12, even=even)
+        clock = Clock(
+            step=float(slope) if even else usual, rounding=rounding, doubt=doubt + 1e-12, even=even
+        )
         if not even:
             break
     return clock
@@ -77,7 +97,11 @@ def _telling(step: float, rounding: float) -> bool:
     """Whether one step and two still differ when times are rounded."""
     if rounding <= _EVEN * step:
         return True
-    return bool(np.ceil(step / rounding) * rounding < _HALF * step < np.floor(2.0 * step / rounding) * rounding)
+    return bool(
+        np.ceil(step / rounding) * rounding
+        < _HALF * step
+        < np.floor(2.0 * step / rounding) * rounding
+    )
 
 
 def _rounding(times: Field) -> float:
@@ -108,7 +132,9 @@ def timed(column: str, unit: str | None, times: Field) -> dict[str, Any]:
             "rate_source": f"file (column {column!r})",
         }
     if unit is None:
-        return {"rate_hint": f" (its column {column!r} names no unit; were it seconds, {1.0 / clock.step:.6g} Hz)"}
+        return {
+            "rate_hint": f" (its column {column!r} names no unit; were it seconds, {1.0 / clock.step:.6g} Hz)"
+        }
     return {"rate_hint": f" (its column {column!r} is in {unit!r}, which is no unit of time)"}
 
 
@@ -127,7 +153,11 @@ class Filling:
             return values
         known = np.isfinite(times)
         if not known.all():
-            times = np.interp(np.arange(times.size), np.flatnonzero(known), times[known]) if known.any() else times
+            times = (
+                np.interp(np.arange(times.size), np.flatnonzero(known), times[known])
+                if known.any()
+                else times
+            )
         before = times[0] - self.clock.step if self._last is None else self._last
         steps = np.diff(times, prepend=before)
         self._last = float(times[-1])
@@ -154,4 +184,8 @@ class Filling:
         if self.backwards:
             return "its times go back or stand still; rows were taken in the order of the file"
         several = "gap" if self.gaps == 1 else "gaps"
-        return f"{self.gaps} {several} in its times: {self.missing} samples are missing" if self.gaps else ""
+        return (
+            f"{self.gaps} {several} in its times: {self.missing} samples are missing"
+            if self.gaps
+            else ""
+        )

@@ -3,18 +3,35 @@
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import UnreadableFile
-from asperity.recording.common import parse_time, refused_as, sliced, whole_rate
+from asperity.core.errors import UnreadableFile
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import parse_time, refused_as, sliced, whole_rate
 
 TIME_RESPONSE = 1
-_FUNCTIONS = {0: "a general function", 2: "an auto spectrum", 3: "a cross spectrum", 4: "a frequency response",
-              5: "a transmissibility", 6: "a coherence", 7: "an auto-correlation", 8: "a cross-correlation",
-              9: "a power spectral density", 10: "an energy spectral density", 11: "a probability density",
-              12: "a spectrum", 13: "a cumulative frequency distribution", 14: "a peaks-valley distribution",
-              15: "stress cycles", 16: "strain cycles", 17: "an orbit", 18: "a mode indicator function",
-              19: "a force pattern", 20: "a partial power", 21: "a partial coherence",
-              27: "a shock response spectrum"}  # fmt: skip
+_FUNCTIONS = {
+    0: "a general function",
+    2: "an auto spectrum",
+    3: "a cross spectrum",
+    4: "a frequency response",
+    5: "a transmissibility",
+    6: "a coherence",
+    7: "an auto-correlation",
+    8: "a cross-correlation",
+    9: "a power spectral density",
+    10: "an energy spectral density",
+    11: "a probability density",
+    12: "a spectrum",
+    13: "a cumulative frequency distribution",
+    14: "a peaks-valley distribution",
+    15: "stress cycles",
+    16: "strain cycles",
+    17: "an orbit",
+    18: "a mode indicator function",
+    19: "a force pattern",
+    20: "a partial power",
+    21: "a partial coherence",
+    27: "a shock response spectrum",
+}
 _ROUNDING = 5e-6  # of the first digit: the step is printed with six
 
 
@@ -34,15 +51,21 @@ def read(path: Path) -> Contents:
         kinds = [int(kind) for kind in file.get_set_types()]
         sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]
     if not sets:
-        raise UnreadableFile(f"{path.name} holds data sets {sorted(set(kinds))} and no 58; export the time record")
+        raise UnreadableFile(
+            f"{path.name} holds data sets {sorted(set(kinds))} and no 58; export the time record"
+        )
     channels: list[Channel] = []
     others: list[str] = []
     with refused_as(path, "a damaged universal file"):
         for record in sets:
             if int(record["func_type"]) != TIME_RESPONSE:
-                others.append(_FUNCTIONS.get(int(record["func_type"]), f"function type {record['func_type']}"))
+                others.append(
+                    _FUNCTIONS.get(int(record["func_type"]), f"function type {record['func_type']}")
+                )
             else:
-                channels.append(_channel(path, record, notes, taken=[channel.name for channel in channels]))
+                channels.append(
+                    _channel(path, record, notes, taken=[channel.name for channel in channels])
+                )
     if not channels:
         raise UnreadableFile(
             f"{path.name} holds {' and '.join(dict.fromkeys(others))}, not a time record; "
@@ -69,12 +92,17 @@ def _channel(path: Path, record: dict[str, Any], notes: list[str], taken: list[s
     samples, promised = int(values.size), int(record["num_pts"])
     if samples < promised:
         notes.append(f"cut short: {samples} of {promised} samples are there")
-    started = next((time for key in ("id3", "id2", "id4", "id5") if (time := parse_time(record.get(key, "")))), None)
+    started = next(
+        (time for key in ("id3", "id2", "id4", "id5") if (time := parse_time(record.get(key, "")))),
+        None,
+    )
     return Channel(
         name=name,
         blocks=sliced(lambda i, j: values[i:j], samples, notes, name),
         samples=samples,
-        rate_hz=whole_rate(1.0 / step, _ROUNDING / float(f"{step:e}".split("e")[0])) if 0.0 < step < 1e9 else None,
+        rate_hz=whole_rate(1.0 / step, _ROUNDING / float(f"{step:e}".split("e")[0]))
+        if 0.0 < step < 1e9
+        else None,
         rate_source=f"file (abscissa step {step:g} s)",
         unit=unit if unit and unit != "NONE" else None,
         started=started,

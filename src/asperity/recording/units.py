@@ -27,24 +27,100 @@ _ACCELERATIONS = {
     "ug": 1e-6 * STANDARD_GRAVITY,
     "kg": None,  # a mass
 }
-_TIMES = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "secs": 1.0, "ms": 1e-3, "msec": 1e-3,
-          "milliseconds": 1e-3, "us": 1e-6, "usec": 1e-6, "ns": 1e-9, "min": 60.0, "minutes": 60.0,
-          "h": 3600.0}  # fmt: skip
-_OTHERS = {"v", "mv", "pa", "n", "kn", "mm", "um", "mm/s", "m/s", "in/s", "°c", "degc", "rpm", "hz", "db", "a", "q",
-           "nm", "mm/sec", "bar", "kpa", "mpa", "lbs", "gf", "%"}  # fmt: skip
+_TIMES = {
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "secs": 1.0,
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "milliseconds": 1e-3,
+    "us": 1e-6,
+    "usec": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "minutes": 60.0,
+    "h": 3600.0,
+}
+_OTHERS = {
+    "v",
+    "mv",
+    "pa",
+    "n",
+    "kn",
+    "mm",
+    "um",
+    "mm/s",
+    "m/s",
+    "in/s",
+    "°c",
+    "degc",
+    "rpm",
+    "hz",
+    "db",
+    "a",
+    "q",
+    "nm",
+    "mm/sec",
+    "bar",
+    "kpa",
+    "mpa",
+    "lbs",
+    "gf",
+    "%",
+}
 
 _PER_SECOND_SQUARED = re.compile(
     r"^([kcmu]?m|in|ft)(?:\s*[*·.]?\s*s(?:ec)?\^?-2|/s(?:ec)?\^?2|/s/s|/\(s\^?2\)|/sec/sec)$"
 )
 
-RATE_NAMES = {"fs", "fs_hz", "sr", "sr_hz", "rate_hz", "sample_rate", "sample_rate_hz", "sampling_rate",
-              "sampling_rate_hz", "samplerate", "samplingrate", "sampling_frequency", "sampling_frequency_hz",
-              "sample_frequency", "samplingfrequency", "samplefrequency", "abtastrate", "abtastfrequenz",
-              "messrate", "abtastrate_hz", "abtastfrequenz_hz"}  # fmt: skip
-STEP_NAMES = {"dt", "dt_s", "wf_increment", "sample_interval", "sampling_interval", "delta_t", "sample_period",
-              "delta_x", "abtastintervall", "abtastzeit"}  # fmt: skip
+RATE_NAMES = {
+    "fs",
+    "fs_hz",
+    "sr",
+    "sr_hz",
+    "rate_hz",
+    "sample_rate",
+    "sample_rate_hz",
+    "sampling_rate",
+    "sampling_rate_hz",
+    "samplerate",
+    "samplingrate",
+    "sampling_frequency",
+    "sampling_frequency_hz",
+    "sample_frequency",
+    "samplingfrequency",
+    "samplefrequency",
+    "abtastrate",
+    "abtastfrequenz",
+    "messrate",
+    "abtastrate_hz",
+    "abtastfrequenz_hz",
+}
+STEP_NAMES = {
+    "dt",
+    "dt_s",
+    "wf_increment",
+    "sample_interval",
+    "sampling_interval",
+    "delta_t",
+    "sample_period",
+    "delta_x",
+    "abtastintervall",
+    "abtastzeit",
+}
 UNIT_NAMES = {"unit", "units", "unit_string", "engineering_units", "y_unit", "y_units", "unitname"}
-START_NAMES = {"started", "start", "start_time", "wf_start_time", "started_at", "start_datetime", "recorded", "date"}
+START_NAMES = {
+    "started",
+    "start",
+    "start_time",
+    "wf_start_time",
+    "started_at",
+    "start_datetime",
+    "recorded",
+    "date",
+}
 
 
 def acceleration_scale(unit: str) -> float | None:
@@ -59,13 +135,21 @@ def time_scale(unit: str) -> float | None:
 
 def known_unit(text: str) -> bool:
     """Whether the text is a unit that files use, so that it may be told from the end of a name."""
-    return bool(text) and (_plain(text) in _ACCELERATIONS or _plain(text) in _TIMES or _plain(text) in _OTHERS)
+    return bool(text) and (
+        _plain(text) in _ACCELERATIONS or _plain(text) in _TIMES or _plain(text) in _OTHERS
+    )
 
 
 def _plain(unit: str) -> str:
     """One spelling for m/s², m/s2, m/s**2, m·s⁻², m s-2, (m/s^2), G."""
     text = unit.strip().strip("()[]{}").strip().lower()
-    text = text.replace("²", "^2").replace("**", "^").replace("µ", "u").replace("μ", "u").replace("⁻^2", "-2")
+    text = (
+        text.replace("²", "^2")
+        .replace("**", "^")
+        .replace("µ", "u")
+        .replace("μ", "u")
+        .replace("⁻^2", "-2")
+    )
     return _PER_SECOND_SQUARED.sub(r"\1/s^2", text)
 
 
@@ -83,4 +167,8 @@ def name_and_unit(label: str) -> tuple[str, str | None]:
 
 def stated(attributes: Iterable[tuple[str, Any]], names: set[str]) -> list[tuple[str, Any]]:
     """Those of the attributes whose name, whatever its case and blanks, is one of `names`."""
-    return [(key, value) for key, value in attributes if re.sub(r"[\s-]+", "_", str(key).strip().lower()) in names]
+    return [
+        (key, value)
+        for key, value in attributes
+        if re.sub(r"[\s-]+", "_", str(key).strip().lower()) in names
+    ]

@@ -6,16 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import UnreadableFile
-from asperity.quiet import first_line
-from asperity.recording.common import REMEDY, refused_as
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.third_party import first_line
 from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import REMEDY, refused_as
 
 
 def is_wav(head: bytes) -> bool:
     """RIFF, RF64 or big-endian RIFX, holding WAVE; FLAC."""
-    return (head[:4] in (b"RIFF", b"RF64", b"RIFX") and head[8:12] == b"WAVE") or head[:4] == b"fLaC"
+    return (head[:4] in (b"RIFF", b"RF64", b"RIFX") and head[8:12] == b"WAVE") or head[
+        :4
+    ] == b"fLaC"
 
 
 def read(path: Path) -> Contents:
@@ -24,9 +26,16 @@ def read(path: Path) -> Contents:
 
     notes: list[str] = []
     with refused_as(path, "no readable sound file"), soundfile.SoundFile(path) as opened:
-        rate, count, frames, kind = opened.samplerate, opened.channels, opened.frames, opened.subtype
+        rate, count, frames, kind = (
+            opened.samplerate,
+            opened.channels,
+            opened.frames,
+            opened.subtype,
+        )
     if rate <= 0 or not 0 < count <= 64:
-        raise UnreadableFile(f"{path.name} states {rate} Hz and {count} channels, which cannot be; {REMEDY}")
+        raise UnreadableFile(
+            f"{path.name} states {rate} Hz and {count} channels, which cannot be; {REMEDY}"
+        )
     whole = _stated_frames(path)
     if whole is not None and frames < whole:
         notes.append(f"cut short: {frames} of {whole} samples are there")
@@ -40,7 +49,9 @@ def read(path: Path) -> Contents:
                     yield np.ascontiguousarray(block[:, number])
         except soundfile.LibsndfileError as error:
             if done == 0:
-                raise UnreadableFile(f"{path.name} cannot be read ({first_line(error)}); {REMEDY}") from error
+                raise UnreadableFile(
+                    f"{path.name} cannot be read ({first_line(error)}); {REMEDY}"
+                ) from error
             notes.append(f"damaged after sample {done} of {frames}; what comes before was read")
 
     channels = [

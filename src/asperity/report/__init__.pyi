@@ -9,10 +9,10 @@ from .run.vibration import excitation_figure as excitation_figure
 from .run.vibration import response_figure as response_figure
 from .run.vibration import table1_figure as table1_figure
 from .run.vibration import trend_over_load_figure as trend_over_load_figure
-from .study.exploration import calibration_figure as calibration_figure
-from .study.exploration import sensitivity_figure as sensitivity_figure
 from .study.page import write_study_report as write_study_report
+from .study.sensitivity import calibration_figure as calibration_figure
+from .study.sensitivity import sensitivity_figure as sensitivity_figure
 from .style import Medium as Medium
 from .style import write_figure as write_figure
 from .track.page import write_track_report as write_track_report
-from .wearing.page import write_wear_report as write_wear_report
+from .wear.page import write_wear_report as write_wear_report

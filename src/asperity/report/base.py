@@ -16,9 +16,9 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from asperity.files import require_writable, whole_file
+from asperity.core.files import require_writable, whole_file
+from asperity.core.quantities import Quantity, in_print, quantity
 from asperity.paper import CITATION
-from asperity.quantities import Quantity, in_print, quantity
 from asperity.report.style import ON_PAGE, ON_PAPER, ON_TELEPHONE, Medium, svg, write_figure
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none';"
@@ -27,7 +27,8 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri
 class Picture(NamedTuple):
     """A figure as the page embeds it; `width` and `height` in CSS pixels keep its place while it loads.
 
-    `narrow` is the same figure drawn for a telephone, with its own width and height; a wide one may have it.
+    `narrow` is the same figure drawn for a telephone, with its own width and height; a wide one
+    may have it.
     """
 
     uri: str
@@ -62,13 +63,25 @@ class Exhibit:
 
     def picture_of(self, figure: Figure) -> Picture:
         """As a page embeds it, once it is drawn."""
-        text = re.sub(r"^.*?(?=<svg)", "", svg(figure), flags=re.DOTALL)  # an image needs no XML prologue
+        text = re.sub(
+            r"^.*?(?=<svg)", "", svg(figure), flags=re.DOTALL
+        )  # an image needs no XML prologue
         width, height = figure.get_size_inches() * 96.0
-        uri = "data:image/svg+xml," + quote(re.sub(r"\s*\n\s*", " ", text), safe=" ='/:;,.()+-*!@?&$[]{}|~^`")
-        return Picture(uri, round(float(width)), round(float(height)), in_print(self.alt), in_print(self.caption))
+        uri = "data:image/svg+xml," + quote(
+            re.sub(r"\s*\n\s*", " ", text), safe=" ='/:;,.()+-*!@?&$[]{}|~^`"
+        )
+        return Picture(
+            uri,
+            round(float(width)),
+            round(float(height)),
+            in_print(self.alt),
+            in_print(self.caption),
+        )
 
 
-def write_exhibits(exhibits: Iterable[Exhibit], folder: Path, progress: Callable[[str], None]) -> None:
+def write_exhibits(
+    exhibits: Iterable[Exhibit], folder: Path, progress: Callable[[str], None]
+) -> None:
     """Each exhibit for a paper, as PDF and PNG, and what to print below them in captions.md."""
     captions = []
     for exhibit in exhibits:
@@ -78,7 +91,10 @@ def write_exhibits(exhibits: Iterable[Exhibit], folder: Path, progress: Callable
             write_figure(figure, folder / f"{exhibit.name}{suffix}", medium=ON_PAPER, dpi=300)
         captions.append(f"**{exhibit.name}**: {exhibit.caption}\n\n")
     with whole_file(folder / "captions.md") as part:
-        part.write_text(f"{''.join(captions)}asperity {version('asperity')}; method: doi:{CITATION.doi}\n", "utf-8")
+        part.write_text(
+            f"{''.join(captions)}asperity {version('asperity')}; method: doi:{CITATION.doi}\n",
+            "utf-8",
+        )
 
 
 class Tile(NamedTuple):
@@ -93,7 +109,11 @@ def tile(quantity: Quantity, row: Mapping[str, Any]) -> Tile:
     """A quantity of a row, its deviation and unit apart."""
     low, high = (row.get(end) for end in quantity.ends)
     if low is not None and high is not None:
-        return Tile(heading(quantity), quantity.number(row[quantity.key]), f"({quantity.interval(low, high)})")
+        return Tile(
+            heading(quantity),
+            quantity.number(row[quantity.key]),
+            f"({quantity.interval(low, high)})",
+        )
     value, _, deviation = quantity.number_in(row).partition(" ± ")
     if value.startswith("("):  # the power of ten of both
         deviation, _, power = deviation.partition(")")
@@ -121,16 +141,27 @@ def capitalised(text: str) -> str:
 def render(template: str, *, script: str = "", **values: Any) -> str:
     """A page as HTML text, escaped and complete; quantities are asked for their names and numbers where they stand.
 
-    The page may load nothing and run nothing but `script`, whatever stands in the names that it shows.
+    The page may load nothing and run nothing but `script`, whatever stands in the names that it
+    shows.
     """
-    runs = f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
+    runs = (
+        f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
+    )
     values |= {"script": script, "policy": f"{POLICY} script-src {runs}"}
     environment = Environment(
-        loader=PackageLoader("asperity.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        loader=PackageLoader("asperity.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
         lstrip_blocks=True,
-    )  # fmt: skip
+    )
     environment.filters.update(in_print=in_print, capitalised=capitalised)
-    shared = {"version": version("asperity"), "paper": CITATION, "quantity": quantity, "heading": heading}
+    shared = {
+        "version": version("asperity"),
+        "paper": CITATION,
+        "quantity": quantity,
+        "heading": heading,
+    }
     return environment.get_template(template).render(**shared, **values)
 
 

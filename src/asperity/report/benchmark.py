@@ -21,7 +21,10 @@ LEAST = 1e-8  # below which an error is drawn at it
 @ON_PAGE.drawing()
 def benchmark_figure(*results: BenchmarkResult) -> Figure:
     """Relative error over processor time, a panel a solver, a line for each value from coarse to fine."""
-    figure = Figure(figsize=(ON_PAGE.single, 4.2 if len(results) == 1 else 3.2 * len(results)), layout="constrained")
+    figure = Figure(
+        figsize=(ON_PAGE.single, 4.2 if len(results) == 1 else 3.2 * len(results)),
+        layout="constrained",
+    )
     rows = figure.subplots(len(results), squeeze=False, sharex=True, sharey=True)[:, 0]
     for axes, result in zip(rows, results, strict=True):
         _panel(axes, result)
@@ -38,9 +41,13 @@ def _panel(axes: Axes, result: BenchmarkResult) -> None:
         axes.loglog(
             [max(row.seconds, 1e-4) for row in rows],
             [max(abs(row.error), LEAST) for row in rows],
-            marker=marker, color=colour, linewidth=0.6, markersize=4, alpha=0.8,
+            marker=marker,
+            color=colour,
+            linewidth=0.6,
+            markersize=4,
+            alpha=0.8,
             label=None if family in named else family,
-        )  # fmt: skip
+        )
         named.add(family)
     axes.axhline(0.01, color=GREY, linewidth=0.8, linestyle=(0, (1, 2)))
     axes.set_ylabel("error over certified value")

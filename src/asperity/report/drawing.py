@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from asperity.arrays import Field
-from asperity.quantities import quantity
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.report.style import SPLIT_COLOUR, SPLIT_STRIP, Medium
-from asperity.wear import Stages
+from asperity.trend import Stages
 
 ACROSS = 4  # panels in a row
 
@@ -27,7 +27,9 @@ def name_axes(axes: Axes, x: str = "", y: str = "", **settings: Any) -> None:
     axes.set(**{side: quantity(key).axis for side, key in labels.items() if key}, **settings)
 
 
-def one_panel(height: float, *, key: int = 2) -> Callable[[Callable[[Axes], None]], Callable[[Medium], Figure]]:
+def one_panel(
+    height: float, *, key: int = 2
+) -> Callable[[Callable[[Axes], None]], Callable[[Medium], Figure]]:
     """Make of what draws on axes a figure of one column, so high [inches], with its key below in so many columns."""
 
     def decorate(draw: Callable[[Axes], None]) -> Callable[[Medium], Figure]:

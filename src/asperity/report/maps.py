@@ -15,11 +15,19 @@ from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.ehl import ContactSolution
-from asperity.quantities import quantity
 from asperity.report.drawing import display, name_axes
-from asperity.report.style import CAVITY_COLOUR, CAVITY_STRIPE, CONTACT_COLOUR, DASHED, GAP_COLOUR, OIL_COLOUR, Medium
+from asperity.report.style import (
+    CAVITY_COLOUR,
+    CAVITY_STRIPE,
+    CONTACT_COLOUR,
+    DASHED,
+    GAP_COLOUR,
+    OIL_COLOUR,
+    Medium,
+)
 
 
 def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axes]:
@@ -28,7 +36,9 @@ def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axe
     height = width * min(max(extent[1] / extent[0], 0.15), 1.4)
     total = below + height + above
     figure = Figure(figsize=(medium.single, total))
-    return figure, figure.add_axes((0.64 / medium.single, below / total, width / medium.single, height / total))
+    return figure, figure.add_axes(
+        (0.64 / medium.single, below / total, width / medium.single, height / total)
+    )
 
 
 def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any) -> AxesImage:
@@ -38,19 +48,32 @@ def show_map(axes: Axes, values: Field, solution: ContactSolution, **style: Any)
     roller = solution.conditions.geometry == "roller"
     aspect: Any = "auto" if roller else "equal"  # a roller is too long to scale
     image = axes.imshow(
-        np.swapaxes(values, 0, 1), origin="lower", extent=corners, interpolation="none", aspect=aspect, **style
+        np.swapaxes(values, 0, 1),
+        origin="lower",
+        extent=corners,
+        interpolation="none",
+        aspect=aspect,
+        **style,
     )
     name_axes(axes, "x_m", "y_m")
     axes.spines[:].set_visible(False)
     if roller:
-        axes.tick_params(axis="y", labelrotation=90)  # thousands of micrometres leave no room beside them
+        axes.tick_params(
+            axis="y", labelrotation=90
+        )  # thousands of micrometres leave no room beside them
     return image
 
 
 def drawn_map(
-    solution: ContactSolution, key: str, values: Field, title: str, *, extend: str = "neither",
-    ticks: Sequence[float] | None = None, **style: Any,
-) -> Callable[[Medium], Figure]:  # fmt: skip
+    solution: ContactSolution,
+    key: str,
+    values: Field,
+    title: str,
+    *,
+    extend: str = "neither",
+    ticks: Sequence[float] | None = None,
+    **style: Any,
+) -> Callable[[Medium], Figure]:
     """The map of a quantity, stored values of shape (nx, ny), with the Hertz zone and a key to the colours."""
 
     def draw(medium: Medium) -> Figure:
@@ -64,11 +87,15 @@ def drawn_map(
     return draw
 
 
-def colour_bar(figure: Figure, axes: Axes, image: ScalarMappable, key: str, **settings: Any) -> None:
+def colour_bar(
+    figure: Figure, axes: Axes, image: ScalarMappable, key: str, **settings: Any
+) -> None:
     """The key to the colours of a map of that quantity, below it."""
     box, total = axes.get_position(), figure.get_size_inches()[1]
     place = figure.add_axes((box.x0, 0.42 / total, box.width, 0.11 / total))
-    figure.colorbar(image, cax=place, orientation="horizontal", label=quantity(key).axis, **settings)
+    figure.colorbar(
+        image, cax=place, orientation="horizontal", label=quantity(key).axis, **settings
+    )
 
 
 def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
@@ -83,7 +110,9 @@ def mark_hertz_zone(axes: Axes, solution: ContactSolution, colour: str) -> None:
         loaded = sliced.line_load > 0.0
         places = display("y_m", sliced.y[loaded])
         side = a * np.sqrt(sliced.line_load[loaded] / sliced.line_load.mean())
-        axes.plot(np.concatenate([side, -side[::-1]]), np.concatenate([places, places[::-1]]), **style)
+        axes.plot(
+            np.concatenate([side, -side[::-1]]), np.concatenate([places, places[::-1]]), **style
+        )
     else:
         turn = np.linspace(0.0, 2.0 * np.pi, 200)
         axes.plot(a * np.cos(turn), b * np.sin(turn), **style)
@@ -94,7 +123,9 @@ def contact_colours(solution: ContactSolution) -> Field:
     colours = np.empty((*solution.grid.cells, 3))
     colours[:] = to_rgb(GAP_COLOUR if solution.lubricant is None else OIL_COLOUR)
     colours[solution.cavitated] = to_rgb(CAVITY_COLOUR)
-    period = max(solution.grid.cells[0] // 20, 5)  # of diagonal lines, one part in five wide, about twenty across
+    period = max(
+        solution.grid.cells[0] // 20, 5
+    )  # of diagonal lines, one part in five wide, about twenty across
     i, j = np.indices(solution.grid.cells, sparse=True)
     colours[solution.cavitated & ((i + j) % period < max(period // 5, 1))] = to_rgb(CAVITY_STRIPE)
     colours[solution.in_contact] = to_rgb(CONTACT_COLOUR)
@@ -106,7 +137,9 @@ def contact_keys(contact: str, rest: str, cavitated: str = "") -> list[Patch | L
     keys: list[Patch | Line2D] = [Patch(color=CONTACT_COLOUR, label=contact)]
     if cavitated:
         keys.append(Patch(color=OIL_COLOUR, label=rest))
-        keys.append(Patch(facecolor=CAVITY_COLOUR, edgecolor=CAVITY_STRIPE, hatch="////", label=cavitated))
+        keys.append(
+            Patch(facecolor=CAVITY_COLOUR, edgecolor=CAVITY_STRIPE, hatch="////", label=cavitated)
+        )
     else:
         keys.append(Patch(color=GAP_COLOUR, label=rest))
     keys.append(Line2D([], [], color="black", linestyle=DASHED, linewidth=1.0, label="Hertz zone"))

@@ -1,6 +1,7 @@
 """How figures look, and figures written to disk.
 
-A page gets titles and wide type; paper gets the column widths of journals, and leaves the words to a caption.
+A page gets titles and wide type; paper gets the column widths of journals, and leaves the words to
+a caption.
 """
 
 from collections.abc import Iterator
@@ -17,13 +18,20 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from asperity.errors import BadInput
-from asperity.files import whole_file
+from asperity.core.errors import BadInput
+from asperity.core.files import whole_file
 
-# Okabe and Ito's colours, told apart with any colour vision; every line also has its own stroke or marker.
+# Okabe and Ito's colours, told apart with any colour vision; every line also has its own stroke or
+# marker.
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#6b7280"
-# The paper's Fig 6 has oil in red and asperities in yellow. These differ in lightness too, for grey printers.
-CONTACT_COLOUR, OIL_COLOUR, CAVITY_COLOUR, CAVITY_STRIPE = "#f7dc4a", "#c8452f", "#33415c", "#8b9cb8"
+# The paper's Fig 6 has oil in red and asperities in yellow. These differ in lightness too, for grey
+# printers.
+CONTACT_COLOUR, OIL_COLOUR, CAVITY_COLOUR, CAVITY_STRIPE = (
+    "#f7dc4a",
+    "#c8452f",
+    "#33415c",
+    "#8b9cb8",
+)
 GAP_COLOUR = "#e5e7eb"  # of a dry contact
 SPLIT_COLOUR, SPLIT_STRIP, BAND_COLOUR = "#8a5a00", "#f2e3c6", "#e8eef4"
 DASHED: Any = (0, (4, 3))
@@ -86,7 +94,9 @@ class Medium:
         axes.set_title(text if self.titled else letter)
 
 
-ON_PAGE = Medium(4.8, 9.6, titled=True)  # two stand side by side, and one alone is readable on a telephone
+ON_PAGE = Medium(
+    4.8, 9.6, titled=True
+)  # two stand side by side, and one alone is readable on a telephone
 ON_TELEPHONE = Medium(4.8, 4.8, titled=True)
 ON_PAPER = Medium(
     84.0 / 25.4,
@@ -122,7 +132,11 @@ def fit_titles(figure: Figure) -> None:
     for axes in figure.axes:
         for title in _titles(axes):
             own = title.get_window_extent()
-            beside = [box for other, box in boxes.items() if other is not axes and box and _level(box, own)]
+            beside = [
+                box
+                for other, box in boxes.items()
+                if other is not axes and box and _level(box, own)
+            ]
             left = max([box.x1 for box in beside if box.x1 <= own.x0], default=0.0)
             right = min([box.x0 for box in beside if box.x0 > own.x0], default=figure.bbox.width)
             _fit_title(axes, title, left + margin, right - margin)

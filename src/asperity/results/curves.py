@@ -10,8 +10,9 @@ from typing import Any, Literal
 import numpy as np
 
 from asperity.case import Case
-from asperity.ehl import HOT, ContactSolution, Iteration, contact_state, friction_and_heat, solve_thermal_contact
-from asperity.errors import BadInput, require_positive
+from asperity.core.errors import BadInput, require_positive
+from asperity.ehl import ContactSolution, Iteration
+from asperity.solution import HOT, contact_state, friction_and_heat, solve_thermal_contact
 
 SolverProgress = Callable[[Iteration], None]
 FrictionCurveKind = Literal["stribeck", "traction"]
@@ -27,8 +28,9 @@ MOST_SLIP = 1000.0
 class FrictionPoint:
     """One contact of a curve, SI.
 
-    `friction_coefficient` = `asperity_part` + `oil_part`; `lambda_ratio` is None for a smooth or dry contact;
-    temperatures are rises [K], the first of the hotter surface; a point that did not converge must not be used.
+    `friction_coefficient` = `asperity_part` + `oil_part`; `lambda_ratio` is None for a smooth or
+    dry contact; temperatures are rises [K], the first of the hotter surface; a point that did not
+    converge must not be used.
     """
 
     entrainment_speed_m_s: float
@@ -81,7 +83,11 @@ class FrictionCurve:
             )
         sentence += f" (Sq {1e6 * self.sq:.3g} um, boundary friction {self.boundary_friction:g})."
         unfinished = sum(not point.converged for point in self.points)
-        return f"NOT CONVERGED at {unfinished} of {len(self.points)} points: {sentence}" if unfinished else sentence
+        return (
+            f"NOT CONVERGED at {unfinished} of {len(self.points)} points: {sentence}"
+            if unfinished
+            else sentence
+        )
 
     def hint(self) -> str | None:
         """What a reader has to know about the figures, None if nothing."""
@@ -110,15 +116,21 @@ def stribeck_curve(
         for a case in which nothing slides, or a speed that is not positive.
     """
     if case.conditions.sliding_speed == 0.0:
-        raise BadInput(f"{case.source}: contact.slip is 0 and nothing slides; set it, to 0.1 for instance")
+        raise BadInput(
+            f"{case.source}: contact.slip is 0 and nothing slides; set it, to 0.1 for instance"
+        )
     if speeds is None:
         low, high = (share * case.conditions.entrainment_speed for share in SPEED_RANGE)
         speeds = [float(speed) for speed in np.geomspace(low, high, SPEEDS)]
     for speed in speeds:
         require_positive("entrainment speed", speed, "m/s")
-    first, second = (speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds)
+    first, second = (
+        speed / case.conditions.entrainment_speed for speed in case.conditions.surface_speeds
+    )
     pairs = [(first * speed, second * speed) for speed in sorted(speeds, reverse=True)]
-    return _curve(case, "stribeck", pairs, progress)  # from full film down: each starts the next well
+    return _curve(
+        case, "stribeck", pairs, progress
+    )  # from full film down: each starts the next well
 
 
 def traction_curve(
@@ -140,14 +152,19 @@ def traction_curve(
         slips = [0.0, *(float(slip) for slip in np.geomspace(*SLIP_RANGE, SLIPS))]
     for slip in slips:
         if not 0.0 <= slip <= MOST_SLIP:
-            raise BadInput(f"slide-to-roll ratio must lie between 0 and {MOST_SLIP:g}, got {slip:g}")
+            raise BadInput(
+                f"slide-to-roll ratio must lie between 0 and {MOST_SLIP:g}, got {slip:g}"
+            )
     speed = case.conditions.entrainment_speed
     pairs = [(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)) for slip in sorted(slips)]
     return _curve(case, "traction", pairs, progress)
 
 
 def _curve(
-    case: Case, kind: FrictionCurveKind, speeds: Sequence[tuple[float, float]], progress: SolverProgress | None
+    case: Case,
+    kind: FrictionCurveKind,
+    speeds: Sequence[tuple[float, float]],
+    progress: SolverProgress | None,
 ) -> FrictionCurve:
     """Contacts at these surface speeds, each started from the one before."""
     if not speeds:
@@ -181,7 +198,9 @@ def _curve(
 
 
 def _point(case: Case, solution: ContactSolution) -> FrictionPoint:
-    rubbing, heat = friction_and_heat(solution, boundary_friction=case.boundary_friction, thermal=case.thermal)
+    rubbing, heat = friction_and_heat(
+        solution, boundary_friction=case.boundary_friction, thermal=case.thermal
+    )
     state, conditions = contact_state(solution), solution.conditions
     return FrictionPoint(
         entrainment_speed_m_s=conditions.entrainment_speed,

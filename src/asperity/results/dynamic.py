@@ -1,7 +1,7 @@
 """Stiffness and damping of a solved contact over frequency: its dynamic stiffness, asked for as often as wanted.
 
-Each frequency costs a third of the solve at 128 x 128 cells and as much as the solve at 256 x 256, so a case says how
-many (`solver.dynamic`); none by default.
+Each frequency costs a third of the solve at 128 x 128 cells and as much as the solve at 256 x 256,
+so a case says how many (`solver.dynamic`); none by default.
 """
 
 import math
@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field, finite_or_none
-from asperity.ehl import ContactSolution, ShakenContact, Yielded
-from asperity.errors import AsperityError
+from asperity.core.arrays import Field, finite_or_none
+from asperity.core.errors import AsperityError
+from asperity.ehl import ContactSolution
+from asperity.solution import ShakenContact, Yielded
 
 FREQUENCIES = 13  # unless the case says
 SPAN = (0.1, 4.0)  # of the resonance, from and to
@@ -59,7 +60,9 @@ def _listed(values: Field) -> list[float | None]:
     return [finite_or_none(float(value)) for value in values]
 
 
-def dynamic_curve(solution: ContactSolution, count: int, resonance_hz: float | None) -> DynamicCurve:
+def dynamic_curve(
+    solution: ContactSolution, count: int, resonance_hz: float | None
+) -> DynamicCurve:
     """Shake a solved contact at so many frequencies.
 
     Parameters
@@ -75,17 +78,25 @@ def dynamic_curve(solution: ContactSolution, count: int, resonance_hz: float | N
     middle = resonance_hz
     if middle is None:
         conditions = solution.conditions
-        speed = conditions.entrainment_speed or conditions.hertz.half_widths[0]  # 1/s where nothing moves
+        speed = (
+            conditions.entrainment_speed or conditions.hertz.half_widths[0]
+        )  # 1/s where nothing moves
         middle = speed / (2.0 * math.pi * conditions.hertz.half_widths[0])
     octaves = np.linspace(math.log(SPAN[0]), math.log(SPAN[1]), count)
     octaves -= octaves[np.argmin(np.abs(octaves))]  # one of them is the resonance itself
     frequency = middle * np.exp(octaves)
     failures: list[str] = []
-    elastic, virgin = (_branch(solution, frequency, yielded, failures) for yielded in ("elastic", "flowing"))
-    return DynamicCurve(frequency_hz=frequency, elastic=elastic, virgin=virgin, failures=tuple(failures))
+    elastic, virgin = (
+        _branch(solution, frequency, yielded, failures) for yielded in ("elastic", "flowing")
+    )
+    return DynamicCurve(
+        frequency_hz=frequency, elastic=elastic, virgin=virgin, failures=tuple(failures)
+    )
 
 
-def _branch(solution: ContactSolution, frequency: Field, yielded: Yielded, failures: list[str]) -> DynamicBranch:
+def _branch(
+    solution: ContactSolution, frequency: Field, yielded: Yielded, failures: list[str]
+) -> DynamicBranch:
     shaken = ShakenContact(solution, yielded=yielded)
     found = []
     for one in (0.0, *frequency):

@@ -12,16 +12,45 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity import ehl
-from asperity.arrays import Field
 from asperity.case import Case
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput
+from asperity.core.quantities import lines, quantity, read
 from asperity.coupling import Vibration, contact_vibration
-from asperity.ehl import FILMS, HOT, ContactSolution, ContactState, FlashTemperature, Friction, friction_and_heat
-from asperity.errors import AsperityError, BadInput
-from asperity.quantities import lines, quantity, read
-from asperity.results.doubt import basis, in_words
+from asperity.ehl import ContactSolution, ContactState
+from asperity.resonance import Resonance
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
-from asperity.results.spread import AVERAGED, Row, Scalar, half_interval, mean_row, whole_error
-from asperity.wear import Resonance
+from asperity.results.surface_spread import (
+    AVERAGED,
+    Row,
+    Scalar,
+    half_interval,
+    mean_row,
+    whole_error,
+)
+from asperity.results.uncertainty_text import basis, in_words
+from asperity.solution import (
+    FILMS,
+    HOT,
+    AlongRoller,
+    DynamicStiffness,
+    FlashTemperature,
+    Friction,
+    LoadSharing,
+    OwnResonance,
+    RegimeCard,
+    SubsurfaceStress,
+    along_roller,
+    clr_below,
+    contact_state,
+    friction_and_heat,
+    own_resonance,
+    regime_card,
+    sharing_by_film,
+    solution_notes,
+    subsurface_stress,
+    undetermined,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -30,22 +59,32 @@ FULL_FILM_BELOW = 0.01  # share of the load on asperities
 BOUNDARY_FROM = 0.9
 
 RUN_GROUPS = (*AVERAGED, "solver")
-SHORT_GROUPS = tuple(group for group in RUN_GROUPS if group != "virgin")  # short tables show none of it
+SHORT_GROUPS = tuple(
+    group for group in RUN_GROUPS if group != "virgin"
+)  # short tables show none of it
 DOUBT = "uncertainty"  # group of the catalogue: of all surfaces together
 ENDS = "ends"  # group of the catalogue: of rollers
 DAMPING = "contact_damping_ratio"
 CRUCIAL = ("clr", "clr_error", "car", "crf_hz", "crf_std_hz")
-MAPS = ("von_mises", "von_mises_depth", "shear", "temperature_1", "temperature_2", "film_temperature")
+MAPS = (
+    "von_mises",
+    "von_mises_depth",
+    "shear",
+    "temperature_1",
+    "temperature_2",
+    "film_temperature",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
     """A solved case: the contact, what a tribologist reads off it, and how a mass on it vibrates.
 
-    `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the numbers has to know.
-    Friction, heat and stress are worked out when they are first asked for. `others` are the numbers of further surfaces
-    of the same kind that were solved: fields, state, vibration and friction are those of the first surface, `scalars`
-    the means over all, and `error` says how far a single surface may be off them. `groups` of the catalogue are what
+    `vibration` is None for a case without [vibration]; `notes` are sentences a reader of the
+    numbers has to know. Friction, heat and stress are worked out when they are first asked for.
+    `others` are the numbers of further surfaces of the same kind that were solved: fields, state,
+    vibration and friction are those of the first surface, `scalars` the means over all, and
+    `error` says how far a single surface may be off them. `groups` of the catalogue are what
     `scalars` has of every surface.
     """
 
@@ -62,10 +101,14 @@ class Run:
         """Friction and heat, or why there are none."""
         try:
             case = self.case
-            return friction_and_heat(self.solution, boundary_friction=case.boundary_friction, thermal=case.thermal)
+            return friction_and_heat(
+                self.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
+            )
         except BadInput:
             raise
-        except AsperityError as error:  # the film, the load sharing and the stress are as good without it
+        except (
+            AsperityError
+        ) as error:  # the film, the load sharing and the stress are as good without it
             return str(error)
 
     @property
@@ -86,7 +129,12 @@ class Run:
         if isinstance(curve, str) and curve:
             shaken = (f"no stiffness over frequency: {curve}",)
         notes = (*self.notes, *(f"{sentence[:1].upper()}{sentence[1:]}." for sentence in shaken))
-        if heat is None or self.case.thermal.feedback or heat.film_max_k < HOT or self.solution.lubricant is None:
+        if (
+            heat is None
+            or self.case.thermal.feedback
+            or heat.film_max_k < HOT
+            or self.solution.lubricant is None
+        ):
             return notes
         hot = (
             f"The film warms up by up to {heat.film_max_k:.4g} K, and its oil is taken as viscous as when cold: "
@@ -100,9 +148,11 @@ class Run:
         return self._rubbing if isinstance(self._rubbing, str) else None
 
     @cached_property
-    def stress(self) -> ehl.SubsurfaceStress:
+    def stress(self) -> SubsurfaceStress:
         """Stresses in body 1 under the solved pressure and friction's traction."""
-        return ehl.subsurface_stress(self.solution, shear=None if self.friction is None else self.friction.shear)
+        return subsurface_stress(
+            self.solution, shear=None if self.friction is None else self.friction.shear
+        )
 
     @property
     def resonance(self) -> Resonance | None:
@@ -111,19 +161,19 @@ class Run:
         return resonance if resonance is not None and resonance.found else None
 
     @cached_property
-    def _shaken(self) -> ehl.OwnResonance | str:
+    def _shaken(self) -> OwnResonance | str:
         """The mass on the solved contact's own stiffness, or why that is not known."""
         if self.case.vibration is None:
             return "no mass is stated; add [vibration]"
         if not self.solution.convergence.converged:
             return "the contact is not solved"
         try:
-            return ehl.own_resonance(self.solution, self.case.vibration.mass)
+            return own_resonance(self.solution, self.case.vibration.mass)
         except AsperityError as error:  # every other number is as good without it
             return str(error)
 
     @property
-    def own_resonance(self) -> ehl.OwnResonance | None:
+    def own_resonance(self) -> OwnResonance | None:
         """The contact's own stiffness and damping where the mass resonates; None where `own_resonance_failure` is."""
         return None if isinstance(self._shaken, str) else self._shaken
 
@@ -133,7 +183,7 @@ class Run:
         return self._shaken if isinstance(self._shaken, str) else None
 
     @cached_property
-    def _yielding(self) -> ehl.DynamicStiffness | str:
+    def _yielding(self) -> DynamicStiffness | str:
         """The same while cells at the pressure cap still yield, or why that is not known."""
         if isinstance(self._shaken, str):
             return self._shaken
@@ -143,7 +193,7 @@ class Run:
             return str(error)
 
     @property
-    def virgin_resonance(self) -> ehl.DynamicStiffness | None:
+    def virgin_resonance(self) -> DynamicStiffness | None:
         """Stiffness and damping of virgin roughness; None where it is not known."""
         return None if isinstance(self._yielding, str) else self._yielding
 
@@ -157,7 +207,9 @@ class Run:
             return "the contact is not solved"
         own = self.own_resonance
         try:
-            return dynamic_curve(self.solution, count, None if own is None else own.elastic.frequency_hz)
+            return dynamic_curve(
+                self.solution, count, None if own is None else own.elastic.frequency_hz
+            )
         except AsperityError as error:  # every other number is as good without it
             return str(error)
 
@@ -174,14 +226,14 @@ class Run:
         return half_interval(found) if len(found) > 1 else None
 
     @cached_property
-    def sharing(self) -> ehl.LoadSharing:
+    def sharing(self) -> LoadSharing:
         """The load by film."""
-        return ehl.sharing_by_film(self.solution)
+        return sharing_by_film(self.solution)
 
     @property
     def load_below(self) -> dict[str, float]:
         """Share of the load on films no thicker than each of `FILMS`."""
-        return {f"{film * 1e9:.0f}nm": ehl.clr_below(self.solution, film) for film in FILMS}
+        return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
 
     @property
     def error(self) -> ehl.ContactError:
@@ -199,23 +251,23 @@ class Run:
         return read(self, lines(*groups, *([] if self.along is None else [ENDS])))
 
     @cached_property
-    def along(self) -> ehl.AlongRoller | None:
+    def along(self) -> AlongRoller | None:
         """A roller along its length; None for a contact of another geometry."""
-        return ehl.along_roller(self.solution)
+        return along_roller(self.solution)
 
     def scalars(self) -> dict[str, Scalar]:
         """Every number of the run by its key, SI: means over its surfaces, and intervals; of the first how it went."""
         return mean_row((self.own_scalars, *self.others)) | read(self, lines(DOUBT))
 
     @cached_property
-    def card(self) -> ehl.RegimeCard:
+    def card(self) -> RegimeCard:
         """What kind of contact it is, and how far its film is from published fits."""
-        return ehl.regime_card(self.solution)
+        return regime_card(self.solution)
 
     @cached_property
     def undetermined(self) -> str | None:
         """Why this grid cannot tell CLR; None where it can."""
-        return ehl.undetermined(self.solution, self.error.clr)
+        return undetermined(self.solution, self.error.clr)
 
     @property
     def determined(self) -> bool:
@@ -225,30 +277,43 @@ class Run:
     def summary(self) -> dict[str, Any]:
         """What `solve --json` prints: every number, the grid's cells, the regime card and what is to be noted.
 
-        Of an oil by its data sheet also its numbers under `oil`, and below them the `origins` of each.
+        Of an oil by its data sheet also its numbers under `oil`, and below them the `origins` of
+        each.
         """
         facts = self.case.oil_facts
         origins = {fact.key: ": ".join(filter(None, (fact.origin, fact.how))) for fact in facts}
-        oil = {"oil": {**{fact.key: fact.value for fact in facts}, "origins": origins}} if facts else {}
+        oil = (
+            {"oil": {**{fact.key: fact.value for fact in facts}, "origins": origins}}
+            if facts
+            else {}
+        )
         return {
             **self.scalars(),
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
             **oil,
-            **({} if self.dynamic_curve is None else {"dynamic_curve": self.dynamic_curve.scalars()}),
+            **(
+                {}
+                if self.dynamic_curve is None
+                else {"dynamic_curve": self.dynamic_curve.scalars()}
+            ),
             "notes": [*self.remarks, *self._without_virgin()],
         }
 
     def _without_virgin(self) -> Iterator[str]:
         """A sentence where one limit of the contact's stiffness is known and the other is not, though asked for."""
-        if "virgin" in self.groups and self.own_resonance is not None and isinstance(self._yielding, str):
+        if (
+            "virgin" in self.groups
+            and self.own_resonance is not None
+            and isinstance(self._yielding, str)
+        ):
             yield f"There is no stiffness of virgin roughness: {self._yielding}."
 
     def verdict(self) -> str:
         """One sentence on the state of the contact, of its surfaces' means and with 90 % intervals.
 
-        Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more; mixed between. On a
-        grid that cannot tell CLR it says so instead, and why.
+        Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more;
+        mixed between. On a grid that cannot tell CLR it says so instead, and why.
         """
         numbers, error = mean_row((self.crucial, *self.others)), self.error
         clr, car = (float(numbers[key]) for key in ("clr", "car"))
@@ -262,7 +327,9 @@ class Run:
         shared = f"asperities carry {load} of the load {in_words('clr', error.clr)} on {area} of the Hertz zone"
         sentence = f"{regime}: {shared}"
         if self.undetermined is not None:
-            sentence = f"Grid too coarse, CLR not determined ({self.undetermined}): on this grid {shared}"
+            sentence = (
+                f"Grid too coarse, CLR not determined ({self.undetermined}): on this grid {shared}"
+            )
         if not self.solution.convergence.converged:
             sentence = f"NOT CONVERGED, do not use: {sentence}"
         return f"{sentence}; {self._ends_in_words()}{self.resonance_in_words()}; {basis(error)}."
@@ -272,7 +339,10 @@ class Run:
         if self.along is None:
             return ""
         numbers, edge = self.numbers([]), quantity("edge_pressure_pa")
-        pressure, middle = self.along.edge_pressure, quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"])
+        pressure, middle = (
+            self.along.edge_pressure,
+            quantity("middle_pressure_pa").named(numbers["middle_pressure_pa"]),
+        )
         if pressure is None:
             said = f"no {edge.name}, the grid ends before"
         elif pressure.value is None:
@@ -306,7 +376,8 @@ class Run:
     def contents(self) -> ehl.Contents:
         """The solution's contents, with every number of the run and maps of traction, temperature and von Mises stress.
 
-        A run that is loaded takes nothing from these: they are worked out anew. Maps are in single precision.
+        A run that is loaded takes nothing from these: they are worked out anew. Maps are in single
+        precision.
         """
         (variables, coordinates, attributes), stress = self.solution.contents(), self.stress
         axis = {"axis": "Z", "positive": "down"}
@@ -316,13 +387,21 @@ class Run:
             if values is not None:
                 variables[entry.key] = (("x", "y"), values.astype(np.float32), entry.attributes)
         variables["von_mises"][2]["comment"] = f"Poisson's ratio {stress.poisson_ratio:g}"
-        section = quantity("von_mises_section").attributes | {"comment": f"in the plane y = {stress.peak.y:g} m"}
-        variables["von_mises_section"] = (("x", "depth"), stress.von_mises[:, stress.row].astype(np.float32), section)
+        section = quantity("von_mises_section").attributes | {
+            "comment": f"in the plane y = {stress.peak.y:g} m"
+        }
+        variables["von_mises_section"] = (
+            ("x", "depth"),
+            stress.von_mises[:, stress.row].astype(np.float32),
+            section,
+        )
         curve = self.dynamic_curve
         if curve is not None:
             coordinates["dynamic_frequency"] = (
-                "dynamic_frequency", curve.frequency_hz, quantity("dynamic_frequency").attributes,
-            )  # fmt: skip
+                "dynamic_frequency",
+                curve.frequency_hz,
+                quantity("dynamic_frequency").attributes,
+            )
             for suffix, branch in (("", curve.elastic), ("_virgin", curve.virgin)):
                 for name in ("dynamic_stiffness", "dynamic_damping"):
                     values = getattr(branch, name.removeprefix("dynamic_"))
@@ -350,25 +429,33 @@ def run_of(
 
     `others` are the numbers of further surfaces, of these `groups` of the catalogue.
     """
-    state = ehl.contact_state(solution)
+    state = contact_state(solution)
     model = case.vibration
     if model is not None and vibration is None:
         with case.naming("vibration"):
             vibration = contact_vibration(state, case.conditions, model, solution=solution)
-    notes = (*notes, *ehl.solution_notes(solution))
+    notes = (*notes, *solution_notes(solution))
     if solution.options.model == "conserving":
         notes = (*notes, _threshold(solution))
     if not solution.convergence.converged:
         notes = (f"Not converged: {solution.convergence.explain()}.", *notes)
     rows = tuple(others)
-    run = Run(case=case, solution=solution, state=state, vibration=vibration, notes=notes, others=rows, groups=groups)
+    run = Run(
+        case=case,
+        solution=solution,
+        state=state,
+        vibration=vibration,
+        notes=notes,
+        others=rows,
+        groups=groups,
+    )
     error = whole_error(state, (run.crucial, *others), case.conditions, model, vibration)
     return replace(run, state=replace(state, error=error))
 
 
 def _threshold(solution: ContactSolution) -> str:
     """What the conserving model's share of asperities counts, and what another film would make of it."""
-    sharing = ehl.sharing_by_film(solution)
+    sharing = sharing_by_film(solution)
     shares = ", ".join(
         f"{100 * share:.0f} % of at most {film * 1e9:.0f} nm"
         for film, share in zip(sharing.films, sharing.below, strict=True)

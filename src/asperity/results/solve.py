@@ -12,12 +12,13 @@ from threadpoolctl import threadpool_limits
 
 from asperity import ehl
 from asperity.case import Case, load_case
+from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.core.processes import cores, set_up_worker
+from asperity.core.storage import version_notes
 from asperity.coupling import require_sampling
-from asperity.errors import AsperityError, BadInput, NotConverged, UnreadableFile
-from asperity.kept import version_notes
-from asperity.processes import cores, set_up_worker
 from asperity.results.run import RUN_GROUPS, Run, run_of
-from asperity.results.spread import Row
+from asperity.results.surface_spread import Row
+from asperity.solution import load_solution, solve_thermal_contact
 from asperity.surface import Surface
 
 WORTH_PROCESSES_S = 8.0  # of work, below which starting processes takes longer than they save
@@ -91,19 +92,28 @@ def solve_case(
     ]
     notes = [*json.loads(run.solution.attributes["notes"]), *left_out]
     kept = {**run.solution.attributes, "notes": json.dumps(notes), "surfaces": json.dumps(others)}
-    return run_of(case, replace(run.solution, attributes=kept), notes, others, run.vibration, groups)
+    return run_of(
+        case, replace(run.solution, attributes=kept), notes, others, run.vibration, groups
+    )
 
 
-def _first(case: Case, progress: Callable[[ehl.Iteration], None] | None, strict: bool, groups: tuple[str, ...]) -> Run:
+def _first(
+    case: Case,
+    progress: Callable[[ehl.Iteration], None] | None,
+    strict: bool,
+    groups: tuple[str, ...],
+) -> Run:
     """A case on its own surface."""
     roughness = case.surface()
     if case.vibration is not None:
         with case.naming("vibration"):
-            require_sampling(case.conditions, case.vibration, roughness.sq)  # before the time a solution takes
+            require_sampling(
+                case.conditions, case.vibration, roughness.sq
+            )  # before the time a solution takes
     notes = (*case.surface_notes, *case.notes)
     kept = {"case": case.text, "notes": json.dumps(notes)}
     try:
-        solution = ehl.solve_thermal_contact(
+        solution = solve_thermal_contact(
             case.conditions,
             case.lubricant,
             roughness,
@@ -127,7 +137,10 @@ class _Outcome(NamedTuple):
 
 
 def _outcome(
-    number: int, case: Case, groups: tuple[str, ...], progress: Callable[[ehl.Iteration], None] | None = None
+    number: int,
+    case: Case,
+    groups: tuple[str, ...],
+    progress: Callable[[ehl.Iteration], None] | None = None,
 ) -> _Outcome:
     """One thread does the algebra: two would sum in another order, and processes are to change nothing."""
     try:
@@ -146,9 +159,13 @@ def _here(
 
 
 def _in_processes(kind: list[Case], groups: tuple[str, ...], workers: int) -> Iterator[_Outcome]:
-    pool = ProcessPoolExecutor(min(workers, cores(), len(kind)), get_context("spawn"), set_up_worker)
+    pool = ProcessPoolExecutor(
+        min(workers, cores(), len(kind)), get_context("spawn"), set_up_worker
+    )
     try:
-        submitted = [pool.submit(_outcome, number, case, groups) for number, case in enumerate(kind, 1)]
+        submitted = [
+            pool.submit(_outcome, number, case, groups) for number, case in enumerate(kind, 1)
+        ]
         for future in as_completed(submitted):
             yield future.result()
     except BrokenExecutor:
@@ -171,7 +188,7 @@ def load_run(path: str | Path) -> Run:
         if the file is missing, damaged, or holds no case.
     """
     path = Path(path)
-    solution = ehl.load_solution(path)
+    solution = load_solution(path)
     try:
         text, notes = solution.attributes["case"], tuple(json.loads(solution.attributes["notes"]))
         others = json.loads(solution.attributes.get("surfaces", "[]"))
@@ -182,6 +199,8 @@ def load_run(path: str | Path) -> Run:
     if (case.conditions, case.grid) != (solution.conditions, solution.grid) or (
         case.lubricant != solution.lubricant or case.options != solution.options
     ):
-        raise UnreadableFile(f"{path} holds a case that is not the one solved in it; solve its case again")
+        raise UnreadableFile(
+            f"{path} holds a case that is not the one solved in it; solve its case again"
+        )
     case = replace(case, stored_notes=tuple(note for note in notes if note not in case.notes))
     return run_of(case, solution, (*version_notes(solution.versions), *notes), others)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.case import Case
+from asperity.core.errors import BadInput
+from asperity.core.quantities import lines, quantity, read
 from asperity.coupling import LINEAR_UP_TO, Vibration, contact_vibration, dry_full_load
 from asperity.ehl import ContactState, Iteration
-from asperity.errors import BadInput
-from asperity.quantities import lines, quantity, read
+from asperity.resonance import Resonance
 from asperity.results.solve import solve_case
-from asperity.wear import Resonance
 
 KEYS = ("crf_hz", "crfa", "crf_std_hz", "crfa_std", "clr", "car", "sq_m")
 
@@ -33,14 +33,23 @@ class VibratedCase:
         """Every number of `asperity vibrate --json` by its key, SI; None where there is none."""
         numbers = read(self, (*map(quantity, KEYS), *lines("vibration")))
         found = {"found": self.resonance.found, "reason": self.resonance.reason}
-        return {"verdict": self.verdict(), **numbers, **found, "band_hz": list(self.vibration.band_hz)}
+        return {
+            "verdict": self.verdict(),
+            **numbers,
+            **found,
+            "band_hz": list(self.vibration.band_hz),
+        }
 
     def verdict(self) -> str:
         """One sentence: the resonance, of which contact, and whether its spring may be taken as linear."""
         resonance, model, force = self.resonance, self.case.vibration, self.vibration.dynamic_load
         load = f"{self.case.conditions.load:g} N on asperities"
         solved = model is not None and model.needs_solution
-        contact = f"solved contact, {100 * self.state.clr:.0f} % of {load}" if solved else f"dry contact, all {load}"
+        contact = (
+            f"solved contact, {100 * self.state.clr:.0f} % of {load}"
+            if solved
+            else f"dry contact, all {load}"
+        )
         if not resonance.found:
             return f"No contact resonance ({resonance.reason.rstrip('.')}): {contact}."
         deviation = f" ± {resonance.crf_std_hz:.1f}" if math.isfinite(resonance.crf_std_hz) else ""
@@ -53,11 +62,13 @@ class VibratedCase:
         return f"{sentence}."
 
 
-def vibrate_case(case: Case, *, progress: Callable[[Iteration], None] | None = None) -> VibratedCase:
+def vibrate_case(
+    case: Case, *, progress: Callable[[Iteration], None] | None = None
+) -> VibratedCase:
     """The vibration model of a case, and the contact it is of.
 
-    That is the paper's section 2, dry and with all load on asperities of the case's Sq; or the solved contact, where
-    the case's stiffness law or excitation needs one.
+    That is the paper's section 2, dry and with all load on asperities of the case's Sq; or the
+    solved contact, where the case's stiffness law or excitation needs one.
 
     Raises
     ------
@@ -68,11 +79,15 @@ def vibrate_case(case: Case, *, progress: Callable[[Iteration], None] | None = N
     """
     model = case.vibration
     if model is None:
-        raise BadInput(f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio")
+        raise BadInput(
+            f"{case.source}: vibration is left out; add [vibration] with mass and damping_ratio"
+        )
     if model.needs_solution:
         run = solve_case(case, progress=progress)
         assert run.vibration is not None  # the case has a model
         return VibratedCase(case=case, state=run.state, vibration=run.vibration)
     state = dry_full_load(case.conditions, case.surface().sq)
     with case.naming("vibration"):
-        return VibratedCase(case=case, state=state, vibration=contact_vibration(state, case.conditions, model))
+        return VibratedCase(
+            case=case, state=state, vibration=contact_vibration(state, case.conditions, model)
+        )

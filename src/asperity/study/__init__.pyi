@@ -4,9 +4,9 @@ from .axes import group_means as group_means
 from .axes import pair_means as pair_means
 from .axes import swept_axis as swept_axis
 from .axes import varying_outputs as varying_outputs
-from .calibrated import anchor_table as anchor_table
-from .calibrated import calibrated_text as calibrated_text
 from .calibration import calibrate as calibrate
+from .calibration_files import anchor_table as anchor_table
+from .calibration_files import calibrated_text as calibrated_text
 from .calibration_result import CalibratedParameter as CalibratedParameter
 from .calibration_result import Calibration as Calibration
 from .calibration_result import ParameterDirection as ParameterDirection
@@ -18,6 +18,7 @@ from .curve import curve_of as curve_of
 from .curve import is_wear_study as is_wear_study
 from .curve import wear_curve as wear_curve
 from .evaluate import BOTH_PRESETS as BOTH_PRESETS
+from .evaluate import DONE as DONE
 from .evaluate import CaseStatus as CaseStatus
 from .evaluate import StudyField as StudyField
 from .execute import StudyCost as StudyCost
@@ -33,10 +34,6 @@ from .global_sensitivity import SQ_LEVELS as SQ_LEVELS
 from .global_sensitivity import Sensitivity as Sensitivity
 from .global_sensitivity import SensitivityOutcome as SensitivityOutcome
 from .global_sensitivity import sensitivity as sensitivity
-from .indices import SensitivityMethod as SensitivityMethod
-from .machine import machine_conditions as machine_conditions
-from .machine import solve_machine as solve_machine
-from .machine_result import MachineResult as MachineResult
 from .overview import FailureReason as FailureReason
 from .overview import StudyOverview as StudyOverview
 from .plan import SEED_KEYS as SEED_KEYS
@@ -50,8 +47,7 @@ from .ranges import ParameterRange as ParameterRange
 from .ranges import overrides_at as overrides_at
 from .ranges import require_ranges as require_ranges
 from .ranges import stated_value as stated_value
-from .rated import DangVan as DangVan
-from .rated import Rating as Rating
+from .sensitivity_indices import SensitivityMethod as SensitivityMethod
 from .summary import duration_text as duration_text
 from .summary import estimate_scalars as estimate_scalars
 from .summary import estimate_verdict as estimate_verdict

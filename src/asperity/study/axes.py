@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas
 
-from asperity.arrays import Field
 from asperity.case import split_amount
-from asperity.errors import BadInput
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
 from asperity.study.curve import student_reach
 from asperity.study.plan import StudyPlan, as_written
 from asperity.study.ranges import stated_value
@@ -92,7 +92,9 @@ def group_means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field,
     """Means over cases with one x, or over near ones, and Student's interval of each mean: x, mean, low, high."""
     group = np.unique(x, return_inverse=True)[1]
     if binned:
-        group = np.searchsorted(np.quantile(x, np.linspace(0.0, 1.0, GROUPS + 1)[1:-1]), x, side="right")
+        group = np.searchsorted(
+            np.quantile(x, np.linspace(0.0, 1.0, GROUPS + 1)[1:-1]), x, side="right"
+        )
     rows = []
     for number in np.unique(group):
         members = values[group == number]

@@ -1,8 +1,9 @@
 """The quantities of a case that best meet what is known of its wear curve: found on the real solver, with the cost.
 
-Least squares of scipy from the best of a Latin hypercube. The objective is a little rough (a moved domain or
-correlation length draws the surface anew), so slopes are taken over a tenth of each range, and what seeds alone do to
-them is taken out before anything is called determined. docs/theory/calibration.md has the equations.
+Least squares of scipy from the best of a Latin hypercube. The objective is a little rough (a moved
+domain or correlation length draws the surface anew), so slopes are taken over a tenth of each
+range, and what seeds alone do to them is taken out before anything is called determined.
+docs/theory/calibration.md has the equations.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pandas
 
-from asperity.arrays import Field
 from asperity.case import Case, split_amount
-from asperity.errors import BadInput, require_positive
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anchors
+from asperity.study.anchor_misfit import CHECK_SEEDS, EDGE, MisfitSolver, least_misfit
 from asperity.study.calibration_result import LEARNT_FROM, CalibratedParameter, Calibration
 from asperity.study.curve import SQ_KEY, WearCurve
 from asperity.study.execute import StudyProgress, study_executor
-from asperity.study.misfit import CHECK_SEEDS, EDGE, MisfitSolver, least_misfit
 from asperity.study.ranges import (
     OPEN_RANGES,
     ParameterRange,
@@ -31,7 +32,7 @@ from asperity.study.ranges import (
     require_ranges,
     stated_value,
 )
-from asperity.study.slopes import PRIOR_VARIANCE, MisfitSlopes
+from asperity.study.sensitivities import PRIOR_VARIANCE, MisfitSlopes
 
 FREE = OPEN_RANGES[:4]  # what decides CAR and CLR: cap, correlation length, alpha, inlet
 CELLS, SEEDS, SCREENED, STARTS = 128, 3, 32, 2
@@ -63,8 +64,8 @@ def calibrate(
 ) -> Calibration:
     """Find the values of free quantities with which a case's wear curve best meets anchors.
 
-    The misfit is the sum over the anchors that are `fitted` of (miss/tolerance)^2, on means over `seeds` surfaces that
-    are the same in every evaluation.
+    The misfit is the sum over the anchors that are `fitted` of (miss/tolerance)^2, on means over
+    `seeds` surfaces that are the same in every evaluation.
 
     Parameters
     ----------
@@ -89,7 +90,9 @@ def calibrate(
         if no parameter set can be solved.
     """
     given, case = case, at_cells(case, cells)
-    wanted = FREE if free is None else tuple(parse_range(r) if isinstance(r, str) else r for r in free)
+    wanted = (
+        FREE if free is None else tuple(parse_range(r) if isinstance(r, str) else r for r in free)
+    )
     ranges = open_ranges(case, wanted) if free is None else wanted
     require_ranges(case, ranges, RESERVED)
     aimed = _aimed_at(case, anchors)
@@ -98,7 +101,9 @@ def calibrate(
         if count < 1:
             raise BadInput(f"{name} must be 1 or more, got {count}")
     with nullcontext(executor) if executor is not None else study_executor(workers) as pool:
-        solver = MisfitSolver(case, ranges, aimed, sq, seeds, None if out is None else Path(out), pool, progress)
+        solver = MisfitSolver(
+            case, ranges, aimed, sq, seeds, None if out is None else Path(out), pool, progress
+        )
         best = least_misfit(solver, screened, starts, sample_seed)
         slopes = MisfitSlopes.at(solver, best, SLOPE_SEEDS * seeds)
         calibrated = _calibrated(given, ranges, best)
@@ -148,18 +153,28 @@ def _aimed_at(case: Case, anchors: Sequence[Anchor]) -> tuple[Anchor, ...]:
         raise BadInput("calibration needs an anchor to aim at, got none; leave out fitted = false")
     for anchor in aimed:
         if anchor.quantity == SPLIT_ANCHOR:
-            raise BadInput(f"anchor {anchor.name!r} is a split, which moves in jumps; set fitted = false for it")
+            raise BadInput(
+                f"anchor {anchor.name!r} is a split, which moves in jumps; set fitted = false for it"
+            )
         if case.vibration is None and anchor.quantity.startswith("crf"):
-            raise BadInput(f"{case.source}: anchor {anchor.name!r} needs a vibration; add [vibration]")
+            raise BadInput(
+                f"{case.source}: anchor {anchor.name!r} needs a vibration; add [vibration]"
+            )
     return aimed
 
 
 def _levels(aimed: Sequence[Anchor], levels: Sequence[float] | None) -> tuple[float, ...]:
     """Roughnesses to solve at [m]: those given, or the anchors', of near ones the outer."""
-    anchored = sorted({sq for anchor in aimed for sq in (anchor.sq, anchor.since) if sq is not None})
+    anchored = sorted(
+        {sq for anchor in aimed for sq in (anchor.sq, anchor.since) if sq is not None}
+    )
     if levels is not None:
         chosen = sorted({require_positive("level", level, "m") for level in levels})
-        if not chosen or chosen[0] > anchored[0] * (1 + 1e-9) or chosen[-1] < anchored[-1] * (1 - 1e-9):
+        if (
+            not chosen
+            or chosen[0] > anchored[0] * (1 + 1e-9)
+            or chosen[-1] < anchored[-1] * (1 - 1e-9)
+        ):
             raise BadInput(
                 f"levels must span the anchors' Sq from {1e6 * anchored[0]:g} to {1e6 * anchored[-1]:g} um, "
                 f"got {', '.join(f'{1e6 * level:g}' for level in chosen) or 'none'}"
@@ -178,7 +193,10 @@ def _calibrated(case: Case, ranges: Sequence[ParameterRange], best: Field) -> Ca
     overrides = overrides_at(case, ranges, best)
     overrides.pop("grid.cells", None)
     if case.contents.study is None:
-        overrides["study"] = {"sq": {"from": "0.5 um", "to": "4 um", "step": "0.1 um"}, "seeds": CHECK_SEEDS}
+        overrides["study"] = {
+            "sq": {"from": "0.5 um", "to": "4 um", "step": "0.1 um"},
+            "seeds": CHECK_SEEDS,
+        }
     return case.with_overrides(overrides)
 
 
@@ -215,4 +233,6 @@ def _start(case: Case, entry: ParameterRange) -> float | None:
 def _compared(curve: WearCurve, anchors: Sequence[Anchor]) -> pandas.DataFrame:
     """The anchors that the curve's levels can tell."""
     reached = [a for a in anchors if a.sq is not None and np.isfinite(a.of(curve)[0])]
-    return compare_with_anchors(curve, [*reached, *(a for a in anchors if a.fitted and a not in reached)])
+    return compare_with_anchors(
+        curve, [*reached, *(a for a in anchors if a.fitted and a not in reached)]
+    )

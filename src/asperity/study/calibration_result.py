@@ -7,21 +7,22 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas
 
-from asperity.arrays import Field
 from asperity.case import Case
+from asperity.core.arrays import Field
 from asperity.paper import Anchor
 from asperity.study.curve import WearCurve
 from asperity.study.ranges import ParameterRange
 
-LEARNT_FROM = 0.5  # share of a range's variance that the anchors must take away from a quantity to determine it
+# share of a range's variance that the anchors must take away from a quantity to determine it
+LEARNT_FROM = 0.5
 
 
 class CalibratedParameter(NamedTuple):
     """A quantity that was free: what was found, and how well the anchors determine it.
 
-    `low` and `high` are one standard deviation either way, the range searched counting as what was known before, and
-    the whole range where the anchors do not determine the quantity; `learnt` is how much of the range's variance they
-    took away, 0 nothing, 1 all.
+    `low` and `high` are one standard deviation either way, the range searched counting as what was
+    known before, and the whole range where the anchors do not determine the quantity; `learnt` is
+    how much of the range's variance they took away, 0 nothing, 1 all.
     """
 
     range: ParameterRange
@@ -50,8 +51,8 @@ class ParameterDirection(NamedTuple):
 class TradeOff(NamedTuple):
     """What the others would gain if one anchor were given up: by slopes, so for small steps only.
 
-    `misfit` of the others (sum of squared misses in tolerances) would go to `without`; `relieved` would gain most, its
-    miss in tolerances going from `miss` to `miss_without`.
+    `misfit` of the others (sum of squared misses in tolerances) would go to `without`; `relieved`
+    would gain most, its miss in tolerances going from `miss` to `miss_without`.
     """
 
     given_up: str
@@ -111,14 +112,21 @@ class Calibration:
     @property
     def unidentifiable(self) -> tuple[str, ...]:
         """Quantities that the anchors do not determine."""
-        return tuple(parameter.range.key for parameter in self.parameters if not parameter.identifiable)
+        return tuple(
+            parameter.range.key for parameter in self.parameters if not parameter.identifiable
+        )
 
     def verdict(self) -> str:
         """What was found, what it meets, what cannot be met together and what stays open."""
         aimed = {anchor.name for anchor in self.aimed_at}
         met = self.fit[self.fit["anchor"].isin(aimed)]
-        missed = [f"{row.anchor} ({row.ours:.4g} for {row.printed:g})" for row in met[~met["met"]].itertuples()]
-        values = ", ".join(f"{p.range.key} {p.value:.3g} {p.range.unit}".rstrip() for p in self.parameters)
+        missed = [
+            f"{row.anchor} ({row.ours:.4g} for {row.printed:g})"
+            for row in met[~met["met"]].itertuples()
+        ]
+        values = ", ".join(
+            f"{p.range.key} {p.value:.3g} {p.range.unit}".rstrip() for p in self.parameters
+        )
         sentence = f"{int(met['met'].sum())} of {len(met)} anchors are met within their tolerances with {values}"
         sentence += f"; missed: {', '.join(missed)}." if missed else "."
         if self.unidentifiable:
@@ -132,7 +140,10 @@ class Calibration:
         """What `asperity calibrate --json` prints; None where there is none."""
 
         def rows(table: pandas.DataFrame) -> list[dict[str, Any]]:
-            return [{str(key): as_json(value) for key, value in row.items()} for row in table.to_dict("records")]
+            return [
+                {str(key): as_json(value) for key, value in row.items()}
+                for row in table.to_dict("records")
+            ]
 
         names = ("start", "value", "low", "high", "std_share", "learnt", "identifiable", "at_end")
         return {
@@ -149,7 +160,9 @@ class Calibration:
             "correlation": self.correlation.tolist(),
             "directions": [
                 {
-                    "weights": dict(zip((p.range.key for p in self.parameters), d.weights, strict=True)),
+                    "weights": dict(
+                        zip((p.range.key for p in self.parameters), d.weights, strict=True)
+                    ),
                     "std": as_json(d.std),
                     "determined": d.determined,
                 }

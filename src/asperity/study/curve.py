@@ -10,13 +10,13 @@ import pandas
 import scipy
 from numpy.typing import ArrayLike
 
-from asperity.arrays import Field
 from asperity.case import Case
-from asperity.errors import BadInput, require_positive
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
 from asperity.study.plan import plan_points
-from asperity.wear import Stages, split_stages
+from asperity.trend import Stages, split_stages
 
 SQ_KEY = "surface.sq"
 MEAN_CONFIDENCE = 0.90  # of the intervals of means
@@ -49,7 +49,9 @@ class WearCurve:
             for a column that the table has not.
         """
         if quantity not in self.table:
-            raise BadInput(f"the study has no column {quantity!r}; it has {', '.join(self.table.columns)}")
+            raise BadInput(
+                f"the study has no column {quantity!r}; it has {', '.join(self.table.columns)}"
+            )
         rows = self.table[(self.table["status"] == DONE) & (self.table[SQ_KEY] == self.sq[level])]
         values = rows[quantity].to_numpy(dtype=float)
         return np.asarray(values[np.isfinite(values)])
@@ -61,11 +63,18 @@ class WearCurve:
 
     def mean(self, quantity: str) -> Field:
         """Mean over seeds, shape (levels,); nan where no seed has a value."""
-        return np.array([values.mean() if values.size else np.nan for values in self._by_level(quantity)])
+        return np.array(
+            [values.mean() if values.size else np.nan for values in self._by_level(quantity)]
+        )
 
     def std(self, quantity: str) -> Field:
         """Standard deviation over seeds, of one surface against another, shape (levels,)."""
-        return np.array([values.std(ddof=1) if values.size > 1 else np.nan for values in self._by_level(quantity)])
+        return np.array(
+            [
+                values.std(ddof=1) if values.size > 1 else np.nan
+                for values in self._by_level(quantity)
+            ]
+        )
 
     def interval(self, quantity: str, level: float = MEAN_CONFIDENCE) -> Field:
         """Student's interval of the mean over seeds, shape (levels, 2); nan with fewer than two seeds."""
@@ -73,20 +82,29 @@ class WearCurve:
         reach = student_reach(self.std(quantity), counts, level)
         return self.mean(quantity)[:, None] + np.outer(reach, (-1.0, 1.0))
 
-    def at(self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE) -> tuple[float, float, float]:
+    def at(
+        self, sq: float, quantity: str, level: float = MEAN_CONFIDENCE
+    ) -> tuple[float, float, float]:
         """Mean at any roughness [m] and its interval, straight between levels; nan outside of them."""
-        mean, reach = self.mean(quantity), np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0
+        mean, reach = (
+            self.mean(quantity),
+            np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0,
+        )
         if not self.sq[0] * (1 - 1e-9) <= sq <= self.sq[-1] * (1 + 1e-9):
             return np.nan, np.nan, np.nan
         weights = np.ones(1)
         if self.sq.size > 1:
             right = int(np.clip(np.searchsorted(self.sq, sq), 1, self.sq.size - 1))
-            share = float(np.clip((sq - self.sq[right - 1]) / (self.sq[right] - self.sq[right - 1]), 0.0, 1.0))
+            share = float(
+                np.clip((sq - self.sq[right - 1]) / (self.sq[right] - self.sq[right - 1]), 0.0, 1.0)
+            )
             weights = np.zeros(self.sq.size)
             weights[right - 1 : right + 1] = 1.0 - share, share
         used = weights > 0.0
         middle = float(weights[used] @ mean[used])
-        off = float(np.sqrt(np.sum((weights[used] * reach[used]) ** 2)))  # neighbouring levels have their own surfaces
+        off = float(
+            np.sqrt(np.sum((weights[used] * reach[used]) ** 2))
+        )  # neighbouring levels have their own surfaces
         return middle, middle - off, middle + off
 
     @cached_property
@@ -97,7 +115,9 @@ class WearCurve:
             if f"crf_{preset}_hz" in rows:
                 keys = (SQ_KEY, f"crf_{preset}_hz", f"crfa_{preset}", f"crf_std_{preset}_hz")
                 sq, crf_hz, crfa, std = (rows[key].to_numpy(dtype=float) for key in keys)
-                stages[preset] = split_stages(1e6 * sq, crf_hz, crfa, crf_std_hz=np.nan_to_num(std), unit="um")
+                stages[preset] = split_stages(
+                    1e6 * sq, crf_hz, crfa, crf_std_hz=np.nan_to_num(std), unit="um"
+                )
         return stages
 
     def summary(self) -> pandas.DataFrame:
@@ -105,13 +125,20 @@ class WearCurve:
         columns: dict[str, Field] = {"sq_um": 1e6 * self.sq}
         for name in self.quantities:
             low, high = self.interval(name).T
-            columns |= {name: self.mean(name), f"{name}_std": self.std(name), f"{name}_low": low, f"{name}_high": high}
+            columns |= {
+                name: self.mean(name),
+                f"{name}_std": self.std(name),
+                f"{name}_low": low,
+                f"{name}_high": high,
+            }
         return pandas.DataFrame(columns)
 
     @property
     def quantities(self) -> tuple[str, ...]:
         """The columns that the paper's Figs 7 and 8 show, and those of contacts that were shaken."""
-        resonances = [key for preset in BOTH_PRESETS for key in (f"crf_{preset}_hz", f"crfa_{preset}")]
+        resonances = [
+            key for preset in BOTH_PRESETS for key in (f"crf_{preset}_hz", f"crfa_{preset}")
+        ]
         own = ("contact_damping_ratio", "contact_damping_ratio_virgin", "contact_stiffness_n_m")
         wanted = ("car", "car_domain", "clr", "friction_coefficient", "h_mean_m", *resonances, *own)
         return tuple(name for name in wanted if name in self.table)
@@ -127,7 +154,11 @@ class WearCurve:
             crf = self.mean("crf_sound_hz")
             sentence += f", the contact resonance from {crf[0]:.0f} to {crf[-1]:.0f} Hz. {self.stages['sound'].verdict}"
         sentence = f"{sentence.rstrip('.')}."
-        return f"{self.left_out} CASES FAILED and are left out: {sentence}" if self.left_out else sentence
+        return (
+            f"{self.left_out} CASES FAILED and are left out: {sentence}"
+            if self.left_out
+            else sentence
+        )
 
     def _by_level(self, quantity: str) -> list[Field]:
         return [self.values(quantity, level) for level in range(self.sq.size)]

@@ -1,6 +1,7 @@
 """One case of a study to one row: solved, made to vibrate by both vibration presets, every number by its name.
 
-Runs in worker processes: takes and gives only what can be sent, raises nothing that a case can cause.
+Runs in worker processes: takes and gives only what can be sent, raises nothing that a case can
+cause.
 """
 
 import logging
@@ -12,10 +13,10 @@ from typing import Any, Literal, get_args
 
 from threadpoolctl import threadpool_limits
 
-from asperity.arrays import Field, finite_or_none
 from asperity.case import Case
+from asperity.core.arrays import Field, finite_or_none
+from asperity.core.errors import AsperityError
 from asperity.coupling import Vibration, contact_vibration
-from asperity.errors import AsperityError
 from asperity.results import RUN_GROUPS, Run, solve_case, vibrate_case
 
 CaseStatus = Literal["done", "not converged", "failed"]
@@ -23,11 +24,15 @@ StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
 DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
 BOTH_PRESETS = ("sound", "paper")
-QUICK = tuple(group for group in RUN_GROUPS if group not in ("own", "virgin"))  # they take as long as the contact
+QUICK = tuple(
+    group for group in RUN_GROUPS if group not in ("own", "virgin")
+)  # they take as long as the contact
 STILL = tuple(group for group in RUN_GROUPS if group not in ("heat", "stress", "resonance"))
 
 Row = dict[str, Any]
-_alone = threading.Lock()  # the solver's work arrays are one set a process, and an executor may have threads
+_alone = (
+    threading.Lock()
+)  # the solver's work arrays are one set a process, and an executor may have threads
 
 
 def evaluate_batch(
@@ -35,7 +40,8 @@ def evaluate_batch(
 ) -> list[tuple[Row, dict[str, Field]]]:
     """Rows, and the fields wanted, of `case` with each of the batch's overrides.
 
-    One thread does the algebra: two would sum in another order, and a resumed study is to be the same to the last bit.
+    One thread does the algebra: two would sum in another order, and a resumed study is to be the
+    same to the last bit.
     """
     with _alone, threadpool_limits(1):
         return [evaluate(case, kind, overrides, wanted) for overrides in batch]
@@ -60,7 +66,9 @@ def evaluate(
         return {"status": FAILED, "reason": f"{type(mistake).__name__}: {mistake}"}, {}
 
 
-def _solved(case: Case, wanted: tuple[str, ...], groups: Sequence[str] = QUICK) -> tuple[Row, dict[str, Field]]:
+def _solved(
+    case: Case, wanted: tuple[str, ...], groups: Sequence[str] = QUICK
+) -> tuple[Row, dict[str, Field]]:
     run = solve_case(case, strict=False)
     row: Row = {**_status(run), **run.numbers(groups)}
     if run.vibration is not None:
@@ -117,10 +125,16 @@ def _both_presets(case: Case, run: Run) -> Row:
         row[f"reason_{preset}"] = ""
         if model != case.vibration:
             try:
-                vibration = contact_vibration(run.state, case.conditions, model, solution=run.solution)
+                vibration = contact_vibration(
+                    run.state, case.conditions, model, solution=run.solution
+                )
             except AsperityError as refusal:
                 vibration, row[f"reason_{preset}"] = None, str(refusal)
-        resonance = vibration.resonance if vibration is not None and vibration.resonance.found else None
+        resonance = (
+            vibration.resonance if vibration is not None and vibration.resonance.found else None
+        )
         for name, unit in (("crf", "_hz"), ("crfa", ""), ("crf_std", "_hz"), ("crfa_std", "")):
-            row[f"{name}_{preset}{unit}"] = finite_or_none(getattr(resonance, f"{name}{unit}", None))
+            row[f"{name}_{preset}{unit}"] = finite_or_none(
+                getattr(resonance, f"{name}{unit}", None)
+            )
     return row

@@ -1,7 +1,7 @@
 """A study computed: batches of cases over processes or machines, any `concurrent.futures` executor, kept as they end.
 
-Nothing here depends on how cases are spread: each is solved from nothing, with its own seeds, so that a resumed,
-sharded or distributed study gives what an unbroken one gives.
+Nothing here depends on how cases are spread: each is solved from nothing, with its own seeds, so
+that a resumed, sharded or distributed study gives what an unbroken one gives.
 """
 
 import math
@@ -27,15 +27,23 @@ from typing import Any
 
 import pandas
 
-from asperity.arrays import Field
-from asperity.errors import AsperityError, BadInput, require_positive
-from asperity.files import versions
-from asperity.kept import MANIFEST
-from asperity.processes import cores, set_up_worker
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput, require_positive
+from asperity.core.files import versions
+from asperity.core.processes import cores, set_up_worker
+from asperity.core.storage import MANIFEST
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, timed_batch
 from asperity.study.maps import require_zarr
 from asperity.study.plan import StudyCase, StudyPlan
-from asperity.study.store import Store, in_order, manifest_of, open_kept, open_read, open_store, table_of
+from asperity.study.store import (
+    Store,
+    in_order,
+    manifest_of,
+    open_kept,
+    open_read,
+    open_store,
+    table_of,
+)
 
 BATCH_S = 2.0  # work in a batch: long beside the cost of handing it over, short enough to lose
 LARGEST_BATCH = 200
@@ -111,7 +119,9 @@ class StudyResult:
         if self.folder is None:
             raise BadInput("maps are kept in a study's folder, and this study has none; give out")
         if case_id not in self.table["case_id"].to_numpy():
-            raise BadInput(f"the study has no finished case {case_id!r}; take one of the column case_id")
+            raise BadInput(
+                f"the study has no finished case {case_id!r}; take one of the column case_id"
+            )
         return open_kept(self.folder).maps(case_id)
 
 
@@ -209,16 +219,22 @@ def dask_executor(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client
     except ModuleNotFoundError:
-        raise BadInput("a dask executor needs dask.distributed; pip install 'asperity[study]'") from None
+        raise BadInput(
+            "a dask executor needs dask.distributed; pip install 'asperity[study]'"
+        ) from None
     try:
         client: Any = Client(address, timeout=DASK_WAIT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
-        raise BadInput(f"no dask scheduler answers at {address} ({type(error).__name__}); check the address") from None
+        raise BadInput(
+            f"no dask scheduler answers at {address} ({type(error).__name__}); check the address"
+        ) from None
     with client:
         try:
             client.wait_for_workers(1, timeout=DASK_WAIT_S)
         except TimeoutError:
-            raise BadInput(f"the dask scheduler at {address} has no workers; start some with dask worker") from None
+            raise BadInput(
+                f"the dask scheduler at {address} has no workers; start some with dask worker"
+            ) from None
         yield client.get_executor(pure=False)
 
 
@@ -251,10 +267,18 @@ class _Work:
         progress: Callable[[StudyProgress], None] | None,
     ) -> None:
         known = {} if store is None else store.finished()
-        self.plan, self.store, self.fields, self.begun, self.progress = plan, store, fields, begun, progress
+        self.plan, self.store, self.fields, self.begun, self.progress = (
+            plan,
+            store,
+            fields,
+            begun,
+            progress,
+        )
         self.attempts = {case_id: attempt + 1 for case_id, (_, attempt) in known.items()}
         share = {case.id: case for case in _share(plan, shard)}
-        kept = {case_id for case_id, (status, _) in known.items() if status == DONE or not retry_failed}
+        kept = {
+            case_id for case_id, (status, _) in known.items() if status == DONE or not retry_failed
+        }
         self.waiting = deque(case for case in share.values() if case.id not in kept)
         self.total, self.kept = len(share), len(share) - len(self.waiting)
         self.done = self.failures = 0
@@ -264,15 +288,28 @@ class _Work:
 
     def batch(self, workers: int) -> list[StudyCase]:
         """The next cases to hand to one worker."""
-        if self.deaths[self.waiting[0].id]:  # a process died over it: on its own, it shows whose fault that was
+        if self.deaths[
+            self.waiting[0].id
+        ]:  # a process died over it: on its own, it shows whose fault that was
             return [self.waiting.popleft()]
-        size = 1 if self.case_s is None else math.ceil(BATCH_S / max(self.case_s, BATCH_S / LARGEST_BATCH))
-        fair = math.ceil(len(self.waiting) / (2 * workers))  # or one worker ends long after the others
-        next_ones = takewhile(lambda case: not self.deaths[case.id], islice(self.waiting, min(size, fair)))
+        size = (
+            1
+            if self.case_s is None
+            else math.ceil(BATCH_S / max(self.case_s, BATCH_S / LARGEST_BATCH))
+        )
+        fair = math.ceil(
+            len(self.waiting) / (2 * workers)
+        )  # or one worker ends long after the others
+        next_ones = takewhile(
+            lambda case: not self.deaths[case.id], islice(self.waiting, min(size, fair))
+        )
         return [self.waiting.popleft() for _ in list(next_ones)]
 
     def finish(
-        self, batch: Sequence[StudyCase], results: Sequence[tuple[Row, dict[str, Field]]], seconds: float
+        self,
+        batch: Sequence[StudyCase],
+        results: Sequence[tuple[Row, dict[str, Field]]],
+        seconds: float,
     ) -> None:
         """Keep what a worker brings back."""
         rows, fields = [], {}
@@ -300,7 +337,10 @@ class _Work:
         for case in chain(*batches):
             self.deaths[case.id] += 1
             if certain:
-                row = {"status": FAILED, "reason": "the process that computed it died: killed, or out of memory"}
+                row = {
+                    "status": FAILED,
+                    "reason": "the process that computed it died: killed, or out of memory",
+                }
                 self.finish([case], [(row, {})], 0.0)
             else:
                 self.waiting.append(case)
@@ -311,7 +351,9 @@ def _compute(work: _Work, executor: Executor | None, workers: int | None) -> Non
     if executor is not None:
         _spread(work, executor, workers or _workers_of(executor))
         if work.waiting:
-            raise AsperityError("the executor lost its workers; finished cases are kept, run the study again to go on")
+            raise AsperityError(
+                "the executor lost its workers; finished cases are kept, run the study again to go on"
+            )
         return
     count = min(workers or cores(), len(work.waiting))
     started = True
@@ -355,7 +397,9 @@ def _spread(work: _Work, executor: Executor, workers: int) -> None:
             return
 
 
-def _hand_out(work: _Work, executor: Executor, workers: int, pending: dict[Future[Any], list[StudyCase]]) -> bool:
+def _hand_out(
+    work: _Work, executor: Executor, workers: int, pending: dict[Future[Any], list[StudyCase]]
+) -> bool:
     """Keep every worker supplied; False if the executor takes nothing any more."""
     while work.waiting and len(pending) < BATCHES_AHEAD * workers:
         cases = (work.waiting[0], *chain(*pending.values()))
@@ -411,7 +455,11 @@ class StudyCost:
 
 
 def estimate_study(
-    plan: StudyPlan, *, out: str | Path | None = None, workers: int | None = None, shard: tuple[int, int] = (1, 1)
+    plan: StudyPlan,
+    *,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    shard: tuple[int, int] = (1, 1),
 ) -> StudyCost:
     """Time three cases of a study, from its beginning, middle and end; nothing is kept.
 
@@ -420,7 +468,11 @@ def estimate_study(
     BadInput
         for a folder that holds another study.
     """
-    known = open_read(Path(out), plan).finished() if out is not None and (Path(out) / MANIFEST).exists() else {}
+    known = (
+        open_read(Path(out), plan).finished()
+        if out is not None and (Path(out) / MANIFEST).exists()
+        else {}
+    )
     share = _share(plan, shard)
     if not share:
         return StudyCost(0, 0, 0.0, 0, workers or cores())

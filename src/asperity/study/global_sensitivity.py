@@ -1,7 +1,8 @@
 """Which of the quantities that are left open moves CAR, CLR, CRF and CRFA most, and where the trend's knee lies.
 
-Samples and indices are SALib's (Morris' elementary effects, Sobol's variances), contacts the real solver's. The surface
-is a factor too: a uniform variable that picks the realisation. What the ranges are is `ranges`' business.
+Samples and indices are SALib's (Morris' elementary effects, Sobol's variances), contacts the real
+solver's. The surface is a factor too: a uniform variable that picks the realisation. What the
+ranges are is `ranges`' business.
 """
 
 import math
@@ -15,14 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas
 
-from asperity.arrays import Field
 from asperity.case import Case
-from asperity.errors import AsperityError, BadInput, require_choice, require_positive
-from asperity.quantities import quantity
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput, require_choice, require_positive
+from asperity.core.quantities import quantity
 from asperity.study.calibration_result import as_json
 from asperity.study.evaluate import DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
-from asperity.study.indices import FEWEST_BLOCKS, SIZES, SampleDesign, SensitivityMethod, indices, sample_design
+from asperity.study.full_film import silent, with_silence
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 from asperity.study.ranges import (
     ParameterRange,
@@ -33,8 +34,15 @@ from asperity.study.ranges import (
     require_ranges,
     stated_value,
 )
-from asperity.study.silence import silent, with_silence
-from asperity.wear import FEWEST_PLACES, split_stages
+from asperity.study.sensitivity_indices import (
+    FEWEST_BLOCKS,
+    SIZES,
+    SampleDesign,
+    SensitivityMethod,
+    indices,
+    sample_design,
+)
+from asperity.trend import FEWEST_PLACES, split_stages
 
 SQ_LEVELS = (0.5e-6, 1e-6, 2.5e-6, 4e-6)  # where the paper's curves are read [m]
 CURVE_LEVELS = 8  # Sq from the smallest to the largest, for the knee
@@ -111,7 +119,11 @@ class Sensitivity:
     def overall(self) -> "pandas.Series[float]":
         """Mean share of each factor over the outcomes that move at all, the largest first."""
         moved = self.effects.groupby("outcome")["share"].transform("sum") > 0.0
-        shares = (self.effects[moved] if moved.any() else self.effects).groupby("factor", sort=False)["share"].mean()
+        shares = (
+            (self.effects[moved] if moved.any() else self.effects)
+            .groupby("factor", sort=False)["share"]
+            .mean()
+        )
         return shares.sort_values(ascending=False, kind="stable")
 
     def verdict(self) -> str:
@@ -120,7 +132,10 @@ class Sensitivity:
         for entry in map(quantity, ("car", "clr", "crf_hz")):
             outcomes = [outcome for outcome in self.outcomes if outcome.quantity == entry.key]
             if outcomes:
-                widest = max(outcomes, key=lambda outcome: float(np.subtract(*self.spread(outcome.name)[::-1])))
+                widest = max(
+                    outcomes,
+                    key=lambda outcome: float(np.subtract(*self.spread(outcome.name)[::-1])),
+                )
                 low, high = (entry.factor * end for end in self.spread(widest.name))
                 first = self.ranking(widest.name).iloc[0]
                 mover = f"most by {first['factor']}" if first["share"] > 0.0 else "by none of them"
@@ -139,7 +154,9 @@ class Sensitivity:
         return {
             "verdict": self.verdict(),
             "method": self.method,
-            "factors": [{name: getattr(entry, name) for name in FACTOR_KEYS} for entry in self.ranges],
+            "factors": [
+                {name: getattr(entry, name) for name in FACTOR_KEYS} for entry in self.ranges
+            ],
             "points": len(self.values),
             "cases": len(self.result.plan.cases),
             "failed": self.result.failed,
@@ -214,7 +231,11 @@ def sensitivity(
     if stated_value(case, "surface.kind") == "flat":
         raise BadInput(f"{case.source}: surface is flat and has no Sq to vary; take a rough one")
     curve = _curve_levels(sq, levels)
-    ranges = open_ranges(case) if vary is None else tuple(parse_range(r) if isinstance(r, str) else r for r in vary)
+    ranges = (
+        open_ranges(case)
+        if vary is None
+        else tuple(parse_range(r) if isinstance(r, str) else r for r in vary)
+    )
     require_ranges(case, ranges, RESERVED)
     seeded = [key for key in SEED_KEYS if stated_value(case, key) is not None]
     factors = (*(entry.key for entry in ranges), *([SEED_FACTOR] if seeded else []))
@@ -225,7 +246,8 @@ def sensitivity(
     return _analysed(study, factors, result, sq)
 
 
-# The study -----------------------------------------------------------------------------------------------------------
+# The study
+# -----------------------------------------------------------------------------------------------------------
 
 
 def _curve_levels(sq: Sequence[float], levels: int) -> tuple[float, ...]:
@@ -280,16 +302,20 @@ class _Design(NamedTuple):
     def _drawn(self, number: int, share: float, surface: int) -> dict[str, int]:
         """The realisation that a share of the seed's range stands for.
 
-        Sobol's shares are all different. Morris' are four, so each trajectory has four realisations of its own: its
-        step along the seed is a change of surface drawn anew.
+        Sobol's shares are all different. Morris' are four, so each trajectory has four
+        realisations of its own: its step along the seed is a change of surface drawn anew.
         """
         trajectory = number // self.sample.block if self.sample.method == "morris" else 0
-        words = np.random.SeedSequence([self.sample_seed, trajectory, round(share * 2**31), surface])
+        words = np.random.SeedSequence(
+            [self.sample_seed, trajectory, round(share * 2**31), surface]
+        )
         drawn = zip(SEED_KEYS, words.generate_state(len(SEED_KEYS)), strict=True)
         return {key: int(word) for key, word in drawn if key in self.seeded}
 
 
-def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq: Sequence[float]) -> Sensitivity:
+def _analysed(
+    study: _Design, factors: tuple[str, ...], result: StudyResult, sq: Sequence[float]
+) -> Sensitivity:
     design, curve = study.sample, study.curve
     shape = (len(design.shares), len(curve), study.seeds)
     curves, silent_share = _curves(result, shape)
@@ -299,7 +325,9 @@ def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq:
     whole = np.isfinite(columns).reshape(len(columns), -1, design.block).all(axis=2)
     if whole.sum(axis=1).min() < FEWEST_BLOCKS:
         first = f"; the first: {result.failures['reason'].iloc[0]}" if result.failed else ""
-        raise AsperityError(f"too many contacts failed to say what moves the curves{first}; narrow the ranges")
+        raise AsperityError(
+            f"too many contacts failed to say what moves the curves{first}; narrow the ranges"
+        )
     effects = []
     for outcome, column in zip(outcomes, columns, strict=True):
         measures = indices(design, column)
@@ -309,7 +337,12 @@ def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq:
         for i, factor in enumerate(factors):
             each = {name: float(measure[i]) for name, measure in measures.items()}
             effects.append(
-                {**about, "factor": factor, **each, "share": float(ranked[i]) / total if total > 0.0 else 0.0}
+                {
+                    **about,
+                    "factor": factor,
+                    **each,
+                    "share": float(ranked[i]) / total if total > 0.0 else 0.0,
+                }
             )
     return Sensitivity(
         case=study.case,
@@ -329,7 +362,9 @@ def _analysed(study: _Design, factors: tuple[str, ...], result: StudyResult, sq:
 def _curves(result: StudyResult, shape: tuple[int, int, int]) -> tuple[dict[str, Field], float]:
     """Quantities over (points, levels), means over surfaces, nan where one failed; the share in full film."""
     if result.failed == len(result.table):
-        raise AsperityError(f"no contact could be solved; the first: {result.failures['reason'].iloc[0]}")
+        raise AsperityError(
+            f"no contact could be solved; the first: {result.failures['reason'].iloc[0]}"
+        )
     table = result.table.set_index("number").reindex(range(math.prod(shape)))
     done = (table["status"] == DONE).to_numpy()
 
@@ -346,7 +381,9 @@ def _curves(result: StudyResult, shape: tuple[int, int, int]) -> tuple[dict[str,
     crfa = filled["crfa"].to_numpy(dtype=float)
     curves["crf_hz"] = over(filled["crf_hz"].to_numpy(dtype=float))
     if np.nanmax(crfa, initial=0.0) > 0.0:
-        curves["log10_crfa"] = over(np.log10(np.where(crfa == 0.0, np.nanmin(crfa[crfa > 0.0]), crfa)))
+        curves["log10_crfa"] = over(
+            np.log10(np.where(crfa == 0.0, np.nanmin(crfa[crfa > 0.0]), crfa))
+        )
     return curves, float(np.mean(silent(table)[done]))
 
 
@@ -367,13 +404,16 @@ def _outcomes(
 def knee(x: Field, y: Field) -> float:
     """Where the least-squares broken line through (x, y) bends, whether or not the points call for a bend; nan for nan.
 
-    `split_stages` says whether there is a stage. This is the place that it would have, for curves with one and without.
+    `split_stages` says whether there is a stage. This is the place that it would have, for curves
+    with one and without.
     """
     if not np.isfinite(y).all():
         return math.nan
     breaks = np.linspace(x[1], x[-2], 201)
     left = [
-        np.linalg.lstsq(np.stack([np.ones_like(x), x - x[0], np.maximum(x - at, 0.0)], axis=1), y, rcond=None)[1].sum()
+        np.linalg.lstsq(
+            np.stack([np.ones_like(x), x - x[0], np.maximum(x - at, 0.0)], axis=1), y, rcond=None
+        )[1].sum()
         for at in breaks
     ]
     return float(breaks[int(np.argmin(left))])

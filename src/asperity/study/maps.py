@@ -1,7 +1,7 @@
 """Maps of a study's cases: a zarr group a case, one chunk a map, for other tools too.
 
-A group carries a digest of all its maps and the case that they are of; each chunk has a checksum besides, by which
-other readers notice damage. Which cases a folder holds is left to `store`.
+A group carries a digest of all its maps and the case that they are of; each chunk has a checksum
+besides, by which other readers notice damage. Which cases a folder holds is left to `store`.
 """
 
 from collections.abc import Mapping
@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.kept import digest
-from asperity.limits import require_unpacked
-from asperity.quiet import first_line
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
+from asperity.core.limits import require_unpacked
+from asperity.core.storage import digest
+from asperity.core.third_party import first_line
 
 MAPS = "fields.zarr"
 _SEAL, _STUDY = "asperity_sha256", "asperity_study"  # attributes of a group
@@ -49,7 +49,9 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
     """The maps of a case as they were kept; UnreadableFile where there are none, or others."""
     zarr, path = require_zarr(), folder / MAPS / case_id
     if not path.is_dir():
-        raise UnreadableFile(f"{folder} keeps no maps of case {case_id}; name them with --fields when it is computed")
+        raise UnreadableFile(
+            f"{folder} keeps no maps of case {case_id}; name them with --fields when it is computed"
+        )
     try:
         group = zarr.open_group(path, mode="r", zarr_format=3)
         about, arrays = dict(group.attrs), dict(group.arrays())
@@ -60,9 +62,13 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
     except Exception as error:
         raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {REMEDY}") from error
     if about.get(_SEAL) != _sealed(study, case_id, maps):
-        raise UnreadableFile(f"{path} is damaged, or of another study: its digest is of other content; {REMEDY}")
+        raise UnreadableFile(
+            f"{path} is damaged, or of another study: its digest is of other content; {REMEDY}"
+        )
     return maps
 
 
 def _sealed(study: str, case_id: str, maps: Mapping[str, Field]) -> str:
-    return digest({"study": study, "case": case_id, "maps": {name: np.asarray(maps[name]) for name in maps}})
+    return digest(
+        {"study": study, "case": case_id, "maps": {name: np.asarray(maps[name]) for name in maps}}
+    )

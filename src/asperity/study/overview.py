@@ -9,10 +9,17 @@ import numpy as np
 import pandas
 from threadpoolctl import threadpool_limits
 
-from asperity.errors import AsperityError, BadInput
-from asperity.kept import version_notes
-from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anchors, is_papers_contact, rig_prediction
-from asperity.quantities import quantity
+from asperity.core.errors import AsperityError, BadInput
+from asperity.core.quantities import quantity
+from asperity.core.storage import version_notes
+from asperity.paper import (
+    PAPER_ANCHORS,
+    SPLIT_ANCHOR,
+    Anchor,
+    compare_with_anchors,
+    is_papers_contact,
+    rig_prediction,
+)
 from asperity.results import Run, solve_case
 from asperity.study.axes import SweptAxis, swept_axis, varying_outputs
 from asperity.study.curve import SQ_KEY, WearCurve, curve_of, is_wear_study
@@ -52,7 +59,9 @@ class StudyOverview:
     def __post_init__(self) -> None:
         if not len(self.result.table):
             planned = len(self.result.plan.cases)
-            raise BadInput(f"the study has no computed case yet, of {planned}; run it with asperity study")
+            raise BadInput(
+                f"the study has no computed case yet, of {planned}; run it with asperity study"
+            )
 
     @cached_property
     def used(self) -> pandas.DataFrame:
@@ -68,14 +77,22 @@ class StudyOverview:
     @property
     def papers(self) -> bool:
         """Whether the paper's printed numbers stand beside the study's."""
-        return self.stated_anchors is None and self.curve is not None and is_papers_contact(self.result.plan.case)
+        return (
+            self.stated_anchors is None
+            and self.curve is not None
+            and is_papers_contact(self.result.plan.case)
+        )
 
     @cached_property
     def anchors(self) -> tuple[Anchor, ...]:
         """What the curve should meet."""
         if self.stated_anchors is not None:
             return tuple(self.stated_anchors)
-        known = {SPLIT_ANCHOR, *self.used} if self.curve is not None and self.curve.stages else set(self.used)
+        known = (
+            {SPLIT_ANCHOR, *self.used}
+            if self.curve is not None and self.curve.stages
+            else set(self.used)
+        )
         return tuple(anchor for anchor in PAPER_ANCHORS if self.papers and anchor.quantity in known)
 
     @cached_property
@@ -101,9 +118,14 @@ class StudyOverview:
                 entry = quantity(key)
                 values = self.used[key] * entry.factor
                 sentence += f"; {entry.symbol} from {values.min():.4g} to {values.max():.4g} {entry.display}"
-        return f"{failed} OF {total} CASES FAILED and are left out: {sentence}." if failed else f"{sentence}."
+        return (
+            f"{failed} OF {total} CASES FAILED and are left out: {sentence}."
+            if failed
+            else f"{sentence}."
+        )
 
-    # Maps ------------------------------------------------------------------------------------------------------------
+    # Maps
+    # ------------------------------------------------------------------------------------------------------------
 
     @cached_property
     def mapped(self) -> list[int]:
@@ -112,7 +134,9 @@ class StudyOverview:
             return []
         wanted = np.linspace(self.curve.sq[0], self.curve.sq[-1], MOST_MAPS)
         levels = {float(self.curve.sq[np.argmin(np.abs(self.curve.sq - sq))]) for sq in wanted}
-        firsts = self.used[self.used[SQ_KEY].isin(levels)].groupby(SQ_KEY, sort=True)["number"].first()
+        firsts = (
+            self.used[self.used[SQ_KEY].isin(levels)].groupby(SQ_KEY, sort=True)["number"].first()
+        )
         return [int(number) for number in firsts]
 
     @cached_property
@@ -123,14 +147,19 @@ class StudyOverview:
             if self.progress is not None:
                 self.progress(f"map {place} of {len(self.mapped)}")
             try:
-                case = self.result.plan.case.with_overrides(self.result.plan.cases[number].overrides)
-                with threadpool_limits(1):  # as in the study, so that it is the same to the last bit
+                case = self.result.plan.case.with_overrides(
+                    self.result.plan.cases[number].overrides
+                )
+                with threadpool_limits(
+                    1
+                ):  # as in the study, so that it is the same to the last bit
                     runs.append(solve_case(case, strict=False))
             except AsperityError as refusal:
                 return f"No maps of surface and contact: {refusal}."
         return runs
 
-    # What to read before the numbers ---------------------------------------------------------------------------------
+    # What to read before the numbers
+    # ---------------------------------------------------------------------------------
 
     @cached_property
     def notes(self) -> list[str]:
@@ -140,14 +169,18 @@ class StudyOverview:
             share = f"{self.result.missing} of {len(self.result.plan.cases)} cases"
             notes.append(f"{share} have not been computed yet: run the study again.")
         if self.result.plan.realisations == 1:
-            notes.append("One surface a point: other seeds give other numbers, and there is no interval of them.")
+            notes.append(
+                "One surface a point: other seeds give other numbers, and there is no interval of them."
+            )
         notes += [self.runs] if isinstance(self.runs, str) else self._changed_maps(self.runs)
         columns = {name: f"crf_{name}_hz" for name in BOTH_PRESETS if f"crf_{name}_hz" in self.used}
         silent = {name: self.used[column].isna().sum() for name, column in columns.items()}
         if self.curve is not None and not silent:
             notes.append("The case has no [vibration]: there is no contact resonance to show.")
         if any(silent.values()):
-            counts = ", ".join(f"{count} with the vibration preset {name}" for name, count in silent.items())
+            counts = ", ".join(
+                f"{count} with the vibration preset {name}" for name, count in silent.items()
+            )
             notes.append(
                 f"No contact resonance was found in some of the {len(self.used)} cases ({counts}); means of CRF and "
                 "CRFA leave them out."
@@ -171,24 +204,35 @@ class StudyOverview:
         reasons = []
         for (status, text), rows in self.result.failures.groupby(["status", "reason"], sort=False):
             points = rows["point"].value_counts(sort=False)
-            names = [self._point_in_words(int(str(point)), count) for point, count in points.head(MOST_NAMED).items()]
-            more = f"; and {len(points) - len(names)} more points" if len(points) > len(names) else ""
+            names = [
+                self._point_in_words(int(str(point)), count)
+                for point, count in points.head(MOST_NAMED).items()
+            ]
+            more = (
+                f"; and {len(points) - len(names)} more points" if len(points) > len(names) else ""
+            )
             reasons.append(FailureReason(f"{status}: {text}", len(rows), "; ".join(names) + more))
         reasons.sort(key=lambda reason: -reason.number)
         rest = reasons[MOST_REASONS:]
         if rest:
             number = sum(reason.number for reason in rest)
-            return [*reasons[:MOST_REASONS], FailureReason(f"{len(rest)} other reasons", number, "in failures.csv")]
+            return [
+                *reasons[:MOST_REASONS],
+                FailureReason(f"{len(rest)} other reasons", number, "in failures.csv"),
+            ]
         return reasons
 
     def _point_in_words(self, point: int, cases: int) -> str:
         """The swept values of a point, and how many of its surfaces are meant where it has several."""
         values = self.result.plan.points[point]
-        words = ", ".join(f"{key} {as_written(value)}" for key, value in values.items()) or "its case"
+        words = (
+            ", ".join(f"{key} {as_written(value)}" for key, value in values.items()) or "its case"
+        )
         several = self.result.plan.realisations
         return words if several == 1 else f"{words} ({cases} of {several} surfaces)"
 
-    # Tables ----------------------------------------------------------------------------------------------------------
+    # Tables
+    # ----------------------------------------------------------------------------------------------------------
 
     @cached_property
     def tables(self) -> dict[str, pandas.DataFrame]:
@@ -200,7 +244,10 @@ class StudyOverview:
         if self.anchors:
             tables["anchors"] = compare_with_anchors(self.curve, self.anchors)
         if self.papers:
-            tables |= {f"rig-{preset}": rig_prediction(self.curve, f"crf_{preset}_hz") for preset in self.curve.stages}
+            tables |= {
+                f"rig-{preset}": rig_prediction(self.curve, f"crf_{preset}_hz")
+                for preset in self.curve.stages
+            }
         return tables
 
     def _points(self) -> pandas.DataFrame:

@@ -1,6 +1,7 @@
 """Which cases a study consists of: points from lists, ranges, products or a Latin hypercube; seeds; ids.
 
-A case's id is the hash of everything that decides its result, so that the same case is the same file anywhere.
+A case's id is the hash of everything that decides its result, so that the same case is the same
+file anywhere.
 """
 
 import hashlib
@@ -18,7 +19,7 @@ import numpy as np
 import scipy
 
 from asperity.case import Case, RangeSection, Section, Seeding, StudyKind, split_amount, to_si
-from asperity.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile
 
 PlanKind: TypeAlias = StudyKind | Literal["surfaces", "still"]
 SEED_KEYS = ("surface.seed", "vibration.seed")
@@ -82,7 +83,9 @@ class StudyPlan:
 
     @cached_property
     def _fixed(self) -> dict[str, Any]:
-        stated = ((k, v) for k, v in _entries(self.case.contents) if k != "infer")  # it changes no contact
+        stated = (
+            (k, v) for k, v in _entries(self.case.contents) if k != "infer"
+        )  # it changes no contact
         values = {key: to_si(value) for key, value in stated if not isinstance(value, Section)}
         return {"kind": self.kind, "surface file": self.surface_digest, **values}
 
@@ -102,19 +105,31 @@ class StudyPlan:
         for place, point in enumerate(self.points):
             plain = {key: to_si(value) for key, value in point.items()}
             shaped = self.case if SHAPING.isdisjoint(point) else self.case.with_overrides(point)
-            seeded = [key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)]
+            seeded = [
+                key for key in SEED_KEYS if _has_seed(shaped, key) and not _states(point, key)
+            ]
             shared: dict[str, Any] = {}
             if self.ids is None:
                 file = self.surface_digest if shaped is self.case else _surface_digest(shaped)
                 shared = {**self._fixed, **plain, "surface file": file}
-            words = [] if self.seeding == "common" else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
+            words = (
+                []
+                if self.seeding == "common"
+                else [int(_hash(plain)[i : i + 8], 16) for i in (0, 8)]
+            )
             for realisation in range(self.realisations):
                 if self.seeds is None:
                     drawn = np.random.SeedSequence([base, realisation, *words]).generate_state(2)
                 else:
                     own = self.seeds[realisation]
-                    drawn = np.array([own, np.random.SeedSequence([own, *words]).generate_state(1)[0]])
-                chosen = {key: int(seed) for key, seed in zip(SEED_KEYS, drawn, strict=True) if key in seeded}
+                    drawn = np.array(
+                        [own, np.random.SeedSequence([own, *words]).generate_state(1)[0]]
+                    )
+                chosen = {
+                    key: int(seed)
+                    for key, seed in zip(SEED_KEYS, drawn, strict=True)
+                    if key in seeded
+                }
                 name = _hash({**shared, **chosen})[:16] if self.ids is None else self.ids[number]
                 yield StudyCase(number, place, realisation, {**point, **chosen}, name)
                 number += 1
@@ -138,12 +153,17 @@ def plan_study(case: Case) -> StudyPlan:
         raise BadInput(f"{case.source}: study varies nothing; add a swept quantity or seeds")
     keys = {full_key(case, name): (name, values) for name, values in section.axes.items()}
     if len(keys) < len(section.axes):
-        raise BadInput(f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}")
+        raise BadInput(
+            f"{case.source}: study sweeps one quantity twice; the keys are {', '.join(section.axes)}"
+        )
     for key, part in permutations(keys, 2):
         if part.startswith(f"{key}."):
-            raise BadInput(f"{case.source}: study sweeps {key} and {part}, a part of it; write {part} in its tables")
+            raise BadInput(
+                f"{case.source}: study sweeps {key} and {part}, a part of it; write {part} in its tables"
+            )
     count = math.prod(
-        len(values) if isinstance(values, tuple) else _range_size(case, name, values) for name, values in keys.values()
+        len(values) if isinstance(values, tuple) else _range_size(case, name, values)
+        for name, values in keys.values()
     )
     seeds = section.seeds
     cases = (section.samples or count) * (seeds if isinstance(seeds, int) else len(seeds))
@@ -151,12 +171,16 @@ def plan_study(case: Case) -> StudyPlan:
         remedy = "widen its steps, or take samples"
         raise BadInput(f"{case.source}: study has {cases} cases, more than {MOST_CASES}; {remedy}")
     if section.samples is None:
-        swept = (v if isinstance(v, tuple) else tuple(_range(case, name, v)) for name, v in keys.values())
+        swept = (
+            v if isinstance(v, tuple) else tuple(_range(case, name, v)) for name, v in keys.values()
+        )
         points = [dict(zip(keys, combined, strict=True)) for combined in product(*swept)]
     else:
         points = _sampled(case, keys, section.samples, section.sample_seed)
     _require_distinct(case, points)
-    return plan_points(case, points, axes=tuple(keys), seeds=seeds, kind=section.kind, seeding=section.seeding)
+    return plan_points(
+        case, points, axes=tuple(keys), seeds=seeds, kind=section.kind, seeding=section.seeding
+    )
 
 
 def plan_points(
@@ -228,11 +252,17 @@ def full_key(case: Case, name: str, section: str = "study") -> str:
     BadInput
         for a name that no key of the case has, or several.
     """
-    entries = [(k, v) for k, v in _entries(case.contents) if k.partition(".")[0] not in ("study", "infer", FOR_RUNS)]
+    entries = [
+        (k, v)
+        for k, v in _entries(case.contents)
+        if k.partition(".")[0] not in ("study", "infer", FOR_RUNS)
+    ]
     tables = [key for key, value in entries if isinstance(value, Section)]
     keys = [key for key, value in entries if not isinstance(value, Section)]
     if name.partition(".")[0] == FOR_RUNS:
-        raise BadInput(f"{case.source}: {section}.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run")
+        raise BadInput(
+            f"{case.source}: {section}.{name} changes nothing in a study; [{FOR_RUNS}] is for asperity run"
+        )
     if name in (*keys, *tables):
         return name
     meant = [key for key in keys if key.rpartition(".")[2] == name]
@@ -240,7 +270,9 @@ def full_key(case: Case, name: str, section: str = "study") -> str:
     if len(meant) == 1:
         return meant[0]
     if meant:
-        raise BadInput(f"{case.source}: {section}.{name} could mean {' or '.join(meant)}; write one of them")
+        raise BadInput(
+            f"{case.source}: {section}.{name} could mean {' or '.join(meant)}; write one of them"
+        )
     near = get_close_matches(name, [*tables, *keys, *(key.rpartition(".")[2] for key in keys)], n=1)
     remedy = f"did you mean {near[0]}?" if near else "name one such as surface.sq or contact.load"
     raise BadInput(f"{case.source}: {section}.{name} is not a key of the case; {remedy}")
@@ -262,7 +294,8 @@ def as_written(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
 
 
-# Ranges --------------------------------------------------------------------------------------------------------------
+# Ranges
+# --------------------------------------------------------------------------------------------------------------
 
 
 class _Span(NamedTuple):
@@ -286,19 +319,27 @@ def _span(case: Case, name: str, section: RangeSection) -> _Span:
     except BadInput as error:
         raise BadInput(f"{case.source}: study.{name} {error}") from None
     if high < low:
-        raise BadInput(f"{case.source}: study.{name} must go upwards, got from {section.start} to {section.to}")
+        raise BadInput(
+            f"{case.source}: study.{name} must go upwards, got from {section.start} to {section.to}"
+        )
     if section.scale == "log" and low <= 0:
-        raise BadInput(f"{case.source}: study.{name} must be positive on a log scale, got from {section.start}")
+        raise BadInput(
+            f"{case.source}: study.{name} must be positive on a log scale, got from {section.start}"
+        )
     return _Span(low, high, unit)
 
 
 def _step(case: Case, name: str, section: RangeSection, span: _Span) -> Decimal:
     if (section.step is None) == (section.count is None):
-        raise BadInput(f"{case.source}: study.{name} needs either step or count; or give study.samples")
+        raise BadInput(
+            f"{case.source}: study.{name} needs either step or count; or give study.samples"
+        )
     if section.count is not None:
         return Decimal(0)
     if section.scale == "log":
-        raise BadInput(f"{case.source}: study.{name} has a step, which a log scale has not; give count")
+        raise BadInput(
+            f"{case.source}: study.{name} has a step, which a log scale has not; give count"
+        )
     try:
         step = split_amount(section.step, span.unit)[0]
     except BadInput as error:
@@ -335,11 +376,15 @@ def _between(span: _Span, share: float, scale: str) -> Decimal:
     return Decimal(f"{value:.{DIGITS}g}")
 
 
-def _sampled(case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int) -> list[dict[str, Any]]:
+def _sampled(
+    case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, sample_seed: int
+) -> list[dict[str, Any]]:
     """Points of a Latin hypercube: over ranges evenly, over lists entry by entry."""
     shares = scipy.stats.qmc.LatinHypercube(len(keys), rng=sample_seed).random(samples)
     points: list[dict[str, Any]] = [{} for _ in range(samples)]
-    for column, (key, (name, values)) in enumerate(sorted(keys.items())):  # a restated case has another order
+    for column, (key, (name, values)) in enumerate(
+        sorted(keys.items())
+    ):  # a restated case has another order
         for point, share in zip(points, shares[:, column], strict=True):
             if isinstance(values, tuple):
                 point[key] = values[int(share * len(values))]
@@ -349,7 +394,8 @@ def _sampled(case: Case, keys: Mapping[str, tuple[str, Any]], samples: int, samp
     return points
 
 
-# Identity ------------------------------------------------------------------------------------------------------------
+# Identity
+# ------------------------------------------------------------------------------------------------------------
 
 
 def _has_seed(case: Case, key: str) -> bool:
@@ -375,7 +421,9 @@ def _surface_digest(case: Case) -> str | None:
         try:
             digest.update(file.read_bytes())
         except OSError as error:
-            raise UnreadableFile(f"{file} cannot be read: {error.strerror}; check surface.file") from None
+            raise UnreadableFile(
+                f"{file} cannot be read: {error.strerror}; check surface.file"
+            ) from None
     return digest.hexdigest() if any(files) else None
 
 

@@ -1,7 +1,7 @@
 """A quantity of a case that may lie anywhere in a range: how it is written, and what a share of the way is.
 
-`sensitivity` and `calibration` both ask what a case does as several of its quantities move. `OPEN_RANGES` are those
-that the paper leaves open, each with the reason for its ends.
+`sensitivity` and `calibration` both ask what a case does as several of its quantities move.
+`OPEN_RANGES` are those that the paper leaves open, each with the reason for its ends.
 """
 
 import math
@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from asperity.case import Case, split_amount
-from asperity.errors import BadInput
+from asperity.core.errors import BadInput
 
-LOG_FROM = 2.0  # a range whose ends are positive and differ by more than this factor is gone through in its logarithm
+# a range whose ends are positive and differ by more than this factor is gone through in its
+# logarithm
+LOG_FROM = 2.0
 DIGITS = 4  # of a value in a range: no curve tells more
 FEWEST_CELLS = 8
 LENGTH_KEY = "surface.correlation_length"
@@ -41,7 +43,9 @@ class ParameterRange:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            raise BadInput(f"{self.key} must have a range that goes upwards, got {self.low:g} to {self.high:g}")
+            raise BadInput(
+                f"{self.key} must have a range that goes upwards, got {self.low:g} to {self.high:g}"
+            )
 
     @property
     def log(self) -> bool:
@@ -73,18 +77,46 @@ class ParameterRange:
 
 OPEN_RANGES = (
     ParameterRange(
-        "material.hardness", 0.5, 5.0, "GPa", "from just above Hertz's mean pressure to quenched 45 steel (50 HRC)"
+        "material.hardness",
+        0.5,
+        5.0,
+        "GPa",
+        "from just above Hertz's mean pressure to quenched 45 steel (50 HRC)",
     ),
-    ParameterRange(LENGTH_KEY, 10.0, 85.0, "um", "from four cells of the coarser grid to nearly half the domain"),
     ParameterRange(
-        "lubricant.viscosity.alpha", 12.0, 26.0, "1/GPa", "mineral oils, warm paraffinic to cool naphthenic"
+        LENGTH_KEY,
+        10.0,
+        85.0,
+        "um",
+        "from four cells of the coarser grid to nearly half the domain",
     ),
-    ParameterRange("grid.x[0]", -4.5, -1.9, "", "from an inlet that feeds the film to the printed one"),
-    ParameterRange("solver.contact_film", 1.0, 20.0, "nm", "from a few molecules of oil to a boundary film"),
     ParameterRange(
-        "vibration.cutoff_exponent", 0.0, 0.5, "", "from a cut-off that ignores CAR to one that goes with its root"
+        "lubricant.viscosity.alpha",
+        12.0,
+        26.0,
+        "1/GPa",
+        "mineral oils, warm paraffinic to cool naphthenic",
     ),
-    ParameterRange("vibration.cutoff_reference", 20.0, 40.0, "Hz", "the neighbours of 30 Hz in the paper's Table 1"),
+    ParameterRange(
+        "grid.x[0]", -4.5, -1.9, "", "from an inlet that feeds the film to the printed one"
+    ),
+    ParameterRange(
+        "solver.contact_film", 1.0, 20.0, "nm", "from a few molecules of oil to a boundary film"
+    ),
+    ParameterRange(
+        "vibration.cutoff_exponent",
+        0.0,
+        0.5,
+        "",
+        "from a cut-off that ignores CAR to one that goes with its root",
+    ),
+    ParameterRange(
+        "vibration.cutoff_reference",
+        20.0,
+        40.0,
+        "Hz",
+        "the neighbours of 30 Hz in the paper's Table 1",
+    ),
 )
 
 
@@ -96,7 +128,9 @@ def parse_range(text: str) -> ParameterRange:
     key, equals, ends = (part.strip() for part in text.partition("="))
     low, dots, high = (part.strip() for part in ends.partition(".."))
     if not (key and equals and low and dots and high):
-        raise BadInput(f"a range is KEY=LOW..HIGH such as 'material.hardness=0.65 GPa..3 GPa', got {text!r}")
+        raise BadInput(
+            f"a range is KEY=LOW..HIGH such as 'material.hardness=0.65 GPa..3 GPa', got {text!r}"
+        )
     try:
         first, unit = split_amount(_number_or_text(low))
         last = split_amount(_number_or_text(high), unit)[0]
@@ -112,11 +146,19 @@ def _number_or_text(text: str) -> object:
         return text
 
 
-def open_ranges(case: Case, wanted: Sequence[ParameterRange] = OPEN_RANGES) -> tuple[ParameterRange, ...]:
+def open_ranges(
+    case: Case, wanted: Sequence[ParameterRange] = OPEN_RANGES
+) -> tuple[ParameterRange, ...]:
     """Those of `wanted` that the case has a key for; lengths of roughness kept to what its grid can carry."""
     ranges = [entry for entry in wanted if _has(case, entry.key)]
-    ranges = [entry for entry in ranges if entry_of(entry.key)[1] is None or stated_value(case, entry.key) is not None]
-    return tuple(_carried(case, entry, ranges) if entry.key == LENGTH_KEY else entry for entry in ranges)
+    ranges = [
+        entry
+        for entry in ranges
+        if entry_of(entry.key)[1] is None or stated_value(case, entry.key) is not None
+    ]
+    return tuple(
+        _carried(case, entry, ranges) if entry.key == LENGTH_KEY else entry for entry in ranges
+    )
 
 
 def _has(case: Case, key: str) -> bool:
@@ -128,22 +170,34 @@ def _has(case: Case, key: str) -> bool:
     return True
 
 
-def _carried(case: Case, lengths: ParameterRange, others: Sequence[ParameterRange]) -> ParameterRange:
+def _carried(
+    case: Case, lengths: ParameterRange, others: Sequence[ParameterRange]
+) -> ParameterRange:
     """Two cells at least and half the domain at most, on every grid in the ranges."""
-    inlets = [entry.value(share) for entry in others if entry.key == "grid.x[0]" for share in (0.0, 1.0)]
+    inlets = [
+        entry.value(share) for entry in others if entry.key == "grid.x[0]" for share in (0.0, 1.0)
+    ]
     grid = case.grid
     a, upper = case.conditions.hertz.half_widths[0], grid.upper[0]
     along = [upper - inlet * a for inlet in inlets] or [grid.extent[0]]
-    fewest = grid.cells[0] * min(along) / max(along)  # cells go along, to a whole even number: one may be missing
+    fewest = (
+        grid.cells[0] * min(along) / max(along)
+    )  # cells go along, to a whole even number: one may be missing
     widened = fewest / (fewest - 1.0) if inlets else 1.0
-    coarsest = 1e6 * max(widened * max(along) / grid.cells[0], grid.spacing[1])  # um, as the length's range
+    coarsest = 1e6 * max(
+        widened * max(along) / grid.cells[0], grid.spacing[1]
+    )  # um, as the length's range
     shortest = 1e6 * min(*along, grid.extent[1])
     low, high = max(lengths.low, 2.0 * coarsest), min(lengths.high, 0.49 * shortest)
     if low >= high:
-        reason = f"the grid carries no correlation length from {lengths.low:g} to {lengths.high:g} um"
+        reason = (
+            f"the grid carries no correlation length from {lengths.low:g} to {lengths.high:g} um"
+        )
         raise BadInput(f"{case.source}: {reason}; use more cells or a larger domain")
     step = 10.0 ** (math.floor(math.log10(low)) - 2)  # three digits, which the grid still carries
-    return replace(lengths, low=float(f"{math.ceil(low / step) * step:.6g}"), high=float(f"{_down(high):.6g}"))
+    return replace(
+        lengths, low=float(f"{math.ceil(low / step) * step:.6g}"), high=float(f"{_down(high):.6g}")
+    )
 
 
 def _down(value: float) -> float:
@@ -168,11 +222,13 @@ def stated_value(case: Case, key: str) -> Any:
     return value[place] if isinstance(value, list) and place < len(value) else None
 
 
-def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Iterable[float]) -> dict[str, Any]:
+def overrides_at(
+    case: Case, ranges: Sequence[ParameterRange], shares: Iterable[float]
+) -> dict[str, Any]:
     """The case's overrides at a share of the way through each range.
 
-    Where the domain is moved along x or y, its cells go with it, so that their size stays that of the case's cells on
-    the widest domain in the ranges.
+    Where the domain is moved along x or y, its cells go with it, so that their size stays that of
+    the case's cells on the widest domain in the ranges.
     """
     overrides: dict[str, Any] = {}
     for entry, share in zip(ranges, map(float, shares), strict=True):
@@ -181,12 +237,16 @@ def overrides_at(case: Case, ranges: Sequence[ParameterRange], shares: Iterable[
             overrides[key] = entry.written(share)
         else:
             whole = overrides.get(key, stated_value(case, key))
-            overrides[key] = [entry.written(share) if i == place else value for i, value in enumerate(whole)]
+            overrides[key] = [
+                entry.written(share) if i == place else value for i, value in enumerate(whole)
+            ]
     cells = list(case.grid.cells)
     for axis, key in enumerate(("grid.x", "grid.y")):
         if key in overrides and cells[axis] > 1:
             reach = overrides[key][1] - overrides[key][0]
-            cells[axis] = max(2 * round(cells[axis] * reach / _widest(case, ranges, key) / 2), FEWEST_CELLS)
+            cells[axis] = max(
+                2 * round(cells[axis] * reach / _widest(case, ranges, key) / 2), FEWEST_CELLS
+            )
     if tuple(cells) != case.grid.cells:
         overrides["grid.cells"] = cells
     return overrides
@@ -201,10 +261,14 @@ def _widest(case: Case, ranges: Sequence[ParameterRange], key: str) -> float:
     return high - low
 
 
-def require_ranges(case: Case, ranges: Sequence[ParameterRange], reserved: Mapping[str, str]) -> None:
+def require_ranges(
+    case: Case, ranges: Sequence[ParameterRange], reserved: Mapping[str, str]
+) -> None:
     """Refuse ranges named twice, of a `reserved` key (the value says why) or that the case would refuse, and none."""
     if not ranges:
-        raise BadInput(f"{case.source}: nothing is varied; name a range such as 'material.hardness=0.65 GPa..3 GPa'")
+        raise BadInput(
+            f"{case.source}: nothing is varied; name a range such as 'material.hardness=0.65 GPa..3 GPa'"
+        )
     keys = [entry.key for entry in ranges]
     for key in keys:
         if key in reserved:
@@ -212,7 +276,9 @@ def require_ranges(case: Case, ranges: Sequence[ParameterRange], reserved: Mappi
         if keys.count(key) > 1:
             raise BadInput(f"{key} is varied twice; name it once")
         if entry_of(key)[1] is not None and stated_value(case, key) is None:
-            raise BadInput(f"{case.source}: {key} is no entry of the case; name one such as grid.x[0]")
+            raise BadInput(
+                f"{case.source}: {key} is no entry of the case; name one such as grid.x[0]"
+            )
     for number in range(len(ranges)):
         for end in (0.0, 1.0):
             shares = [end if place == number else 0.5 for place in range(len(ranges))]
@@ -225,4 +291,6 @@ def at_cells(case: Case, cells: int | None) -> Case:
         return case
     if cells < FEWEST_CELLS:
         raise BadInput(f"cells must be {FEWEST_CELLS} or more, got {cells}; 128 is the default")
-    return case.with_overrides({"grid.cells": [cells if count > 1 else 1 for count in case.grid.cells]})
+    return case.with_overrides(
+        {"grid.cells": [cells if count > 1 else 1 for count in case.grid.cells]}
+    )

@@ -1,7 +1,8 @@
 """What a study leaves on disk, and how it comes back: manifest first, then a part a finished batch, each written whole.
 
-A part is a small parquet table under a temporary name, flushed and renamed, so that a crash at any moment leaves only
-whole ones; what the manifest promises and no part holds is still to be computed.
+A part is a small parquet table under a temporary name, flushed and renamed, so that a crash at any
+moment leaves only whole ones; what the manifest promises and no part holds is still to be
+computed.
 """
 
 import hashlib
@@ -18,11 +19,18 @@ import filelock
 import pandas
 import pyarrow
 
-from asperity.arrays import Field
 from asperity.case import load_case, relative_path, to_si
-from asperity.errors import AsperityError, BadInput, UnreadableFile
-from asperity.files import make_folder, require_writable, versions, write_bytes
-from asperity.kept import MANIFEST, read_manifest, read_table, require_same_version, write_json, write_table
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
+from asperity.core.files import make_folder, require_writable, versions, write_bytes
+from asperity.core.storage import (
+    MANIFEST,
+    read_manifest,
+    read_table,
+    require_same_version,
+    write_json,
+    write_table,
+)
 from asperity.study.evaluate import Row
 from asperity.study.maps import read_maps, write_maps
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
@@ -56,7 +64,9 @@ class Store:
         for case_id, fields in maps.items():
             if fields:
                 write_maps(self.folder, self.design, case_id, fields)
-        names = hashlib.sha256("".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()).hexdigest()
+        names = hashlib.sha256(
+            "".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()
+        ).hexdigest()
         self._write(self.folder / PARTS / f"{names[:20]}.parquet", table_of(rows))
 
     def maps(self, case_id: str) -> dict[str, Field]:
@@ -98,22 +108,26 @@ class Store:
         try:
             write_table(path, table, self.design)
         except AsperityError as refused:
-            raise type(refused)(f"{refused}; finished cases are kept, make room and run the study again") from refused
+            raise type(refused)(
+                f"{refused}; finished cases are kept, make room and run the study again"
+            ) from refused
 
 
 @contextmanager
 def open_store(folder: Path, plan: StudyPlan, shard: tuple[int, int]) -> Iterator[Store]:
     """A study's folder, made or found, with its manifest written, held against a second process that computes there.
 
-    `BadInput` for a folder that cannot be written to, that holds another study, or that another process is working in;
-    `AsperityError` if the system refuses to write, as on a full disk.
+    `BadInput` for a folder that cannot be written to, that holds another study, or that another
+    process is working in; `AsperityError` if the system refuses to write, as on a full disk.
     """
     make_folder(folder)
     manifest = folder / MANIFEST
     if manifest.exists():
         _require_same(plan, folder)
     elif any((folder / PARTS).glob("*.parquet")):
-        raise BadInput(f"{folder} holds parts of a study without its manifest; choose another folder")
+        raise BadInput(
+            f"{folder} holds parts of a study without its manifest; choose another folder"
+        )
     make_folder(folder / PARTS)
     require_writable(manifest)
     with ExitStack() as held:
@@ -142,7 +156,9 @@ def _hold(folder: Path, shard: tuple[int, int], held: ExitStack) -> None:
             with filelock.FileLock(whole, timeout=1):
                 held.enter_context(filelock.FileLock(own, timeout=0))
     except filelock.Timeout:
-        raise BadInput(f"another process computes this study in {folder}; wait for it, or stop it") from None
+        raise BadInput(
+            f"another process computes this study in {folder}; wait for it, or stop it"
+        ) from None
     except OSError as error:
         raise BadInput(f"cannot write into {folder}: {error.strerror}; choose another") from None
 
@@ -166,10 +182,14 @@ def open_kept(folder: Path) -> Store:
             raise KeyError("ids")
         with suppress(UnreadableFile):  # the measured surface need not be at hand
             if plan.design == manifest["design"] and ids != tuple(case.id for case in plan.cases):
-                raise KeyError("ids")  # another design is that of an asperity whose case file had other keys
+                raise KeyError(
+                    "ids"
+                )  # another design is that of an asperity whose case file had other keys
         return Store(folder, replace(plan, ids=ids), manifest["design"])
     except KeyError:
-        raise UnreadableFile(f"{folder / MANIFEST} is damaged; compute the study into another folder") from None
+        raise UnreadableFile(
+            f"{folder / MANIFEST} is damaged; compute the study into another folder"
+        ) from None
 
 
 def manifest_of(folder: Path) -> dict[str, Any]:
@@ -201,7 +221,8 @@ def _require_same(plan: StudyPlan, folder: Path) -> None:
         raise BadInput(f"{folder} holds a study of another case than {plan.case.source}; {remedy}")
 
 
-# Tables --------------------------------------------------------------------------------------------------------------
+# Tables
+# --------------------------------------------------------------------------------------------------------------
 
 
 def table_of(rows: Iterable[Row]) -> pyarrow.Table:
@@ -214,7 +235,8 @@ def table_of(rows: Iterable[Row]) -> pyarrow.Table:
 def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFrame:
     """Finished rows behind the plan's own columns, by case number; of a case computed twice, the last attempt."""
     planned = pandas.DataFrame(
-        [(case.id, case.number, case.point, case.realisation) for case in plan.cases], columns=list(_LEADING[:4])
+        [(case.id, case.number, case.point, case.realisation) for case in plan.cases],
+        columns=list(_LEADING[:4]),
     )
     for key in (*plan.axes, *(seed for seed in SEED_KEYS if seed not in plan.axes)):
         values = [to_si(case.overrides.get(key)) for case in plan.cases]
@@ -222,7 +244,9 @@ def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFram
             planned[key] = _of_one_type(values)
     for seed in SEED_KEYS:
         if seed in planned:
-            planned[seed] = planned[seed].astype("int64" if planned[seed].notna().all() else "Int64")
+            planned[seed] = planned[seed].astype(
+                "int64" if planned[seed].notna().all() else "Int64"
+            )
     if parts:
         fewest_last = sorted(parts, key=lambda part: part.num_columns, reverse=True)
         table = pyarrow.concat_tables(fewest_last, promote_options="permissive")
@@ -230,13 +254,19 @@ def in_order(parts: Sequence[pyarrow.Table], plan: StudyPlan) -> pandas.DataFram
             if pyarrow.types.is_null(column.type):  # a number that no case has
                 table = table.set_column(place, column.name, table.column(place).cast("float64"))
         runs = table.select(["case_id", "attempt"]).to_pandas()
-        last = runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
+        last = (
+            runs.sort_values("attempt", kind="stable").drop_duplicates("case_id", keep="last").index
+        )
         finished = table.take(sorted(last)).drop_columns("attempt").to_pandas()
         if "converged" in finished:
-            finished["converged"] = finished["converged"].eq(True)  # what failed before it was solved did not converge
+            finished["converged"] = finished["converged"].eq(
+                True
+            )  # what failed before it was solved did not converge
     else:
         finished = pandas.DataFrame({"case_id": [], "status": [], "reason": []}, dtype=str)
-    merged = planned.merge(finished, on="case_id", how="inner").sort_values("number", ignore_index=True)
+    merged = planned.merge(finished, on="case_id", how="inner").sort_values(
+        "number", ignore_index=True
+    )
     rest = [name for name in merged.columns if name not in _LEADING]
     return merged[[*_LEADING, *rest]]
 
@@ -247,4 +277,6 @@ def _of_one_type(values: Sequence[Any]) -> list[Any]:
         values = [[value, value] if isinstance(value, int | float) else value for value in values]
     if all(value is None or isinstance(value, int | float) for value in values):
         return list(values)
-    return [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
+    return [
+        value if value is None or isinstance(value, str) else json.dumps(value) for value in values
+    ]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 
 _POINTS = 10_001  # of the curve
 _SECANT = 0.4  # share of the surface that the flattest secant spans
@@ -44,8 +44,12 @@ def bearing_curve(heights: Field) -> BearingCurve:
     """The curve of heights of any shape [m]; NaN are left out, the mean is removed."""
     known = heights[np.isfinite(heights)]
     share = np.linspace(0.0, 1.0, _POINTS)
-    ordered = np.sort(known - known.mean(), axis=None)  # once: numpy's quantile is fifty times slower for so many
-    return BearingCurve(share, np.interp((1.0 - share) * (known.size - 1), np.arange(known.size), ordered))
+    ordered = np.sort(
+        known - known.mean(), axis=None
+    )  # once: numpy's quantile is fifty times slower for so many
+    return BearingCurve(
+        share, np.interp((1.0 - share) * (known.size - 1), np.arange(known.size), ordered)
+    )
 
 
 def core_heights(curve: BearingCurve) -> CoreHeights:

@@ -1,7 +1,7 @@
 """From what an instrument gave to roughness: turn, drop outliers, remove the form, filter.
 
-The map keeps its pixels and its missing cells; putting it onto a contact grid is left to `asperity.surface.prepare`.
-Every step says in one sentence what it did.
+The map keeps its pixels and its missing cells; putting it onto a contact grid is left to
+`asperity.surface.prepare`. Every step says in one sentence what it did.
 """
 
 from dataclasses import replace
@@ -10,8 +10,8 @@ from typing import Literal, get_args
 import numpy as np
 import scipy
 
-from asperity.arrays import Field, Mask
-from asperity.errors import BadInput, require_positive
+from asperity.core.arrays import Field, Mask
+from asperity.core.errors import BadInput, require_positive
 from asperity.surface.model import MeasuredSurface, length_text
 
 Form = Literal["none", "plane", "quadratic", "cubic", "quartic", "cylinder"]
@@ -21,7 +21,9 @@ _DEGREES: dict[str, int] = {"none": 0, "plane": 1, "quadratic": 2, "cubic": 3, "
 _OUTLYING = 10.0  # robust standard deviations off the median of the neighbours; 1 in 1e23 by chance
 _NEIGHBOURS = 5  # cells a side of the neighbourhood
 _POINTS_TO_FIT = 20_000  # of a cylinder: five parameters need no more
-SIGMA_OVER_CUTOFF = np.sqrt(np.log(2.0) / 2.0) / np.pi  # ISO 16610: a Gaussian that passes half there
+SIGMA_OVER_CUTOFF = (
+    np.sqrt(np.log(2.0) / 2.0) / np.pi
+)  # ISO 16610: a Gaussian that passes half there
 
 
 def condition_surface(
@@ -59,7 +61,9 @@ def condition_surface(
     count = int(np.count_nonzero(outlying))
     if count and outliers == "remove":
         measured = replace(measured, heights=np.where(outlying, np.nan, measured.heights))
-        steps.append(f"removed {count} outliers, more than {_OUTLYING:g} robust deviations off their neighbours")
+        steps.append(
+            f"removed {count} outliers, more than {_OUTLYING:g} robust deviations off their neighbours"
+        )
     elif count:
         steps.append(
             f"kept {count} heights more than {_OUTLYING:g} robust deviations off their neighbours; "
@@ -96,8 +100,9 @@ def condition_surface(
 def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
     """Remove the least-squares form and the mean; returns the levelled map and what was done.
 
-    Missing cells take no part and stay missing. `form`: "none" (the mean only), a polynomial of the first to fourth
-    degree ("plane", "quadratic", "cubic", "quartic"), or "cylinder", of any axis and tilt.
+    Missing cells take no part and stay missing. `form`: "none" (the mean only), a polynomial of
+    the first to fourth degree ("plane", "quadratic", "cubic", "quartic"), or "cylinder", of any
+    axis and tilt.
 
     Raises
     ------
@@ -111,7 +116,9 @@ def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
         raise BadInput(
             f"{measured.name} has too few valid heights to remove a {form} form; use form none or measure again"
         )
-    offset = np.mean(measured.heights[known])  # some files carry centimetres of it; least squares should not
+    offset = np.mean(
+        measured.heights[known]
+    )  # some files carry centimetres of it; least squares should not
     heights = measured.heights - offset
     detail = ""
     if form == "cylinder":
@@ -125,7 +132,10 @@ def level(measured: MeasuredSurface, form: Form) -> tuple[MeasuredSurface, str]:
         return levelled, "removed the mean height and no form"
     height = length_text(float(np.ptp(shape)))
     sq = f"Sq {length_text(measured.sq)} before, {length_text(levelled.sq)} after"
-    return levelled, f"removed a {form} form{detail} of {height} peak to valley from the whole map ({sq})"
+    return (
+        levelled,
+        f"removed a {form} form{detail} of {height} peak to valley from the whole map ({sq})",
+    )
 
 
 def _polynomial(heights: Field, known: Mask, degree: int) -> Field:
@@ -139,8 +149,8 @@ def _polynomial(heights: Field, known: Mask, degree: int) -> Field:
 def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[Field, float]:
     """The cylinder nearest in height, and its radius [m], negative where it is hollow.
 
-    Across its axis, at distance w from it, the height is z0 + t v - sqrt(1 + t^2) (R - sqrt(R^2 - w^2)), where v runs
-    along the axis in the plane and t is its tilt.
+    Across its axis, at distance w from it, the height is z0 + t v - sqrt(1 + t^2) (R - sqrt(R^2 -
+    w^2)), where v runs along the axis in the plane and t is its tilt.
     """
     grid = measured.grid
     scale = max(grid.extent) / 2.0
@@ -151,15 +161,20 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     def shape(p: Field, x: Field, y: Field) -> Field:
         z0, slope, tilt, angle, curvature = p
         across, along = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
-        # w = across - w0 with w0 = slope/curvature; written so that a plane (curvature 0) is no special case
+        # w = across - w0 with w0 = slope/curvature; written so that a plane (curvature 0) is no
+        # special case
         flat = np.sqrt(np.maximum(1.0 - slope**2, 1e-12))
         round_ = np.sqrt(np.maximum(1.0 - (slope - curvature * across) ** 2, 1e-12))
         bow = across * (2.0 * slope - curvature * across) / (flat + round_)
         return np.asarray(z0 + tilt * along + np.sqrt(1.0 + tilt**2) * bow)
 
     quadratic = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-    powers = [power for power in quadratic if measured.uniform is None or power[measured.uniform] == 0]
-    fitted, *_ = np.linalg.lstsq(np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None)
+    powers = [
+        power for power in quadratic if measured.uniform is None or power[measured.uniform] == 0
+    ]
+    fitted, *_ = np.linalg.lstsq(
+        np.stack([at_x**i * at_y**j for i, j in powers], axis=-1), z, rcond=None
+    )
     c = dict.fromkeys(quadratic, 0.0) | dict(zip(powers, fitted, strict=True))
     gradient = np.array([c[1, 0], c[0, 1]])
     bends, axes = np.linalg.eigh(np.array([[2.0 * c[2, 0], c[1, 1]], [c[1, 1], 2.0 * c[0, 2]]]))
@@ -180,7 +195,9 @@ def _cylinder(measured: MeasuredSurface, heights: Field, known: Mask) -> tuple[F
     def misfit(freed: Field) -> Field:
         return np.asarray(shape(parameters(freed), at_x, at_y) - z)
 
-    nearest = scipy.optimize.least_squares(misfit, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    nearest = scipy.optimize.least_squares(
+        misfit, start[free], x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14
+    )
     best = parameters(nearest.x)
     curvature = float(best[4])
     return scale * shape(best, x, y), scale / curvature if curvature else np.inf
@@ -193,7 +210,11 @@ def find_outliers(measured: MeasuredSurface) -> Mask:
     size = [1 if axis == measured.uniform else _NEIGHBOURS for axis in range(2)]
     off = np.abs(measured.heights - scipy.ndimage.median_filter(heights, size=size, mode="nearest"))
     deviation = 1.4826 * float(np.nanmedian(off))
-    return np.asarray(known & (np.nan_to_num(off) > _OUTLYING * deviation)) if deviation > 0.0 else known & False
+    return (
+        np.asarray(known & (np.nan_to_num(off) > _OUTLYING * deviation))
+        if deviation > 0.0
+        else known & False
+    )
 
 
 def _low_pass(measured: MeasuredSurface, cutoff: float) -> Field:

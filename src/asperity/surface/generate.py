@@ -1,21 +1,24 @@
 """Random rough surfaces with a wanted spectrum and height distribution, by seed.
 
-White noise is filtered in wavenumber space, so a surface repeats along both axes. The noise belongs to the domain, not
-to its cells: one seed gives one physical surface, sampled at the cell centres of whatever grid resolves it. Surfaces
-made by cutting and denting are in `asperity.surface.machined`.
+White noise is filtered in wavenumber space, so a surface repeats along both axes. The noise
+belongs to the domain, not to its cells: one seed gives one physical surface, sampled at the cell
+centres of whatever grid resolves it. Surfaces made by cutting and denting are in
+`asperity.surface.machined`.
 """
 
 from collections.abc import Callable
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 from asperity.surface import johnson
 from asperity.surface.model import Surface, length_text, require_roughness
 
-_LARGEST_WAVENUMBER = 9.0  # times the correlation length: beyond it a Gaussian spectrum holds exp(-81/4), nothing
+_LARGEST_WAVENUMBER = (
+    9.0  # times the correlation length: beyond it a Gaussian spectrum holds exp(-81/4), nothing
+)
 
 
 def gaussian_surface(
@@ -28,8 +31,8 @@ def gaussian_surface(
 ) -> Surface:
     """Gaussian heights with a Gaussian autocorrelation: R(u, v) = Sq^2 exp(-(u/l1)^2 - (v/l2)^2).
 
-    The correlation length is where the autocorrelation has fallen to 1/e. ISO 25178's Sal is another length, where it
-    has fallen to 0.2: Sal = l sqrt(ln 5) = 1.27 l.
+    The correlation length is where the autocorrelation has fallen to 1/e. ISO 25178's Sal is
+    another length, where it has fallen to 0.2: Sal = l sqrt(ln 5) = 1.27 l.
 
     Parameters
     ----------
@@ -49,7 +52,9 @@ def gaussian_surface(
     return _filtered_noise(grid, sq, *_gaussian_spectrum(lengths, direction), rng)
 
 
-def _lengths(grid: Grid, length: float | tuple[float, float], direction: float) -> tuple[float, float]:
+def _lengths(
+    grid: Grid, length: float | tuple[float, float], direction: float
+) -> tuple[float, float]:
     lengths = length if isinstance(length, tuple) else (length, length)
     require_lengths(grid, lengths, direction)
     return lengths
@@ -64,7 +69,11 @@ def require_lengths(
     """Refuse lengths along and across `direction` that the grid cannot show or the domain cannot hold."""
     cosine, sine = abs(np.cos(direction)), abs(np.sin(direction))
     for name, length, along in zip(names, lengths, ((cosine, sine), (sine, cosine)), strict=True):
-        where = name if direction == 0.0 else name.replace("along x", "along the lay").replace("along y", "across it")
+        where = (
+            name
+            if direction == 0.0
+            else name.replace("along x", "along the lay").replace("along y", "across it")
+        )
         require_positive(where, length, "m")
         coarsest = 2.0 / np.hypot(along[0] / grid.spacing[0], along[1] / grid.spacing[1])
         longest = 0.5 / max(along[0] / grid.extent[0], along[1] / grid.extent[1])
@@ -108,10 +117,11 @@ def non_gaussian_surface(
 ) -> Surface:
     """Heights of wanted skewness and kurtosis, met by this very sample, at wanted correlation lengths.
 
-    A Gaussian surface is translated height by height by the curve of Johnson's system (SU or SB) that gives its sample
-    the two moments. Translation shortens correlations; the Gaussian surface has longer ones to make up for it, so that
-    the autocorrelation falls to 1/e at the lengths asked for. Sources: N. L. Johnson, Biometrika 36 (1949) 149; the
-    polynomial of correlations of M. Grigoriu, J. Eng. Mech. 110 (1984) 610.
+    A Gaussian surface is translated height by height by the curve of Johnson's system (SU or SB)
+    that gives its sample the two moments. Translation shortens correlations; the Gaussian surface
+    has longer ones to make up for it, so that the autocorrelation falls to 1/e at the lengths
+    asked for. Sources: N. L. Johnson, Biometrika 36 (1949) 149; the polynomial of correlations of
+    M. Grigoriu, J. Eng. Mech. 110 (1984) 610.
 
     Parameters
     ----------
@@ -135,7 +145,10 @@ def non_gaussian_surface(
     longer = (lengths[0] * stretch, lengths[1] * stretch)
     gaussian = _filtered_noise(grid, 1.0, *_gaussian_spectrum(longer, direction), rng).heights
     curve, reached = johnson.fit(*johnson.histogram(gaussian), skewness, kurtosis)
-    if abs(reached[0] - skewness) > 0.02 * max(1.0, abs(skewness)) or abs(reached[1] - kurtosis) > 0.02 * kurtosis:
+    if (
+        abs(reached[0] - skewness) > 0.02 * max(1.0, abs(skewness))
+        or abs(reached[1] - kurtosis) > 0.02 * kurtosis
+    ):
         raise BadInput(
             f"this sample cannot take a skewness of {skewness:g} and a kurtosis of {kurtosis:g} (nearest: "
             f"{reached[0]:.3g} and {reached[1]:.3g}); use a larger domain, shorter correlation lengths or milder values"
@@ -155,8 +168,8 @@ def run_in_surface(
 ) -> Surface:
     """A Gaussian surface whose peaks are worn to a plateau, as running-in and plateau honing leave it.
 
-    z = min(z1, c + r z2): of the rough z1, what stood above c is gone, replaced by the finer roughness of the plateau.
-    Source: the two processes of ISO 13565-3.
+    z = min(z1, c + r z2): of the rough z1, what stood above c is gone, replaced by the finer
+    roughness of the plateau. Source: the two processes of ISO 13565-3.
 
     Parameters
     ----------
@@ -171,9 +184,13 @@ def run_in_surface(
         for a share out of range, a negative roughness, and as `gaussian_surface` does.
     """
     if not 0.0 < plateau_share < 1.0:
-        raise BadInput(f"plateau_share must lie between 0 and 1, got {plateau_share:g}; a run-in surface has about 0.4")
+        raise BadInput(
+            f"plateau_share must lie between 0 and 1, got {plateau_share:g}; a run-in surface has about 0.4"
+        )
     if not 0.0 <= plateau_roughness <= 1.0:
-        raise BadInput(f"plateau_roughness must lie between 0 and 1, got {plateau_roughness:g}; 0.1 is usual")
+        raise BadInput(
+            f"plateau_roughness must lie between 0 and 1, got {plateau_roughness:g}; 0.1 is usual"
+        )
     lengths = _lengths(grid, correlation_length, direction)
     rough = _filtered_noise(grid, 1.0, *_gaussian_spectrum(lengths, direction), rng).heights
     finer = (lengths[0] / 2.0, lengths[1] / 2.0)
@@ -187,8 +204,9 @@ def self_affine_surface(
 ) -> Surface:
     """Gaussian heights with a power-law spectrum: C(q) ~ q^(-2 (1 + H)) between two wavelengths.
 
-    Waves longer than the longest have the spectrum of the longest (roll-off plateau), waves shorter than the shortest
-    are absent. Source: B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1, section 2.
+    Waves longer than the longest have the spectrum of the longest (roll-off plateau), waves
+    shorter than the shortest are absent. Source: B. N. J. Persson et al., J. Phys.: Condens.
+    Matter 17 (2005) R1, section 2.
 
     Parameters
     ----------
@@ -204,7 +222,9 @@ def self_affine_surface(
         for a Hurst exponent out of range, or cut-offs that are swapped, below 2 cells or beyond the domain.
     """
     if not 0.0 < hurst <= 1.0:
-        raise BadInput(f"hurst must lie above 0 and at most at 1, got {hurst:g}; machined metal has about 0.8")
+        raise BadInput(
+            f"hurst must lie above 0 and at most at 1, got {hurst:g}; machined metal has about 0.8"
+        )
     shortest, longest = cutoffs
     coarsest, domain = 2.0 * max(grid.spacing), min(grid.extent)
     if not coarsest <= shortest < longest <= domain:
@@ -236,10 +256,18 @@ def _filtered_noise(
     highest = [int(np.ceil(k * extent / (2.0 * np.pi))) for k, extent in sides]
     noise = rng.standard_normal([2 * m + 1 for m in highest])
     modes = [np.fft.ifftshift(np.arange(-m, m + 1)) for m in highest]
-    wavenumbers: list[Field] = [2.0 * np.pi / extent * m for m, extent in zip(modes, grid.extent, strict=True)]
+    wavenumbers: list[Field] = [
+        2.0 * np.pi / extent * m for m, extent in zip(modes, grid.extent, strict=True)
+    ]
     # samples sit at cell centres, half a cell from the corner that the noise starts at
-    phases = [np.exp(0.5j * k * spacing) for k, spacing in zip(wavenumbers, grid.spacing, strict=True)]
-    waves = np.fft.fft2(noise) * amplitude(wavenumbers[0][:, None], wavenumbers[1][None, :]) * np.outer(*phases)
+    phases = [
+        np.exp(0.5j * k * spacing) for k, spacing in zip(wavenumbers, grid.spacing, strict=True)
+    ]
+    waves = (
+        np.fft.fft2(noise)
+        * amplitude(wavenumbers[0][:, None], wavenumbers[1][None, :])
+        * np.outer(*phases)
+    )
     waves[0, 0] = 0.0  # roughness is measured from its mean
     kept = [np.abs(m) < cells / 2.0 for m, cells in zip(modes, grid.cells, strict=True)]
     spectrum = np.zeros(grid.cells, dtype=complex)

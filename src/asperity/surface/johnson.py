@@ -1,7 +1,7 @@
 """Johnson's curves: turn a standard normal height into one of wanted skewness and kurtosis.
 
-SU: sinh(z/d + s) for heavy tails, SB: 1/(1 + exp(s - z/d)) for light ones; between them they reach every pair of
-moments that a distribution can have. Mirrored for negative skewness.
+SU: sinh(z/d + s) for heavy tails, SB: 1/(1 + exp(s - z/d)) for light ones; between them they reach
+every pair of moments that a distribution can have. Mirrored for negative skewness.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 
 Curve = Callable[[Field], Field]
 _BINS = 512
@@ -31,7 +31,9 @@ def histogram(heights: Field) -> tuple[Field, Field]:
     return (edges[1:] + edges[:-1]) / 2.0, shares / heights.size
 
 
-def fit(z: Field, shares: Field, skewness: float, kurtosis: float) -> tuple[Curve, tuple[float, float]]:
+def fit(
+    z: Field, shares: Field, skewness: float, kurtosis: float
+) -> tuple[Curve, tuple[float, float]]:
     """The curve that gives heights z with those shares the two moments, and the moments it gives."""
     side = -1.0 if skewness < 0.0 else 1.0
     z, wanted = side * z, np.array([abs(skewness), kurtosis])
@@ -53,7 +55,9 @@ def _nearest(
 
     def misfit(parameters: Field) -> Field:
         reached = _moments(family(z, float(np.exp(parameters[0])), float(parameters[1])), shares)
-        return np.asarray(np.nan_to_num((reached - wanted) / np.array([1.0, wanted[1]]), nan=1e3, posinf=1e3))
+        return np.asarray(
+            np.nan_to_num((reached - wanted) / np.array([1.0, wanted[1]]), nan=1e3, posinf=1e3)
+        )
 
     net = [np.array([d, s]) for d in np.linspace(-1.5, 3.5, 11) for s in np.linspace(0.0, 5.0, 9)]
     start = min(net, key=lambda parameters: float(np.sum(misfit(parameters) ** 2)))
@@ -65,7 +69,8 @@ def _nearest(
 def stretch(skewness: float, kurtosis: float) -> float:
     """How much longer the Gaussian autocorrelation must be, for the translated one to fall to 1/e where it would.
 
-    The translated heights correlate as sum c_n^2 rho^n / sum c_n^2, c_n the curve's Hermite coefficients.
+    The translated heights correlate as sum c_n^2 rho^n / sum c_n^2, c_n the curve's Hermite
+    coefficients.
     """
     nodes, weights = np.polynomial.hermite_e.hermegauss(120)
     weights = weights / weights.sum()
@@ -75,11 +80,15 @@ def stretch(skewness: float, kurtosis: float) -> float:
     heights = curve(np.clip(nodes, -8.0, 8.0))
     polynomials = [np.ones_like(nodes), nodes]  # normalised: E[p_m p_n] = 1 for m = n, else 0
     for n in range(1, _MOMENTS):
-        polynomials.append((nodes * polynomials[n] - np.sqrt(n) * polynomials[n - 1]) / np.sqrt(n + 1.0))
+        polynomials.append(
+            (nodes * polynomials[n] - np.sqrt(n) * polynomials[n - 1]) / np.sqrt(n + 1.0)
+        )
     powers = np.array([np.sum(weights * heights * p) ** 2 for p in polynomials[1:]])
     powers /= powers.sum()
     orders = np.arange(1, powers.size + 1)
-    rho = float(scipy.optimize.brentq(lambda r: float(np.sum(powers * r**orders)) - np.exp(-1.0), 1e-6, 1.0))
+    rho = float(
+        scipy.optimize.brentq(lambda r: float(np.sum(powers * r**orders)) - np.exp(-1.0), 1e-6, 1.0)
+    )
     return float(1.0 / np.sqrt(-np.log(rho)))
 
 
@@ -87,4 +96,6 @@ def _moments(heights: Field, shares: Field) -> Field:
     """Skewness and kurtosis."""
     off = heights - np.sum(shares * heights)
     variance = np.sum(shares * off**2)
-    return np.array([np.sum(shares * off**3) / variance**1.5, np.sum(shares * off**4) / variance**2])
+    return np.array(
+        [np.sum(shares * off**3) / variance**1.5, np.sum(shares * off**4) / variance**2]
+    )

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 
 LEAST_SQ = 1e-15  # m, the size of an atom's nucleus
 
@@ -14,7 +14,9 @@ LEAST_SQ = 1e-15  # m, the size of an atom's nucleus
 def require_roughness(sq: float) -> float:
     """Return an Sq [m], or say why it is none that a surface can be scaled to."""
     if require_positive("sq", sq, "m") < LEAST_SQ:
-        raise BadInput(f'sq must be at least {LEAST_SQ:g} m, got {sq:.3g} m; raise it, or take kind = "flat"')
+        raise BadInput(
+            f'sq must be at least {LEAST_SQ:g} m, got {sq:.3g} m; raise it, or take kind = "flat"'
+        )
     return sq
 
 
@@ -39,7 +41,9 @@ class Surface:
             )
         missing = int(np.count_nonzero(~np.isfinite(self.heights)))
         if missing:
-            raise BadInput(f"surface has {missing} heights that are not finite; fill or crop them first")
+            raise BadInput(
+                f"surface has {missing} heights that are not finite; fill or crop them first"
+            )
 
     @classmethod
     def scaled(cls, heights: Field, grid: Grid, sq: float) -> "Surface":
@@ -57,9 +61,10 @@ class Surface:
 class MeasuredSurface:
     """A measured map as its file gives it, apart from the unit.
 
-    `heights` [m], shape (nx, ny) on `grid`, NaN where the instrument saw nothing; `grid` is centred on zero and
-    repeats along neither axis. `name` and `format` of the file; `notes` say in a sentence each what looks odd.
-    `uniform` is the axis along which a measured profile is taken to go on unchanged, None for a map.
+    `heights` [m], shape (nx, ny) on `grid`, NaN where the instrument saw nothing; `grid` is
+    centred on zero and repeats along neither axis. `name` and `format` of the file; `notes` say in
+    a sentence each what looks odd. `uniform` is the axis along which a measured profile is taken
+    to go on unchanged, None for a map.
 
     Raises
     ------
@@ -76,9 +81,13 @@ class MeasuredSurface:
 
     def __post_init__(self) -> None:
         if self.heights.shape != self.grid.cells:
-            raise BadInput(f"{self.name} must have its grid's shape {self.grid.cells}, got {self.heights.shape}")
+            raise BadInput(
+                f"{self.name} must have its grid's shape {self.grid.cells}, got {self.heights.shape}"
+            )
         if not np.isfinite(self.heights).any():
-            raise BadInput(f"{self.name} holds no valid height among its {self.heights.size}; measure it again")
+            raise BadInput(
+                f"{self.name} holds no valid height among its {self.heights.size}; measure it again"
+            )
 
     @property
     def missing(self) -> float:
@@ -111,7 +120,9 @@ class MeasuredSurface:
             periodic=self.grid.periodic[::-1],
         )
         uniform = None if self.uniform is None else 1 - self.uniform
-        return replace(self, heights=np.ascontiguousarray(self.heights[:, ::-1].T), grid=grid, uniform=uniform)
+        return replace(
+            self, heights=np.ascontiguousarray(self.heights[:, ::-1].T), grid=grid, uniform=uniform
+        )
 
 
 def flat_surface(grid: Grid) -> Surface:
@@ -129,5 +140,7 @@ def length_text(metres: float) -> str:
 
 def area_text(metres: tuple[float, float]) -> str:
     """Two lengths as one size: 358 x 179 um."""
-    unit, size = next(((u, s) for u, s in (("mm", 1e-3), ("um", 1e-6)) if max(metres) >= s), ("nm", 1e-9))
+    unit, size = next(
+        ((u, s) for u, s in (("mm", 1e-3), ("um", 1e-6)) if max(metres) >= s), ("nm", 1e-9)
+    )
     return f"{metres[0] / size:.4g} x {metres[1] / size:.4g} {unit}"

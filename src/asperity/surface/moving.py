@@ -1,8 +1,9 @@
 """Rough surfaces that run through a contact, each at its own speed: where they are at any time.
 
-Each lies on a track that repeats along rolling. What has moved by whole cells is the same numbers further on; between
-them heights are interpolated by their own Fourier series, which on a track that repeats is exact for every wave that
-the cells can show: nothing is smeared however long it runs.
+Each lies on a track that repeats along rolling. What has moved by whole cells is the same numbers
+further on; between them heights are interpolated by their own Fourier series, which on a track
+that repeats is exact for every wave that the cells can show: nothing is smeared however long it
+runs.
 """
 
 from dataclasses import dataclass, replace
@@ -13,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
 from asperity.surface.model import Surface, flat_surface
 from asperity.surface.prepare import CompositeSurface
 
@@ -28,8 +29,9 @@ WHOLE = 1e-9  # of a cell: closer to a whole number of cells is one
 class MovingSurfaces:
     """Two surfaces that face each other and run along x at `speeds` [m/s], seen through the contact's `grid`.
 
-    Each one's own grid is its track: it begins where the contact's does, has its cells, is as long or longer, and
-    repeats along x. The second lies face down, turned over about x, so its y runs back.
+    Each one's own grid is its track: it begins where the contact's does, has its cells, is as long
+    or longer, and repeats along x. The second lies face down, turned over about x, so its y runs
+    back.
 
     Raises
     ------
@@ -46,7 +48,11 @@ class MovingSurfaces:
         for name, surface in (("first", self.first), ("second", self.second)):
             track = surface.grid
             same = np.allclose(track.spacing, self.grid.spacing, rtol=1e-9, atol=0.0)
-            if not same or track.cells[1] != self.grid.cells[1] or track.cells[0] < self.grid.cells[0]:
+            if (
+                not same
+                or track.cells[1] != self.grid.cells[1]
+                or track.cells[0] < self.grid.cells[0]
+            ):
                 raise BadInput(
                     f"the {name} surface's track must have the contact's cells and be as long, got "
                     f"{track.cells} cells of {track.spacing[0]:.4g} m for {self.grid.cells} of "
@@ -60,7 +66,12 @@ class MovingSurfaces:
 
     @classmethod
     def one_rough(
-        cls, surface: Surface, speeds: tuple[float, float], grid: Grid | None = None, *, first: bool = True
+        cls,
+        surface: Surface,
+        speeds: tuple[float, float],
+        grid: Grid | None = None,
+        *,
+        first: bool = True,
     ) -> "MovingSurfaces":
         """All roughness on the first surface, or on the second, and seen by the contact as it lies here.
 
@@ -79,7 +90,10 @@ class MovingSurfaces:
     @property
     def uniform(self) -> bool:
         """Whether nothing varies along y."""
-        return all(bool(np.all(surface.heights == surface.heights[:, :1])) for surface in (self.first, self.second))
+        return all(
+            bool(np.all(surface.heights == surface.heights[:, :1]))
+            for surface in (self.first, self.second)
+        )
 
     def at(self, time: float) -> Surface:
         """What the gap sees after `time` [s]: the sum of both, on the contact's grid."""
@@ -98,7 +112,8 @@ class MovingSurfaces:
     def on_track(self, index: int, field: Field, time: float) -> Field:
         """What a field on the contact's grid at `time` [s] is on the track of surface 0 or 1, and nothing beside it.
 
-        What straddles two cells of the track is shared between them, so that its sum is kept and its sign.
+        What straddles two cells of the track is shared between them, so that its sum is kept and
+        its sign.
         """
         surface = (self.first, self.second)[index]
         cells = self.speeds[index] * time / self.grid.spacing[0]
@@ -123,7 +138,9 @@ class MovingSurfaces:
 
     @cached_property
     def _spectra(self) -> tuple[Spectrum, Spectrum]:
-        return scipy.fft.rfft(self.first.heights, axis=0), scipy.fft.rfft(self.second.heights, axis=0)
+        return scipy.fft.rfft(self.first.heights, axis=0), scipy.fft.rfft(
+            self.second.heights, axis=0
+        )
 
 
 def moved(heights: Field, cells: float, spectrum: Spectrum) -> Field:

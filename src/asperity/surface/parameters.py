@@ -8,9 +8,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.grid import Grid
-from asperity.quantities import Quantity, catalogue
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.quantities import Quantity, catalogue
 from asperity.surface.bearing import bearing_curve, core_heights
 from asperity.surface.condition import Form, Outliers, condition_surface
 from asperity.surface.model import MeasuredSurface, Surface
@@ -25,14 +25,16 @@ _DIRECTIONS = 180  # rays over half a turn; the autocorrelation is the same back
 class SurfaceParameters:
     """Areal parameters of ISO 25178-2, about the mean of the cells that are known.
 
-    Height: `sa`, `sq` arithmetic and root mean square height [m]; `ssk`, `sku` skewness and kurtosis (0 and 3 for
-    Gaussian heights); `sp`, `sv`, `sz` highest peak, deepest pit and their sum [m]. Hybrid: `sdq` root mean square
-    gradient, from differences of neighbouring cells; `sdr` area of the surface over its projection, less 1. Spatial:
-    `sal` the shortest distance over which the autocorrelation falls to 0.2 [m]; `str_` that distance over the longest
-    one (1 isotropic, towards 0 with a lay). Where the autocorrelation stays above 0.2 within half the map in some
-    direction, `str_` is an upper bound and `str_bounded` is true. Functional: core height `sk`, reduced peak height
-    `spk`, reduced pit depth `svk` [m], and the material ratios `smr1`, `smr2` that bound the core, 0 to 1. NaN: ssk,
-    sku, sal and str_ of a flat surface, sal and str_ where nothing decays.
+    Height: `sa`, `sq` arithmetic and root mean square height [m]; `ssk`, `sku` skewness and
+    kurtosis (0 and 3 for Gaussian heights); `sp`, `sv`, `sz` highest peak, deepest pit and their
+    sum [m]. Hybrid: `sdq` root mean square gradient, from differences of neighbouring cells; `sdr`
+    area of the surface over its projection, less 1. Spatial: `sal` the shortest distance over
+    which the autocorrelation falls to 0.2 [m]; `str_` that distance over the longest one (1
+    isotropic, towards 0 with a lay). Where the autocorrelation stays above 0.2 within half the map
+    in some direction, `str_` is an upper bound and `str_bounded` is true. Functional: core height
+    `sk`, reduced peak height `spk`, reduced pit depth `svk` [m], and the material ratios `smr1`,
+    `smr2` that bound the core, 0 to 1. NaN: ssk, sku, sal and str_ of a flat surface, sal and str_
+    where nothing decays.
     """
 
     sa: float
@@ -58,8 +60,9 @@ class SurfaceParameters:
 class SurfaceDescription:
     """A measured file: as read, levelled (the map to draw), its parameters after levelling, and what was done.
 
-    `profile` are the parameters of ISO 21920-2, of a file that holds a profile only; `profile_letter` is what that
-    standard calls them by: "R" of what a filter has left of the waviness, "P" of a primary profile.
+    `profile` are the parameters of ISO 21920-2, of a file that holds a profile only;
+    `profile_letter` is what that standard calls them by: "R" of what a filter has left of the
+    waviness, "P" of a primary profile.
     """
 
     path: Path
@@ -76,7 +79,11 @@ class SurfaceDescription:
 
     def verdict(self) -> str:
         """One sentence: roughness, cells and what is missing."""
-        measured, (nx, ny), (dx, dy) = self.measured, self.measured.grid.cells, self.measured.grid.spacing
+        measured, (nx, ny), (dx, dy) = (
+            self.measured,
+            self.measured.grid.cells,
+            self.measured.grid.spacing,
+        )
         what = f"Sq {1e6 * self.parameters.sq:.3g} um, {nx} x {ny} cells of {1e6 * dx:.4g} x {1e6 * dy:.4g} um"
         if measured.uniform is not None:
             rms = f"{self.profile_letter}q {1e6 * self.parameters.sq:.3g} um"
@@ -93,7 +100,9 @@ class SurfaceDescription:
             "size_m": list(self.measured.grid.extent),
             "missing": self.measured.missing,
             **_plain(self.parameters),
-            "profile": None if self.profile is None else {"letter": self.profile_letter, **_plain(self.profile)},
+            "profile": None
+            if self.profile is None
+            else {"letter": self.profile_letter, **_plain(self.profile)},
             "steps": list(self.steps),
             "notes": list(self.measured.notes),
         }
@@ -140,7 +149,9 @@ def describe_surface(
     if levelled.uniform is not None:
         profile = profile_parameters(levelled.profile, levelled.grid.spacing[1 - levelled.uniform])
     letter: Literal["P", "R"] = "P" if l_filter is None else "R"
-    return SurfaceDescription(Path(path), measured, levelled, surface_parameters(levelled), steps, profile, letter)
+    return SurfaceDescription(
+        Path(path), measured, levelled, surface_parameters(levelled), steps, profile, letter
+    )
 
 
 class HeightParameters(NamedTuple):
@@ -183,7 +194,15 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
     if own.sq == 0.0:
         nan = float("nan")
         return SurfaceParameters(
-            **own._asdict(), sp=0.0, sv=0.0, sz=0.0, sdq=0.0, sdr=0.0, sal=nan, str_=nan, str_bounded=False
+            **own._asdict(),
+            sp=0.0,
+            sv=0.0,
+            sz=0.0,
+            sdq=0.0,
+            sdr=0.0,
+            sal=nan,
+            str_=nan,
+            str_bounded=False,
         )
     sal, texture, bounded = _texture(heights, surface.grid)
     sp, sv = float(np.nanmax(heights)), -float(np.nanmin(heights))
@@ -202,20 +221,33 @@ def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
 
 def known_once(surface: Surface | MeasuredSurface) -> Field:
     """The heights, of a profile those of one of its equal rows: the bearing curve is that of its own points."""
-    return surface.profile if isinstance(surface, MeasuredSurface) and surface.uniform is not None else surface.heights
+    return (
+        surface.profile
+        if isinstance(surface, MeasuredSurface) and surface.uniform is not None
+        else surface.heights
+    )
 
 
-def correlation_lengths(surface: Surface | MeasuredSurface, direction: float = 0.0) -> tuple[float, float]:
+def correlation_lengths(
+    surface: Surface | MeasuredSurface, direction: float = 0.0
+) -> tuple[float, float]:
     """Distances along and across `direction` [rad from x] over which the autocorrelation falls to 1/e [m].
 
-    NaN where it does not within half the map. Generators take these lengths; Sal is where it has fallen to 0.2.
+    NaN where it does not within half the map. Generators take these lengths; Sal is where it has
+    fallen to 0.2.
     """
     return _correlation_lengths(surface, direction)
 
 
-@lru_cache(maxsize=2)  # of a solve: a surface's notes, those of its solution and whether that is determined all ask
-def _correlation_lengths(surface: Surface | MeasuredSurface, direction: float) -> tuple[float, float]:
-    correlation, middle = _autocorrelation(surface.heights - np.nanmean(surface.heights), surface.grid)
+@lru_cache(
+    maxsize=2
+)  # of a solve: a surface's notes, those of its solution and whether that is determined all ask
+def _correlation_lengths(
+    surface: Surface | MeasuredSurface, direction: float
+) -> tuple[float, float]:
+    correlation, middle = _autocorrelation(
+        surface.heights - np.nanmean(surface.heights), surface.grid
+    )
     angles = np.array([direction, direction + np.pi / 2.0])
     first, second = _decay(correlation, middle, surface.grid, angles, np.exp(-1.0))[0]
     return float(first), float(second)
@@ -236,14 +268,19 @@ def _developed_area(heights: Field, grid: Grid) -> float:
             heights = np.concatenate([heights, np.take(heights, [0], axis)], axis)
     slope_x = (np.diff(heights, axis=0) / grid.spacing[0]) ** 2
     slope_y = (np.diff(heights, axis=1) / grid.spacing[1]) ** 2
-    corners = [np.sqrt(1.0 + x + y) for x in (slope_x[:, :-1], slope_x[:, 1:]) for y in (slope_y[:-1], slope_y[1:])]
+    corners = [
+        np.sqrt(1.0 + x + y)
+        for x in (slope_x[:, :-1], slope_x[:, 1:])
+        for y in (slope_y[:-1], slope_y[1:])
+    ]
     return float(np.nanmean(np.mean(corners, axis=0)))
 
 
 def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]]:
     """ISO 25178-2 3.2.x f_ACF for lags up to half the map, zero lag in the middle, and where the middle is.
 
-    Each lag is the mean over the pairs of cells that are both known; an axis that repeats is not padded.
+    Each lag is the mean over the pairs of cells that are both known; an axis that repeats is not
+    padded.
     """
     reach = (grid.cells[0] // 2, grid.cells[1] // 2)
     shape = [
@@ -251,25 +288,35 @@ def _autocorrelation(heights: Field, grid: Grid) -> tuple[Field, tuple[int, int]
         for n, m, repeats in zip(grid.cells, reach, grid.periodic, strict=True)
     ]
     known = np.isfinite(heights)
-    sums = scipy.fft.irfft2(np.abs(scipy.fft.rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape)
+    sums = scipy.fft.irfft2(
+        np.abs(scipy.fft.rfft2(np.where(known, heights, 0.0), shape)) ** 2, shape
+    )
     lags = np.ix_(*(np.arange(-m, m + 1) % size for m, size in zip(reach, shape, strict=True)))
     if known.all():
         pairs = np.outer(*map(_pairs, grid.cells, reach, grid.periodic))
     else:
-        pairs = np.rint(scipy.fft.irfft2(np.abs(scipy.fft.rfft2(known.astype(float), shape)) ** 2, shape))[lags]
+        pairs = np.rint(
+            scipy.fft.irfft2(np.abs(scipy.fft.rfft2(known.astype(float), shape)) ** 2, shape)
+        )[lags]
     means = np.divide(sums[lags], pairs, out=np.zeros_like(pairs), where=pairs > 0)
     return means / means[reach], reach
 
 
 def _pairs(cells: int, reach: int, repeats: bool) -> Field:
     """How many pairs of cells lie each lag apart along an axis."""
-    return np.full(2 * reach + 1, float(cells)) if repeats else cells - np.abs(np.arange(-reach, reach + 1.0))
+    return (
+        np.full(2 * reach + 1, float(cells))
+        if repeats
+        else cells - np.abs(np.arange(-reach, reach + 1.0))
+    )
 
 
 def _texture(heights: Field, grid: Grid) -> tuple[float, float, bool]:
     """Sal, Str, and whether Str is only an upper bound."""
     correlation, middle = _autocorrelation(heights, grid)
-    distances, ends = _decay(correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAYED)
+    distances, ends = _decay(
+        correlation, middle, grid, np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS, _DECAYED
+    )
     if np.isnan(distances).all():
         return float("nan"), float("nan"), False
     shortest = float(np.nanmin(distances))
@@ -281,12 +328,18 @@ def _decay(
     correlation: Field, middle: tuple[int, int], grid: Grid, angles: Field, threshold: float
 ) -> tuple[Field, Field]:
     """Where the autocorrelation falls below the threshold along rays, NaN where it does not; and where they end."""
-    cosines, sines = np.cos(angles)[:, None] / grid.spacing[0], np.sin(angles)[:, None] / grid.spacing[1]
+    cosines, sines = (
+        np.cos(angles)[:, None] / grid.spacing[0],
+        np.sin(angles)[:, None] / grid.spacing[1],
+    )
     # the ray ends where it leaves the known lags; its samples are half a cell apart, at most
     ends = 1.0 / np.maximum(np.abs(cosines) / middle[0], np.abs(sines) / middle[1])
     radii = np.linspace(0.0, 1.0, 4 * max(middle) + 1) * ends
     along = scipy.ndimage.map_coordinates(
-        correlation, [middle[0] + radii * cosines, middle[1] + radii * sines], order=3, mode="nearest"
+        correlation,
+        [middle[0] + radii * cosines, middle[1] + radii * sines],
+        order=3,
+        mode="nearest",
     )
     below = along < threshold
     ray = np.flatnonzero(below.any(axis=1))

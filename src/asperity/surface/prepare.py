@@ -9,16 +9,24 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 import numpy.typing as npt
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
-from asperity.grid import Grid
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
 from asperity.surface.condition import Form, Outliers, condition_surface
-from asperity.surface.model import MeasuredSurface, Surface, area_text, length_text, require_roughness
+from asperity.surface.model import (
+    MeasuredSurface,
+    Surface,
+    area_text,
+    length_text,
+    require_roughness,
+)
 from asperity.surface.read import surface_topography
 
 Fit = Literal["crop", "tile"]
 
-_OVERLAP = 1.0 / 8.0  # of a repeating side, over which its ends are blended: long enough to hide, short enough to spare
+_OVERLAP = (
+    1.0 / 8.0
+)  # of a repeating side, over which its ends are blended: long enough to hide, short enough to spare
 _LOBES = 16  # of the windowed sinc to either side; Kaiser's 6 then stops aliases to 1e-3 ...
 _KAISER = 6.0  # ... and passes waves longer than 2.3 cells untouched
 
@@ -74,9 +82,10 @@ def prepare_surface(
 ) -> PreparedSurface:
     """Put a measured map onto a contact grid as roughness about a zero mean.
 
-    The map is conditioned as a whole, a place of it cut out, its missing cells filled, resampled by a windowed sinc
-    that keeps every wave that the coarser of pixel and cell can show, and, along an axis that repeats, its ends
-    blended into one another. A profile goes on unchanged across its direction.
+    The map is conditioned as a whole, a place of it cut out, its missing cells filled, resampled
+    by a windowed sinc that keeps every wave that the coarser of pixel and cell can show, and,
+    along an axis that repeats, its ends blended into one another. A profile goes on unchanged
+    across its direction.
 
     Parameters
     ----------
@@ -113,14 +122,18 @@ def prepare_surface(
         if shared:
             before = _shape_inside(heights, grid)
             heights = _close(heights, axis, cells, shared)
-            steps.append(_closing(axis, shared, levelled, grid, before, _shape_inside(heights, grid)))
+            steps.append(
+                _closing(axis, shared, levelled, grid, before, _shape_inside(heights, grid))
+            )
     heights = heights - heights.mean()
     natural_sq = float(np.std(heights))
     if sq is None:
         steps.append(f"removed the mean; Sq is {length_text(natural_sq)}")
         return PreparedSurface(Surface(heights, grid), tuple(steps))
     if natural_sq == 0.0:
-        raise BadInput(f"{measured.name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq out")
+        raise BadInput(
+            f"{measured.name} is flat and cannot be scaled to an Sq of {length_text(sq)}; leave sq out"
+        )
     steps.append(
         f"removed the mean and scaled the heights by {sq / natural_sq:.4g}, "
         f"from Sq {length_text(natural_sq)} to {length_text(sq)}"
@@ -144,11 +157,19 @@ def _overlap(measured: MeasuredSurface, grid: Grid) -> tuple[int, ...]:
 def _places(measured: MeasuredSurface, grid: Grid) -> list[tuple[float, float]]:
     """Centres of parts that lie side by side within the map, from the map's own centre [m], the nearest first."""
     steps, each_way = [], []
-    for axis, (side, cell, shared) in enumerate(zip(grid.extent, grid.spacing, _overlap(measured, grid), strict=True)):
+    for axis, (side, cell, shared) in enumerate(
+        zip(grid.extent, grid.spacing, _overlap(measured, grid), strict=True)
+    ):
         step, have = side + shared * cell, measured.grid.extent[axis]
         steps.append(step)
-        each_way.append(0 if axis == measured.uniform else max(0, int((have / step * (1.0 + 1e-9) - 1.0) / 2.0)))
-    lattice = [(i, j) for i in range(-each_way[0], each_way[0] + 1) for j in range(-each_way[1], each_way[1] + 1)]
+        each_way.append(
+            0 if axis == measured.uniform else max(0, int((have / step * (1.0 + 1e-9) - 1.0) / 2.0))
+        )
+    lattice = [
+        (i, j)
+        for i in range(-each_way[0], each_way[0] + 1)
+        for j in range(-each_way[1], each_way[1] + 1)
+    ]
     lattice.sort(key=lambda at: (abs(at[0]) + abs(at[1]), at))
     return [(i * steps[0], j * steps[1]) for i, j in lattice]
 
@@ -179,7 +200,8 @@ def _fitting(measured: MeasuredSurface, grid: Grid, fit: Fit) -> str:
                 f"{length_text(side)}; use a smaller grid, a longer profile, or fit = tile to repeat it mirrored"
             )
         return f"repeated the profile of {length_text(length)}, mirrored at its ends, to {length_text(side)}, {steady}"
-    # a grid whose corners come out of a division may exceed the map it was cut to by a rounding error
+    # a grid whose corners come out of a division may exceed the map it was cut to by a rounding
+    # error
     if all(m >= g * (1.0 - 1e-9) for m, g in zip(measured.grid.extent, grid.extent, strict=True)):
         return f"cut {need} from the centre of the {have} measured"
     if fit == "crop":
@@ -197,7 +219,13 @@ def _cut(
     indices: list[npt.NDArray[np.intp]] = []
     positions: list[Field] = []
     for n, pixel, extent, cell, shared, offset in zip(
-        measured.grid.cells, measured.grid.spacing, grid.extent, grid.spacing, overlap, centre, strict=True
+        measured.grid.cells,
+        measured.grid.spacing,
+        grid.extent,
+        grid.spacing,
+        overlap,
+        centre,
+        strict=True,
     ):
         half = (extent + shared * cell) / 2.0
         margin = 1 + int(np.ceil(_LOBES * max(pixel, cell) / pixel))  # the sinc's reach
@@ -222,7 +250,11 @@ def _fill(heights: Field, measured: MeasuredSurface, most_missing: float) -> tup
             f"{100.0 * most_missing:g} % that are filled; measure it again or use another part"
         )
     sizes = (float(heights.shape[0]), float(heights.shape[1]))
-    filled = surface_topography().Topography(np.ma.masked_array(heights, missing), sizes).interpolate_undefined_data()
+    filled = (
+        surface_topography()
+        .Topography(np.ma.masked_array(heights, missing), sizes)
+        .interpolate_undefined_data()
+    )
     whole = np.ma.filled(filled.heights(), np.nan)
     return whole, f"filled {100.0 * share:.2g} % missing cells by harmonic interpolation"
 
@@ -253,20 +285,31 @@ def _resample(
 def _close(heights: Field, axis: int, cells: int, shared: int) -> Field:
     """Blend what follows the last cell into the first ones, so that the surface goes on where it began.
 
-    The weights keep the variance whatever the correlation rho of the two ends: w1^2 + w2^2 + 2 rho w1 w2 = 1.
+    The weights keep the variance whatever the correlation rho of the two ends: w1^2 + w2^2 + 2 rho
+    w1 w2 = 1.
     """
     rows = np.moveaxis(heights, axis, 0)
     start, beyond = rows[:shared], rows[cells : cells + shared]
-    rho = float(np.clip(np.mean(start * beyond) / max(np.std(start) * np.std(beyond), np.finfo(float).tiny), -0.5, 1.0))
+    rho = float(
+        np.clip(
+            np.mean(start * beyond) / max(np.std(start) * np.std(beyond), np.finfo(float).tiny),
+            -0.5,
+            1.0,
+        )
+    )
     t = (np.arange(shared) + 0.5)[:, None] / shared
     own = t * t * (3.0 - 2.0 * t)
     other = 1.0 - own
     closed = rows[:cells].copy()
-    closed[:shared] = (own * start + other * beyond) / np.sqrt(own**2 + other**2 + 2.0 * rho * own * other)
+    closed[:shared] = (own * start + other * beyond) / np.sqrt(
+        own**2 + other**2 + 2.0 * rho * own * other
+    )
     return np.moveaxis(closed, 0, axis)
 
 
-def _closing(axis: int, shared: int, measured: MeasuredSurface, grid: Grid, before: "_Shape", after: "_Shape") -> str:
+def _closing(
+    axis: int, shared: int, measured: MeasuredSurface, grid: Grid, before: "_Shape", after: "_Shape"
+) -> str:
     length = shared * grid.spacing[axis]
     spare = measured.grid.extent[axis] - grid.extent[axis]
     mirrored = "" if spare >= length else ", mirrored there for want of more measurement,"
@@ -287,9 +330,18 @@ class _Shape(NamedTuple):
 
 
 def _shape_inside(heights: Field, grid: Grid) -> _Shape:
-    inside = heights[: grid.cells[0], : grid.cells[1]] - heights[: grid.cells[0], : grid.cells[1]].mean()
+    inside = (
+        heights[: grid.cells[0], : grid.cells[1]] - heights[: grid.cells[0], : grid.cells[1]].mean()
+    )
     sq = float(np.std(inside))
-    sdq = float(np.sqrt(sum(np.mean(np.diff(inside, axis=axis) ** 2) / d**2 for axis, d in enumerate(grid.spacing))))
+    sdq = float(
+        np.sqrt(
+            sum(
+                np.mean(np.diff(inside, axis=axis) ** 2) / d**2
+                for axis, d in enumerate(grid.spacing)
+            )
+        )
+    )
     if sq == 0.0:
         return _Shape(0.0, 0.0, 0.0, 0.0)
     return _Shape(sq, sdq, float(np.mean(inside**3)) / sq**3, float(np.mean(inside**4)) / sq**4)

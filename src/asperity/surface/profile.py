@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 from asperity.surface.bearing import bearing_curve, core_heights
 
 SECTIONS = 5  # section lengths in the evaluation length, ISO 21920-3's default
@@ -15,10 +15,11 @@ _DISCRIMINATION = 0.1  # of Rz: lower peaks and shallower pits belong to their n
 class ProfileParameters:
     """Parameters of ISO 21920-2 about the mean of the points that are known.
 
-    `ra`, `rq` arithmetic and root mean square height [m]; `rsk`, `rku` skewness and kurtosis; `rp`, `rv`, `rz` highest
-    peak, deepest pit and their sum, means over five section lengths [m]; `rt` the whole height [m]; `rsm` mean spacing
-    of profile elements [m], NaN for fewer than two; `rdq` root mean square slope, from neighbouring points; `rk`,
-    `rpk`, `rvk` core height, reduced peak height and pit depth [m]; `rmr1`, `rmr2` the shares that bound the core.
+    `ra`, `rq` arithmetic and root mean square height [m]; `rsk`, `rku` skewness and kurtosis;
+    `rp`, `rv`, `rz` highest peak, deepest pit and their sum, means over five section lengths [m];
+    `rt` the whole height [m]; `rsm` mean spacing of profile elements [m], NaN for fewer than two;
+    `rdq` root mean square slope, from neighbouring points; `rk`, `rpk`, `rvk` core height, reduced
+    peak height and pit depth [m]; `rmr1`, `rmr2` the shares that bound the core.
     """
 
     ra: float

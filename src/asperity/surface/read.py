@@ -1,7 +1,8 @@
 """Reading measured surfaces, in the formats of the instruments.
 
-SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that it cannot, `asperity.surface.text` the
-tables. Nothing is corrected here: levelling, filling and resampling are left to `asperity.surface.prepare`.
+SurfaceTopography does the reading, x3pio and sdfio the x3p and SDF files that it cannot,
+`asperity.surface.text` the tables. Nothing is corrected here: levelling, filling and resampling
+are left to `asperity.surface.prepare`.
 """
 
 import warnings
@@ -15,19 +16,22 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from asperity.apart import read_apart
-from asperity.arrays import Field
-from asperity.errors import BadInput, UnreadableFile, require_positive
-from asperity.files import require_file
-from asperity.grid import FEWEST_CELLS, Grid
-from asperity.limits import require_unpacked
-from asperity.quiet import first_line, quietly
+from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, UnreadableFile, require_positive
+from asperity.core.files import require_file
+from asperity.core.limits import require_unpacked
+from asperity.core.sandbox import read_apart
+from asperity.core.third_party import first_line, quietly
 from asperity.surface.model import MeasuredSurface, length_text
 from asperity.surface.text import SUFFIXES as TABLES
 from asperity.surface.text import read_table
 
 _TEXT = {"xyz", "asc"}  # columns of numbers: any name will do for them
-_UNMARKED = {"nms", "hgt"}  # formats that accept nearly any bytes, so only the file's name can call for them
+_UNMARKED = {
+    "nms",
+    "hgt",
+}  # formats that accept nearly any bytes, so only the file's name can call for them
 _PLAUSIBLE_PIXEL = 1e-10, 1e-3  # an atom to a millimetre [m]
 _POSSIBLE = 1e-15, 1e6  # [m]: lengths beyond are a damaged file's
 _PLAUSIBLE_SLOPE = 3.0  # median over neighbours; 72 degrees, which no instrument sees everywhere
@@ -58,8 +62,8 @@ def read_surface(
 ) -> MeasuredSurface:
     """Read a measured map or profile; heights in metres, NaN where the instrument saw nothing.
 
-    A profile is taken to run along x and to go on unchanged along y, as ground or turned roughness across the rolling
-    direction of a line contact does; `MeasuredSurface.uniform` is then 1.
+    A profile is taken to run along x and to go on unchanged along y, as ground or turned roughness
+    across the rolling direction of a line contact does; `MeasuredSurface.uniform` is then 1.
 
     Parameters
     ----------
@@ -82,7 +86,11 @@ def read_surface(
     require_file(path)
     stated = (unit, lateral_unit, sizes)
     surface: MeasuredSurface = read_apart(
-        path.absolute(), "asperity.surface.read:measured", *stated, remedy=_REMEDY, library="SurfaceTopography"
+        path.absolute(),
+        "asperity.surface.read:measured",
+        *stated,
+        remedy=_REMEDY,
+        library="SurfaceTopography",
     )
     return surface
 
@@ -95,7 +103,9 @@ def measured(
     height_scale, sizes = _sizes(path.name, raw, unit, lateral_unit, sizes)
     heights = np.where(np.isfinite(raw.heights), raw.heights, np.nan) * height_scale
     if np.isnan(heights).all():
-        raise UnreadableFile(f"{path.name} holds no valid height among its {heights.size}; measure it again")
+        raise UnreadableFile(
+            f"{path.name} holds no valid height among its {heights.size}; measure it again"
+        )
     if not all(_POSSIBLE[0] < size < _POSSIBLE[1] for size in sizes):
         raise UnreadableFile(f"{path.name} has a pixel of {sizes[0]:g} x {sizes[1]:g} m; {_REMEDY}")
     impossible = np.abs(heights - np.nanmedian(heights)) > _POSSIBLE[1]
@@ -103,7 +113,9 @@ def measured(
     if impossible.any():
         heights[impossible] = np.nan
         count = int(np.count_nonzero(impossible))
-        notes += (f"{count} heights, more than a thousand kilometres off, count as missing; check the file",)
+        notes += (
+            f"{count} heights, more than a thousand kilometres off, count as missing; check the file",
+        )
     uniform = 1 if heights.shape[1] == 1 else None
     if uniform:
         heights, sizes = np.repeat(heights, FEWEST_CELLS, axis=1), (sizes[0], sizes[0])
@@ -120,7 +132,11 @@ def measured(
 
 
 def _sizes(
-    name: str, raw: RawMap, unit: str | None, lateral_unit: str | None, pixel: tuple[float, float] | None
+    name: str,
+    raw: RawMap,
+    unit: str | None,
+    lateral_unit: str | None,
+    pixel: tuple[float, float] | None,
 ) -> tuple[float, tuple[float, float]]:
     """Metres in one unit of height, and the pixel [m]: from the file, or else from the caller."""
     if raw.pixel is not None:
@@ -131,7 +147,9 @@ def _sizes(
     if pixel is None:
         raise BadInput(f"{name} holds heights without a pixel size; give pixel, their distance")
     if lateral_unit is not None:
-        raise BadInput(f"{name} holds bare heights, whose pixel is given in metres; leave out lateral_unit")
+        raise BadInput(
+            f"{name} holds bare heights, whose pixel is given in metres; leave out lateral_unit"
+        )
     return _scales(name, raw.unit, unit, "m" if raw.unit is None else None)[0], pixel
 
 
@@ -148,7 +166,9 @@ def _oddities(pixel: tuple[float, float], heights: Field) -> Iterator[str]:
         yield f"the pixel is not square: {length_text(pixel[0])} along x, {length_text(pixel[1])} along y"
 
 
-def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str | None) -> tuple[float, float]:
+def _scales(
+    name: str, stated: str | None, unit: str | None, lateral_unit: str | None
+) -> tuple[float, float]:
     """Metres in one unit of height and in one unit of length, from the file or else from the caller."""
     convert = surface_topography().Support.UnitConversion.get_unit_conversion_factor
 
@@ -156,7 +176,9 @@ def _scales(name: str, stated: str | None, unit: str | None, lateral_unit: str |
         try:
             return float(convert(given.replace("um", "µm"), "m"))
         except (ValueError, KeyError) as error:
-            raise BadInput(f"{name} cannot have the unit {given!r}; use a length such as nm, um, mm or m") from error
+            raise BadInput(
+                f"{name} cannot have the unit {given!r}; use a length such as nm, um, mm or m"
+            ) from error
 
     if stated is not None:
         if unit is not None or lateral_unit is not None:
@@ -177,7 +199,9 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
         with path.open("rb") as file:
             start = file.read(1)
     except OSError as error:
-        raise UnreadableFile(f"{path} cannot be opened ({error.strerror}); name a file that can be read") from error
+        raise UnreadableFile(
+            f"{path} cannot be opened ({error.strerror}); name a file that can be read"
+        ) from error
     if not start:
         raise UnreadableFile(f"{name} is empty; {_REMEDY}")
 
@@ -188,7 +212,9 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
         return _array(path)
     if matrix and suffix in TABLES:
         return RawMap(_x_first(read_table(path)[::-1]), None, "text", None)
-    suffixes = {reader.format(): set(reader.file_extensions()) for reader in surface_topography().IO.readers}
+    suffixes = {
+        reader.format(): set(reader.file_extensions()) for reader in surface_topography().IO.readers
+    }
     formats = [form for form, known in suffixes.items() if suffix in known]
     if not formats and suffix not in TABLES:
         try:
@@ -219,8 +245,12 @@ def _read(path: Path, *, matrix: bool) -> RawMap:
     actual = _format_of(path)
     if actual is not None and actual not in formats:
         remedy = f"rename it to .{min(suffixes[actual])} if that is right"
-        raise UnreadableFile(f"{name} is called .{suffix} but looks like {actual} inside; {remedy}") from reason
-    mismatch = surface_topography().Exceptions.FileFormatMismatch  # speaks of bytes that it did not expect
+        raise UnreadableFile(
+            f"{name} is called .{suffix} but looks like {actual} inside; {remedy}"
+        ) from reason
+    mismatch = (
+        surface_topography().Exceptions.FileFormatMismatch
+    )  # speaks of bytes that it did not expect
     why = "its content is something else" if isinstance(reason, mismatch) else first_line(reason)
     raise UnreadableFile(f"{name} is no readable .{suffix} file ({why}); {_REMEDY}") from reason
 
@@ -250,7 +280,9 @@ def _topography(path: Path, form: str | None) -> RawMap:
             x, z = line.positions_and_heights()
             return _profile(path, x, z, str(reader.format()), line.unit)
         bare = channel.physical_sizes is None
-        topography = reader.topography(physical_sizes=channel.nb_grid_pts) if bare else reader.topography()
+        topography = (
+            reader.topography(physical_sizes=channel.nb_grid_pts) if bare else reader.topography()
+        )
         heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
         (width, length), unit = topography.physical_sizes, topography.unit
     pixel = None if bare else (float(width) / heights.shape[0], float(length) / heights.shape[1])
@@ -264,12 +296,16 @@ def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> Raw
     """A profile on even steps; steps that differ are interpolated onto their mean, which is noted."""
     steps = np.diff(x)
     if x.size < FEWEST_CELLS or not (steps > 0.0).all():
-        raise UnreadableFile(f"{path.name} is no profile of at least {FEWEST_CELLS} points along a rising x; {_REMEDY}")
+        raise UnreadableFile(
+            f"{path.name} is no profile of at least {FEWEST_CELLS} points along a rising x; {_REMEDY}"
+        )
     step = float(x[-1] - x[0]) / (x.size - 1)
     notes: tuple[str, ...] = ()
     z = np.ma.filled(np.ma.asarray(z, dtype=np.float64), np.nan)
     if np.max(np.abs(steps - step)) > _EVEN * step:
-        notes = ("the profile's points are not evenly spaced; they were interpolated onto even steps",)
+        notes = (
+            "the profile's points are not evenly spaced; they were interpolated onto even steps",
+        )
         z = np.interp(x[0] + step * np.arange(x.size), x, z)
     return RawMap(z[:, None], (step, step), form, unit, notes)
 
@@ -292,9 +328,13 @@ def _array(path: Path) -> RawMap:
     try:
         heights = np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
     except Exception as error:
-        raise UnreadableFile(f"{path.name} is no readable .npy file ({first_line(error)}); {_REMEDY}") from error
+        raise UnreadableFile(
+            f"{path.name} is no readable .npy file ({first_line(error)}); {_REMEDY}"
+        ) from error
     if heights.ndim != 2:
-        raise UnreadableFile(f"{path.name} holds an array of {heights.ndim} axes; give heights along x and y")
+        raise UnreadableFile(
+            f"{path.name} holds an array of {heights.ndim} axes; give heights along x and y"
+        )
     return RawMap(heights, None, "npy", None)
 
 
@@ -310,7 +350,9 @@ def _x3p(path: Path) -> RawMap:
         return loose
     if not isinstance(content, x3pio.Surface):
         kind = type(content).__name__.lower()
-        raise UnreadableFile(f"{path.name} holds a {kind}, not a map on a regular grid; give an areal map")
+        raise UnreadableFile(
+            f"{path.name} holds a {kind}, not a map on a regular grid; give an areal map"
+        )
     pixel = (float(content.header.x.increment), float(content.header.y.increment))
     return RawMap(_x_first(content.layers[0].z), pixel, "x3p", "m")
 
@@ -318,14 +360,20 @@ def _x3p(path: Path) -> RawMap:
 def _loose_x3p(path: Path) -> RawMap | None:
     """An x3p map whose archive strays from the standard: in a folder of its own, or with elements unknown to it.
 
-    Damage is none of these: the archive's checksums find it. None for what is no map on a regular grid.
+    Damage is none of these: the archive's checksums find it. None for what is no map on a regular
+    grid.
     """
     try:
         with zipfile.ZipFile(path) as archive:
             mains = [name for name in archive.namelist() if name.split("/")[-1] == "main.xml"]
             root = ElementTree.fromstring(archive.read(mains[0]))
-            elements = {element.tag.split("}")[-1]: (element.text or "").strip() for element in root.iter()}
-            steps = [float(root.findtext(f".//{{*}}{axis}/{{*}}Increment") or "nan") for axis in ("CX", "CY", "CZ")]
+            elements = {
+                element.tag.split("}")[-1]: (element.text or "").strip() for element in root.iter()
+            }
+            steps = [
+                float(root.findtext(f".//{{*}}{axis}/{{*}}Increment") or "nan")
+                for axis in ("CX", "CY", "CZ")
+            ]
             data = archive.read(mains[0].removesuffix("main.xml") + elements["PointDataLink"])
         kind = {"D": "<f8", "F": "<f4"}[root.findtext(".//{*}CZ/{*}DataType") or ""]
         cells = int(elements["SizeX"]), int(elements["SizeY"])
@@ -340,7 +388,12 @@ def _sdf(path: Path) -> RawMap:
     import sdfio
 
     content: Any = sdfio.read(path)
-    return RawMap(_x_first(content.data), (float(content.header.x_scale), float(content.header.y_scale)), "sdf", "m")
+    return RawMap(
+        _x_first(content.data),
+        (float(content.header.x_scale), float(content.header.y_scale)),
+        "sdf",
+        "m",
+    )
 
 
 _LAST_RESORTS: dict[str, Callable[[Path], RawMap]] = {

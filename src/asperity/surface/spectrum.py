@@ -1,13 +1,14 @@
 """Which wavelengths and directions roughness is made of: radial and directional spectra.
 
-Source of the normalisation: T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr. Metrol. Prop. 5 (2017) 013001.
+Source of the normalisation: T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr. Metrol. Prop. 5
+(2017) 013001.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
 from asperity.surface.model import MeasuredSurface, Surface
 
 _PER_DECADE = 12  # radial bins
@@ -18,10 +19,10 @@ _SECTORS = 36  # directional bins over half a turn
 class SurfaceSpectrum:
     """The power of roughness over wavelength and over direction.
 
-    `wavenumber` [1/m, 2 pi over the wavelength], ascending; `density` there: of a map the isotropic C [m^4] with
-    Sq^2 = (1/2 pi) integral of q C dq, of a profile the one-dimensional C [m^3] with Rq^2 = (1/pi) integral of C dq.
-    `lay` [rad], from x towards y, mid-sector, 0 to pi, and `share` of Sq^2 in ridges that run that way; both empty for
-    a profile.
+    `wavenumber` [1/m, 2 pi over the wavelength], ascending; `density` there: of a map the
+    isotropic C [m^4] with Sq^2 = (1/2 pi) integral of q C dq, of a profile the one-dimensional C
+    [m^3] with Rq^2 = (1/pi) integral of C dq. `lay` [rad], from x towards y, mid-sector, 0 to pi,
+    and `share` of Sq^2 in ridges that run that way; both empty for a profile.
     """
 
     wavenumber: Field
@@ -41,17 +42,27 @@ def surface_spectrum(surface: Surface | MeasuredSurface) -> SurfaceSpectrum:
     heights = np.nan_to_num(surface.heights - np.nanmean(surface.heights))
     if isinstance(surface, MeasuredSurface) and surface.uniform is not None:
         axis = 1 - surface.uniform
-        return _profile_spectrum(np.nan_to_num(surface.profile - np.nanmean(surface.profile)), grid.spacing[axis])
-    windows = [np.ones(n) if repeats else _hann(n) for n, repeats in zip(grid.cells, grid.periodic, strict=True)]
+        return _profile_spectrum(
+            np.nan_to_num(surface.profile - np.nanmean(surface.profile)), grid.spacing[axis]
+        )
+    windows = [
+        np.ones(n) if repeats else _hann(n)
+        for n, repeats in zip(grid.cells, grid.periodic, strict=True)
+    ]
     window = np.outer(*windows)
     power = np.abs(np.fft.fft2(heights * window)) ** 2 / np.mean(window**2)  # |sum|^2
     (nx, ny), (dx, dy) = grid.cells, grid.spacing
     density = power * dx * dy / (nx * ny)
-    kx, ky = 2.0 * np.pi * np.fft.fftfreq(nx, dx)[:, None], 2.0 * np.pi * np.fft.fftfreq(ny, dy)[None, :]
+    kx, ky = (
+        2.0 * np.pi * np.fft.fftfreq(nx, dx)[:, None],
+        2.0 * np.pi * np.fft.fftfreq(ny, dy)[None, :],
+    )
     k = np.hypot(kx, ky)
     inside = (k > 0.0) & (k < np.pi / max(dx, dy))  # every direction up to the same wavenumber
     wavenumber, radial = _binned(k[inside], density[inside])
-    crest = np.mod(np.arctan2(np.broadcast_to(ky, k.shape), np.broadcast_to(kx, k.shape)) + np.pi / 2.0, np.pi)
+    crest = np.mod(
+        np.arctan2(np.broadcast_to(ky, k.shape), np.broadcast_to(kx, k.shape)) + np.pi / 2.0, np.pi
+    )
     sector = np.floor(crest[inside] / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
     share: Field = np.bincount(sector, density[inside], minlength=_SECTORS).astype(np.float64)
     total = share.sum()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.arrays import Field
-from asperity.dialect import sniff_dialect
-from asperity.errors import UnreadableFile
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.text_dialect import sniff_dialect
 
 SUFFIXES = {"txt", "csv", "tsv", "asc", "dat", "xyz", "hfm", "prf"}
 _LONGEST_HEADER = 200  # lines
@@ -28,15 +28,21 @@ def read_table(path: Path) -> Field:
     if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise UnreadableFile(f"{path.name} is not a text file; name it after its format")
     encoding = "utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
-    lines = [line for line in content.decode(encoding, errors="replace").splitlines() if line.strip()]
-    dialect = sniff_dialect([line for line in lines if re.search(r"\d", line)][-100:], fewest_columns=2)
+    lines = [
+        line for line in content.decode(encoding, errors="replace").splitlines() if line.strip()
+    ]
+    dialect = sniff_dialect(
+        [line for line in lines if re.search(r"\d", line)][-100:], fewest_columns=2
+    )
     rows: list[list[float]] = []
     for number, line in enumerate(lines):
         numbers = [dialect.number(field) for field in dialect.fields(line)]
         row = [value for value in numbers if value is not None]
         if len(row) < len(numbers) or (not np.isfinite(row).any() and not rows):
             if rows or number >= _LONGEST_HEADER:
-                raise UnreadableFile(f"{path.name} has no numbers in {line.strip()[:40]!r}; mend or delete that line")
+                raise UnreadableFile(
+                    f"{path.name} has no numbers in {line.strip()[:40]!r}; mend or delete that line"
+                )
             continue
         if rows and len(row) != len(rows[0]):
             raise UnreadableFile(

@@ -3,7 +3,7 @@
 from io import BytesIO
 from pathlib import Path
 
-from asperity.files import write_bytes
+from asperity.core.files import write_bytes
 from asperity.surface.model import Surface
 
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.signals import taper
+from asperity.core.arrays import Field
+from asperity.core.signals import taper
 
 CHUNK_S = 4.0  # transformed together: lines a quarter of a hertz apart
 BAND = (0.1, 0.4)  # of the sampling rate: above shafts and meshes, below the anti-alias filter
@@ -21,8 +21,8 @@ FEWEST = 64  # samples of an envelope that tell anything
 class Envelope:
     """Gathers the spectrum of the squared envelope from blocks as they pass through `watch`.
 
-    The band is cut out of each chunk's Fourier transform and shifted to 0, so that the envelope needs no filter and no
-    more samples than the band is wide. Chunks with a gap are left out.
+    The band is cut out of each chunk's Fourier transform and shifted to 0, so that the envelope
+    needs no filter and no more samples than the band is wide. Chunks with a gap are left out.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -83,7 +83,10 @@ class Envelope:
             return float("nan")
         power = 0.0
         for harmonic in range(1, HARMONICS + 1):
-            at, reach = harmonic * rate_hz / self.spacing_hz, max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0)
+            at, reach = (
+                harmonic * rate_hz / self.spacing_hz,
+                max(SLIP * harmonic * rate_hz / self.spacing_hz, 1.0),
+            )
             near = self.total[max(int(np.ceil(at - reach)), 2) : int(at + reach) + 1]
             if harmonic == 1 and not near.size:
                 return float("nan")

@@ -1,7 +1,8 @@
 """What passes under the contact: rough heights in time, as a record and as a spectrum.
 
-Two sources, filtered noise (the paper's section 2.2) and a surface's own spectrum run over at a speed, and the contact
-patch that averages either. Which of them a contact rides over is for `asperity.coupling` to say.
+Two sources, filtered noise (the paper's section 2.2) and a surface's own spectrum run over at a
+speed, and the contact patch that averages either. Which of them a contact rides over is for
+`asperity.coupling` to say.
 """
 
 from collections.abc import Callable
@@ -11,9 +12,9 @@ from typing import Literal, Protocol, TypeAlias, get_args
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.errors import BadInput, require_choice, require_positive
-from asperity.signals import Signal, recursion
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_choice, require_positive
+from asperity.core.signals import Signal, recursion
 from asperity.surface import Surface
 
 FilterName: TypeAlias = Literal["continuous", "bilinear"]
@@ -68,9 +69,9 @@ class NoiseFilter:
 class FilteredNoise(NoiseFilter):
     """Gaussian white noise behind a Butterworth low pass: `height` of the profile [m], `cutoff_hz` of the filter [Hz].
 
-    `reference_cutoff_hz` is the cut-off [Hz] at which the noise's coefficient is set so that the height comes out, and
-    then kept: spectra at the resonance grow as cut-off^4 (order 2). None: readjusted at each cut-off, ^3. Raises
-    BadInput for a quantity out of range.
+    `reference_cutoff_hz` is the cut-off [Hz] at which the noise's coefficient is set so that the
+    height comes out, and then kept: spectra at the resonance grow as cut-off^4 (order 2). None:
+    readjusted at each cut-off, ^3. Raises BadInput for a quantity out of range.
     """
 
     height: float
@@ -92,16 +93,21 @@ class FilteredNoise(NoiseFilter):
         frequency, cutoff = np.asarray(frequency_hz), self.cutoff_hz
         if self.filter == "bilinear":
             _require_below_half(cutoff, rate_hz)
-            warped, corner = np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5)), np.tan(np.pi * cutoff / rate_hz)
+            warped, corner = (
+                np.tan(np.pi * np.minimum(frequency / rate_hz, 0.5)),
+                np.tan(np.pi * cutoff / rate_hz),
+            )
         else:
             warped, corner = frequency, cutoff
-        return np.asarray(self._white_density(rate_hz) / (1.0 + (warped / corner) ** (2 * self.filter_order)))
+        return np.asarray(
+            self._white_density(rate_hz) / (1.0 + (warped / corner) ** (2 * self.filter_order))
+        )
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
         """Record of `samples` heights [m].
 
-        Raises BadInput for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record shorter than one of
-        its periods.
+        Raises BadInput for a cut-off above rate/2 (bilinear) or rate/10 (continuous), or a record
+        shorter than one of its periods.
         """
         for cutoff in {self.cutoff_hz, self.reference_cutoff_hz or self.cutoff_hz}:
             top = rate_hz / (10.0 if self.filter == "continuous" else 2.0)
@@ -114,7 +120,11 @@ class FilteredNoise(NoiseFilter):
         if self.height_of == "record":
             kept = self.reference_cutoff_hz
             judged = heights if kept is None else self._filtered(kept, samples, rate_hz, seed)
-            height = np.std(judged) if self.height_as == "rms" else np.mean(np.abs(judged - np.mean(judged)))
+            height = (
+                np.std(judged)
+                if self.height_as == "rms"
+                else np.mean(np.abs(judged - np.mean(judged)))
+            )
             heights *= self.height / float(height)
         return Signal(heights, rate_hz, "m")
 
@@ -126,7 +136,9 @@ class FilteredNoise(NoiseFilter):
         """One-sided density of the noise before the filter [m^2/Hz]."""
         if self.height_of == "noise":
             return self._rms**2 * 2.0 / rate_hz
-        return self._rms**2 / self._noise_bandwidth(self.reference_cutoff_hz or self.cutoff_hz, rate_hz)
+        return self._rms**2 / self._noise_bandwidth(
+            self.reference_cutoff_hz or self.cutoff_hz, rate_hz
+        )
 
     def _noise_bandwidth(self, cutoff: float, rate_hz: float) -> float:
         """∫|H|^2 df [Hz]: fc (π/2n) / sin(π/2n), or over the warped axis."""
@@ -153,7 +165,9 @@ class FilteredNoise(NoiseFilter):
         if self.filter_order == 2:
             rms = float(np.sqrt(white_density * self._noise_bandwidth(cutoff, rate_hz)))
             return _butterworth_noise(samples, cutoff / rate_hz, rms, seed)
-        source = replace(self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz)
+        source = replace(
+            self, cutoff_hz=cutoff, reference_cutoff_hz=self.reference_cutoff_hz or self.cutoff_hz
+        )
         return synthesised(source, samples, rate_hz, seed)
 
 
@@ -164,16 +178,19 @@ def white_noise(samples: int, seed: int) -> Field:
 
 def _require_below_half(cutoff: float, rate_hz: float) -> None:
     if cutoff >= rate_hz / 2.0:
-        raise BadInput(f"a digital filter's cut-off must lie below rate/2, {rate_hz / 2.0:g} Hz, got {cutoff:g} Hz")
+        raise BadInput(
+            f"a digital filter's cut-off must lie below rate/2, {rate_hz / 2.0:g} Hz, got {cutoff:g} Hz"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceTrack:
     """A surface's own profile run over at a speed: S(f) = Φ(f/v)/v.
 
-    `wavenumber` [cycles/m] evenly spaced from 0 and `spectrum` Φ [m^3], one-sided, both of shape (lines,); `speed` v
-    [m/s]. Between the lines Φ is linear, above the last it is 0: the map shows nothing finer than two of its pixels.
-    Records are Gaussian, and as long as one likes; they know the surface's spectrum, not its shapes.
+    `wavenumber` [cycles/m] evenly spaced from 0 and `spectrum` Φ [m^3], one-sided, both of shape
+    (lines,); `speed` v [m/s]. Between the lines Φ is linear, above the last it is 0: the map shows
+    nothing finer than two of its pixels. Records are Gaussian, and as long as one likes; they know
+    the surface's spectrum, not its shapes.
     """
 
     wavenumber: Field
@@ -187,10 +204,14 @@ class SurfaceTrack:
     def of(cls, surface: Surface, speed: float) -> "SurfaceTrack":
         """The mean spectrum of the surface's cuts along rolling, Hann-tapered: line width 1.5 over the length."""
         if surface.sq == 0.0:
-            raise BadInput("a flat surface excites nothing; give it a roughness, or take filtered noise")
+            raise BadInput(
+                "a flat surface excites nothing; give it a roughness, or take filtered noise"
+            )
         heights = surface.heights - np.mean(surface.heights)
         spacing = surface.grid.spacing[0]
-        wavenumber, spectra = scipy.signal.periodogram(heights, 1.0 / spacing, "hann", detrend=False, axis=0)
+        wavenumber, spectra = scipy.signal.periodogram(
+            heights, 1.0 / spacing, "hann", detrend=False, axis=0
+        )
         return cls(wavenumber=wavenumber, spectrum=np.mean(spectra, axis=1), speed=speed)
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:  # noqa: ARG002 - the same at any rate
@@ -207,8 +228,9 @@ class SurfaceTrack:
 class PatchAverage:
     """An excitation averaged over the contact patch, with the weight of Hertz's pressure.
 
-    Waves of k = 2π f/v run across the patch of half-width a [m]: their height shrinks by 2 J1(ka)/(ka) in a line
-    contact (`shape` "line"), by 3 (sin ka - ka cos ka)/(ka)^3 in a round one ("point").
+    Waves of k = 2π f/v run across the patch of half-width a [m]: their height shrinks by 2
+    J1(ka)/(ka) in a line contact (`shape` "line"), by 3 (sin ka - ka cos ka)/(ka)^3 in a round one
+    ("point").
     """
 
     source: Excitation
@@ -228,11 +250,15 @@ class PatchAverage:
 
     def density(self, frequency_hz: Field, rate_hz: float) -> Field:
         """The source's, times the weight squared [m^2/Hz]."""
-        return np.asarray(self.source.density(frequency_hz, rate_hz) * self.weight(frequency_hz) ** 2)
+        return np.asarray(
+            self.source.density(frequency_hz, rate_hz) * self.weight(frequency_hz) ** 2
+        )
 
     def profile(self, samples: int, rate_hz: float, seed: int) -> Signal:
         """The source's record, averaged [m]."""
-        reach = int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64  # beyond the reach of either end
+        reach = (
+            int(np.ceil(4.0 * self.half_width / self.speed * rate_hz)) + 64
+        )  # beyond the reach of either end
         heights = self.source.profile(samples + 2 * reach, rate_hz, seed).values
         length = scipy.fft.next_fast_len(heights.size, real=True)
         weight = self.weight(scipy.fft.rfftfreq(length, 1.0 / rate_hz))
@@ -240,7 +266,9 @@ class PatchAverage:
         return Signal(np.ascontiguousarray(averaged[reach : reach + samples]), rate_hz, "m")
 
 
-PATCHES: dict[PatchShape, Callable[[Field], Field]] = {  # what is left of a wave's height, of ka > 0
+PATCHES: dict[
+    PatchShape, Callable[[Field], Field]
+] = {  # what is left of a wave's height, of ka > 0
     "line": lambda ka: 2.0 * scipy.special.j1(ka) / ka,
     "point": lambda ka: 3.0 * scipy.special.spherical_jn(1, ka) / ka,
 }
@@ -249,7 +277,8 @@ PATCHES: dict[PatchShape, Callable[[Field], Field]] = {  # what is left of a wav
 def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> Field:
     """Gaussian heights with the source's spectrum: random waves on the lines of a record a quarter longer, cut off.
 
-    What is left is not periodic, as no real record is. What lies above rate/2 is left out, not folded.
+    What is left is not periodic, as no real record is. What lies above rate/2 is left out, not
+    folded.
     """
     length = scipy.fft.next_fast_len(samples + samples // 4, real=True)
     frequency = scipy.fft.rfftfreq(length, 1.0 / rate_hz)
@@ -263,14 +292,18 @@ def synthesised(source: Excitation, samples: int, rate_hz: float, seed: int) -> 
 def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Field:
     """Samples of y'' + √2 ω y' + ω^2 y = white noise, of standard deviation `rms`; `cutoff` in cycles a sample.
 
-    State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan 1978): y is an ARMA(2, 1) series of one white noise.
+    State x = (y, y') obeys x⁺ = A x + e with cov e = Q (Van Loan 1978): y is an ARMA(2, 1) series
+    of one white noise.
     """
     omega = 2.0 * np.pi * cutoff
     drift = np.array([[0.0, 1.0], [-(omega**2), -np.sqrt(2.0) * omega]])
-    exponential = scipy.linalg.expm(np.block([[-drift, np.diag([0.0, 1.0])], [np.zeros((2, 2)), drift.T]]))
+    exponential = scipy.linalg.expm(
+        np.block([[-drift, np.diag([0.0, 1.0])], [np.zeros((2, 2)), drift.T]])
+    )
     step = exponential[2:, 2:].T
     noise = step @ exponential[:2, 2:]
-    # y_n - tr(A) y_(n-1) + det(A) y_(n-2) = e1_(n-1) + (A12 e2 - A22 e1)_(n-2): its variance, neighbour covariance ...
+    # y_n - tr(A) y_(n-1) + det(A) y_(n-2) = e1_(n-1) + (A12 e2 - A22 e1)_(n-2): its variance,
+    # neighbour covariance ...
     back = np.array([-step[1, 1], step[0, 1]])
     variance = noise[0, 0] + back @ noise @ back
     neighbour = back @ noise[:, 0]
@@ -279,7 +312,11 @@ def _butterworth_noise(samples: int, cutoff: float, rms: float, seed: int) -> Fi
     numerator = np.array([plus + minus, plus - minus]) / 2.0
     denominator = np.array([1.0, -np.trace(step), np.linalg.det(step)])
 
-    settling = int(np.ceil(12.0 * np.sqrt(2.0) / omega))  # 12 time constants: what is left of the start is e^-12
+    settling = int(
+        np.ceil(12.0 * np.sqrt(2.0) / omega)
+    )  # 12 time constants: what is left of the start is e^-12
     white = white_noise(settling + samples, seed)
-    to_rms = rms * np.sqrt(2.0 * np.sqrt(2.0) * omega**3)  # unit white noise would have variance 1 / (2 √2 ω^3)
+    to_rms = rms * np.sqrt(
+        2.0 * np.sqrt(2.0) * omega**3
+    )  # unit white noise would have variance 1 / (2 √2 ω^3)
     return np.asarray(to_rms * recursion(numerator, denominator, white)[settling:])

@@ -8,14 +8,21 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from asperity.arrays import Field
-from asperity.errors import BadInput, require_positive
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, require_positive
 
-FINER = 2  # samples in place of one before the spline, which is good to a third of the rate it is given
+FINER = (
+    2  # samples in place of one before the spline, which is good to a third of the rate it is given
+)
 FEWEST_PULSES = 4
-SLOWEST = 0.25  # of the mean speed: what turned more slowly is left out, or samples would have to be ever finer
-LEVELS = (0.25, 0.75)  # of a tacho's range: it has to pass both to count, so that its noise makes no pulses
-UNEVEN = 4.0  # times the median interval, or a share of it so small, between pulses: these are no shaft's
+# of the mean speed: what turned more slowly is left out, or samples would have to be ever finer
+SLOWEST = 0.25
+LEVELS = (
+    0.25,
+    0.75,
+)  # of a tacho's range: it has to pass both to count, so that its noise makes no pulses
+# times the median interval, or a share of it so small, between pulses: these are no shaft's
+UNEVEN = 4.0
 
 
 class Turning(NamedTuple):
@@ -36,14 +43,18 @@ def turning_by_pulses(pulses: Field, rate_hz: float, per_turn: float = 1.0) -> T
     require_positive("pulses per turn", per_turn)
     edges = _rising(pulses)
     if edges.size < FEWEST_PULSES:
-        raise BadInput(f"the tacho shows {edges.size} pulses, and {FEWEST_PULSES} are needed; name another channel")
+        raise BadInput(
+            f"the tacho shows {edges.size} pulses, and {FEWEST_PULSES} are needed; name another channel"
+        )
     between = np.diff(edges) / np.median(np.diff(edges))
     if between.min() < 1.0 / UNEVEN or between.max() > UNEVEN:
         raise BadInput(
             f"the tacho's pulses come at {between.min():.2g} to {between.max():.2g} times their median interval, as no "
             "shaft turns; name another channel"
         )
-    angle = scipy.interpolate.PchipInterpolator(edges, np.arange(edges.size) / per_turn, extrapolate=False)
+    angle = scipy.interpolate.PchipInterpolator(
+        edges, np.arange(edges.size) / per_turn, extrapolate=False
+    )
     turns = angle(np.arange(pulses.size))
     return Turning(turns, float((edges.size - 1) / per_turn / (edges[-1] - edges[0]) * rate_hz))
 
@@ -65,8 +76,8 @@ def turning_by_speed(speed_hz: Field, rate_hz: float) -> Turning:
 def steadied(values: Field, turning: Turning, rate_hz: float) -> tuple[Field, float]:
     """The values as if the shaft had turned at its mean speed all the time, and how many of them there are a second.
 
-    Sampled so finely that nothing folds back where the shaft turned slowest. Raises BadInput for a shaft that turned
-    at less than a quarter of its mean speed for a time.
+    Sampled so finely that nothing folds back where the shaft turned slowest. Raises BadInput for a
+    shaft that turned at less than a quarter of its mean speed for a time.
     """
     known = np.flatnonzero(np.isfinite(turning.turns))
     turns = turning.turns[known]
@@ -84,7 +95,10 @@ def steadied(values: Field, turning: Turning, rate_hz: float) -> tuple[Field, fl
 
 def _rising(pulses: Field) -> Field:
     """Places of rising edges, in samples, between which the signal has gone low again."""
-    low, high = float(np.nanmin(pulses)), float(np.nanmax(pulses))  # a pulse may be two samples of ten thousand
+    low, high = (
+        float(np.nanmin(pulses)),
+        float(np.nanmax(pulses)),
+    )  # a pulse may be two samples of ten thousand
     middle, (under, over) = 0.5 * (low + high), (low + level * (high - low) for level in LEVELS)
     state = np.where(pulses > over, 1, np.where(pulses < under, -1, 0))
     told = np.flatnonzero(state)

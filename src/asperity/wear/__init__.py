@@ -1,4 +1,4 @@
-"""What vibration spectra say about wear: contact-resonance indicators, their series, stages and alarms."""
+"""Wear of the bodies: wear laws, mechanisms, and coefficients fitted to tests."""
 
 import lazy_loader
 

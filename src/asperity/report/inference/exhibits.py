@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.inference import CRUCIAL, Design, Inference
-from asperity.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import legend_below, panels_in_rows
 from asperity.report.style import BLUE, GREY, VERMILION, Medium
@@ -22,11 +22,15 @@ LONGEST = 28  # letters of a label
 
 def marginals(found: Inference) -> Exhibit:
     """Each quantity before and after."""
-    after, before, exact = (found.values(draws) for draws in (found.draws, found.prior, found.exact))
+    after, before, exact = (
+        found.values(draws) for draws in (found.draws, found.prior, found.exact)
+    )
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, SIDE * -(-len(after) // 4)), layout="constrained")
-        for number, (axes, key) in enumerate(zip(panels_in_rows(figure, len(after)), after, strict=True)):
+        for number, (axes, key) in enumerate(
+            zip(panels_in_rows(figure, len(after)), after, strict=True)
+        ):
             _marginal(axes, key, (before[key], after[key], exact[key]), named=not number)
         legend_below(figure, 3)
         return figure
@@ -48,9 +52,19 @@ def _marginal(axes: Axes, key: str, draws: tuple[Field, Field, Field], *, named:
     names = ("before", "after", "after, laws exact") if named else ("", "", "")
     axes.hist(before, edges, density=True, color=GREY, alpha=0.35, label=names[0] or None)
     axes.hist(after, edges, density=True, color=BLUE, alpha=0.65, label=names[1] or None)
-    axes.hist(exact, edges, density=True, histtype="step", color="black", linestyle="--", label=names[2] or None)
+    axes.hist(
+        exact,
+        edges,
+        density=True,
+        histtype="step",
+        color="black",
+        linestyle="--",
+        label=names[2] or None,
+    )
     label = (
-        entry.label if len(entry.label) <= LONGEST else f"{entry.name} [{entry.display}]".replace(" along rolling", "")
+        entry.label
+        if len(entry.label) <= LONGEST
+        else f"{entry.name} [{entry.display}]".replace(" along rolling", "")
     )
     axes.set(xlabel=label, yticks=[], xlim=(low, high))
     axes.locator_params(axis="x", nbins=4)
@@ -63,7 +77,9 @@ def pairs(found: Inference) -> Exhibit:
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, SIDE + 0.3), layout="constrained")
-        for number, (axes, (first, second)) in enumerate(zip(panels_in_rows(figure, len(shown)), shown, strict=True)):
+        for number, (axes, (first, second)) in enumerate(
+            zip(panels_in_rows(figure, len(shown)), shown, strict=True)
+        ):
             one, other = quantity(first), quantity(second)
             for values, colour, name in ((before, GREY, "before"), (after, BLUE, "after")):
                 axes.plot(
@@ -99,7 +115,11 @@ def _most_alike(values: dict[str, Field], keys: Sequence[str]) -> list[tuple[str
 
 def predicted(found: Inference) -> Exhibit:
     """CRF at each operating point: heard, and what possible contacts would show."""
-    heard = [(place, point) for place, point in enumerate(found.forward.points) if not np.isnan(point.crf.value)]
+    heard = [
+        (place, point)
+        for place, point in enumerate(found.forward.points)
+        if not np.isnan(point.crf.value)
+    ]
     again = np.exp(found.heard_again())
 
     def draw(medium: Medium) -> Figure:
@@ -107,12 +127,28 @@ def predicted(found: Inference) -> Exhibit:
         at = np.arange(len(heard))
         for number, (place, _) in enumerate(heard):
             low, middle, high = np.quantile(again[:, place], (0.05, 0.5, 0.95))
-            axes.plot([number, number], [low, high], color=BLUE, linewidth=7, alpha=0.35, solid_capstyle="butt",
-                      label=None if number else "90 % of possible contacts")  # fmt: skip
+            axes.plot(
+                [number, number],
+                [low, high],
+                color=BLUE,
+                linewidth=7,
+                alpha=0.35,
+                solid_capstyle="butt",
+                label=None if number else "90 % of possible contacts",
+            )
             axes.plot(number, middle, "_", color=BLUE, markersize=12)
         values = np.array([np.exp(point.crf.value) for _, point in heard])
         stds = np.array([point.crf.std for _, point in heard]) * values
-        axes.errorbar(at, values, 1.645 * stds, fmt="o", color=VERMILION, markersize=4, capsize=3, label="heard")
+        axes.errorbar(
+            at,
+            values,
+            1.645 * stds,
+            fmt="o",
+            color=VERMILION,
+            markersize=4,
+            capsize=3,
+            label="heard",
+        )
         names = [f"{point.load_n:.4g} N\n{point.entrainment_m_s:.3g} m/s" for _, point in heard]
         axes.set_xticks(at, names, fontsize=7.5)
         axes.set(ylabel=quantity("crf_hz").label, xlim=(-0.6, len(heard) - 0.4))
@@ -139,14 +175,30 @@ def following(found: Inference) -> Exhibit:
         told = np.array([[expected[load, speed] for load in loads] for speed in speeds])
         drawn = axes.contourf(loads, speeds, told, 12, cmap="cividis")
         figure.colorbar(drawn, ax=axes, label="expected information [bits]")
-        run = [(point.load_n, point.entrainment_m_s) for point in found.forward.points if point.names]
+        run = [
+            (point.load_n, point.entrainment_m_s) for point in found.forward.points if point.names
+        ]
         if run:
-            axes.plot(*np.array(run).T, "o", color="white", markeredgecolor="black", label="recorded")
+            axes.plot(
+                *np.array(run).T, "o", color="white", markeredgecolor="black", label="recorded"
+            )
         best = found.next_point
-        axes.plot(best.load_n, best.entrainment_m_s, "*", color=VERMILION, markeredgecolor="white", markersize=15,
-                  clip_on=False, zorder=5, label="to run next")  # fmt: skip
+        axes.plot(
+            best.load_n,
+            best.entrainment_m_s,
+            "*",
+            color=VERMILION,
+            markeredgecolor="white",
+            markersize=15,
+            clip_on=False,
+            zorder=5,
+            label="to run next",
+        )
         axes.set(
-            xlabel=quantity("load_n").axis, ylabel=quantity("entrainment_speed_m_s").axis, yscale="log", xscale="log"
+            xlabel=quantity("load_n").axis,
+            ylabel=quantity("entrainment_speed_m_s").axis,
+            yscale="log",
+            xscale="log",
         )
         ends = ((axes.xaxis, loads), (axes.yaxis, speeds))
         for axis, values in ends:
@@ -169,13 +221,17 @@ def levers(design: Design) -> Exhibit:
 
     def draw(medium: Medium) -> Figure:
         figure = Figure(figsize=(medium.double, SIDE + 0.2), layout="constrained")
-        for axes, lever in zip(panels_in_rows(figure, len(design.levers), sharey=True), design.levers, strict=True):
+        for axes, lever in zip(
+            panels_in_rows(figure, len(design.levers), sharey=True), design.levers, strict=True
+        ):
             entry = quantity(lever.key)
             axes.plot(entry.factor * lever.values, 100.0 * lever.chances, color=BLUE)
             axes.axhline(95.0, color="black", linestyle="--", linewidth=0.8)
             if lever.bound is not None:
                 axes.axvline(entry.factor * lever.bound, color=VERMILION)
-            axes.set(xlabel=entry.label if len(entry.label) <= LONGEST else entry.name, ylim=(-3, 103))
+            axes.set(
+                xlabel=entry.label if len(entry.label) <= LONGEST else entry.name, ylim=(-3, 103)
+            )
         figure.supylabel("probability [%]", fontsize="medium")
         return figure
 

@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from asperity.core.quantities import quantity
 from asperity.inference import CRUCIAL, Design, Forecast, Inference, PointEstimates
-from asperity.quantities import quantity
-from asperity.report.ahead import ahead
 from asperity.report.base import Tile, heading, render, write_page
+from asperity.report.forecast import ahead
 from asperity.report.inference import exhibits
 
 
@@ -22,7 +22,11 @@ class Line(NamedTuple):
 
 
 def write_inference_report(
-    found: Inference, path: str | Path, *, forecast: Forecast | None = None, design: Design | None = None
+    found: Inference,
+    path: str | Path,
+    *,
+    forecast: Forecast | None = None,
+    design: Design | None = None,
 ) -> Path:
     """Write one self-contained HTML page about what recordings say, whole or not at all.
 
@@ -40,7 +44,9 @@ def write_inference_report(
     return write_page(path, lambda: render_inference_page(found, forecast, design))
 
 
-def render_inference_page(found: Inference, forecast: Forecast | None = None, design: Design | None = None) -> str:
+def render_inference_page(
+    found: Inference, forecast: Forecast | None = None, design: Design | None = None
+) -> str:
     """The page as HTML text; see `write_inference_report`."""
     known = found.posterior()
     return render(
@@ -48,9 +54,13 @@ def render_inference_page(found: Inference, forecast: Forecast | None = None, de
         title="What recordings say of a contact",
         found=found,
         tiles=[
-            Tile(heading(quantity(key)), quantity(key).number(known[key].median),
-                 f"({quantity(key).interval(known[key].low, known[key].high)})")
-            for key in CRUCIAL if key in known
+            Tile(
+                heading(quantity(key)),
+                quantity(key).number(known[key].median),
+                f"({quantity(key).interval(known[key].low, known[key].high)})",
+            )
+            for key in CRUCIAL
+            if key in known
         ],
         warnings=found.warnings(),
         marginals=exhibits.marginals(found).picture(),
@@ -65,13 +75,16 @@ def render_inference_page(found: Inference, forecast: Forecast | None = None, de
         ahead=None if forecast is None else ahead(forecast.bands, forecast.x_name or "x").picture(),
         levers=None if design is None else exhibits.levers(design).picture(),
         models=[
-            (model.law, "with its error" if model.discrepancy else "exact",
-             quantity("log_evidence").number(model.log_evidence, model.log_evidence_std),
-             quantity("model_probability").text(model.probability))
+            (
+                model.law,
+                "with its error" if model.discrepancy else "exact",
+                quantity("log_evidence").number(model.log_evidence, model.log_evidence_std),
+                quantity("model_probability").text(model.probability),
+            )
             for model in found.models
         ],
         emulator=found.emulator.sentence(),
-    )  # fmt: skip
+    )
 
 
 def _lines(found: Inference) -> list[Line]:

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from asperity.quantities import NO_VALUE, Quantity, quantity
+from asperity.core.quantities import NO_VALUE, Quantity, quantity
+from asperity.machines import MachineResult, Rating
 from asperity.report.base import Exhibit, heading, render, tile, write_page
-from asperity.report.machine.path import SHOWN, along_path, fatigue_over_depth
+from asperity.report.machine.contact_path import SHOWN, along_path, fatigue_over_depth
 from asperity.report.machine.sketch import machine_sketch
-from asperity.report.run import contact, rubbing
+from asperity.report.run import contact, friction_maps
 from asperity.results import Run
-from asperity.study import MachineResult, Rating
 
 CONDITIONS = (
     ("load_n", "load_n"),
@@ -20,10 +20,20 @@ CONDITIONS = (
     ("slide_to_roll", "slide_to_roll"),
     ("p_hertz_pa", "hertz_pressure_pa"),
 )
-TILES = ("clr", "h_central_m", "lambda_ratio", "car", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
+TILES = (
+    "clr",
+    "h_central_m",
+    "lambda_ratio",
+    "car",
+    "friction_coefficient",
+    "flash_temperature_max_k",
+    "crf_hz",
+)
 
 
-def write_machine_report(result: MachineResult, path: str | Path, *, opened: str | None = None) -> Path:
+def write_machine_report(
+    result: MachineResult, path: str | Path, *, opened: str | None = None
+) -> Path:
     """Write one self-contained HTML page about a machine, whole or not at all.
 
     Parameters
@@ -52,7 +62,9 @@ def _page(result: MachineResult, opened: str | None) -> str:
         title=result.case.machine.title(),
         result=result,
         failures=result.failures,
-        tiles=[tile(quantity(key), result.worst) for key in TILES if result.worst.get(key) is not None],
+        tiles=[
+            tile(quantity(key), result.worst) for key in TILES if result.worst.get(key) is not None
+        ],
         sketch=machine_sketch(result).picture(),
         path=along_path(result).picture() if len(result.rows) > 1 else None,
         heads=[(_head(key, entry), entry.display) for key, entry in keys],
@@ -98,7 +110,10 @@ def _rated(rating: Rating) -> _RatingView:
         value = entry.text(rating.alone)
     else:
         known = {name: number for name, number in rating.values.items() if number is not None}
-        value = "; ".join(f"{name} {entry.number(number)}" for name, number in known.items()) or NO_VALUE
+        value = (
+            "; ".join(f"{name} {entry.number(number)}" for name, number in known.items())
+            or NO_VALUE
+        )
         value = f"{value} {entry.display}".rstrip()
     return _RatingView(heading(entry), entry.meaning, value, rating)
 
@@ -117,6 +132,10 @@ def _maps(run: Run) -> Iterator[Exhibit]:
     yield contact.film_map(run)
     yield contact.pressure_map(run)
     yield contact.centre_line(run)
-    if run.friction is not None and run.heat is not None and run.solution.conditions.sliding_speed != 0.0:
-        yield rubbing.temperature_map(run, run.friction, run.heat)
-    yield rubbing.stress_section(run)
+    if (
+        run.friction is not None
+        and run.heat is not None
+        and run.solution.conditions.sliding_speed != 0.0
+    ):
+        yield friction_maps.temperature_map(run, run.friction, run.heat)
+    yield friction_maps.stress_section(run)

@@ -10,12 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from asperity.arrays import Field
-from asperity.machine import BallBearing, Cam, CylindricalRollerBearing, FlatCam, RollerCam, SpurGear, TwinDisc
-from asperity.quantities import quantity
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
+from asperity.machine import (
+    BallBearing,
+    Cam,
+    CylindricalRollerBearing,
+    FlatCam,
+    RollerCam,
+    SpurGear,
+    TwinDisc,
+)
+from asperity.machines import MachineResult
 from asperity.report.base import Exhibit
 from asperity.report.style import BLUE, GREY, VERMILION, Medium
-from asperity.study import MachineResult
 
 MM = 1e3
 METAL, EDGE, IDLE = "#e5e7eb", "#556070", "#ffffff"
@@ -49,7 +57,9 @@ def machine_sketch(result: MachineResult) -> Exhibit:
         assert isinstance(machine, Cam)
         draw, caption = (
             partial(_cam, machine, result),
-            ("Cam and follower at the worst contact, to scale; the places that were solved are dots on the cam."),
+            (
+                "Cam and follower at the worst contact, to scale; the places that were solved are dots on the cam."
+            ),
         )
 
     def drawn(medium: Medium) -> Figure:
@@ -63,7 +73,9 @@ def machine_sketch(result: MachineResult) -> Exhibit:
 
 
 def _circle(axes: Axes, x: float, y: float, radius: float, **style: Any) -> None:
-    axes.add_patch(Circle((MM * x, MM * y), MM * radius, **{"facecolor": "none", "edgecolor": EDGE, **style}))
+    axes.add_patch(
+        Circle((MM * x, MM * y), MM * radius, **{"facecolor": "none", "edgecolor": EDGE, **style})
+    )
 
 
 def _line(axes: Axes, line: Line, **style: Any) -> None:
@@ -74,10 +86,13 @@ def _frame(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
     axes.set(xlim=(MM * x[0], MM * x[1]), ylim=(MM * y[0], MM * y[1]))
 
 
-# Bearings ------------------------------------------------------------------------------------------------------------
+# Bearings
+# ------------------------------------------------------------------------------------------------------------
 
 
-def _bearing(bearing: CylindricalRollerBearing | BallBearing, result: MachineResult, axes: Axes) -> None:
+def _bearing(
+    bearing: CylindricalRollerBearing | BallBearing, result: MachineResult, axes: Axes
+) -> None:
     if isinstance(bearing, BallBearing):
         diameter, loads = bearing.ball_diameter, bearing.loads(result.case.pair)[0]
     else:
@@ -93,17 +108,40 @@ def _bearing(bearing: CylindricalRollerBearing | BallBearing, result: MachineRes
         away = np.array([math.sin(angle), -math.cos(angle)])
         x, y = middle * away
         share = load / largest
-        _circle(axes, x, y, radius, facecolor=BLUE if load > 0.0 else IDLE, alpha=0.25 + 0.6 * share, zorder=2)
-        axes.text(MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3)
+        _circle(
+            axes,
+            x,
+            y,
+            radius,
+            facecolor=BLUE if load > 0.0 else IDLE,
+            alpha=0.25 + 0.6 * share,
+            zorder=2,
+        )
+        axes.text(
+            MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3
+        )
         if load > 0.0:
             start, end = outer + wall, outer + wall + room * share
-            axes.plot(*(MM * np.outer(away, [start, end])), color=VERMILION, linewidth=4.0, solid_capstyle="butt")
+            axes.plot(
+                *(MM * np.outer(away, [start, end])),
+                color=VERMILION,
+                linewidth=4.0,
+                solid_capstyle="butt",
+            )
     most = int(np.argmax(loads))
-    place = (outer + wall + room) * np.array([math.sin(bearing.angles[most]), -math.cos(bearing.angles[most])])
+    place = (outer + wall + room) * np.array(
+        [math.sin(bearing.angles[most]), -math.cos(bearing.angles[most])]
+    )
     axes.annotate(
-        quantity("load_n").text(largest), (MM * place[0], MM * place[1]), (0, -3), textcoords="offset points",
-        ha="center", va="top", color=VERMILION, fontsize="small",
-    )  # fmt: skip
+        quantity("load_n").text(largest),
+        (MM * place[0], MM * place[1]),
+        (0, -3),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        color=VERMILION,
+        fontsize="small",
+    )
     _applied(axes, bearing, inner - wall)
     reach = outer + wall + 0.3 * diameter
     _frame(axes, (-reach - room, reach + room), (-reach - 1.2 * room, reach))
@@ -119,14 +157,28 @@ def _applied(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore: 
     axial = getattr(bearing, "axial_load", 0.0)
     if axial > 0.0:
         words.append(f"{quantity('load_n').text(axial)} axial")
-    axes.text(0.0, MM * 0.38 * bore, "\n".join(words), ha="center", va="bottom", color=VERMILION, fontsize="small")
+    axes.text(
+        0.0,
+        MM * 0.38 * bore,
+        "\n".join(words),
+        ha="center",
+        va="bottom",
+        color=VERMILION,
+        fontsize="small",
+    )
     turn = np.linspace(math.radians(150.0), math.radians(30.0), 40)
     way = 0.85 * bore * np.array([np.cos(turn), np.sin(turn)])
     _line(axes, (way[0], way[1]), color=GREY)
-    axes.annotate("", tuple(MM * way[:, -1]), tuple(MM * way[:, -3]), arrowprops={"arrowstyle": "-|>", "color": GREY})
+    axes.annotate(
+        "",
+        tuple(MM * way[:, -1]),
+        tuple(MM * way[:, -3]),
+        arrowprops={"arrowstyle": "-|>", "color": GREY},
+    )
 
 
-# Gears ---------------------------------------------------------------------------------------------------------------
+# Gears
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
@@ -136,9 +188,17 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
     along = np.array([-math.cos(angle), math.sin(angle)])
     touching = foot + result.worst["position"] * along
     pinion = _flanks(gears, 0, touching)
-    wheel = _flanks(gears, 1, np.array([0.0, centres]) - touching)  # its own axis is turned by half a turn
+    wheel = _flanks(
+        gears, 1, np.array([0.0, centres]) - touching
+    )  # its own axis is turned by half a turn
     axes.fill(MM * pinion[0], MM * pinion[1], facecolor=METAL, edgecolor=EDGE, linewidth=0.9)
-    axes.fill(-MM * wheel[0], MM * (centres - wheel[1]), facecolor="#d7dde5", edgecolor=EDGE, linewidth=0.9)
+    axes.fill(
+        -MM * wheel[0],
+        MM * (centres - wheel[1]),
+        facecolor="#d7dde5",
+        edgecolor=EDGE,
+        linewidth=0.9,
+    )
     places = np.array([foot + s * along for s in gears.path.values()])
     _line(axes, (places[[0, -1], 0], places[[0, -1], 1]), color=VERMILION, linewidth=1.6)
     for side, (name, (x, y)) in enumerate(zip(gears.path, places, strict=True)):
@@ -147,19 +207,31 @@ def _gears(gears: SpurGear, result: MachineResult, axes: Axes) -> None:
         axes.plot(MM * x, MM * y, "o", color=VERMILION, markersize=size)
         shift = (0, 8) if side % 2 else (0, -9)
         axes.annotate(
-            name, (MM * x, MM * y), shift, textcoords="offset points", ha="center", va="center", fontsize="small",
+            name,
+            (MM * x, MM * y),
+            shift,
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize="small",
             fontweight="bold" if is_worst else "normal",
-        )  # fmt: skip
+        )
     reach = 0.62 * float(np.ptp(places[:, 0])) + 1.2 * gears.module
     middle = places.mean(axis=0)
-    _frame(axes, (middle[0] - reach, middle[0] + reach), (middle[1] - 0.8 * reach, middle[1] + 0.8 * reach))
+    _frame(
+        axes,
+        (middle[0] - reach, middle[0] + reach),
+        (middle[1] - 0.8 * reach, middle[1] + 0.8 * reach),
+    )
 
 
 def _flanks(gears: SpurGear, body: int, touching: Field) -> Line:
     """A gear's outline about its own axis, a flank through a point given from there, y towards the mesh."""
     teeth, shift = gears.teeth[body], gears.profile_shift[body]
     base, tip = gears.base_radii[body], gears.tip_radii[body]
-    half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _inv(gears.pressure_angle)
+    half = (0.5 * math.pi + 2.0 * shift * math.tan(gears.pressure_angle)) / teeth + _inv(
+        gears.pressure_angle
+    )
     root = gears.module * (0.5 * teeth + shift - 1.25)
     radii = np.linspace(max(base, root), tip, 25)
     rolled = np.arccos(np.clip(base / radii, -1.0, 1.0))
@@ -177,20 +249,28 @@ def _inv(angle: float) -> float:
     return math.tan(angle) - angle
 
 
-# Discs and cams ------------------------------------------------------------------------------------------------------
+# Discs and cams
+# ------------------------------------------------------------------------------------------------------
 
 
 def _discs(discs: TwinDisc, axes: Axes) -> None:
     first, second = discs.radii
-    for number, (x, radius, speed) in enumerate(zip((-first, second), discs.radii, discs.turning, strict=True), 1):
+    for number, (x, radius, speed) in enumerate(
+        zip((-first, second), discs.radii, discs.turning, strict=True), 1
+    ):
         _circle(axes, x, 0.0, radius, facecolor=METAL)
         turning = f"disc {number}\n{speed * 30.0 / math.pi:.4g} r/min"
         axes.text(MM * x, 0.0, turning, ha="center", va="center", fontsize="small")
     axes.plot(0.0, 0.0, "o", color=VERMILION, markersize=6)
     axes.annotate(
-        quantity("load_n").text(discs.load), (0.0, 0.0), (0, 12), textcoords="offset points", ha="center",
-        color=VERMILION, fontsize="small",
-    )  # fmt: skip
+        quantity("load_n").text(discs.load),
+        (0.0, 0.0),
+        (0, 12),
+        textcoords="offset points",
+        ha="center",
+        color=VERMILION,
+        fontsize="small",
+    )
     tallest = 1.05 * max(first, second)
     _frame(axes, (-2.1 * first, 2.1 * second), (-tallest, tallest))
 
@@ -218,9 +298,12 @@ def _cam(cam: Cam, result: MachineResult, axes: Axes) -> None:
         lift = cam.base_radius + cam.lift_at(turn)
         half = 1.1 * cam.base_radius
         axes.fill(
-            MM * np.array([-half, half, half, -half]), MM * (lift + np.array([0.0, 0.0, 0.2, 0.2]) * cam.base_radius),
-            facecolor="#d7dde5", edgecolor=EDGE, linewidth=1.0,
-        )  # fmt: skip
+            MM * np.array([-half, half, half, -half]),
+            MM * (lift + np.array([0.0, 0.0, 0.2, 0.2]) * cam.base_radius),
+            facecolor="#d7dde5",
+            edgecolor=EDGE,
+            linewidth=1.0,
+        )
         reach += 0.4 * cam.base_radius
     axes.plot(*(MM * met), "o", color=VERMILION, markersize=6)
     below = 1.1 * (cam.base_radius + cam.lift)

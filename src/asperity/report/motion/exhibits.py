@@ -8,18 +8,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from asperity.arrays import Field
-from asperity.history import History
-from asperity.quantities import quantity
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, VERMILION, Medium
+from asperity.simulation import History
 
 STROKES = (("-", BLUE), ("--", VERMILION), (":", GREEN))
 PANELS = (  # over time: what the axis is, unless a panel's one curve says so, and its curves
     ("share", ("clr", "car")),
     ("film_thickness_m", ("h_mean_m", "h_central_m", "h_min_m")),
-    ("friction_coefficient", ("friction_coefficient", "friction_asperity_part", "friction_oil_part")),
+    (
+        "friction_coefficient",
+        ("friction_coefficient", "friction_asperity_part", "friction_oil_part"),
+    ),
     ("power_w", ("friction_power_w", "flow_power_w")),
     ("frequency_hz", ("resonance_hz",)),
 )
@@ -31,7 +34,9 @@ PASSES = (
 )
 
 
-def _known(panels: Sequence[tuple[str, tuple[str, ...]]], table: Any) -> list[tuple[str, tuple[str, ...]]]:
+def _known(
+    panels: Sequence[tuple[str, tuple[str, ...]]], table: Any
+) -> list[tuple[str, tuple[str, ...]]]:
     """The panels that have a value to show."""
     return [panel for panel in panels if bool(table[panel[1][0]].notna().any())]
 
@@ -46,9 +51,15 @@ def curves(history: History) -> Exhibit:
         every = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         bottom = 0.5 / figure.get_size_inches()[1]
         figure.subplots_adjust(left=0.09, right=0.985, top=0.985, bottom=bottom, hspace=0.12)
-        time, counts = (display("time_s", rows["time_s"].to_numpy()) for rows in (table, history.settled))
+        time, counts = (
+            display("time_s", rows["time_s"].to_numpy()) for rows in (table, history.settled)
+        )
         for axes, (side, keys) in zip(every, panels, strict=True):
-            _draw_over_time(axes, time, {quantity(key).title: display(key, table[key].to_numpy()) for key in keys})
+            _draw_over_time(
+                axes,
+                time,
+                {quantity(key).title: display(key, table[key].to_numpy()) for key in keys},
+            )
             axes.axvspan(float(counts[0]), time[-1], color=GREY, alpha=0.08, linewidth=0.0)
             axes.set_ylabel(quantity(side).label)
         name_axes(every[-1], "time_s")
@@ -68,7 +79,11 @@ def _draw_over_time(axes: Axes, time: Field, lines: Mapping[str, Field]) -> None
         axes.plot(time, values, stroke, color=colour, label=name)
     axes.set_xlim(0.0, float(time[-1]) or 1.0)
     low, high = axes.get_ylim()
-    low = 0.0 if min(float(np.nanmin(values)) for values in lines.values()) >= 0.0 and low < 0.4 * high else low
+    low = (
+        0.0
+        if min(float(np.nanmin(values)) for values in lines.values()) >= 0.0 and low < 0.4 * high
+        else low
+    )
     axes.set_ylim(low, high + 0.28 * (high - low))  # room for the key
     axes.legend(loc="upper right", ncols=3)
 
@@ -85,7 +100,9 @@ def running_in(history: History) -> Exhibit:
             axes = figure.add_subplot(rows, 2, number)
             for key, (_, colour), marker in zip(keys, STROKES, "os", strict=False):
                 values, title = display(key, table[key].to_numpy()), quantity(key).title
-                axes.plot(table["pass"], values, marker=marker, markersize=3.5, color=colour, label=title)
+                axes.plot(
+                    table["pass"], values, marker=marker, markersize=3.5, color=colour, label=title
+                )
             if len(keys) > 1:
                 axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])  # room for the key
             if keys != (side,):  # else the axis says it

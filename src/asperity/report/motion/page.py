@@ -6,21 +6,34 @@ The maps are small pictures in the page, shown one after the other by a few line
 from dataclasses import replace
 from pathlib import Path
 
-from asperity.errors import BadInput
-from asperity.history import History, HistoryVibration
-from asperity.quantities import in_print, quantity
-from asperity.report import moving
+from asperity.core.errors import BadInput
+from asperity.core.quantities import in_print, quantity
+from asperity.report import animated_maps as moving
 from asperity.report.base import render, tile, write_page
 from asperity.report.motion import exhibits
+from asperity.simulation import History, HistoryVibration
 
 NUMBERS = (
-    "clr", "car", "car_domain", "contact_force_n", "h_min_m", "h_central_m", "h_mean_m", "p_max_pa",
-    "friction_coefficient", "friction_power_w", "flow_power_w", "resonance_hz", "mass_flux_imbalance",
-)  # fmt: skip
+    "clr",
+    "car",
+    "car_domain",
+    "contact_force_n",
+    "h_min_m",
+    "h_central_m",
+    "h_mean_m",
+    "p_max_pa",
+    "friction_coefficient",
+    "friction_power_w",
+    "flow_power_w",
+    "resonance_hz",
+    "mass_flux_imbalance",
+)
 TILES = ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz")
 
 
-def write_motion_report(history: History, path: str | Path, *, vibration: HistoryVibration | None = None) -> Path:
+def write_motion_report(
+    history: History, path: str | Path, *, vibration: HistoryVibration | None = None
+) -> Path:
     """Write one self-contained HTML page about a history, whole or not at all; with what a mass on it does.
 
     Raises
@@ -29,7 +42,9 @@ def write_motion_report(history: History, path: str | Path, *, vibration: Histor
         for a history without a kept map, or a path that cannot be written to.
     """
     if not history.frames:
-        raise BadInput("a report needs at least one map of the history, got none; run the case into a new folder")
+        raise BadInput(
+            "a report needs at least one map of the history, got none; run the case into a new folder"
+        )
     return write_page(path, lambda: render_motion_page(history, vibration))
 
 
@@ -47,7 +62,9 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
         history=history,
         vibration=vibration,
         tiles=[
-            tile(replace(quantity(key), deviation=f"{key}_std"), values) for key in TILES if values[key] is not None
+            tile(replace(quantity(key), deviation=f"{key}_std"), values)
+            for key in TILES
+            if values[key] is not None
         ],
         maps=[moving.moving_map(history.case, kind, reach) for kind in moving.KINDS],
         curves=over_time.picture_of(figure),
@@ -76,4 +93,6 @@ def _in_words(history: History, number: int) -> str:
     values = [quantity(key).named(row[key]) for key in ("clr", "car")]
     friction = quantity("friction_coefficient").number(row["friction_coefficient"])
     time = quantity("time_s").text(row["time_s"])
-    return in_print(f"step {number} of {history.steps}, {time}: {', '.join(values)}, friction {friction}")
+    return in_print(
+        f"step {number} of {history.steps}, {time}: {', '.join(values)}, friction {friction}"
+    )

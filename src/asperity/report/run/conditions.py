@@ -5,15 +5,19 @@ import tomllib
 from collections.abc import Sequence
 from typing import Any
 
-from asperity.conditions import ContactConditions
+from asperity.contact.conditions import ContactConditions
+from asperity.core.quantities import NO_VALUE, parameters, quantity, with_deviation
 from asperity.coupling import VibrationModel
 from asperity.ehl import ContactSolution
 from asperity.lubricant import FREEZING, LawFamily, Lubricant, Solid, law_name
-from asperity.quantities import NO_VALUE, parameters, quantity, with_deviation
 from asperity.report.base import heading
 from asperity.results import Run
 
-TACIT = {"direction_deg": 0.0, "turn": False, "outliers": "keep"}  # of a surface: what goes without saying
+TACIT = {
+    "direction_deg": 0.0,
+    "turn": False,
+    "outliers": "keep",
+}  # of a surface: what goes without saying
 
 
 def conditions_table(runs: Sequence[Run]) -> dict[str, list[str]]:
@@ -40,7 +44,11 @@ def _conditions(run: Run) -> dict[str, str]:
 
 def _law(family: LawFamily, law: object) -> str:
     values = ((name, mark, getattr(law, name)) for name, mark in parameters(type(law)).items())
-    stated = (f"{mark.symbol or name} = {mark.text(value)}" for name, mark, value in values if value is not None)
+    stated = (
+        f"{mark.symbol or name} = {mark.text(value)}"
+        for name, mark, value in values
+        if value is not None
+    )
     return ", ".join([law_name(family, law), *stated])
 
 
@@ -62,16 +70,24 @@ def _contact_rows(conditions: ContactConditions) -> dict[str, str]:
     half_widths = [quantity("half_width_m").text(half_width) for half_width in hertz.half_widths]
     across = "" if conditions.long else f", across rolling b = {half_widths[1]}"
     speeds = " and ".join(map(quantity("surface_speed_m_s").text, conditions.surface_speeds))
-    mean, slip, modulus = map(quantity, ("entrainment_speed_m_s", "slide_to_roll", "reduced_modulus_pa"))
-    shape = {"Shape along the roller": _shape(conditions)} if conditions.geometry == "roller" else {}
+    mean, slip, modulus = map(
+        quantity, ("entrainment_speed_m_s", "slide_to_roll", "reduced_modulus_pa")
+    )
+    shape = (
+        {"Shape along the roller": _shape(conditions)} if conditions.geometry == "roller" else {}
+    )
     return {
         "Contact": contact,
         **shape,
         "Load": load,
         "Speeds": f"{speeds}: {mean.name} {mean.text(conditions.entrainment_speed)}, "
         f"{slip.name} {slip.text(conditions.slide_to_roll)}",
-        "Young's moduli": _both([quantity("youngs_modulus_pa").text(each) for each in pair.youngs_moduli]),
-        "Poisson's ratios": _both([quantity("poisson_ratio").text(each) for each in pair.poisson_ratios]),
+        "Young's moduli": _both(
+            [quantity("youngs_modulus_pa").text(each) for each in pair.youngs_moduli]
+        ),
+        "Poisson's ratios": _both(
+            [quantity("poisson_ratio").text(each) for each in pair.poisson_ratios]
+        ),
         "Reduced modulus": f"E* = {modulus.text(pair.reduced_modulus)} "
         f"(E′ = 2 E* = {modulus.text(pair.effective_modulus)})",
         "Pressure cap (hardness)": "none: purely elastic"
@@ -87,14 +103,20 @@ def _shape(conditions: ContactConditions) -> str:
     shape, drop, length = conditions.roller, quantity("height_m"), quantity("length_m")
     parts = []
     if shape.amplitude > 0.0:
-        ends = "unbounded at the ends" if shape.end_drop is None else f"{drop.text(shape.end_drop)} at the ends"
+        ends = (
+            "unbounded at the ends"
+            if shape.end_drop is None
+            else f"{drop.text(shape.end_drop)} at the ends"
+        )
         parts.append(f"logarithmic drop of amplitude {drop.text(shape.amplitude)}, {ends}")
     if shape.crown_radius is not None:
         parts.append(f"circular crown of radius {length.text(shape.crown_radius)}")
     if shape.flat > 0.0:
         parts.append(f"straight middle of {length.text(shape.flat)}")
     if shape.chamfer > 0.0:
-        parts.append(f"chamfers of {length.text(shape.chamfer)} at {math.degrees(shape.chamfer_angle):.3g} degrees")
+        parts.append(
+            f"chamfers of {length.text(shape.chamfer)} at {math.degrees(shape.chamfer_angle):.3g} degrees"
+        )
     if shape.tilt != 0.0:
         parts.append(f"tilted by {1e3 * shape.tilt:.3g} mrad")
     return ", ".join(parts) or "straight"
@@ -126,11 +148,20 @@ def _thermal_rows(run: Run) -> dict[str, str]:
         for name, mark in parameters(Solid).items()
     ]
     boundary = quantity("boundary_friction")
-    rows = {heading(boundary): boundary.text(run.case.boundary_friction), "Bodies": ", ".join(solids)}
+    rows = {
+        heading(boundary): boundary.text(run.case.boundary_friction),
+        "Bodies": ", ".join(solids),
+    }
     if run.solution.lubricant is None:
         return rows
-    bulk = "" if thermal.bulk is None else f", bodies at {_both([_temperature(each) for each in thermal.bulk])}"
-    feedback = "the film's heat thins the oil" if thermal.feedback else "heat does not act back on the oil"
+    bulk = (
+        ""
+        if thermal.bulk is None
+        else f", bodies at {_both([_temperature(each) for each in thermal.bulk])}"
+    )
+    feedback = (
+        "the film's heat thins the oil" if thermal.feedback else "heat does not act back on the oil"
+    )
     return {
         **rows,
         "Temperature": f"{_temperature(thermal.ambient)} ambient{bulk}; {feedback}",
@@ -147,8 +178,14 @@ def _temperature(kelvin: float) -> str:
 def _numerical_rows(solution: ContactSolution) -> dict[str, str]:
     grid, a, cell = solution.grid, solution.conditions.hertz.half_widths[0], quantity("cell_m")
     (nx, ny), (dx, dy) = grid.cells, grid.spacing
-    ends = [[with_deviation(end / a, None, ".2f") for end in corner] for corner in (grid.lower, grid.upper)]
-    sides = (f"{axis} from {lower} a to {upper} a" for axis, lower, upper in zip("xy", *ends, strict=True))
+    ends = [
+        [with_deviation(end / a, None, ".2f") for end in corner]
+        for corner in (grid.lower, grid.upper)
+    ]
+    sides = (
+        f"{axis} from {lower} a to {upper} a"
+        for axis, lower, upper in zip("xy", *ends, strict=True)
+    )
     return {
         "Grid": f"{nx} × {ny} cells of {cell.number(dx)} × {cell.text(dy)}",
         "Domain": ", ".join(sides) + (", repeating in y" if grid.periodic[1] else ""),
@@ -161,7 +198,10 @@ def _vibration_rows(model: VibrationModel | None) -> dict[str, str]:
     if model is None:
         return {"Vibration": "not asked for"}
     damping = model.damping_law.summary(model.damping_ratio)
-    duration, rate = quantity("duration_s").text(model.duration_s), quantity("record_rate_hz").text(model.rate_hz)
+    duration, rate = (
+        quantity("duration_s").text(model.duration_s),
+        quantity("record_rate_hz").text(model.rate_hz),
+    )
     return {
         "Oscillator": f"{quantity('mass_kg').name} {quantity('mass_kg').text(model.mass)}, {damping}, "
         f"stiffness law {model.stiffness_law.name}",
@@ -181,5 +221,8 @@ def _roughness(case_text: str) -> str:
 
 def _table_in_words(table: dict[str, Any]) -> str:
     stated = {key: value for key, value in table.items() if TACIT.get(key) != value}
-    texts = {key: " and ".join(map(str, value)) if isinstance(value, list) else value for key, value in stated.items()}
+    texts = {
+        key: " and ".join(map(str, value)) if isinstance(value, list) else value
+        for key, value in stated.items()
+    }
     return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in texts.items())

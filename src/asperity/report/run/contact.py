@@ -6,13 +6,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.arrays import Field
+from asperity.contact.hertz import line_pressure
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.ehl import ContactSolution, hertz_zone
-from asperity.hertz import line_pressure
-from asperity.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes, one_panel
-from asperity.report.maps import contact_colours, contact_keys, drawn_map, map_figure, mark_hertz_zone, show_map
+from asperity.report.maps import (
+    contact_colours,
+    contact_keys,
+    drawn_map,
+    map_figure,
+    mark_hertz_zone,
+    show_map,
+)
 from asperity.report.style import BLUE, CONTACT_COLOUR, GREEN, GREY, VERMILION, Medium
 from asperity.results import Run
 
@@ -55,7 +62,9 @@ def film_map(run: Run) -> Exhibit:
     title = "Gap between the surfaces" if solution.lubricant is None else "Film thickness"
     return Exhibit(
         "film",
-        drawn_map(solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top),
+        drawn_map(
+            solution, "gap", solution.gap, title, extend="max", cmap="viridis", vmin=0.0, vmax=top
+        ),
         "Gap between the deformed surfaces. The colours end at the Hertz zone's 99th percentile.",
         f"Map of the film thickness: mean {quantity('h_mean_m').text(state.h_mean)} in the Hertz zone, "
         f"smallest {quantity('h_min_m').text(state.h_min)}.",
@@ -108,10 +117,14 @@ def _draw_pressure_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
     x, hertz = display("x_m", solution.grid.x), solution.conditions.hertz
     pressure = solution.pressure[:, row]
     smooth = line_pressure(solution.grid.x, hertz.half_widths[0], hertz.p_max)
-    axes.plot(x, display("pressure", pressure), color=BLUE, linewidth=1.1, label="pressure p, solved")
+    axes.plot(
+        x, display("pressure", pressure), color=BLUE, linewidth=1.1, label="pressure p, solved"
+    )
     axes.plot(x, display("pressure", smooth), "--", color="black", label="p, Hertz (smooth, dry)")
     if solution.p_cap is not None and pressure.max() > 0.5 * solution.p_cap:
-        axes.axhline(display("pressure", solution.p_cap), color=VERMILION, linestyle=":", label="hardness")
+        axes.axhline(
+            display("pressure", solution.p_cap), color=VERMILION, linestyle=":", label="hardness"
+        )
     axes.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
 
 
@@ -121,16 +134,26 @@ def _draw_gap_cut(axes: Axes, solution: ContactSolution, row: int) -> None:
     top = 1.15 * float(gap[inside].max()) or 1.0
     axes.plot(x, gap, color=GREEN, linestyle="-.", linewidth=1.1, label="gap h")
     axes.fill_between(
-        x, 0.0, 0.06 * top, where=solution.in_contact[:, row], color=CONTACT_COLOUR, edgecolor="black", linewidth=0.3,
-        step="mid", label="asperity contact",
-    )  # fmt: skip
+        x,
+        0.0,
+        0.06 * top,
+        where=solution.in_contact[:, row],
+        color=CONTACT_COLOUR,
+        edgecolor="black",
+        linewidth=0.3,
+        step="mid",
+        label="asperity contact",
+    )
     name_axes(axes, "x_m", ylabel=quantity("gap").label, ylim=(0.0, top))
 
 
 def roughness_map(run: Run) -> Exhibit:
     """The roughness that was pressed into the contact, before it deformed."""
     solution, sq = run.solution, quantity("sq_m")
-    heights, title = solution.surface.heights, f"Composite roughness, {sq.named(solution.surface.sq)}"
+    heights, title = (
+        solution.surface.heights,
+        f"Composite roughness, {sq.named(solution.surface.sq)}",
+    )
     reach = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
     colours: Any = {"extend": "both", "cmap": "cividis", "vmin": -reach, "vmax": reach}
     return Exhibit(
@@ -145,7 +168,9 @@ def height_distribution(run: Run) -> Exhibit:
     """How often each height occurs, beside the Gaussian of the same Sq."""
     return Exhibit(
         "heights",
-        one_panel(3.1, key=0)(lambda axes: draw_height_distribution(axes, run.solution.surface.heights)),
+        one_panel(3.1, key=0)(
+            lambda axes: draw_height_distribution(axes, run.solution.surface.heights)
+        ),
         "Distribution of the heights in the map, with the Gaussian of the same Sq dashed.",
         f"Histogram of the heights, {quantity('sq_m').named(run.state.sq)}, beside a Gaussian curve.",
     )
@@ -160,11 +185,17 @@ def draw_height_distribution(axes: Axes, heights: Field, rms: str = "Sq") -> Non
     if sq == 0.0:
         axes.text(0.5, 0.5, "perfectly smooth", transform=axes.transAxes, ha="center")
         return
-    axes.hist(values, bins=80, range=(-4.5 * sq, 4.5 * sq), density=True, color="#9ec5dd", label="surface")
+    axes.hist(
+        values, bins=80, range=(-4.5 * sq, 4.5 * sq), density=True, color="#9ec5dd", label="surface"
+    )
     grid = np.linspace(-4.5 * sq, 4.5 * sq, 181)
     gauss = np.exp(-0.5 * (grid / sq) ** 2) / (sq * np.sqrt(2.0 * np.pi))
     axes.plot(
-        grid, gauss, "--", color="black", label=f"Gaussian, {rms} {quantity('sq_m').text(float(deviations.std()))}"
+        grid,
+        gauss,
+        "--",
+        color="black",
+        label=f"Gaussian, {rms} {quantity('sq_m').text(float(deviations.std()))}",
     )
     axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the key
     axes.legend(loc="upper right")
@@ -179,22 +210,40 @@ def convergence_history(run: Run) -> Exhibit:
     def draw(axes: Axes) -> None:
         steps, sparse = np.arange(1, len(history) + 1), max(len(history) // 60, 1)
         for name, stroke, colour in (
-            ("residual", "-o", BLUE), ("load_error", "--s", VERMILION), ("change", ":^", GREEN),
-        ):  # fmt: skip
+            ("residual", "-o", BLUE),
+            ("load_error", "--s", VERMILION),
+            ("change", ":^", GREEN),
+        ):
             values = np.array([getattr(step, name) for step in history])
-            positive = np.where(values > 0.0, values, np.nan)  # a logarithmic axis has no place for exact zeros
+            positive = np.where(
+                values > 0.0, values, np.nan
+            )  # a logarithmic axis has no place for exact zeros
             style = {"color": colour, "markersize": 3, "markevery": sparse, "linewidth": 1.0}
             axes.semilogy(steps, positive, stroke, label=name.replace("_", " "), **style)
-        axes.axhline(convergence.tolerance, color="black", linewidth=0.8, linestyle=(0, (6, 2)), label="tolerance")
-        starts = [i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells]
+        axes.axhline(
+            convergence.tolerance,
+            color="black",
+            linewidth=0.8,
+            linestyle=(0, (6, 2)),
+            label="tolerance",
+        )
+        starts = [
+            i for i, step in enumerate(history) if i == 0 or step.cells != history[i - 1].cells
+        ]
         crowded = min(np.diff([*starts, len(history)])) < 0.16 * len(history)
         for start in starts:
             nx, ny = history[start].cells
             axes.axvline(start + 0.5, color=GREY, linewidth=0.6)
             axes.annotate(
-                f"{nx} × {ny}", (start + 0.5, 0.0), (3, 3), xycoords=("data", "axes fraction"),
-                textcoords="offset points", fontsize=8, color="#374151", rotation=90 if crowded else 0,
-            )  # fmt: skip
+                f"{nx} × {ny}",
+                (start + 0.5, 0.0),
+                (3, 3),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                fontsize=8,
+                color="#374151",
+                rotation=90 if crowded else 0,
+            )
         outcome = "converged" if convergence.converged else f"NOT CONVERGED ({convergence.status})"
         axes.set(xlabel="Newton step", ylabel="relative size [-]", title=f"Convergence: {outcome}")
         axes.set_xlim(0.5, len(history) + 0.5)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from asperity.quantities import quantity
+from asperity.core.quantities import quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, VERMILION
 from asperity.results import FrictionCurve
@@ -15,7 +15,10 @@ from asperity.results import FrictionCurve
 STROKES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "D"))
 ABSCISSA = {"stribeck": "entrainment_speed_m_s", "traction": "slide_to_roll"}
 PARTS = {  # of a single curve, left and right: the quantity, what it is of, its stroke
-    "friction_coefficient": (("asperity_part", "asperities", STROKES[1]), ("oil_part", "oil", STROKES[2])),
+    "friction_coefficient": (
+        ("asperity_part", "asperities", STROKES[1]),
+        ("oil_part", "oil", STROKES[2]),
+    ),
     "flash_temperature_max_k": (("film_temperature_max_k", "film", STROKES[2]),),
 }
 
@@ -33,9 +36,14 @@ def friction_figure(curves: Sequence[FrictionCurve]) -> Figure:
     for limit in limits:
         left.axhline(limit, color="black", linewidth=0.8, linestyle=(0, (1, 2)))
         left.annotate(
-            f"boundary friction {limit:g}", (0.99, limit), xycoords=("axes fraction", "data"),
-            xytext=(0, 3), textcoords="offset points", ha="right", fontsize=8.5,
-        )  # fmt: skip
+            f"boundary friction {limit:g}",
+            (0.99, limit),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8.5,
+        )
     left.set(ylabel=quantity("friction_coefficient").axis, title=f"{kind}: friction{of}")
     right.set(ylabel=quantity("temperature_rise_k").axis, title=f"{kind}: temperature{of}")
     left.set_ylim(0.0, max(1.12 * max(limits), left.get_ylim()[1]))
@@ -64,11 +72,21 @@ def _name(curve: FrictionCurve) -> str:
     return quantity("sq_m").named(curve.sq) + (", heat fed back" if curve.feedback else "")
 
 
-def _draw(axes: Axes, curve: FrictionCurve, name: str, label: str, colour: str, stroke: str, marker: str) -> None:
+def _draw(
+    axes: Axes, curve: FrictionCurve, name: str, label: str, colour: str, stroke: str, marker: str
+) -> None:
     abscissa = ABSCISSA[curve.kind]
     x = display(abscissa, np.array([getattr(point, abscissa) for point in curve.points]))
     y = np.array([getattr(point, name) for point in curve.points])
     converged = np.array([point.converged for point in curve.points])
-    axes.plot(x, np.where(converged, y, np.nan), stroke, marker=marker, markersize=4, color=colour, label=label)
+    axes.plot(
+        x,
+        np.where(converged, y, np.nan),
+        stroke,
+        marker=marker,
+        markersize=4,
+        color=colour,
+        label=label,
+    )
     if not converged.all():
         axes.plot(x[~converged], y[~converged], "x", color=colour)

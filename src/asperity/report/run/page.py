@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity, select
 from asperity.ehl import Convergence
-from asperity.errors import BadInput
 from asperity.lubricant import Newtonian
-from asperity.quantities import quantity, select
 from asperity.report.base import Exhibit, Picture, Tile, render, span, tile, write_page
-from asperity.report.run import contact, roller, rubbing, several
+from asperity.report.run import contact, friction_maps, roller, several_runs
 from asperity.report.run.conditions import conditions_table
 from asperity.report.run.stiffness import stiffness_over_frequency
 from asperity.report.run.vibration import spectrum
@@ -56,22 +56,32 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     """The page as HTML text."""
     oils = [run.solution.lubricant for run in runs]
     ends = any(run.along is not None for run in runs)
-    groups = [name for group in RUN_GROUPS for name in ([group, ENDS] if ends and group == "pressure" else [group])]
+    groups = [
+        name
+        for group in RUN_GROUPS
+        for name in ([group, ENDS] if ends and group == "pressure" else [group])
+    ]
     return render(
         "run/page.html.j2",
         title=title or _title(runs),
         runs=[_view(run, number, len(runs) > 1) for number, run in enumerate(runs, 1)],
-        overview=[exhibit.picture() for exhibit in _overview(runs)] if len({run.state.sq for run in runs}) > 1 else [],
+        overview=[exhibit.picture() for exhibit in _overview(runs)]
+        if len({run.state.sq for run in runs}) > 1
+        else [],
         numbers=[entry for group in groups for entry in select(group)],
         conditions=conditions_table(runs),
         lubricated=any(oil is not None for oil in oils),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
         alone=any(run.error.surfaces == 1 and run.state.sq > 0.0 for run in runs),
         isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
-        sphere=any(run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs),
+        sphere=any(
+            run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs
+        ),
         line=any(run.solution.conditions.long for run in runs),
         ends=ends,
-        imbalance=span(quantity("mass_flux_imbalance"), [run.state.mass_flux_imbalance for run in runs]),
+        imbalance=span(
+            quantity("mass_flux_imbalance"), [run.state.mass_flux_imbalance for run in runs]
+        ),
     )
 
 
@@ -121,12 +131,12 @@ def _exhibits(run: Run) -> Iterator[Exhibit]:
     yield contact.height_distribution(run)
     friction, heat = run.friction, run.heat
     if friction is not None and heat is not None and run.solution.conditions.sliding_speed != 0.0:
-        yield rubbing.traction_map(run, friction)
-        yield rubbing.temperature_map(run, friction, heat)
-        yield rubbing.temperature_line(run, heat)
-    yield rubbing.stress_map(run)
-    yield rubbing.stress_section(run)
-    yield rubbing.stress_over_depth(run)
+        yield friction_maps.traction_map(run, friction)
+        yield friction_maps.temperature_map(run, friction, heat)
+        yield friction_maps.temperature_line(run, heat)
+    yield friction_maps.stress_map(run)
+    yield friction_maps.stress_section(run)
+    yield friction_maps.stress_over_depth(run)
     if run.vibration is not None and run.vibration.spectrum is not None:
         yield spectrum(run.vibration, run.resonance_in_words())
     if run.dynamic_curve is not None:
@@ -150,8 +160,10 @@ def _overview(runs: Sequence[Run]) -> Iterator[Exhibit]:
     """Several runs against their roughness."""
     points = [run.scalars() for run in runs]
     full_load = {run.vibration.full_load_crf_hz for run in runs if run.vibration is not None}
-    yield several.shares_against_roughness(points)
-    yield several.resonance_against_roughness(points, full_load.pop() if len(full_load) == 1 else None)
+    yield several_runs.shares_against_roughness(points)
+    yield several_runs.resonance_against_roughness(
+        points, full_load.pop() if len(full_load) == 1 else None
+    )
     sliding = [point for point in points if point["friction_coefficient"]]
     if sliding:
-        yield several.friction_against_roughness(sliding)
+        yield several_runs.friction_against_roughness(sliding)

@@ -2,12 +2,12 @@
 
 from matplotlib.figure import Figure
 
-from asperity.ehl import AlongRoller, AtEnd
-from asperity.quantities import quantity
+from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, VERMILION, Medium
 from asperity.results import UNDETERMINED, Run
+from asperity.solution import AlongRoller, AtEnd
 
 
 def doubted(key: str, figure: AtEnd | None) -> str:
@@ -26,24 +26,55 @@ def along_length(run: Run, along: AlongRoller) -> Exhibit:
         figure = Figure(figsize=(medium.single, 4.6), layout="constrained")
         load, pressure, gap = figure.subplots(3, 1, sharex=True)
         load.set_title("Along the roller")
-        load.plot(places, display("line_load_n_per_m", along.line_load), color=VERMILION, label="load per length")
-        load.axhline(display("line_load_n_per_m", along.load / along.length), color="black", linestyle="--")
+        load.plot(
+            places,
+            display("line_load_n_per_m", along.line_load),
+            color=VERMILION,
+            label="load per length",
+        )
+        load.axhline(
+            display("line_load_n_per_m", along.load / along.length), color="black", linestyle="--"
+        )
         load.set(ylabel=quantity("line_load_n_per_m").label, ylim=(0.0, None))
-        pressure.plot(places, display("pressure", along.pressure), color=BLUE, label="largest pressure")
+        pressure.plot(
+            places, display("pressure", along.pressure), color=BLUE, label="largest pressure"
+        )
         if oiled:
-            pressure.plot(places, display("pressure", along.dome), color=GREY, linestyle=":", label="before the spike")
-        pressure.axhline(display("pressure", hertz), color="black", linestyle="--", label="of an even load (Hertz)")
+            pressure.plot(
+                places,
+                display("pressure", along.dome),
+                color=GREY,
+                linestyle=":",
+                label="before the spike",
+            )
+        pressure.axhline(
+            display("pressure", hertz),
+            color="black",
+            linestyle="--",
+            label="of an even load (Hertz)",
+        )
         pressure.set(ylabel=quantity("pressure").label, ylim=(0.0, None))
         thin = display("gap", along.gap)
         gap.plot(places, thin, color=GREEN, linestyle="-.", label="smallest gap")
-        name_axes(gap, "y_m", ylabel=quantity("gap").label, ylim=(0.0, 1.6 * float(thin[thin.size // 2]) or 1.0))
-        keys = [key for axes in (load, pressure, gap) for key in axes.get_legend_handles_labels()[0]]
+        name_axes(
+            gap,
+            "y_m",
+            ylabel=quantity("gap").label,
+            ylim=(0.0, 1.6 * float(thin[thin.size // 2]) or 1.0),
+        )
+        keys = [
+            key for axes in (load, pressure, gap) for key in axes.get_legend_handles_labels()[0]
+        ]
         legend_below(figure, 2, handles=keys)
         return figure
 
     edge = doubted("edge_pressure_pa", along.edge_pressure)
     film = f"; film at the ends {doubted('end_film_m', along.end_film)}" if oiled else ""
-    spike = "Pressures at the ends are those before the oil's spike, which grows with the cells. " if oiled else ""
+    spike = (
+        "Pressures at the ends are those before the oil's spike, which grows with the cells. "
+        if oiled
+        else ""
+    )
     loaded = quantity("loaded_share").text(along.loaded_share)
     return Exhibit(
         "along",

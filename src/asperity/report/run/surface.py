@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.errors import BadInput
-from asperity.quantities import quantity
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.run.contact import draw_height_distribution
 from asperity.report.style import BLUE, DASHED, GREEN, GREY, ON_PAGE, VERMILION, write_figure
@@ -45,14 +45,18 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
     if levelled.uniform is None:
         _draw_levelled_map(figure, figure.add_subplot(places[0, :2]), levelled)
         _draw_lay(figure.add_subplot(places[0, 2], projection="polar"), spectrum)
-        _draw_profile(figure.add_subplot(places[1, 0]), levelled, "Profile through the middle, along x")
+        _draw_profile(
+            figure.add_subplot(places[1, 0]), levelled, "Profile through the middle, along x"
+        )
         nx, ny = levelled.grid.cells
         size = f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
     else:
         _draw_profile(figure.add_subplot(places[0, :]), levelled, "Levelled profile")
         rms = f"{description.profile_letter}q"
         draw_height_distribution(figure.add_subplot(places[1, 0]), levelled.profile, rms)
-        size = f"profile, {rms} {sq}, {levelled.profile.size} points every {pixel.text(min(dx, dy))}"
+        size = (
+            f"profile, {rms} {sq}, {levelled.profile.size} points every {pixel.text(min(dx, dy))}"
+        )
     _draw_bearing_curve(figure.add_subplot(places[1, 1]), description)
     _draw_radial_spectrum(figure.add_subplot(places[1, 2]), spectrum, levelled.uniform is not None)
     figure.suptitle(f"{description.path.name}: {size}", x=0.01, ha="left", parse_math=False)
@@ -65,11 +69,24 @@ def _draw_levelled_map(figure: Figure, axes: Axes, levelled: MeasuredSurface) ->
     reach = float(np.nanpercentile(np.abs(heights), 99.5)) or 1.0
     axes.set_facecolor("#d946ef")  # what was not measured; no height has this colour
     image = axes.imshow(
-        heights.T, origin="lower", extent=(0.0, width, 0.0, height), cmap="cividis", vmin=-reach, vmax=reach,
+        heights.T,
+        origin="lower",
+        extent=(0.0, width, 0.0, height),
+        cmap="cividis",
+        vmin=-reach,
+        vmax=reach,
         interpolation="none" if max(heights.shape) < 600 else "antialiased",
-    )  # fmt: skip
-    missing = f", {quantity('share').text(levelled.missing)} not measured (pink)" if levelled.missing else ""
-    axes.set(title=f"Levelled heights{missing}", xlabel=quantity("surface_x_m").axis, ylabel=quantity("y_m").axis)
+    )
+    missing = (
+        f", {quantity('share').text(levelled.missing)} not measured (pink)"
+        if levelled.missing
+        else ""
+    )
+    axes.set(
+        title=f"Levelled heights{missing}",
+        xlabel=quantity("surface_x_m").axis,
+        ylabel=quantity("y_m").axis,
+    )
     figure.colorbar(image, ax=axes, label=quantity("height_m").axis, extend="both", shrink=0.9)
 
 
@@ -83,19 +100,34 @@ def _draw_profile(axes: Axes, levelled: MeasuredSurface, title: str) -> None:
 
 
 def _draw_bearing_curve(axes: Axes, description: SurfaceDescription) -> None:
-    curve, parameters, sq = bearing_curve(known_once(description.levelled)), description.parameters, quantity("sk_m")
+    curve, parameters, sq = (
+        bearing_curve(known_once(description.levelled)),
+        description.parameters,
+        quantity("sk_m"),
+    )
     prefix = "S" if description.profile is None else description.profile_letter
     axes.plot(display("material_ratio", curve.share), display("height_m", curve.height), color=BLUE)
-    top, bottom = (display("height_m", curve.height_at(share)) for share in (parameters.smr1, parameters.smr2))
+    top, bottom = (
+        display("height_m", curve.height_at(share)) for share in (parameters.smr1, parameters.smr2)
+    )
     axes.axhspan(bottom, top, color="#e5e7eb", linewidth=0)
-    core, peaks, pits = (sq.text(height) for height in (parameters.sk, parameters.spk, parameters.svk))
+    core, peaks, pits = (
+        sq.text(height) for height in (parameters.sk, parameters.spk, parameters.svk)
+    )
     axes.text(
-        0.97, 0.96, f"{prefix}k {core} (shaded)\n{prefix}pk {peaks}, {prefix}vk {pits}",
-        transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
-    )  # fmt: skip
+        0.97,
+        0.96,
+        f"{prefix}k {core} (shaded)\n{prefix}pk {peaks}, {prefix}vk {pits}",
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        fontsize=8.5,
+    )
     inner = [display("height_m", curve.height_at(share)) for share in (0.999, 0.001)]
     if inner[0] < inner[1]:  # the rarest heights would flatten the rest
-        axes.set_ylim(inner[0] - 0.1 * (inner[1] - inner[0]), inner[1] + 0.4 * (inner[1] - inner[0]))
+        axes.set_ylim(
+            inner[0] - 0.1 * (inner[1] - inner[0]), inner[1] + 0.4 * (inner[1] - inner[0])
+        )
     name_axes(axes, "material_ratio", "height_m", title="Bearing curve")
     axes.set_xlim(0.0, 100.0)
 
@@ -109,7 +141,12 @@ def _draw_radial_spectrum(axes: Axes, spectrum: SurfaceSpectrum, profile: bool) 
         axes.loglog(wavelength, spectrum.density[some], color=VERMILION, marker=".", markersize=4)
         axes.invert_xaxis()
     title = "Spectrum of the profile" if profile else "Spectrum, all directions"
-    name_axes(axes, "wavelength_m", "profile_power_density" if profile else "surface_power_density", title=title)
+    name_axes(
+        axes,
+        "wavelength_m",
+        "profile_power_density" if profile else "surface_power_density",
+        title=title,
+    )
 
 
 def _draw_lay(axes: Axes, spectrum: SurfaceSpectrum) -> None:

@@ -8,17 +8,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.arrays import Field
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity
+from asperity.core.signals import Signal, Spectrum, power_spectrum
 from asperity.coupling import Vibration, VibrationModel
-from asperity.errors import BadInput
 from asperity.paper import Table1Row, continuous_crfa, expected_crfa
-from asperity.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes, neighbours, one_panel
 from asperity.report.style import BAND_COLOUR, BLUE, GREEN, GREY, ON_PAGE, VERMILION
-from asperity.signals import Signal, Spectrum, power_spectrum
+from asperity.resonance import Resonance
 from asperity.vibration import mass_motion, white_noise
-from asperity.wear import Resonance
 
 RATES = (10e3, 20e3, 50e3, 200e3)  # Hz
 LONGEST = 0.5  # seconds of a record that are drawn: more is a black bar
@@ -43,15 +43,28 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
     @one_panel(3.5)
     def draw(axes: Axes) -> None:
         _draw_band(axes, density, (low - margin, high + margin), (low, high))
-        found = f"Contact resonance at {line.text(resonance.crf_hz)}" if resonance.found else "No resonance found"
+        found = (
+            f"Contact resonance at {line.text(resonance.crf_hz)}"
+            if resonance.found
+            else "No resonance found"
+        )
         axes.set_title(found)
         if resonance.found:
             _mark_resonance(axes, resonance, np.linspace(low, high, 600))
-        axes.axvline(vibration.full_load_crf_hz, color="black", linestyle=":", linewidth=1.0, label="CRF at full load")
+        axes.axvline(
+            vibration.full_load_crf_hz,
+            color="black",
+            linestyle=":",
+            linewidth=1.0,
+            label="CRF at full load",
+        )
         axes.set_xlim(low - margin, high + margin)
 
     ends = quantity("band_hz")
-    band, full_load = f"{ends.number(low)} to {ends.text(high)}", ends.text(vibration.full_load_crf_hz)
+    band, full_load = (
+        f"{ends.number(low)} to {ends.text(high)}",
+        ends.text(vibration.full_load_crf_hz),
+    )
     return Exhibit(
         "spectrum",
         draw,
@@ -62,13 +75,16 @@ def spectrum(vibration: Vibration, resonance_in_words: str) -> Exhibit:
     )
 
 
-def _draw_band(axes: Axes, density: Spectrum, ends: tuple[float, float], band: tuple[float, float]) -> None:
+def _draw_band(
+    axes: Axes, density: Spectrum, ends: tuple[float, float], band: tuple[float, float]
+) -> None:
     """The spectrum between the ends, means of neighbours where it has more lines than can be seen."""
     near = (density.frequency_hz >= ends[0]) & (density.frequency_hz <= ends[1])
     together = max(int(np.count_nonzero(near)) // 400, 1)
     axes.axvspan(*band, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="search band")
     frequency, level = (
-        neighbours(values[near], together).mean(axis=1) for values in (density.frequency_hz, density.density)
+        neighbours(values[near], together).mean(axis=1)
+        for values in (density.frequency_hz, density.density)
     )
     name = "spectrum" if together == 1 else f"spectrum, mean of {together} lines"
     axes.semilogy(frequency, level, color=GREY, linewidth=0.7, label=name)
@@ -77,7 +93,9 @@ def _draw_band(axes: Axes, density: Spectrum, ends: tuple[float, float], band: t
 
 def _mark_resonance(axes: Axes, resonance: Resonance, frequency: Field) -> None:
     if np.isfinite(resonance.damping_ratio):  # a highest point has no curve
-        axes.semilogy(frequency, resonance.curve(frequency), color=VERMILION, label="fitted resonance")
+        axes.semilogy(
+            frequency, resonance.curve(frequency), color=VERMILION, label="fitted resonance"
+        )
     crf, reach = resonance.crf_hz, 2.0 * resonance.crf_std
     if np.isfinite(reach):
         axes.axvspan(crf - reach, crf + reach, color=BLUE, alpha=0.35, linewidth=0)
@@ -85,7 +103,8 @@ def _mark_resonance(axes: Axes, resonance: Resonance, frequency: Field) -> None:
     axes.axvline(crf, color=BLUE, linestyle="--", linewidth=1.0, label=label)
 
 
-# The paper's Figs 3 and 4 --------------------------------------------------------------------------------------------
+# The paper's Figs 3 and 4
+# --------------------------------------------------------------------------------------------
 
 
 @ON_PAGE.drawing()
@@ -127,8 +146,10 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     motion = mass_motion(oscillator, profile, method=model.response, substeps=model.substeps)
     figure, (a, b, c, d) = _four_panels()
     for axes, letter, key, colour in (
-        (a, "a", "displacement", BLUE), (b, "b", "velocity", GREEN), (c, "c", "acceleration", VERMILION),
-    ):  # fmt: skip
+        (a, "a", "displacement", BLUE),
+        (b, "b", "velocity", GREEN),
+        (c, "c", "acceleration", VERMILION),
+    ):
         record = Signal(getattr(motion, key), profile.rate_hz, quantity(key).unit)
         _draw_record(axes, record, key, f"({letter}) {quantity(key).name}", colour)
     f0, resonance = oscillator.natural_frequency_hz, vibration.resonance
@@ -139,7 +160,13 @@ def response_figure(vibration: Vibration, model: VibrationModel) -> Figure:
     if resonance.found:
         label = f"{quantity('crf_hz').named(resonance.crf_hz)}, CRFA {quantity('crfa').number(resonance.crfa)}"
         d.plot(resonance.crf_hz, resonance.crfa, "o", color=VERMILION, label=label)
-    d.axvline(f0, color=BLUE, linestyle=":", linewidth=1.2, label=f"f0 {quantity('frequency_hz').text(f0)}")
+    d.axvline(
+        f0,
+        color=BLUE,
+        linestyle=":",
+        linewidth=1.2,
+        label=f"f0 {quantity('frequency_hz').text(f0)}",
+    )
     name_axes(d, "frequency_hz", "acceleration_density", title="(d) spectrum of the acceleration")
     d.set_ylim(0.0, None)
     d.legend(loc="upper right" if resonance.found and resonance.crf_hz < f0 else "upper left")
@@ -169,7 +196,8 @@ def _draw_spectrum(axes: Axes, record: Signal, title: str, colour: str) -> None:
     name_axes(axes, "frequency_hz", "profile_density", title=title)
 
 
-# Its Table 1 ---------------------------------------------------------------------------------------------------------
+# Its Table 1
+# ---------------------------------------------------------------------------------------------------------
 
 
 @ON_PAGE.drawing()
@@ -184,12 +212,21 @@ def table1_figure(rows: Sequence[Table1Row]) -> Figure:
     panels = figure.subplots(1, 3)
     for axes, (part, name, key, word) in zip(panels, parts, strict=True):
         x = display(key, np.array([getattr(row, name) for row in part]))
-        median, low, high = (np.array([getattr(row, f"crfa{end}") for row in part]) for end in ("", "_low", "_high"))
+        median, low, high = (
+            np.array([getattr(row, f"crfa{end}") for row in part]) for end in ("", "_low", "_high")
+        )
         axes.errorbar(
-            x, median, [median - low, high - median], fmt="o", color=BLUE, capsize=5,
+            x,
+            median,
+            [median - low, high - median],
+            fmt="o",
+            color=BLUE,
+            capsize=5,
             label="ours: median, 5 to 95 % of single records",
-        )  # fmt: skip
-        axes.plot(x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="printed")
+        )
+        axes.plot(
+            x, [row.paper_crfa for row in part], "x", color=VERMILION, markersize=9, label="printed"
+        )
         axes.set(xscale="log", yscale="log", title=f"median ~ {_power(word, x, median)}")
         name_axes(axes, key)
         _tick_at(axes, x)

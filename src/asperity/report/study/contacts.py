@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.quantities import quantity
+from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import ACROSS, display, legend_below, panels_in_rows
 from asperity.report.maps import contact_colours, contact_keys, mark_hertz_zone, show_map
@@ -27,9 +27,15 @@ def contact_maps(runs: Sequence[Run]) -> Exhibit:
             show_map(axes, contact_colours(run.solution), run.solution)
             mark_hertz_zone(axes, run.solution, "black")
             clr, car, domain = _shares(run)
-            axes.set_title(f"({letter}) {_sq(run)}: {clr}\n{car}\n{domain}", fontweight="normal", fontsize="small")
+            axes.set_title(
+                f"({letter}) {_sq(run)}: {clr}\n{car}\n{domain}",
+                fontweight="normal",
+                fontsize="small",
+            )
         _label_outer(panels)
-        keys = contact_keys("asperity contact", *(("open gap",) if dry else ("oil film", "ruptured oil")))
+        keys = contact_keys(
+            "asperity contact", *(("open gap",) if dry else ("oil film", "ruptured oil"))
+        )
         legend_below(figure, 4 if len(runs) > 2 else 2, handles=keys)
         return figure
 
@@ -75,14 +81,18 @@ def _shares(run: Run) -> list[str]:
     return [quantity(key).named(getattr(run.state, key)) for key in SHARES]
 
 
-def _sheet(runs: Sequence[Run], medium: Medium, *, above: float, below: float) -> tuple[Figure, list[Axes]]:
+def _sheet(
+    runs: Sequence[Run], medium: Medium, *, above: float, below: float
+) -> tuple[Figure, list[Axes]]:
     """Equal panels in rows for the maps of the runs, so many lines of type above each and below all."""
     across = min(ACROSS, len(runs))
     down = -(-len(runs) // across)
     extent = runs[0].case.grid.extent
     line, width = medium.line_height, medium.width(across)
     panel = (width - 4.0 * line) / across - 0.6 * line
-    height = down * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
+    height = (
+        down * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
+    )
     figure = Figure(figsize=(width, height), layout="compressed")
     return figure, panels_in_rows(figure, len(runs), sharex=True, sharey=True)
 

@@ -10,14 +10,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from asperity.arrays import Field
-from asperity.paper import PAPER_ANCHORS, RIG_SPLIT_UM, SPLIT_ANCHOR, Anchor, rig_deviation, rig_prediction
-from asperity.quantities import in_print, quantity
+from asperity.core.arrays import Field
+from asperity.core.quantities import in_print, quantity
+from asperity.paper import (
+    PAPER_ANCHORS,
+    RIG_SPLIT_UM,
+    SPLIT_ANCHOR,
+    Anchor,
+    rig_deviation,
+    rig_prediction,
+)
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, draw_intervals, legend_below, mark_split, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, SPLIT_COLOUR, VERMILION, Medium
 from asperity.study import StudyOverview, WearCurve
-from asperity.wear import Stages
+from asperity.trend import Stages
 
 SPLIT_STROKES: tuple[Any, ...] = ("-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 1)))
 MOST_MARKERS = 20  # on a curve
@@ -27,7 +34,9 @@ SHARES = (("clr", "-o", VERMILION), ("car", "--s", BLUE), ("car_domain", "-.^", 
 def curve_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
     """What is shown of a wear curve, in the order of the page."""
     yield shares(study, curve)
-    resonant = [preset for preset in curve.stages if np.isfinite(curve.mean(f"crf_{preset}_hz")).any()]
+    resonant = [
+        preset for preset in curve.stages if np.isfinite(curve.mean(f"crf_{preset}_hz")).any()
+    ]
     if resonant:
         if study.papers:
             yield rig(curve, resonant[0])
@@ -43,8 +52,12 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
         figure, axes = medium.panel(0.9 * medium.single)
         for key, stroke, colour in SHARES:
             draw_mean(axes, curve, key, stroke, colour, quantity(key).short)
-        _draw_anchors(axes, anchors, ("car", "car_domain"), "D", "CAR, printed" if printed else "CAR, given")
-        _draw_anchors(axes, anchors, ("clr",), "P", "CLR from rig's CRF" if printed else "CLR, given")
+        _draw_anchors(
+            axes, anchors, ("car", "car_domain"), "D", "CAR, printed" if printed else "CAR, given"
+        )
+        _draw_anchors(
+            axes, anchors, ("clr",), "P", "CLR from rig's CRF" if printed else "CLR, given"
+        )
         name_axes(axes, "sq_m", "share")
         axes.set_ylim(0.0, max(100.0, axes.get_ylim()[1]))
         medium.title(axes, "Load and area share of asperities")
@@ -57,7 +70,9 @@ def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
             " Diamonds: CAR as printed, which does not say of which area; crosses: CLR behind the CRF printed for "
             "the rig's smoothest and roughest ring. Their bars are tolerances of ours."
         )
-    ends = (f"{quantity(key).short} from {first_to_last(key, curve.mean(key))}" for key, *_ in SHARES)
+    ends = (
+        f"{quantity(key).short} from {first_to_last(key, curve.mean(key))}" for key, *_ in SHARES
+    )
     return Exhibit(
         "shares",
         draw,
@@ -99,13 +114,20 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
         grid[0, 0].set_ylabel(quantity("crf_hz").label)
         grid[1, 0].set_ylabel(quantity("crfa").label)
         known = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
-        stay_near(grid[0, 0], np.concatenate([known, *(curve.by_case(f"crf_{preset}_hz")[1] for preset in presets)]))
-        stay_near(grid[1, 0], np.concatenate([curve.by_case(f"crfa_{preset}")[1] for preset in presets]))
+        stay_near(
+            grid[0, 0],
+            np.concatenate([known, *(curve.by_case(f"crf_{preset}_hz")[1] for preset in presets)]),
+        )
+        stay_near(
+            grid[1, 0], np.concatenate([curve.by_case(f"crfa_{preset}")[1] for preset in presets])
+        )
         grid[1, 0].set_ylim(bottom=0.0)
         key_below(figure, *grid.flat, columns=4)
         return figure
 
-    stages = " ".join(f"Preset {name}: {in_print(stages.verdict)}" for name, stages in curve.stages.items())
+    stages = " ".join(
+        f"Preset {name}: {in_print(stages.verdict)}" for name, stages in curve.stages.items()
+    )
     return Exhibit(
         "resonance",
         draw,
@@ -119,7 +141,9 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
 _CRF = ("crf_sound_hz", "crf_paper_hz")
 
 
-def _draw_preset(above: Axes, below: Axes, curve: WearCurve, anchors: Sequence[Anchor], preset: str) -> None:
+def _draw_preset(
+    above: Axes, below: Axes, curve: WearCurve, anchors: Sequence[Anchor], preset: str
+) -> None:
     printed = set(anchors) <= set(PAPER_ANCHORS)
     splits = [anchor for anchor in anchors if anchor.quantity == SPLIT_ANCHOR]
     for axes in (above, below):
@@ -145,14 +169,25 @@ def rig(curve: WearCurve, preset: str) -> Exhibit:
         draw_mean(axes, curve, f"crf_{first}_hz", "-", BLUE, f"ours, preset {first}", seeds=False)
         for other in others:
             sq, label = display("sq_m", curve.sq), f"ours, preset {other}"
-            axes.plot(sq, curve.mean(f"crf_{other}_hz"), "--", color=GREEN, linewidth=1.0, label=label)
+            axes.plot(
+                sq, curve.mean(f"crf_{other}_hz"), "--", color=GREEN, linewidth=1.0, label=label
+            )
         rings = rig_prediction(curve, f"crf_{first}_hz")
-        sq, ours, low, std = (rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um"))
-        ring: Any = {"color": BLUE, "markerfacecolor": "white", "markersize": 4, "label": "ours at a ring's Sq"}
+        sq, ours, low, std = (
+            rings[column].to_numpy() for column in ("sq_um", "crf_hz", "low", "sq_std_um")
+        )
+        ring: Any = {
+            "color": BLUE,
+            "markerfacecolor": "white",
+            "markersize": 4,
+            "label": "ours at a ring's Sq",
+        }
         draw_intervals(axes, sq, ours, ours - low, "o", xerr=std, **ring)
         known = rings[rings["printed_hz"].notna()]
         ring = {"color": "black", "markersize": 4.5, "label": "rings, CRF printed", "zorder": 4}
-        draw_intervals(axes, known["sq_um"], known["printed_hz"], None, "D", xerr=known["sq_std_um"], **ring)
+        draw_intervals(
+            axes, known["sq_um"], known["printed_hz"], None, "D", xerr=known["sq_std_um"], **ring
+        )
         _draw_full_load(axes, curve)
         name_axes(axes, "sq_m", ylabel=quantity("crf_hz").label)
         stay_near(axes, np.concatenate([curve.by_case(f"crf_{first}_hz")[1], known["printed_hz"]]))
@@ -181,7 +216,14 @@ def _deviations(off: dict[str, float]) -> str:
 
 
 def draw_mean(
-    axes: Axes, curve: WearCurve, key: str, stroke: str, colour: str, label: str, *, seeds: bool = True
+    axes: Axes,
+    curve: WearCurve,
+    key: str,
+    stroke: str,
+    colour: str,
+    label: str,
+    *,
+    seeds: bool = True,
 ) -> None:
     """Mean over seeds with its interval as a band, each seed as a faint dot."""
     sq = display("sq_m", curve.sq)
@@ -189,15 +231,27 @@ def draw_mean(
         at, each = curve.by_case(key)
         style: Any = {"alpha": 0.5, "markersize": 4.5, "markeredgewidth": 0, "zorder": 1}
         axes.plot(display("sq_m", at), display(key, each), ".", color=colour, **style)
-    axes.update_datalim([(end, 0.0) for end in sq[[0, -1]]], updatey=False)  # levels without a value, too
-    axes.fill_between(sq, *display(key, curve.interval(key)).T, color=colour, alpha=0.22, linewidth=0, zorder=1)
+    axes.update_datalim(
+        [(end, 0.0) for end in sq[[0, -1]]], updatey=False
+    )  # levels without a value, too
+    axes.fill_between(
+        sq, *display(key, curve.interval(key)).T, color=colour, alpha=0.22, linewidth=0, zorder=1
+    )
     axes.plot(
-        sq, display(key, curve.mean(key)), stroke, color=colour, markersize=3.5,
-        markevery=-(-sq.size // MOST_MARKERS), label=label, zorder=2,
-    )  # fmt: skip
+        sq,
+        display(key, curve.mean(key)),
+        stroke,
+        color=colour,
+        markersize=3.5,
+        markevery=-(-sq.size // MOST_MARKERS),
+        label=label,
+        zorder=2,
+    )
 
 
-def _draw_anchors(axes: Axes, anchors: Sequence[Anchor], keys: Sequence[str], marker: str, label: str) -> None:
+def _draw_anchors(
+    axes: Axes, anchors: Sequence[Anchor], keys: Sequence[str], marker: str, label: str
+) -> None:
     """Numbers known of these quantities, with their tolerance; changes from one Sq to another have no place here."""
     places = {}
     for anchor in anchors:
@@ -205,7 +259,9 @@ def _draw_anchors(axes: Axes, anchors: Sequence[Anchor], keys: Sequence[str], ma
             places[anchor.sq, anchor.value] = anchor
     for number, anchor in enumerate(places.values()):
         assert anchor.sq is not None
-        value, tolerance = (display(anchor.quantity, value) for value in (anchor.value, anchor.tolerance))
+        value, tolerance = (
+            display(anchor.quantity, value) for value in (anchor.value, anchor.tolerance)
+        )
         style: Any = {"color": "black", "markersize": 5, "markerfacecolor": "white", "zorder": 4}
         style["label"] = "_" if number else label
         draw_intervals(axes, display("sq_m", anchor.sq), value, tolerance, marker, **style)
@@ -226,7 +282,12 @@ def _draw_full_load(axes: Axes, curve: WearCurve) -> None:
     known = curve.table["full_load_crf_hz"].dropna().unique()
     if known.size == 1:  # of several, none is the one
         axes.axhline(
-            float(known[0]), color="black", linestyle=":", linewidth=1.0, label="all load on asperities", zorder=1
+            float(known[0]),
+            color="black",
+            linestyle=":",
+            linewidth=1.0,
+            label="all load on asperities",
+            zorder=1,
         )
 
 
@@ -246,9 +307,16 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
         names = {before: 0.5 * (low + stages.split), after: 0.5 * (stages.split + high)}
     for name, middle in names.items() if named else ():
         axes.annotate(
-            name, (middle, 0.04), xycoords=("data", "axes fraction"), ha="center", va="bottom", color=SPLIT_COLOUR,
-            style="italic", bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}, zorder=5,
-        )  # fmt: skip
+            name,
+            (middle, 0.04),
+            xycoords=("data", "axes fraction"),
+            ha="center",
+            va="bottom",
+            color=SPLIT_COLOUR,
+            style="italic",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5},
+            zorder=5,
+        )
 
 
 def key_below(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -> None:
@@ -259,5 +327,7 @@ def key_below(figure: Figure, *panels: Axes, columns: int, seeds: bool = True) -
             keys.setdefault(label, handle)
     keys["mean's 90 % interval"] = Patch(color=GREY, alpha=0.3, linewidth=0)
     if seeds:
-        keys["single seeds"] = Line2D([], [], color=GREY, marker=".", linestyle="none", alpha=0.6, markersize=4)
+        keys["single seeds"] = Line2D(
+            [], [], color=GREY, marker=".", linestyle="none", alpha=0.6, markersize=4
+        )
     legend_below(figure, columns, handles=list(keys.values()), labels=list(keys))

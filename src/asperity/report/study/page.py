@@ -1,7 +1,7 @@
 """One HTML page of a study, and its figures and tables for a paper.
 
-A study of Sq alone gets the paper's Figs 5 to 8 and 13 with the printed numbers in them; any other gets each output
-against each swept quantity.
+A study of Sq alone gets the paper's Figs 5 to 8 and 13 with the printed numbers in them; any other
+gets each output against each swept quantity.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.files import make_folder, require_writable, write_csv
+from asperity.core.files import make_folder, require_writable, write_csv
+from asperity.core.quantities import quantity
 from asperity.paper import Anchor
-from asperity.quantities import quantity
 from asperity.report.base import Exhibit, Picture, Tile, heading, render, write_exhibits, write_page
 from asperity.report.study import contacts, tables
 from asperity.report.study.curve import curve_exhibits, first_to_last
-from asperity.report.study.shaken import shaken_exhibits
+from asperity.report.study.dynamic import shaken_exhibits
 from asperity.report.study.sweep import sweep_exhibits
 from asperity.study import SEED_KEYS, StudyOverview, StudyResult
 
@@ -127,7 +127,11 @@ def _title(study: StudyOverview) -> str:
 def _tiles(study: StudyOverview) -> list[Tile]:
     result, curve = study.result, study.curve
     tiles = [
-        Tile("Cases", f"{len(result.table)}", f"of {len(result.plan.cases)}" if result.missing else ""),
+        Tile(
+            "Cases",
+            f"{len(result.table)}",
+            f"of {len(result.plan.cases)}" if result.missing else "",
+        ),
         Tile("Failed or not converged", f"{result.failed}", f"of {len(result.table)}"),
     ]
     if curve is None:
@@ -136,10 +140,20 @@ def _tiles(study: StudyOverview) -> list[Tile]:
         if key in curve.table:
             entry, (first, last) = quantity(key), curve.mean(key)[[0, -1]]
             if np.isfinite([first, last]).all():
-                tiles.append(Tile(heading(entry), f"{entry.number(first)} to {entry.number(last)}", entry.display))
+                tiles.append(
+                    Tile(
+                        heading(entry),
+                        f"{entry.number(first)} to {entry.number(last)}",
+                        entry.display,
+                    )
+                )
     split = quantity("split")
     for preset, stages in curve.stages.items():
         low, high = (split.number(end) for end in stages.interval)
-        value, rest = (split.text(stages.split), f"90 %: {low} to {high}") if stages.found else ("none", stages.kind)
+        value, rest = (
+            (split.text(stages.split), f"90 %: {low} to {high}")
+            if stages.found
+            else ("none", stages.kind)
+        )
         tiles.append(Tile(f"Split, preset {preset}", value, rest))
     return tiles

@@ -12,14 +12,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from asperity.arrays import Field
-from asperity.quantities import quantity
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import ACROSS, display, draw_intervals, legend_below, panels_in_rows
 from asperity.report.study.curve import stay_near
-from asperity.report.study.keys import axis_label, place_in_words
+from asperity.report.study.quantity_names import axis_label, place_in_words
 from asperity.report.style import BLUE, GREY, Medium
-from asperity.study import GROUPS, MEAN_CONFIDENCE, StudyOverview, SweptAxis, group_means, pair_means
+from asperity.study import (
+    GROUPS,
+    MEAN_CONFIDENCE,
+    StudyOverview,
+    SweptAxis,
+    group_means,
+    pair_means,
+)
 
 MOST_DRAWN = 1500  # dots as drawings; more are a picture
 MOST_WRITTEN = 8  # values a side of a map whose cells hold their number
@@ -109,7 +116,9 @@ def over_two(study: StudyOverview, across: SweptAxis, up: SweptAxis) -> Exhibit:
         for key, axes in zip(study.outputs, panels, strict=True):
             cells = pair_means(display(key, study.used[key].to_numpy(dtype=float)), across, up)
             axes.patch.set(hatch="////", edgecolor="#9ca3af", facecolor="white")
-            image = axes.imshow(cells, origin="lower", cmap="cividis", aspect="auto", interpolation="none")
+            image = axes.imshow(
+                cells, origin="lower", cmap="cividis", aspect="auto", interpolation="none"
+            )
             if max(cells.shape) <= MOST_WRITTEN:
                 _write_cells(axes, cells, image.norm(cells))
             _tick(axes.xaxis, across)
@@ -135,13 +144,20 @@ def _write_cells(axes: Axes, cells: Field, shade: Any) -> None:
     for (j, i), value in np.ndenumerate(cells):
         if np.isfinite(value):
             axes.text(
-                i, j, f"{value:.{decimals}f}", ha="center", va="center", fontsize="x-small",
+                i,
+                j,
+                f"{value:.{decimals}f}",
+                ha="center",
+                va="center",
+                fontsize="x-small",
                 color="black" if shade[j, i] > 0.5 else "white",
-            )  # fmt: skip
+            )
 
 
 def _tick(side: Any, axis: SweptAxis) -> None:
     """The values at cell centres, thinned out where they are many."""
     places = axis.places
     step = -(-places.size // 6)
-    side.set_ticks(np.arange(places.size)[::step], [place_in_words(axis, value) for value in places[::step]])
+    side.set_ticks(
+        np.arange(places.size)[::step], [place_in_words(axis, value) for value in places[::step]]
+    )

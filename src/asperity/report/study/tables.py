@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.quantities import NO_VALUE, Quantity, in_print, quantity
+from asperity.core.quantities import NO_VALUE, Quantity, in_print, quantity
 from asperity.report.study.curve import stage_names, surfaces_a_point
-from asperity.report.study.keys import axis_label, place_in_words
+from asperity.report.study.quantity_names import axis_label, place_in_words
 from asperity.study import StudyOverview, as_written
 
 MOST_POINTS = 60  # in a table of the page; the csv has all
@@ -70,7 +70,11 @@ def _entry(column: str) -> Quantity:
 
 def _interval(entry: Quantity, low: float, high: float) -> str:
     """From low to high; empty where there is none."""
-    return f"{entry.number(low)} to {entry.number(high)}" if np.isfinite(low) and np.isfinite(high) else ""
+    return (
+        f"{entry.number(low)} to {entry.number(high)}"
+        if np.isfinite(low) and np.isfinite(high)
+        else ""
+    )
 
 
 def level_rows(study: StudyOverview) -> list[list[Cell]]:
@@ -80,7 +84,9 @@ def level_rows(study: StudyOverview) -> list[list[Cell]]:
         return []
     summary, stages, sq = study.tables["levels"], curve.stages.get("sound"), quantity("sq_m")
     entries = [quantity(key) for key in LEVELS if key in summary]
-    rows = [[Cell(sq.label), Cell("Used"), *(Cell(entry.short, entry.display) for entry in entries)]]
+    rows = [
+        [Cell(sq.label), Cell("Used"), *(Cell(entry.short, entry.display) for entry in entries)]
+    ]
     staged = stages is not None and stages.found
     if staged:
         rows[0].append(Cell("Stage", "preset sound"))
@@ -105,7 +111,9 @@ def point_rows(study: StudyOverview) -> list[list[Cell]]:
     """Head and rows of the points of any other study, where there are not too many: means and standard deviations."""
     if study.curve is not None or has_many_points(study) or not len(study.used):
         return []
-    entries = [replace(quantity(key), deviation=f"{key}_std") for key in study.outputs[:MOST_OUTPUTS]]
+    entries = [
+        replace(quantity(key), deviation=f"{key}_std") for key in study.outputs[:MOST_OUTPUTS]
+    ]
     head = [*(Cell(axis_label(axis)) for axis in study.axes), Cell("Used")]
     rows = [[*head, *(Cell(entry.short, entry.display) for entry in entries)]]
     for _, point in study.tables["points"].iterrows():
@@ -119,7 +127,9 @@ def point_rows(study: StudyOverview) -> list[list[Cell]]:
 def _stacked(number: str) -> Cell:
     """A value, its deviation below it."""
     value, _, deviation = number.partition(" ± ")
-    return Cell(value, f"± {deviation}") if deviation and not number.startswith("(") else Cell(number)
+    return (
+        Cell(value, f"± {deviation}") if deviation and not number.startswith("(") else Cell(number)
+    )
 
 
 def facts(study: StudyOverview) -> list[tuple[str, str]]:
@@ -135,11 +145,20 @@ def facts(study: StudyOverview) -> list[tuple[str, str]]:
         "independent": "drawn anew for every case from the case's own seed",
         "common": "the same at every point, realisation by realisation",
     }
-    seeds = "surfaces' seeds given: " + ", ".join(map(str, plan.seeds)) if plan.seeds else seeding[plan.seeding]
+    seeds = (
+        "surfaces' seeds given: " + ", ".join(map(str, plan.seeds))
+        if plan.seeds
+        else seeding[plan.seeding]
+    )
     rows.append(("Seeds", f"{seeds}; each case's own stand in cases.csv"))
     if study.result.folder is not None:
         rows.append(("Folder", study.result.folder.resolve().name))
-    rows.append(("Versions", ", ".join(f"{name} {number}" for name, number in study.result.versions.items())))
+    rows.append(
+        (
+            "Versions",
+            ", ".join(f"{name} {number}" for name, number in study.result.versions.items()),
+        )
+    )
     return rows
 
 
@@ -147,4 +166,6 @@ def _range(plan: Any, key: str) -> str:
     """The values of a swept key in words."""
     values = list(dict.fromkeys(as_written(point[key]) for point in plan.points if key in point))
     few = len(values) <= 8
-    return in_print(", ".join(values) if few else f"{len(values)} values, {values[0]} to {values[-1]}")
+    return in_print(
+        ", ".join(values) if few else f"{len(values)} values, {values[0]} to {values[-1]}"
+    )

@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from asperity.arrays import Field
-from asperity.errors import BadInput
-from asperity.quantities import in_print, quantity
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.core.quantities import in_print, quantity
+from asperity.monitoring import BASELINE, LEVEL_LEAST, Track, TrackedRecording
 from asperity.report.base import Exhibit
 from asperity.report.drawing import (
     display,
@@ -23,8 +24,7 @@ from asperity.report.drawing import (
     plain_powers,
 )
 from asperity.report.style import BAND_COLOUR, BLUE, DASHED, GREEN, GREY, VERMILION, Medium
-from asperity.tracking import BASELINE, LEVEL_LEAST, Track, TrackedRecording
-from asperity.wear import INTERVAL, Stages
+from asperity.trend import INTERVAL, Stages
 
 STEADIED = 1e-3  # of a CRF: what conditions explain of it is drawn from there on
 MARKS = "osv^Dp*hXP<>"
@@ -81,7 +81,9 @@ def trend(track: Track) -> Exhibit:
 def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> None:
     mark_split(axes, track.stages, "break, 90 %")
     x, x_std = np.array([(recording.x, recording.x_std) for recording in resonant]).T
-    crf, crf_std = np.array([(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]).T
+    crf, crf_std = np.array(
+        [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]
+    ).T
     sideways: Any = {"xerr": INTERVAL * x_std} if x_std.any() else {}
     style: Any = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
     draw_intervals(axes, x, crf, INTERVAL * crf_std, "none", **sideways, **style)
@@ -92,28 +94,44 @@ def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> Non
     moved = np.abs(steadied - crf) > STEADIED * crf
     if moved.any():
         axes.plot(
-            x[moved], steadied[moved], "o", markersize=5, markerfacecolor="none", color=GREEN, zorder=3,
+            x[moved],
+            steadied[moved],
+            "o",
+            markersize=5,
+            markerfacecolor="none",
+            color=GREEN,
+            zorder=3,
             label="at the first load, speed, temperature",
-        )  # fmt: skip
+        )
     full = track.target.full_load_crf_hz
     if full is not None:
-        axes.axhline(full, color="black", linestyle=":", linewidth=1.0, label="all load on asperities")
+        axes.axhline(
+            full, color="black", linestyle=":", linewidth=1.0, label="all load on asperities"
+        )
     missing = [recording.x for recording in track.recordings if not recording.resonance.found]
     if missing:
         axes.plot(
-            missing, np.full(len(missing), 0.02), "x", color=GREY, transform=axes.get_xaxis_transform(),
+            missing,
+            np.full(len(missing), 0.02),
+            "x",
+            color=GREY,
+            transform=axes.get_xaxis_transform(),
             label="not found, or not usable",
-        )  # fmt: skip
+        )
     axes.set(ylabel=quantity("crf_hz").label, title="Contact resonance frequency")
 
 
 def _draw_severity(axes: Axes, track: Track) -> None:
     mark_split(axes, track.stages)
-    severe = np.array([(recording.x, recording.severe_probability) for recording in track.recordings])
+    severe = np.array(
+        [(recording.x, recording.severe_probability) for recording in track.recordings]
+    )
     axes.plot(*severe[np.isfinite(severe[:, 1])].T, "o", color=VERMILION, markersize=4)
     alarmed = [recording.x for recording in track.recordings if recording.state == "alarm"]
     if alarmed:
-        axes.axvline(alarmed[0], color=VERMILION, linewidth=1.0, linestyle=DASHED, label="alarm raised")
+        axes.axvline(
+            alarmed[0], color=VERMILION, linewidth=1.0, linestyle=DASHED, label="alarm raised"
+        )
     axes.set(ylim=(-0.05, 1.12), xlabel=x_label(track), ylabel="severe", yticks=(0.0, 0.5, 1.0))
 
 
@@ -122,13 +140,19 @@ def amplitude(track: Track) -> Exhibit:
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
-        resonant = [one for one in track.recordings if one.resonance.found and one.resonance.crfa > 0.0]
+        resonant = [
+            one for one in track.recordings if one.resonance.found and one.resonance.crfa > 0.0
+        ]
         crfa = np.array([recording.resonance.crfa for recording in resonant])
         std = np.array([recording.resonance.crfa_std for recording in resonant])
-        factor = np.exp(INTERVAL * np.where(np.isfinite(std), std, 0.0) / crfa) if resonant else crfa
+        factor = (
+            np.exp(INTERVAL * np.where(np.isfinite(std), std, 0.0) / crfa) if resonant else crfa
+        )
         ends = [crfa - crfa / factor, crfa * factor - crfa]
         x = [recording.x for recording in resonant]
-        _draw_intervals(axes, track, x, crfa, ends, "s", BLUE, f"{quantity('crfa').short} with 90 % interval")
+        _draw_intervals(
+            axes, track, x, crfa, ends, "s", BLUE, f"{quantity('crfa').short} with 90 % interval"
+        )
         axes.set(yscale="log", ylabel=crfa_label(track), title="Contact resonance amplitude")
 
     return Exhibit(
@@ -147,19 +171,30 @@ def damping(track: Track) -> Exhibit:
     def draw(axes: Axes) -> None:
         known = [one for one in track.recordings if not one.damping_reason]
         ratio, std = (
-            display("damping_ratio", np.array(part)) for part in zip(*[one.damping for one in known], strict=True)
+            display("damping_ratio", np.array(part))
+            for part in zip(*[one.damping for one in known], strict=True)
         )
         factor = np.exp(INTERVAL * std / ratio)
         ends = [ratio - ratio / factor, ratio * factor - ratio]
         x = [recording.x for recording in known]
-        _draw_intervals(axes, track, x, ratio, ends, "^", GREEN, "damping ratio with 90 % interval", stages)
+        _draw_intervals(
+            axes, track, x, ratio, ends, "^", GREEN, "damping ratio with 90 % interval", stages
+        )
         unknown = [one.x for one in track.recordings if one.resonance.found and one.damping_reason]
         if unknown:
             axes.plot(
-                unknown, np.full(len(unknown), 0.02), "x", color=GREY, transform=axes.get_xaxis_transform(),
+                unknown,
+                np.full(len(unknown), 0.02),
+                "x",
+                color=GREY,
+                transform=axes.get_xaxis_transform(),
                 label="not determined",
-            )  # fmt: skip
-        axes.set(yscale="log", ylabel=quantity("damping_ratio").axis, title="Damping of the contact resonance")
+            )
+        axes.set(
+            yscale="log",
+            ylabel=quantity("damping_ratio").axis,
+            title="Damping of the contact resonance",
+        )
         plain_powers(axes)
 
     said = "" if stages is None else f" By it alone: {in_print(stages.verdict)}"
@@ -184,8 +219,19 @@ def levels(track: Track) -> Exhibit | None:
         for number, (name, values) in enumerate(courses.items()):
             mark = MARKS[number % len(MARKS)]
             axes.plot(x, values, mark, markersize=4, linestyle=":", linewidth=0.8, label=name)
-        axes.axhline(np.exp(LEVEL_LEAST), color=VERMILION, linestyle=DASHED, linewidth=1.0, label="least that alarms")
-        axes.set(yscale="log", xlabel=x_label(track), ylabel="over the first", title="Levels, bands, rates of faults")
+        axes.axhline(
+            np.exp(LEVEL_LEAST),
+            color=VERMILION,
+            linestyle=DASHED,
+            linewidth=1.0,
+            label="least that alarms",
+        )
+        axes.set(
+            yscale="log",
+            xlabel=x_label(track),
+            ylabel="over the first",
+            title="Levels, bands, rates of faults",
+        )
         plain_powers(axes)
 
     return Exhibit(
@@ -201,7 +247,9 @@ def _courses(track: Track) -> dict[str, Field]:
     """By name, every level that at least two recordings have, relative to the first."""
     readings = [recording.reading for recording in track.recordings]
     heard: dict[str, list[float]] = {
-        name: [np.nan if one.quality is None else float(getattr(one.quality, name)) for one in readings]
+        name: [
+            np.nan if one.quality is None else float(getattr(one.quality, name)) for one in readings
+        ]
         for name in ("rms", "kurtosis")
     }
     heard["velocity"] = [one.velocity for one in readings]
@@ -212,9 +260,9 @@ def _courses(track: Track) -> dict[str, Field]:
     for name, values in heard.items():
         known = [value for value in values if value > 0.0]
         if len(known) > 1:
-            courses[name] = np.array([value if value > 0.0 else np.nan for value in values]) / np.median(
-                known[:BASELINE]
-            )
+            courses[name] = np.array(
+                [value if value > 0.0 else np.nan for value in values]
+            ) / np.median(known[:BASELINE])
     return courses
 
 
@@ -225,8 +273,13 @@ def asperity_load_share(track: Track) -> Exhibit:
     def draw(axes: Axes) -> None:
         read = [recording for recording in track.recordings if np.isfinite(recording.clr)]
         clr = display("clr", np.array([recording.clr for recording in read]))
-        low, high = display("clr", np.array([recording.clr_interval for recording in read]).reshape(-1, 2)).T
-        x, label = [recording.x for recording in read], f"{quantity('clr').short} as the model reads it"
+        low, high = display(
+            "clr", np.array([recording.clr_interval for recording in read]).reshape(-1, 2)
+        ).T
+        x, label = (
+            [recording.x for recording in read],
+            f"{quantity('clr').short} as the model reads it",
+        )
         _draw_intervals(axes, track, x, clr, [clr - low, high - clr], "o", VERMILION, label)
         axes.axhline(display("clr", 1.0), color="black", linestyle=":", linewidth=1.0)
         axes.set(ylabel=quantity("clr").label, title="Load share, read off the CRF")
@@ -253,7 +306,9 @@ def _draw_intervals(
 ) -> None:
     """With the break of `stages`, or else the one that decides."""
     mark_split(axes, stages or track.stages, "break, 90 %")
-    draw_intervals(axes, x, values, reach, marker, color=colour, ecolor=GREY, markersize=4, label=label)
+    draw_intervals(
+        axes, x, values, reach, marker, color=colour, ecolor=GREY, markersize=4, label=label
+    )
     axes.set_xlabel(x_label(track))
 
 
@@ -275,20 +330,43 @@ def waterfall(track: Track) -> Exhibit:
         frequency, levels = _levels(track, rows)
         reach = float(np.quantile(np.abs(levels), 0.995)) or 1.0
         image = axes.imshow(
-            levels, aspect="auto", origin="lower", cmap="cividis", vmin=-0.6 * reach, vmax=reach, interpolation="none",
+            levels,
+            aspect="auto",
+            origin="lower",
+            cmap="cividis",
+            vmin=-0.6 * reach,
+            vmax=reach,
+            interpolation="none",
             extent=(frequency[0], frequency[-1], 0.5, len(rows) + 0.5),
-        )  # fmt: skip
-        resonant = [(one.resonance.crf_hz, number) for number, one in enumerate(rows, 1) if one.resonance.found]
+        )
+        resonant = [
+            (one.resonance.crf_hz, number)
+            for number, one in enumerate(rows, 1)
+            if one.resonance.found
+        ]
         axes.plot(
-            [crf for crf, _ in resonant], [number for _, number in resonant], "o", markerfacecolor="none",
-            color="white", markersize=4.5, markeredgewidth=0.9, label=quantity("crf_hz").short,
-        )  # fmt: skip
+            [crf for crf, _ in resonant],
+            [number for _, number in resonant],
+            "o",
+            markerfacecolor="none",
+            color="white",
+            markersize=4.5,
+            markeredgewidth=0.9,
+            label=quantity("crf_hz").short,
+        )
         for end in track.target.band_hz:
             axes.axvline(end, color="white", linewidth=0.9, linestyle=DASHED)
-        name_axes(axes, "frequency_hz", title="Spectra of the series", ylabel=f"recording, by {x_label(track)}")
+        name_axes(
+            axes,
+            "frequency_hz",
+            title="Spectra of the series",
+            ylabel=f"recording, by {x_label(track)}",
+        )
         axes.set_xlim(frequency[0], frequency[-1])
         places = sorted({0, len(rows) // 4, len(rows) // 2, 3 * len(rows) // 4, len(rows) - 1})
-        axes.set_yticks([place + 1 for place in places], [f"{rows[place].x:.3g}" for place in places])
+        axes.set_yticks(
+            [place + 1 for place in places], [f"{rows[place].x:.3g}" for place in places]
+        )
         axes.spines[:].set_visible(False)
         style: Any = {"location": "bottom", "shrink": 0.8}
         axes.figure.colorbar(image, ax=axes, label=quantity("level_db").axis, **style)
@@ -307,7 +385,11 @@ def _levels(track: Track, rows: list[TrackedRecording]) -> tuple[Field, Field]:
     frequency, inside = _around(track)
     together = max(1, int(np.count_nonzero(inside)) // 480)
     density = np.array(
-        [neighbours(row.clean.spectrum.density[inside], together).mean(axis=1) for row in rows if row.clean is not None]
+        [
+            neighbours(row.clean.spectrum.density[inside], together).mean(axis=1)
+            for row in rows
+            if row.clean is not None
+        ]
     )
     levels = 10.0 * np.log10(np.maximum(density, 1e-300))
     levels -= np.median(levels, axis=1, keepdims=True)
@@ -316,7 +398,10 @@ def _levels(track: Track, rows: list[TrackedRecording]) -> tuple[Field, Field]:
 
 def typical_recording(track: Track) -> TrackedRecording:
     """The recording whose CRF is known as well as most; of a series without any, the first that could be used."""
-    resonant = sorted((one for one in track.recordings if one.resonance.found), key=lambda one: one.resonance.crf_std)
+    resonant = sorted(
+        (one for one in track.recordings if one.resonance.found),
+        key=lambda one: one.resonance.crf_std,
+    )
     if resonant:
         return resonant[len(resonant) // 2]
     return next(recording for recording in track.recordings if recording.clean is not None)
@@ -330,7 +415,11 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
     BadInput
         for a recording without a spectrum.
     """
-    spectrum, name, resonance = recording.reading.spectrum, Path(recording.file).name, recording.resonance
+    spectrum, name, resonance = (
+        recording.reading.spectrum,
+        Path(recording.file).name,
+        recording.resonance,
+    )
     if recording.clean is None or spectrum is None:
         raise BadInput(f"{recording.file} has no spectrum to draw: {resonance.reason}")
     clean = recording.clean
@@ -342,14 +431,26 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
         f = neighbours(frequency[inside], together).mean(axis=1)
         recorded = neighbours(spectrum.density[inside], together).max(axis=1)
         cleaned = neighbours(clean.spectrum.density[inside], together).mean(axis=1)
-        axes.axvspan(*track.target.band_hz, facecolor=BAND_COLOUR, edgecolor=GREY, linewidth=0.7, label="band searched")
+        axes.axvspan(
+            *track.target.band_hz,
+            facecolor=BAND_COLOUR,
+            edgecolor=GREY,
+            linewidth=0.7,
+            label="band searched",
+        )
         axes.semilogy(f, recorded, color="#e3b9a0", linewidth=0.6, label="as recorded (peaks)")
         axes.semilogy(f, cleaned, color=GREY, linewidth=0.8, label="lines taken out (mean)")
         lines = [line.frequency_hz for line in clean.removed if f[0] <= line.frequency_hz <= f[-1]]
         axes.plot(
-            lines, np.full(len(lines), 0.985), "|", color=VERMILION, markersize=5, markeredgewidth=0.6,
-            transform=axes.get_xaxis_transform(), label=f"{len(lines)} lines of shafts and mains",
-        )  # fmt: skip
+            lines,
+            np.full(len(lines), 0.985),
+            "|",
+            color=VERMILION,
+            markersize=5,
+            markeredgewidth=0.6,
+            transform=axes.get_xaxis_transform(),
+            label=f"{len(lines)} lines of shafts and mains",
+        )
         _draw_fit(axes, track, recording, f)
         unit = quantity("acceleration_density").display if track.comparable else spectrum.unit
         name_axes(axes, "frequency_hz", ylabel=f"density [{unit}]")
@@ -358,7 +459,9 @@ def spectrum_with_fit(track: Track, recording: TrackedRecording) -> Exhibit:
     return Exhibit(
         "spectrum",
         draw,
-        f"{name}, the recording of the middle interval width." if resonance.found else f"{name}: {resonance.reason}.",
+        f"{name}, the recording of the middle interval width."
+        if resonance.found
+        else f"{name}: {resonance.reason}.",
         f"Spectrum of {name} with its fit and the lines taken out.",
     )
 
@@ -368,15 +471,24 @@ def _draw_fit(axes: Axes, track: Track, recording: TrackedRecording, frequency: 
     curve = resonance.curve(frequency)
     within = (frequency >= low) & (frequency <= high) & (curve > 0.0)
     if np.isfinite(curve[within]).any():
-        axes.semilogy(frequency[within], curve[within], color=BLUE, label="fit" if resonance.found else "fit, no line")
+        axes.semilogy(
+            frequency[within],
+            curve[within],
+            color=BLUE,
+            label="fit" if resonance.found else "fit, no line",
+        )
     if resonance.found:
         axes.axvline(resonance.crf_hz, color=BLUE, linestyle="--", linewidth=1.0, label=crf.short)
-    axes.set_title(f"One spectrum: {crf.named(resonance.crf_hz) if resonance.found else 'no resonance found'}")
+    axes.set_title(
+        f"One spectrum: {crf.named(resonance.crf_hz) if resonance.found else 'no resonance found'}"
+    )
 
 
 def _around(track: Track) -> tuple[Field, Any]:
     """The frequencies of the series, and which of them lie in the band or near it."""
-    first = next(recording.reading.spectrum for recording in track.recordings if recording.clean is not None)
+    first = next(
+        recording.reading.spectrum for recording in track.recordings if recording.clean is not None
+    )
     assert first is not None
     low, high = track.target.band_hz
     margin = 0.3 * (high - low)

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.quantities import NO_VALUE, in_print, quantity
-from asperity.report.ahead import ahead
+from asperity.core.quantities import NO_VALUE, in_print, quantity
+from asperity.monitoring import FORECAST, Track, TrackedRecording
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
+from asperity.report.forecast import ahead
 from asperity.report.track import exhibits
-from asperity.tracking import FORECAST, Track, TrackedRecording
-from asperity.wear import ALERTS, IN_WORDS
+from asperity.trend import ALERTS, IN_WORDS
 
 METHODS = {
     "joint": "All spectra are fitted together: a background common to the series, of any shape, each recording with "
@@ -36,9 +36,20 @@ NEXT = {  # what to do, by the alarm's state; of an alarm by who raised it, its 
     "blind": "Check that the machine runs, then sensor, cable and supply. Until then nobody hears the machine.",
     "none": "Nothing; record on as planned.",
 }
-NEXT |= {FORECAST: NEXT["CRF"], "damping": NEXT["CRF"], "kurtosis": NEXT["the"], "velocity": NEXT["the"]}
+NEXT |= {
+    FORECAST: NEXT["CRF"],
+    "damping": NEXT["CRF"],
+    "kurtosis": NEXT["the"],
+    "velocity": NEXT["the"],
+}
 SUREST = 0.99  # beyond which a probability says more of the model than of the machine
-NO_BREAK = ("saturating exponential", "saturating hyperbola", "straight line", "smooth curves", "no change")
+NO_BREAK = (
+    "saturating exponential",
+    "saturating hyperbola",
+    "straight line",
+    "smooth curves",
+    "no change",
+)
 MOST_LINES = 20  # of those taken out, listed by name
 
 
@@ -110,8 +121,15 @@ def _act(track: Track) -> list[tuple[str, str]]:
     if alarm.since is not None:
         first = track.recordings[alarm.since]
         when = f", {_when(first)}" if first.reading.started else ""
-        rows.append(("Since", f"{Path(first.file).name}{when} ({exhibits.x_label(track)}: {first.x:.4g})"))
-    rows.append(("Last heard", f"{Path(last.file).name}{', ' + _when(last) if last.reading.started else ''}"))
+        rows.append(
+            ("Since", f"{Path(first.file).name}{when} ({exhibits.x_label(track)}: {first.x:.4g})")
+        )
+    rows.append(
+        (
+            "Last heard",
+            f"{Path(last.file).name}{', ' + _when(last) if last.reading.started else ''}",
+        )
+    )
     rows.append(("Severity", capitalised(in_print(last.severity())) + "."))
     rows.append(("How sure", _how_sure(track)))
     kind = alarm.raised_by.partition(" ")[0] if alarm.state == "alarm" else alarm.state
@@ -130,9 +148,17 @@ def _how_sure(track: Track) -> str:
     if alarm.raised_by == FORECAST:
         return "The probability is that of the model's courses; a change is told where it is a hundred to one."
     if alarm.state not in ("alarm", "alert"):
-        return "No statement: see what is missing." if alarm.state != "none" else "Small changes would not be seen yet."
+        return (
+            "No statement: see what is missing."
+            if alarm.state != "none"
+            else "Small changes would not be seen yet."
+        )
     said = f"Set to be said without wear once in {1.0 / alarm.false_alarm_rate:.0f} recordings"
-    said = said if alarm.state == "alarm" else f"Not sure: chance does it {ALERTS:.0f} times as often as it alarms"
+    said = (
+        said
+        if alarm.state == "alarm"
+        else f"Not sure: chance does it {ALERTS:.0f} times as often as it alarms"
+    )
     if np.isfinite(last.severe_probability) and alarm.raised_by in ("CRF", "damping"):
         said += f"; probability of the severe stage {_likely(last.severe_probability)}, if the line is the contact's"
     return f"{said}."
@@ -152,13 +178,17 @@ def _tiles(track: Track) -> list[Tile]:
         low, high = stages.interval
         label = f"Break at, {exhibits.x_label(track)}"
         tiles.append(Tile(label, f"{stages.split:.3g}", f"90 %: {low:.3g} to {high:.3g}"))
-    last = next((recording for recording in reversed(track.recordings) if recording.resonance.found), None)
+    last = next(
+        (recording for recording in reversed(track.recordings) if recording.resonance.found), None
+    )
     if last is not None:
         crf, clr = quantity("crf_hz"), quantity("clr")
         value, _, deviation = crf.text(last.resonance.crf_hz, last.resonance.crf_std).partition(" ")
         tiles.append(Tile(f"Last {crf.short}", value, deviation))
         if np.isfinite(last.severe_probability):
-            tiles.append(Tile("Severe, last recording", _likely(last.severe_probability), "probability"))
+            tiles.append(
+                Tile("Severe, last recording", _likely(last.severe_probability), "probability")
+            )
         if np.isfinite(last.clr):
             low, high = last.clr_interval
             interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
@@ -179,7 +209,10 @@ def _pictures(chosen: list[Exhibit]) -> list[Picture]:
 def _details(track: Track) -> list[Exhibit]:
     """What is shown below the trend."""
     heard = exhibits.levels(track)
-    details = [*([] if heard is None else [heard]), *([exhibits.amplitude(track)] if track.resonance_count else [])]
+    details = [
+        *([] if heard is None else [heard]),
+        *([exhibits.amplitude(track)] if track.resonance_count else []),
+    ]
     if _with_damping(track):
         details.append(exhibits.damping(track))
     if track.resonance_count and _with_clr(track):
@@ -200,7 +233,13 @@ class _Row(NamedTuple):
 
 
 def _heads(track: Track) -> list[str]:
-    keys = ["crf_hz", "crfa", "damping_ratio", *(["clr"] if _with_clr(track) else []), "severe_probability"]
+    keys = [
+        "crf_hz",
+        "crfa",
+        "damping_ratio",
+        *(["clr"] if _with_clr(track) else []),
+        "severe_probability",
+    ]
     heads = {key: quantity(key).label for key in keys}
     if not track.comparable:
         heads["crfa"] = quantity("crfa").short
@@ -210,16 +249,27 @@ def _heads(track: Track) -> list[str]:
 def _row(recording: TrackedRecording, with_clr: bool) -> _Row:
     resonance, row = recording.resonance, recording.row()
     place = f"{recording.x:.4g}" + (f" ± {recording.x_std:.2g}" if recording.x_std else "")
-    resonant = [quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")]
+    resonant = [
+        quantity(key).number_in(row) if resonance.found else NO_VALUE for key in ("crf_hz", "crfa")
+    ]
     width = (
-        "not determined" if resonance.found and recording.damping_reason else quantity("damping_ratio").number_in(row)
+        "not determined"
+        if resonance.found and recording.damping_reason
+        else quantity("damping_ratio").number_in(row)
     )
     resonant.append(width)
-    severe = _likely(recording.severe_probability) if np.isfinite(recording.severe_probability) else NO_VALUE
+    severe = (
+        _likely(recording.severe_probability)
+        if np.isfinite(recording.severe_probability)
+        else NO_VALUE
+    )
     shares = [quantity("clr").number(row["clr"])] if with_clr else []
     cells = [place, *resonant, *shares, severe]
     return _Row(
-        Path(recording.file).name, cells, recording.label, in_print("" if resonance.found else resonance.reason)
+        Path(recording.file).name,
+        cells,
+        recording.label,
+        in_print("" if resonance.found else resonance.reason),
     )
 
 
@@ -228,7 +278,9 @@ def _remarks(track: Track) -> list[tuple[str, str]]:
     remarks: dict[str, list[str]] = {}
     for recording in track.recordings:
         name = Path(recording.file).name
-        for sentence in recording.reading.quality.remarks if recording.reading.quality is not None else ():
+        for sentence in (
+            recording.reading.quality.remarks if recording.reading.quality is not None else ()
+        ):
             remarks.setdefault(sentence, []).append(name)
         if recording.reading.reason:
             remarks.setdefault(f"Not used: {recording.reading.reason}", []).append(name)
@@ -239,7 +291,9 @@ def _remarks(track: Track) -> list[tuple[str, str]]:
             return "all"
         return ", ".join(names) if len(names) <= 3 else f"{len(names)} recordings, first {names[0]}"
 
-    return [(in_print(capitalised(sentence)), holders(names)) for sentence, names in remarks.items()]
+    return [
+        (in_print(capitalised(sentence)), holders(names)) for sentence, names in remarks.items()
+    ]
 
 
 def _facts(track: Track) -> list[tuple[str, str, str]]:
@@ -250,11 +304,21 @@ def _facts(track: Track) -> list[tuple[str, str, str]]:
         if seen:
             ((value, source), count), *others = seen.most_common()
             more = f"; others in {seen.total() - count} recordings" if others else ""
-            rows.append((name.capitalize(), f"{value} Hz{more}" if name == "rate" else value + more, source))
+            rows.append(
+                (name.capitalize(), f"{value} Hz{more}" if name == "rate" else value + more, source)
+            )
     lengths = [reading.quality.duration_s for reading in readings if reading.quality is not None]
     if lengths:
-        shortest, longest = (quantity("duration_s").text(length) for length in (min(lengths), max(lengths)))
-        rows.append(("Length", shortest if shortest == longest else f"{shortest} to {longest}", "its samples"))
+        shortest, longest = (
+            quantity("duration_s").text(length) for length in (min(lengths), max(lengths))
+        )
+        rows.append(
+            (
+                "Length",
+                shortest if shortest == longest else f"{shortest} to {longest}",
+                "its samples",
+            )
+        )
     started = sorted(reading.started for reading in readings if reading.started)
     if started:
         first, last = started[0].replace("T", " "), started[-1].replace("T", " ")
@@ -289,7 +353,11 @@ def _ways(track: Track) -> list[_Way]:
     ways = []
     for source, stages in track.stages_by.items():
         low, high = stages.interval
-        breaks = [value for name, value in stages.evidence.items() if "break in" in name or name == "broken stick"]
+        breaks = [
+            value
+            for name, value in stages.evidence.items()
+            if "break in" in name or name == "broken stick"
+        ]
         others = [value for name, value in stages.evidence.items() if name in NO_BREAK]
         margin = f"{min(others) - min(breaks):+.1f}" if breaks and others else NO_VALUE
         name = capitalised(IN_WORDS[source]) + (" (decides)" if stages is track.stages else "")
@@ -307,10 +375,19 @@ def _evidence(track: Track) -> list[tuple[str, str]]:
 
 
 def _resolution(track: Track) -> str:
-    spectrum = next((recording.reading.spectrum for recording in track.recordings if recording.clean is not None), None)
+    spectrum = next(
+        (
+            recording.reading.spectrum
+            for recording in track.recordings
+            if recording.clean is not None
+        ),
+        None,
+    )
     if spectrum is None:
         return "no spectrum"
-    spacing, resolution = (quantity(key).text(getattr(spectrum, key)) for key in ("spacing_hz", "resolution_hz"))
+    spacing, resolution = (
+        quantity(key).text(getattr(spectrum, key)) for key in ("spacing_hz", "resolution_hz")
+    )
     return (
         f"{spectrum.window} window, {spectrum.segment} samples a piece, lines {spacing} apart "
         f"(noise bandwidth {resolution})"

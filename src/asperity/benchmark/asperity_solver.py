@@ -1,0 +1,266 @@
+"""asperity's own adapter: contacts, waves and sliders of the benchmark by the solvers of `asperity.ehl`."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput
+from asperity.ehl import ContactModel, ContactSolution, Options, solve_contact, solve_film
+from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
+from asperity.solution import contact_state
+from asperity.surface import MovingSurfaces, Surface, flat_surface
+from asperity.transient import moving_contact
+
+LENGTH = 0.01  # of a line contact, which no certified value hangs on [m]
+TIGHT = Options(tolerance=1e-6)
+
+
+class Ours:
+    """asperity, at a tight tolerance."""
+
+    name = "asperity"
+    kinds = ("dry", "wave", "ehl", "mixed", "conserving", "moving", "slider")
+
+    def solve(self, given: Mapping[str, Any], cells: int) -> dict[str, float]:
+        """Quantities by key."""
+        return _SOLVES[given["kind"]](given, cells)
+
+
+def _conditions(given: Mapping[str, Any], speed: float = 1.0) -> ContactConditions:
+    line = given["geometry"] == "line"
+    radius = given["radius_m"]
+    return ContactConditions(
+        pair=ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"])),
+        geometry=given["geometry"],
+        radius=tuple(radius) if isinstance(radius, list) else radius,
+        length=LENGTH if line else None,
+        load=given["line_load_n_m"] * LENGTH if line else given["load_n"],
+        surface_speeds=(speed, speed),
+    )
+
+
+def waves_on(grid: Grid, given: Mapping[str, Any]) -> Field:
+    """Heights of the case's waves [m], each of (amplitude [m], waves along x and y over the side, phase [rad])."""
+    x, y = grid.x[:, None], grid.y[None, :]
+    turn = 2.0 * np.pi / given["side_m"]
+    return np.asarray(
+        np.sum(
+            [a * np.cos(turn * (kx * x + ky * y) + phase) for a, kx, ky, phase in given["waves"]],
+            axis=0,
+        )
+    )
+
+
+def dry_roughness(grid: Grid, given: Mapping[str, Any]) -> Field:
+    """Heights [m] of a dry ball's or ellipse's roughness: waves, rings, or none."""
+    if "waves" in given:
+        return waves_on(grid, given)
+    if "rings" in given:
+        amplitude, length = given["rings"]
+        return np.asarray(
+            amplitude * np.cos(2.0 * np.pi * np.hypot(grid.x[:, None], grid.y[None, :]) / length)
+        )
+    return np.zeros(grid.cells)
+
+
+def pressures(pressure: Field, cell_area: float) -> dict[str, float]:
+    """Largest pressure, and the mean of the pressure weighted by itself, which hangs less on single cells."""
+    return {
+        "p_max_pa": float(pressure.max()),
+        "p_weighted_pa": float((pressure**2).sum() / pressure.sum()),
+        "contact_area_m2": float(np.count_nonzero(pressure) * cell_area),
+    }
+
+
+def _dry(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    conditions = _conditions(given)
+    a, b = conditions.hertz.half_widths
+    if given["geometry"] == "line":
+        grid = Grid((cells, 8), (-1.5 * a, 0.0), (1.5 * a, 8 * 3.0 * a / cells))
+    else:
+        x, y = (given["side_m"] / 2.0,) * 2 if "side_m" in given else (1.5 * a, 1.5 * b)
+        grid = Grid((cells, cells), (-x, -y), (x, y), periodic=(False, False))
+    if given["geometry"] == "line" and "waves" in given:
+        surface = _oiled_waves(given, grid)
+    else:
+        surface = Surface(dry_roughness(grid, given), grid)
+    solution = solve_contact(conditions, None, surface, options=TIGHT)
+    found = pressures(solution.pressure, grid.spacing[0] * grid.spacing[1])
+    if given["geometry"] == "line" and "waves" not in given:
+        found["half_width_m"] = _half_width(grid.x, solution.pressure[:, 0])
+    return found
+
+
+def _half_width(x: Field, pressure: Field) -> float:
+    """Where the square of the pressure, which is straight at the edge, goes through zero."""
+    inside = np.flatnonzero(pressure)[-3:-1]  # the last cell is cut by the edge
+    slope, level = np.polyfit(x[inside] ** 2, pressure[inside] ** 2, 1)
+    return float(np.sqrt(-level / slope))
+
+
+def _wave(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    """Waves across a line contact that is so wide that its middle is as good as endless."""
+    pair = ElasticPair(tuple(given["youngs_modulus_pa"]), tuple(given["poisson_ratio"]))
+    length, amplitude = given["wavelength_m"], given["amplitude_m"]
+    p_mean = given["pressure_over_full"] * np.pi * pair.reduced_modulus * amplitude / length
+    a = 30.0 * length
+    wide = {
+        "geometry": "line",
+        "radius_m": a * pair.reduced_modulus / (2.0 * p_mean),
+        "line_load_n_m": 0.5 * np.pi * a * p_mean,
+    }
+    grid = Grid((cells, cells), (-1.5 * a, 0.0), (1.5 * a, length))
+    heights = np.tile(amplitude * np.cos(2.0 * np.pi * grid.y / length), (cells, 1))
+    solution = solve_contact(
+        _conditions({**given, **wide}), None, Surface(heights, grid), options=TIGHT
+    )
+    middle = slice(cells // 2 - 1, cells // 2 + 1)
+    return {
+        "p_max_pa": float(solution.pressure[middle].max()),
+        "mean_gap_m": float(solution.gap[middle].mean()),
+    }
+
+
+def _oil(given: Mapping[str, Any]) -> Lubricant:
+    oil = given["oil"]
+    stated = (oil["density"], oil["density_c1_1_pa"], oil["density_c2_1_pa"])
+    if stated != ("dowson-higginson", 0.6e-9, 1.7e-9):
+        raise BadInput(
+            f"the oil's density must be Dowson and Higginson's with 0.6e-9 and 1.7e-9 1/Pa, got {stated}"
+        )
+    thick: Barus | Roelands
+    if oil["viscosity"] == "barus":
+        thick = Barus(oil["eta0_pa_s"], oil["alpha_1_pa"])
+    else:
+        thick = Roelands(oil["eta0_pa_s"], oil["alpha_1_pa"], oil["roelands_p0_pa"])
+    return Lubricant(
+        viscosity=thick, density=DowsonHigginson(oil["rho0_kg_m3"]), rheology=Newtonian()
+    )
+
+
+def _ehl_grid(given: Mapping[str, Any], a: float, cells: int) -> Grid:
+    low, high = given["inlet_half_widths"] * a, given["outlet_half_widths"] * a
+    if given["geometry"] == "point":
+        side = given["side_half_widths"] * a
+        return Grid((cells, cells), (low, -side), (high, side), periodic=(False, False))
+    if "width_m" in given:
+        return Grid((cells, max(8, cells // 4)), (low, 0.0), (high, given["width_m"]))
+    return Grid((cells, 8), (low, 0.0), (high, 8 * (high - low) / cells))
+
+
+def _oiled_waves(given: Mapping[str, Any], grid: Grid) -> Surface:
+    """Waves of (amplitude [m], waves a metre along x, waves over the width along y, phase [rad])."""
+    x, y = grid.x[:, None], grid.y[None, :] / given.get("width_m", 1.0)
+    heights = [
+        a * np.cos(2.0 * np.pi * (along * x + across * y) + phase)
+        for a, along, across, phase in given["waves"]
+    ]
+    return Surface(np.broadcast_to(np.sum(heights, axis=0), grid.cells).copy(), grid)
+
+
+def _ehl(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    """Smooth, with standing waves (which may touch), and with no oil lost."""
+    conditions = _conditions(given, float(np.mean(given["surface_speeds_m_s"])))
+    grid = _ehl_grid(given, conditions.hertz.half_widths[0], cells)
+    surface = _oiled_waves(given, grid) if "waves" in given else flat_surface(grid)
+    options = TIGHT
+    if "touching_film_m" in given:
+        model: ContactModel = "conserving" if given["kind"] == "conserving" else "mixed"
+        options = Options(tolerance=1e-6, contact_film=given["touching_film_m"], model=model)
+    return _films(given, solve_contact(conditions, _oil(given), surface, options=options))
+
+
+def _films(given: Mapping[str, Any], solution: ContactSolution) -> dict[str, float]:
+    grid, gap, pressure = solution.grid, solution.gap, solution.pressure
+    if given["geometry"] == "point":
+        state = contact_state(solution)
+        return {"h_central_m": state.h_central, "h_min_m": state.h_min}
+    middle = (
+        gap[:, 0] if grid.y[0] == 0.0 or "width_m" not in given else 0.5 * (gap[:, 0] + gap[:, -1])
+    )
+    inside = np.linspace(-1.0, 1.0, 4001) * solution.conditions.hertz.half_widths[0]
+    found = {
+        "h_central_m": float(np.interp(0.0, grid.x, middle)),
+        "h_min_m": _least(gap[:, 0]),
+        "h_mean_m": float(np.interp(inside, grid.x, gap.mean(axis=1)).mean()),
+        "p_weighted_pa": float((pressure**2).sum() / pressure.sum()),
+        "load_share": float((pressure * solution.in_contact).sum() / pressure.sum()),
+    }
+    if solution.oil is not None and given["kind"] == "conserving":
+        speed = float(np.mean(given["surface_speeds_m_s"]))
+        found["flux_m2_s"] = speed * float(
+            (solution.oil.content * gap)[-1].mean()
+        )  # nothing drives it there but u
+    return found
+
+
+def _moving(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    """Waves of the first surface that run through: the film at x = 0 over their last period."""
+    speeds = tuple(given["surface_speeds_m_s"])
+    conditions = replace(_conditions(given), surface_speeds=speeds)
+    a = conditions.hertz.half_widths[0]
+    grid = _ehl_grid(given, a, cells)
+    surfaces = MovingSurfaces.one_rough(_oiled_waves(given, grid), speeds)
+    ((amplitude, along, _, _),) = given["waves"]
+    step, rough = grid.spacing[0], speeds[0] / float(np.mean(speeds))
+    period = round(1.0 / (along * rough * step))
+    last = round(given["settles_half_widths"] * a / step) + period
+    films = []
+    for snapshot in islice(
+        moving_contact(conditions, _oil(given), surfaces, options=TIGHT), last + 1
+    ):
+        if not snapshot.solution.convergence.converged:
+            raise AsperityError(
+                f"step {snapshot.number} of {last} did not converge; take other cells"
+            )
+        films.append(float(np.interp(0.0, grid.x, snapshot.solution.gap[:, 0])))
+    heard = np.array(films[-period:])
+    turns = np.exp(2j * np.pi * np.arange(period) / period)
+    return {
+        "amplitude_ratio": float(2.0 * abs(turns @ heard) / period / amplitude),
+        "h_mean_m": float(heard.mean()),
+    }
+
+
+def _least(gap: Field) -> float:
+    """Vertex of the parabola through the three lowest cells, which a finer grid does not move from cell to cell."""
+    i = int(np.clip(gap.argmin(), 1, gap.size - 2))
+    before, here, behind = gap[i - 1 : i + 2]
+    bend = before - 2.0 * here + behind
+    return float(here - (behind - before) ** 2 / (8.0 * bend)) if bend > 0.0 else float(here)
+
+
+def _slider(given: Mapping[str, Any], cells: int) -> dict[str, float]:
+    journal = given["shape"] == "journal"
+    length = 2.0 * np.pi * given["radius_m"] if journal else given["length_m"]
+    share = (np.arange(cells) + 0.5) / cells
+    if journal:
+        gap = given["clearance_m"] * (1.0 + given["eccentricity"] * np.cos(2.0 * np.pi * share))
+    else:
+        gap = given["least_m"] * (1.0 + (2.0 * share - 1.0) ** 2)
+    film = solve_film(
+        gap,
+        spacing=length / cells,
+        entrainment_speed=given["speed_m_s"],
+        viscosity=given["viscosity_pa_s"],
+        ends=tuple(given["pressures_pa"]),
+    )
+    load = {} if journal else {"load_n_m": float(film.load)}
+    return {"p_max_pa": float(film.pressure.max()), "flux_m2_s": float(film.flux.mean()), **load}
+
+
+_SOLVES = {
+    "dry": _dry,
+    "wave": _wave,
+    "ehl": _ehl,
+    "mixed": _ehl,
+    "conserving": _ehl,
+    "moving": _moving,
+    "slider": _slider,
+}

@@ -1,0 +1,133 @@
+"""What a grid has to know of a case's roughness before it can be made or put on one."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.case.surfaces import FileSection, GeneratedSection, SurfaceSection
+from asperity.case.units import plain
+from asperity.ehl import Texture
+from asperity.surface import condition_surface, correlation_lengths, read_surface
+
+Pair = tuple[float, float]
+BEYOND = 1.02  # of what a generator asks for at least
+GROOVE = 0.45, 0.95  # correlation lengths of a ground surface over its grooves' length and width
+CRATER = 0.8  # of a sandblasted one over the craters' radius
+
+
+def texture_of(section: SurfaceSection, folder: Path) -> Texture | None:
+    """Roughness of both bodies together; None for smooth ones.
+
+    Raises UnreadableFile for a surface file that cannot be read, BadInput for one that cannot be
+    conditioned.
+    """
+    bodies = [
+        texture
+        for part in section.parts.values()
+        if (texture := _of_body(part, folder)) is not None
+    ]
+    if len(bodies) < 2:
+        return bodies[0] if bodies else None
+    first, second = bodies
+    return Texture(
+        sq=math.hypot(first.sq, second.sq),
+        lengths=_each(min, first.lengths, second.lengths),
+        least=_each(max, first.least, second.least),
+        most=_each(min, first.most, second.most),
+    )
+
+
+def _of_body(section: SurfaceSection, folder: Path) -> Texture | None:
+    if isinstance(section, GeneratedSection):
+        return _KINDS[section.kind](section.arguments())
+    assert isinstance(section, FileSection)
+    return _measured(section, folder)
+
+
+def _correlated(arguments: dict[str, Any]) -> Texture:
+    return _turned(arguments["sq"], arguments["correlation_length"], arguments["direction"])
+
+
+def _ground(arguments: dict[str, Any]) -> Texture:
+    grooves = arguments["groove_length"], arguments["groove_width"]
+    return _turned(arguments["sq"], grooves, arguments["direction"], GROOVE)
+
+
+def _turned(sq: float, sizes: Pair, direction: float, shares: Pair = (1.0, 1.0)) -> Texture:
+    """Sizes along and across a direction, of which the shares are correlation lengths; the domain holds two of each."""
+    cosine, sine = abs(math.cos(direction)), abs(math.sin(direction))
+    first, second = sizes[0] * shares[0], sizes[1] * shares[1]
+    return Texture(
+        sq=sq,
+        lengths=(
+            1.0 / math.hypot(cosine / first, sine / second),
+            1.0 / math.hypot(sine / first, cosine / second),
+        ),
+        least=(
+            2.0 * BEYOND * max(sizes[0] * cosine, sizes[1] * sine),
+            2.0 * BEYOND * max(sizes[0] * sine, sizes[1] * cosine),
+        ),
+    )
+
+
+def _self_affine(arguments: dict[str, Any]) -> Texture:
+    """Half the shortest wave counts as its correlation length: what has to be resolved."""
+    shortest, longest = arguments["cutoffs"]
+    return Texture(sq=arguments["sq"], lengths=(shortest / 2.0,) * 2, least=(BEYOND * longest,) * 2)
+
+
+def _sandblasted(arguments: dict[str, Any]) -> Texture:
+    radius = arguments["crater_radius"]
+    return Texture(
+        sq=arguments["sq"], lengths=(CRATER * radius,) * 2, least=(8.0 * BEYOND * radius,) * 2
+    )
+
+
+_KINDS: dict[str, Callable[[dict[str, Any]], Texture | None]] = {
+    "gaussian": _correlated,
+    "non-gaussian": _correlated,
+    "run-in": _correlated,
+    "self-affine": _self_affine,
+    "ground": _ground,
+    "sandblasted": _sandblasted,
+    "flat": lambda _: None,
+}
+
+
+def _measured(section: FileSection, folder: Path) -> Texture:
+    """Of the whole map, conditioned as it will be; where its autocorrelation never falls, it asks for nothing."""
+    measured = read_surface(
+        folder / section.file,
+        unit=section.unit,
+        lateral_unit=section.lateral_unit,
+        pixel=plain(section.pixel),
+    )
+    levelled, _ = condition_surface(
+        measured,
+        form=section.form,
+        turn=section.turn,
+        outliers=section.outliers,
+        s_filter=plain(section.s_filter),
+        l_filter=plain(section.l_filter),
+    )
+    sq = plain(section.sq) or float(np.nanstd(levelled.heights))
+    lengths = correlation_lengths(levelled)
+    extents = [
+        math.inf if axis == levelled.uniform else levelled.grid.extent[axis] for axis in (0, 1)
+    ]
+    return Texture(
+        sq=sq,
+        lengths=(_known(lengths[0]), _known(lengths[1])),
+        most=(extents[0], extents[1]) if section.fit == "crop" else (math.inf, math.inf),
+    )
+
+
+def _known(length: float) -> float:
+    return math.inf if math.isnan(length) else length
+
+
+def _each(choose: Callable[[float, float], float], first: Pair, second: Pair) -> Pair:
+    return choose(first[0], second[0]), choose(first[1], second[1])

@@ -1,0 +1,73 @@
+"""What foretells a series: the emulator, built or taken, and who is asked with it."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from asperity import case, inference, simulation
+from asperity.cli.options import contact_at
+from asperity.cli.output import progress
+from asperity.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from asperity.inference import Emulator, Follower, Setting
+    from asperity.study import StudyProgress
+
+EMULATING = "the emulator's contacts; once for a case, and kept ..."
+
+
+def require_forecast(forecast: str | None, **only_with: object) -> None:
+    """BadInput for what is only of use with a forecast, without one."""
+    reasons = {"worn": "says how Sq is expected to drift", "emulator": "is what foretells a series"}
+    for name, given in only_with.items():
+        if given is not None and forecast is None:
+            raise BadInput(f"--{name} {reasons[name]}; give --forecast, too")
+
+
+def follower(
+    forecast: str | None,
+    case_file: Path | None,
+    worn: Path | None,
+    emulator: Path | None,
+    *,
+    workers: int,
+    quiet: bool,
+) -> "Follower | None":
+    """Who foretells a series that is tracked or watched; None where nobody asked."""
+    require_forecast(forecast, worn=worn, emulator=emulator)
+    if forecast is None:
+        return None
+    contact = contact_at(case_file)
+    if not isinstance(contact, case.Case):
+        raise BadInput("--forecast needs the contact; give --case CASE.toml of one contact")
+    setting = inference.setting_of(contact)
+    limit = inference.read_limit(forecast, setting)
+    inference.require_limit(setting, limit, worn=worn is not None)
+    history = None if worn is None else simulation.load_wear(worn)
+    return inference.Follower(
+        setting, emulated(setting, emulator, workers, quiet=quiet), limit, history
+    )
+
+
+def emulated(setting: "Setting", folder: Path | None, workers: int, *, quiet: bool) -> "Emulator":
+    """The emulator, and on a terminal how far it is."""
+    with contacts_solved(quiet=quiet) as step:
+        return inference.build_emulator(setting, folder=folder, workers=workers, progress=step)
+
+
+@contextmanager
+def contacts_solved(*, quiet: bool) -> "Iterator[Callable[[StudyProgress], None]]":
+    """Count an emulator's contacts on a terminal as they are solved."""
+    with progress("emulator", EMULATING, quiet=quiet) as display:
+
+        def step(state: "StudyProgress") -> None:
+            left = state.seconds_left
+            rest = "" if left is None else f", {left:.0f} s left"
+            display(
+                f"{state.kept + state.done} of {state.total} contacts{rest}",
+                state.kept + state.done,
+                state.total,
+            )
+
+        yield step

@@ -1,0 +1,198 @@
+"""What commands print: a verdict with its tables and notes, or one JSON object; and progress while they work."""
+
+import json
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any, Protocol
+
+from asperity.cli.options import with_flags
+from asperity.core.quantities import catalogue, quantity, select
+from asperity.core.third_party import printable
+
+if TYPE_CHECKING:
+    from asperity.ehl import Iteration
+
+SILENT_FOR = 2.0  # seconds without a step of the solver, after which its compilation is announced
+TITLE = 12  # letters of a column's title, beyond which it is wrapped
+
+Block = Iterable[str]  # lines; worked out only where they are printed
+Row = tuple[str, str]
+
+
+def show(
+    verdict: str | Sequence[str],
+    values: Callable[[], Mapping[str, Any]],
+    *blocks: Block,
+    as_json: bool,
+    quiet: bool,
+    a_line: bool = False,
+) -> None:
+    """Print the values as the one JSON object, or the verdict (or several) and, unless quiet, blocks after empty lines.
+
+    `a_line` keeps the object on one line and hands it on at once, for a command that prints one
+    after another. Nan or infinity in the object is a mistake of ours.
+    """
+    if as_json:
+        print(json.dumps(values(), indent=None if a_line else 2, allow_nan=False), flush=a_line)
+        return
+    for sentence in [verdict] if isinstance(verdict, str) else verdict:
+        print(printable(with_flags(sentence)), flush=a_line)
+    if quiet:
+        return
+    for block in blocks:
+        for number, line in enumerate(block):
+            print("" if number else "\n", printable(with_flags(line)), sep="", flush=a_line)
+
+
+def table(rows: Iterable[Row], notes: Iterable[str] = ()) -> Block:
+    """Names and values in two columns, and notes below."""
+    pairs = list(rows)
+    width = max((len(name) for name, _ in pairs), default=0)
+    yield from (f"  {name:{width}}  {value}" for name, value in pairs)
+    yield from (f"  note: {note}" for note in notes)
+
+
+def columns(titles: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 0) -> Block:
+    """A table, its first `left` columns and those without a title flush left; long titles are wrapped."""
+    cells = [list(row) for row in rows]
+    widths = [max(map(len, column), default=1) for column in zip(*cells, strict=True)] or [1] * len(
+        titles
+    )
+    headings = [wrap(title, max(TITLE, width)) for title, width in zip(titles, widths, strict=True)]
+    widths = [
+        max(width, *map(len, heading), 1) for width, heading in zip(widths, headings, strict=True)
+    ]
+    height = max(map(len, headings))
+    stacked = zip(*([""] * (height - len(heading)) + heading for heading in headings), strict=True)
+    for line in (*stacked, *cells):
+        aligned = (
+            f"{cell:<{width}}" if number < left or not title else f"{cell:>{width}}"
+            for number, (title, cell, width) in enumerate(zip(titles, line, widths, strict=True))
+        )
+        yield f"  {'  '.join(aligned)}".rstrip()
+
+
+def known(values: Mapping[str, Any], *groups: str) -> list[Row]:
+    """The numbers that `values` have and the catalogue shows in a table, of these groups of it or of all."""
+    groups = groups or tuple({entry.group for entry in catalogue().values()})
+    return [
+        (entry.title, entry.text_in(values)) for entry in select(*groups) if entry.key in values
+    ]
+
+
+def text(key: str, value: Any) -> str:
+    """A value as the catalogue shows it, with its unit."""
+    return quantity(key).text(value)
+
+
+def span(key: str, ends: Sequence[float]) -> str:
+    """From where to where a quantity goes, with its unit."""
+    low, high = ends
+    return f"{quantity(key).number(low)} to {text(key, high)}"
+
+
+def written(name: str, *paths: Path | None) -> Block:
+    """Where something was written, unless it was not."""
+    return [f"{name}: {path}" for path in paths if path is not None]
+
+
+class Display(Protocol):
+    """Takes how far the work is: in words, and as a number of things done, of how many."""
+
+    def __call__(self, doing: str, done: int | None = None, total: int | None = None) -> None:
+        """Show it."""
+
+
+@contextmanager
+def progress(
+    label: str, doing: str = "", *, quiet: bool, compiles: bool = False
+) -> Iterator[Display]:
+    """Show on a terminal how far the work is.
+
+    With `compiles`, the compilation that makes the first solve ever slow is announced after a
+    while without a report, in a file too.
+    """
+    if quiet or not (compiles or sys.stderr.isatty()):
+        yield _unseen
+        return
+    label = printable(label)
+    notice = f"{label}: no step yet; the first solve after installation compiles the solver, up to a minute ..."
+    if not sys.stderr.isatty():
+        announcement = threading.Timer(
+            SILENT_FOR, print, [notice], {"file": sys.stderr, "flush": True}
+        )
+        with _announced(announcement):
+            yield lambda *_, **__: announcement.cancel()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    announcement = threading.Timer(
+        SILENT_FOR, console.print, [notice], {"soft_wrap": True, "highlight": False}
+    )
+    label_column, doing_column = (
+        TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[doing]")
+    )
+    bar = Progress(
+        *(label_column, BarColumn(20), doing_column, TimeElapsedColumn()),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,  # as where TERM=dumb
+        redirect_stdout=sys.stdout.isatty(),  # what goes to a file must not end beside the bar
+    )
+    with _announced(announcement) if compiles else nullcontext(), bar:
+        task = bar.add_task(label, total=None, doing=doing)
+
+        def show_progress(doing: str, done: int | None = None, total: int | None = None) -> None:
+            announcement.cancel()
+            bar.update(task, doing=doing, completed=done, total=total)
+
+        yield show_progress
+
+
+@contextmanager
+def _announced(announcement: threading.Timer) -> Iterator[None]:
+    """Let it speak unless it is cancelled or what it is about has ended."""
+    announcement.daemon = True
+    announcement.start()
+    try:
+        yield
+    finally:
+        announcement.cancel()
+
+
+def _unseen(doing: str, done: int | None = None, total: int | None = None) -> None:
+    """What a display does that nobody sees."""
+
+
+class SolverSteps:
+    """Shows the solver's steps, and the surfaces that are done where there are several."""
+
+    def __init__(self, display: Display) -> None:
+        self.display = display
+        self.done: int | None = None
+        self.total: int | None = None
+
+    def step(self, iteration: "Iteration") -> None:
+        """After a Newton step; the start is known before all is compiled."""
+        if iteration.number > 0:
+            nx, ny = iteration.cells
+            words = f"{nx} x {ny} cells, step {iteration.number}, residual {iteration.residual:.1e}"
+            self.display(words, self.done, self.total)
+
+    def surface(self, done: int, total: int) -> None:
+        """After a surface."""
+        self.done, self.total = done, total
+        self.display(f"{done} of {total} surfaces", done, total)
+
+
+@contextmanager
+def solver_progress(label: str, *, quiet: bool) -> "Iterator[Callable[[Iteration], None]]":
+    """Show the solver's steps."""
+    with progress(label, "setting up ...", quiet=quiet, compiles=True) as display:
+        yield SolverSteps(display).step

@@ -1,0 +1,1 @@
+"""What every room uses: errors, arrays, files, limits, processes, storage, quantities, signals."""

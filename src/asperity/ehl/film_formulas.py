@@ -1,0 +1,221 @@
+"""Films of smooth, flooded, isothermal contacts by published fits, and which regime of lubrication they say it is.
+
+Speed U = η₀ u/(E' R), load W = w/(E' R) or F/(E' R²), material G = α E', with u the mean speed and
+R along rolling. Moes' load M = W (2U)^-1/2 (line) or W (2U)^-3/4, oil L = G (2U)^1/4, and film H =
+(h/R) (2U)^-1/2.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from asperity.contact.conditions import ContactConditions
+from asperity.lubricant import Lubricant
+
+Regime = Literal[
+    "isoviscous-rigid", "isoviscous-elastic", "piezoviscous-rigid", "piezoviscous-elastic"
+]
+Place = Literal["central", "least"]
+AT_THE_PRESSURE_PEAK = (
+    1.2257  # film of a rigid cylinder under the highest pressure over its least one
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FilmNumbers:
+    """Dimensionless speed U, load W and material G (Dowson, Higginson, Hamrock), and load M and oil L (Moes)."""
+
+    speed: float
+    load: float
+    material: float
+    moes_load: float
+    moes_oil: float
+
+
+@dataclass(frozen=True, slots=True)
+class FilmFit:
+    """A published fit: who, which film it gives, and that film [m].
+
+    A central film that the fit gives for an incompressible oil is thinner in a compressible one,
+    by the density there: `incompressible` says so.
+    """
+
+    source: str
+    place: Place
+    film: float
+    incompressible: bool = False
+
+
+class _Asymptotes(NamedTuple):
+    """Moes' films in the four regimes, each as if there were no other."""
+
+    isoviscous_rigid: float
+    isoviscous_elastic: float
+    piezoviscous_rigid: float
+    piezoviscous_elastic: float
+
+
+def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNumbers:
+    """The numbers that fits of the film are made of."""
+    radius, modulus = conditions.radius_along_rolling, conditions.pair.effective_modulus
+    line = conditions.long
+    material = float(lubricant.viscosity.log_slope(np.zeros(1))[0]) * modulus
+    speed = lubricant.viscosity.eta0 * conditions.entrainment_speed / (modulus * radius)
+    load = (
+        conditions.line_load / (modulus * radius)
+        if line
+        else conditions.load / (modulus * radius**2)
+    )
+    return FilmNumbers(
+        speed,
+        load,
+        material,
+        moes_load=load * (2.0 * speed) ** (-0.5 if line else -0.75),
+        moes_oil=material * (2.0 * speed) ** 0.25,
+    )
+
+
+def lubrication_regime(conditions: ContactConditions, lubricant: Lubricant) -> Regime:
+    """Which fit of the least film holds: elastic or rigid bodies, oil that thickens under pressure or does not.
+
+    Of an oil that does not thicken the thicker film holds, of one that does the thinner, and of
+    both the thicker: each fit leaves something out, rigid bodies what widens the contact, elastic
+    ones the shape that they still have.
+    """
+    films = {regime: fit.film for regime, fit in least_films(conditions, lubricant).items()}
+    thin = max(films["isoviscous-rigid"], films["isoviscous-elastic"])
+    if min(films["piezoviscous-rigid"], films["piezoviscous-elastic"]) > thin:
+        rigid = films["piezoviscous-rigid"] < films["piezoviscous-elastic"]
+        return "piezoviscous-rigid" if rigid else "piezoviscous-elastic"
+    return "isoviscous-rigid" if films["isoviscous-rigid"] == thin else "isoviscous-elastic"
+
+
+def central_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
+    """Central film [m] of an incompressible oil by the fit that spans all regimes.
+
+    Line: Moes; others: Nijenbanning, Venner and Moes (1994), for contacts no narrower across
+    rolling than along it. In the rigid regimes it is the film under the highest pressure, 1.2257
+    times the least one of a cylinder.
+    """
+    numbers = film_numbers(conditions, lubricant)
+    films = _asymptotes(conditions, numbers)
+    blend = _moes if conditions.long else _nijenbanning
+    unit = conditions.radius_along_rolling * (2.0 * numbers.speed) ** 0.5
+    return float(blend(films, _ratio(conditions)) * unit)
+
+
+def least_film(conditions: ContactConditions, lubricant: Lubricant) -> float:
+    """Least film [m] by the fit of the contact's regime: what a film ratio is made of."""
+    return least_films(conditions, lubricant)[lubrication_regime(conditions, lubricant)].film
+
+
+def least_films(conditions: ContactConditions, lubricant: Lubricant) -> dict[Regime, FilmFit]:
+    """The fit of the least film in each regime."""
+    numbers, radius = film_numbers(conditions, lubricant), conditions.radius_along_rolling
+    u, w, g = numbers.speed, numbers.load, numbers.material
+    if conditions.long:
+        return {
+            "isoviscous-rigid": FilmFit("Martin (1916)", "least", 4.898 * u / w * radius),
+            "isoviscous-elastic": FilmFit(
+                "Herrebrugh (1968)", "least", 3.10 * u**0.6 * w**-0.2 * radius
+            ),
+            "piezoviscous-rigid": FilmFit(
+                "Blok (1952)", "least", 1.664 * (g * u) ** (2.0 / 3.0) * radius
+            ),
+            "piezoviscous-elastic": FilmFit(
+                "Dowson (1968)", "least", 2.65 * g**0.54 * u**0.7 * w**-0.13 * radius
+            ),
+        }
+    side, axes = 1.0 / _ratio(conditions), _axes(conditions)
+    across = 1.0 / (1.0 + 2.0 / (3.0 * side))
+    rigid = 128.0 * side * (across * (0.131 * np.arctan(side / 2.0) + 1.683) * u / w) ** 2
+    soft = 7.43 * u**0.65 * w**-0.21 * (1.0 - 0.85 * np.exp(-0.31 * axes))
+    hard = 3.63 * u**0.68 * g**0.49 * w**-0.073 * (1.0 - np.exp(-0.68 * axes))
+    stiff = _asymptotes(conditions, numbers).piezoviscous_rigid * (2.0 * u) ** 0.5
+    return {
+        "isoviscous-rigid": FilmFit(
+            "Brewe, Hamrock and Taylor (1979)", "least", float(rigid) * radius
+        ),
+        "isoviscous-elastic": FilmFit(
+            "Hamrock and Dowson, soft (1978)", "least", float(soft) * radius
+        ),
+        "piezoviscous-rigid": FilmFit(
+            "Nijenbanning, Venner and Moes (1994), rigid", "least", stiff * radius
+        ),
+        "piezoviscous-elastic": FilmFit("Hamrock and Dowson (1977)", "least", float(hard) * radius),
+    }
+
+
+def film_fits(conditions: ContactConditions, lubricant: Lubricant) -> tuple[FilmFit, ...]:
+    """The fits that hold in the contact's regime, thickest film first.
+
+    None for a contact that is narrower across rolling than along it, where none of these was
+    fitted.
+    """
+    if _ratio(conditions) > 1.0:
+        return ()
+    regime, numbers = lubrication_regime(conditions, lubricant), film_numbers(conditions, lubricant)
+    line, radius = conditions.long, conditions.radius_along_rolling
+    spanning = "Moes" if line else "Nijenbanning, Venner and Moes (1994)"
+    fits = [
+        FilmFit(spanning, "central", central_film(conditions, lubricant), incompressible=True),
+        least_films(conditions, lubricant)[regime],
+    ]
+    u, w, g = numbers.speed, numbers.load, numbers.material
+    axes = _axes(conditions)
+    if not line and regime == "piezoviscous-elastic":
+        film = 2.69 * u**0.67 * g**0.53 * w**-0.067 * (1.0 - 0.61 * np.exp(-0.73 * axes))
+        fits.append(FilmFit("Hamrock and Dowson (1977)", "central", float(film) * radius))
+    if not line and regime == "isoviscous-elastic":
+        film = 7.32 * u**0.64 * w**-0.22 * (1.0 - 0.72 * np.exp(-0.28 * axes))
+        fits.append(FilmFit("Hamrock and Dowson, soft (1978)", "central", float(film) * radius))
+    return tuple(sorted(fits, key=lambda fit: -fit.film))
+
+
+def _ratio(conditions: ContactConditions) -> float:
+    """Rx/Ry; 0 for a line contact."""
+    return conditions.radius_along_rolling / conditions.radius_across_rolling
+
+
+def _axes(conditions: ContactConditions) -> float:
+    """Width of the Hertz contact across rolling over that along it."""
+    a, b = conditions.hertz.half_widths
+    return b / a
+
+
+def _asymptotes(conditions: ContactConditions, numbers: FilmNumbers) -> _Asymptotes:
+    m, l = numbers.moes_load, numbers.moes_oil  # noqa: E741
+    if conditions.long:
+        return _Asymptotes(
+            3.0 / m, 2.621 * m**-0.2, 1.287 * l ** (2.0 / 3.0), 1.311 * m**-0.125 * l**0.75
+        )
+    ratio = _ratio(conditions)
+    shape = 1.0 + 0.006 * np.log(ratio) + 0.63 * ratio ** (4.0 / 7.0)
+    films = (
+        145.0 * (1.0 + 0.796 * ratio ** (14.0 / 15.0)) ** (-15.0 / 7.0) / ratio * m**-2.0,
+        3.18 * shape ** (-14.0 / 25.0) * ratio ** (-1.0 / 15.0) * m ** (-2.0 / 15.0),
+        1.29 * (1.0 + 0.691 * ratio) ** (-2.0 / 3.0) * l ** (2.0 / 3.0),
+        1.48 * shape ** (-7.0 / 20.0) * ratio ** (-1.0 / 24.0) * m ** (-1.0 / 12.0) * l**0.75,
+    )
+    return _Asymptotes(*map(float, films))
+
+
+def _moes(films: _Asymptotes, _: float) -> float:
+    """Central film H of a line contact, between the asymptotes."""
+    rigid, elastic, stiff_rigid, stiff = films
+    s = (7.0 + 8.0 * np.exp(-2.0 * elastic / rigid)) / 5.0
+    thin = (rigid ** (7.0 / 3.0) + elastic ** (7.0 / 3.0)) ** (3.0 * s / 7.0)
+    thick = (stiff_rigid**-3.5 + stiff**-3.5) ** (-2.0 * s / 7.0) if stiff else 0.0
+    return float((thin + thick) ** (1.0 / s))
+
+
+def _nijenbanning(films: _Asymptotes, ratio: float) -> float:
+    """Central film H of a point or elliptic contact, between the asymptotes."""
+    rigid, elastic, stiff_rigid, stiff = films
+    thin = rigid**1.5 + (elastic**-4.0 + (1.8 / ratio) ** -4.0) ** (-3.0 / 8.0)
+    if not stiff:
+        return float(thin ** (2.0 / 3.0))
+    s = 1.5 * (1.0 + np.exp(-1.2 * elastic / stiff))
+    thick = (stiff_rigid**-8.0 + stiff**-8.0) ** (-s / 8.0)
+    return float((thin ** (2.0 * s / 3.0) + thick) ** (1.0 / s))

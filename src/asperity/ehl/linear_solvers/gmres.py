@@ -1,0 +1,243 @@
+"""GMRES, right-preconditioned, without restart, in the precision of what is wanted; real or complex.
+
+And the same of equations with a frequency in them, which may move between two steps.
+
+SciPy's preconditions from the left, so that it stops on a residual nobody asked for, and
+orthogonalises vector by vector; at 65 000 unknowns and a few dozen steps that costs as much as the
+physics.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy
+
+Vector = np.ndarray[Any, Any]
+Operator = Callable[[Any], Vector]
+
+FEW = 7  # vectors that there is room for at first
+CANCELLED = (
+    0.5  # share of a vector left by orthogonalising it, below which that is done once more ...
+)
+NEARLY_CANCELLED = (
+    0.1  # ... where all of it stays in this precision, and little is asked of the last digits
+)
+ADJOINT = 2  # what BLAS calls the conjugate transpose
+# what a step leaves of what was left, below which that tells where to go on, and not the step
+FALLING = 0.9
+
+
+class Room:
+    """Memory for the vectors of one GMRES after the other: fresh memory takes as long as what is done with it."""
+
+    def __init__(self) -> None:
+        self.parts: tuple[Vector, Vector] = (np.empty(0), np.empty(0))
+
+    def rows(self, count: int, vector: Vector) -> tuple[Vector, Vector]:
+        """Two arrays of at least `count` rows like `vector`; rows of the same length are what they were before."""
+        size = vector.size
+        if self.parts[0].dtype != vector.dtype or self.parts[0].size < count * size:
+            before = self.parts
+            self.parts = np.empty(count * size, vector.dtype), np.empty(count * size, vector.dtype)
+            for old, new in zip(before, self.parts, strict=True):
+                if old.dtype == new.dtype:
+                    new[: old.size] = old
+        whole = self.parts[0].size // size
+        first, second = (part[: whole * size].reshape(whole, size) for part in self.parts)
+        return first, second
+
+
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # what leaves this precision's range is found out below
+def gmres(
+    product: Operator,
+    precondition: Operator,
+    wanted: Vector,
+    *,
+    tolerance: float,
+    most_steps: int,
+    room: Room | None = None,
+) -> Vector:
+    """Solve product(x) = wanted until the residual has fallen by `tolerance` or steps run out; return the best x.
+
+    Where many are solved one after the other, all of them may have one `room`.
+    """
+    exact = np.result_type(wanted.dtype, float)
+    norm = _length(wanted)
+    if norm == 0.0:
+        return np.zeros_like(wanted)
+    room = room or Room()
+    basis, corrections = room.rows(min(FEW, most_steps) + 1, wanted)
+    triangle = np.zeros((most_steps, most_steps), exact)
+    turns = np.zeros(
+        (most_steps, 2), exact
+    )  # cosine and sine of the rotations that make the Hessenberg matrix a triangle
+    target = np.zeros(most_steps + 1, exact)
+    target[0] = norm
+    np.divide(wanted, norm, out=basis[0])
+    for step in range(most_steps):
+        if step + 1 == len(basis):
+            basis, corrections = room.rows(2 * len(basis), wanted)
+        corrections[step] = precondition(basis[step])
+        new = product(corrections[step])
+        known = basis[: step + 1]
+        before = _length(new)
+        overlaps = (known @ new.conj()).conj()
+        new -= overlaps @ known
+        column, length = overlaps.astype(exact), _length(new)
+        if not np.isfinite(
+            length
+        ):  # out of this precision's range: what is known already has to do
+            step -= 1
+            break
+        if length < CANCELLED * before:
+            overlaps = (known @ new.conj()).conj()
+            new -= overlaps @ known
+            column, length = column + overlaps, _length(new)
+        for i, (cosine, sine) in enumerate(turns[:step]):
+            column[i : i + 2] = (
+                cosine.conj() * column[i] + sine * column[i + 1],
+                cosine * column[i + 1] - sine * column[i],
+            )
+        slant = float(np.hypot(abs(column[step]), length))
+        cosine, sine = turns[step] = (column[step] / slant, length / slant) if slant else (1.0, 0.0)
+        column[step] = slant
+        triangle[: step + 1, step] = column
+        target[step : step + 2] = np.conj(cosine) * target[step], -sine * target[step]
+        if abs(target[step + 1]) < tolerance * norm or length < np.finfo(wanted.dtype).eps * before:
+            break
+        np.divide(new, length, out=basis[step + 1])
+    count = step + 1
+    if count == 0:
+        return np.full_like(wanted, np.nan)
+    weights = np.linalg.lstsq(triangle[:count, :count], target[:count], rcond=None)[0]
+    return np.asarray(weights.astype(wanted.dtype) @ corrections[:count])
+
+
+def _length(vector: Vector) -> float:
+    return float(np.sqrt(np.vdot(vector, vector).real))
+
+
+class Shifted:
+    """(A + iΩ B) x = a + iΩ b: corrections x one by one, their best combination at an Ω that may move on the way.
+
+    Adaptive simpler GMRES: a step answers what is left, or, where that hardly fell, what the last
+    step made of it. Either alone loses its digits, the one while nothing falls, the other once
+    much has fallen. Source: P. Jiránek and M. Rozložník, Numerical Algorithms 53 (2010) 93-112.
+
+    Parameters
+    ----------
+    product, precondition : A v and B v of a complex vector; about what A turns into one
+    wanted : a and b
+    bearing : weights of the unknowns in `sum`, which is known after every step
+    frequency : the Ω to begin with
+    most_steps : room for corrections
+    """
+
+    def __init__(
+        self,
+        product: Callable[[Any], tuple[Vector, Vector]],
+        precondition: Operator,
+        wanted: tuple[Vector, Vector],
+        bearing: Vector,
+        frequency: float,
+        most_steps: int,
+    ) -> None:
+        self.product, self.precondition, self.wanted, self.frequency = (
+            product,
+            precondition,
+            wanted,
+            frequency,
+        )
+        self.kind = wanted[0].dtype
+        self.bearing, self.count = bearing.astype(self.kind), 0
+        self.basis, self.corrections, self.stored = np.empty(
+            (3, most_steps, wanted[0].size), self.kind
+        )
+        self.triangle = np.zeros((most_steps, most_steps), complex)
+        self.times, self.plus = scipy.linalg.get_blas_funcs(("gemv", "axpy"), (self.basis,))
+        self.sums: list[complex] = []
+        self.falls: bool
+        self._begin()
+
+    @property
+    def left(self) -> float:
+        """Share of the equations that is left, as far as this precision tells."""
+        return _length(self.rest) / self.size
+
+    @property
+    def sum(self) -> complex:
+        """Weighted sum of the unknowns."""
+        return complex(self._combination() @ np.array(self.sums)) if self.count else 0.0j
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for further corrections."""
+        return self.count == len(self.basis)
+
+    def answer(self) -> Vector:
+        """The unknowns."""
+        return np.asarray(self._combination().astype(self.kind) @ self.corrections[: self.count])
+
+    def step(self) -> bool:
+        """One correction more; False where it told nothing new."""
+        before = _length(self.rest)
+        tried = self.rest / self.kind.type(before) if self.falls else self.basis[self.count - 1]
+        correction = self.precondition(tried)
+        rows, stored = self.product(correction)
+        if not self._met(self.plus(stored, rows, a=1j * self.frequency)):
+            return False
+        self.corrections[self.count], self.stored[self.count] = correction, stored
+        self.sums.append(complex(correction @ self.bearing))
+        self.count, self.falls = self.count + 1, _length(self.rest) < FALLING * before
+        return True
+
+    def move(self, frequency: float) -> None:
+        """Combine what is known anew, for another Ω."""
+        count, further = self.count, self.kind.type(1j * (frequency - self.frequency))
+        rows = self.triangle[:count, :count].T.astype(self.kind) @ self.basis[:count]
+        rows += further * self.stored[:count]
+        self.frequency, self.count = frequency, 0
+        self._begin()
+        for row in rows:
+            if not self._met(row):
+                raise ArithmeticError(
+                    f"corrections that are no longer independent at frequency {frequency:g}"
+                )
+            self.count += 1
+
+    def _begin(self) -> None:
+        a, b = self.wanted
+        self.rest = a + self.kind.type(1j * self.frequency) * b
+        self.size = _length(self.rest)
+        self.falls = True
+        self.target: list[complex] = []
+
+    def _met(self, new: Vector) -> bool:
+        """What is left without what another correction makes of the equations; False where that is nothing new."""
+        count = self.count
+        known, before = self.basis[:count].T, _length(new)
+        column = np.zeros(count, complex)
+        for _ in range(2 if count else 0):
+            overlaps = self.times(1.0, known, new, trans=ADJOINT)
+            new = self.times(-1.0, known, overlaps, beta=1.0, y=new, overwrite_y=True)
+            column += overlaps
+            length = _length(new)
+            if length >= NEARLY_CANCELLED * before:
+                break
+        else:
+            length = _length(new)
+        if not length > np.finfo(self.kind).eps * before:
+            return False
+        self.triangle[:count, count], self.triangle[count, count] = column, length
+        np.divide(new, length, out=self.basis[count])
+        share = complex(np.vdot(self.basis[count], self.rest))
+        self.rest = self.plus(self.basis[count], self.rest, a=-share)
+        self.target.append(share)
+        return True
+
+    def _combination(self) -> Vector:
+        triangle = self.triangle[: self.count, : self.count]
+        return np.asarray(scipy.linalg.solve_triangular(triangle, np.array(self.target)))

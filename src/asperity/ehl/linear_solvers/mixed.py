@@ -1,0 +1,432 @@
+"""The mixed contact linearised, and Newton's step of it by GMRES, in single precision.
+
+Unknown are the changes of the oil's pressure where it is lubricated and of the total one where
+bodies touch; free cells have one pressure, ruptured and capped ones know theirs. The approximate
+inverse answers the oil's rows by blocks and lines, as
+`asperity.ehl.linear_solvers.single_pressure` does, and a touching cell's row by its own
+compliance.
+
+Two things differ from there, and GMRES needs a fifth of the steps for them where oil is stiff. A
+cell's pressure moves its own gap only: oil carries its film downstream unchanged, which the
+differences of a stencil cut off after three cells let decay. And mobilities answer: beside
+asperities the oil's pressure changes so much from cell to cell that this outweighs the mobilities
+themselves.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from asperity.core.arrays import Field, Mask
+from asperity.ehl.linear_solvers.gmres import Room, gmres
+from asperity.ehl.linear_solvers.single_pressure import (
+    Blocks,
+    Kept,
+    LineRelaxation,
+    NestedBlocks,
+    single_faces,
+    turn_back,
+)
+from asperity.ehl.models.mixed import (
+    OPEN_FROM,
+    MixedBalance,
+    Pressures,
+    added_by_lean,
+    lean_slopes,
+    opening_slopes,
+    transported,
+    upwind_at_outlet,
+)
+from asperity.ehl.models.single_pressure import CLOSED_WITHIN, Past
+from asperity.kernels import load_sharing, reynolds, stencils
+from asperity.kernels.load_sharing import FREE
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
+from asperity.kernels.stencils import Far, Stencil
+
+LEFT = 0.1  # share to which the linearised equations are left ...
+LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
+LEFT_NEAR, NEAR = (
+    1e-3,
+    1e-3,
+)  # ... from so little left on, of followed oil that may not be lost: met far closer
+OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
+MOST_KRYLOV_STEPS = 60
+FEWEST_NESTED = (
+    64  # cells along both axes from which on blocks are nested, where bodies touch firmly
+)
+NEARLY_CLOSED = 0.1  # of the flattened cells: fewer are nearly closed where bodies touch firmly
+LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
+
+
+class MixedLinear:
+    """The linearisation of a balance: `product` applies it, `answer` approximately inverts it; all (nx, ny).
+
+    `closely` lets the lines follow how the wedge leans, too: where the equations are met far
+    closer than to a tenth.
+    """
+
+    def __init__(
+        self,
+        balance: MixedBalance,
+        dtype: Any = np.float32,
+        settled: Mask | None = None,
+        *,
+        closely: bool = False,
+    ) -> None:
+        self.balance, problem = balance, balance.problem
+        self.cells, self.real = problem.cells, dtype
+        self.full = balance.rows.state == LUBRICATED
+        self.lubricated = balance.solved
+        self.free, self.touching = balance.solid == FREE, balance.solid == TOUCHING
+        self.oil = balance.oil_pressure.astype(self.real)
+        self.conserves = balance.surplus is not None
+        self.follows_wedge = (
+            problem.accurate and problem.cells[1] > 1
+        )  # on one line own pressures tell more
+        if balance.surplus is not None and balance.surplus_by_oil is not None:
+            self.surplus_by_oil = balance.surplus_by_oil.astype(self.real)
+            missing = np.minimum(balance.unknowns.oil, 0.0)
+            self.missing_by_oil = np.where(
+                balance.unknowns.oil < 0.0, self.surplus_by_oil, self.real(0.0)
+            )
+            pressed = (balance.unknowns.oil > problem.p_cap) & self.lubricated
+            self.growth_by_oil = np.where(pressed, self.real(problem.softness), self.real(0.0))
+            self.surplus_by_gap = (missing * balance.film.content_by_gap).astype(self.real)
+        self.leans = bool(np.any(balance.lean))
+        if self.leans:
+            self.lean_own, self.lean_upstream = lean_slopes(balance, dtype)
+        state = np.where(self.lubricated, np.int8(LUBRICATED), balance.rows.state)
+        self.rows = Rows(
+            state, balance.rows.fluid_scale.astype(self.real), balance.rows.contact_scale
+        )
+        self.scale = np.where(self.lubricated, self.rows.fluid_scale, self.real(0.0))
+        self.film = Film(*(part.astype(self.real) for part in balance.film))
+        self.faces = single_faces(balance.faces, dtype)
+        self.content_by_gap, self.content_by_pressure = (
+            self.film.content_by_gap,
+            self.film.content_by_pressure,
+        )
+        self.kept = self._kept(problem.past)
+        self.follows_oil = problem.past is not None and problem.past.followed
+        self.opening = None
+        if self.leans and settled is not None and not self.follows_oil:
+            self.opening = opening_slopes(balance, settled)
+        if self.follows_oil:
+            self.film = self.film.followed
+        self.closely = closely and self.leans
+
+    @cached_property
+    def inverse(self) -> tuple[Blocks | NestedBlocks, LineRelaxation]:
+        """Blocks and lines, made when they are first asked for."""
+        stencil, far = self._stencil()
+        weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
+        alike = (
+            not self.follows_wedge
+            and min(self.cells) >= FEWEST_NESTED
+            and (self.closely or firm(self.balance))
+        )
+        blocks = (NestedBlocks if alike else Blocks)(stencil, weight)
+        return blocks, LineRelaxation(*self._leaning(stencil)) if self.closely else LineRelaxation(
+            stencil, far
+        )
+
+    def _stencil(self) -> tuple[Stencil, Far | None]:
+        problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
+        state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
+        rows, film = self.rows._replace(state=state), self.film.held_where(~self.free)
+        own, far = 1.0 / self.rows.contact_scale, None
+        if self.follows_wedge:
+            far, near = Far(*np.empty((2, *self.cells), self.real)), problem.deflection.near
+            stencils.wedge_stencil(
+                rows,
+                film,
+                self.faces,
+                self.oil,
+                (own, near[1] - near[3]),
+                problem.spacing,
+                stencil,
+                far,
+            )
+        else:
+            stencils.own_stencil(rows, film, self.faces, self.oil, own, problem.spacing, stencil)
+        if self.kept is not None:
+            by_gap = np.where(self.free, self.kept.by_gap, self.real(0.0))
+            stencil.centre[:] += np.where(
+                self.lubricated, by_gap * self.real(own) + self.kept.by_pressure, 0.0
+            )
+        turn_back(stencil, problem.mirror)
+        if self.conserves:
+            self._loosen(stencil)
+        return stencil, far
+
+    def _leaning(self, stencil: Stencil) -> tuple[Stencil, Far]:
+        """The stencil and what it has of cells further upstream, with the wedge leaning.
+
+        Beside closed cells films thin many times over from one cell to the next. The wedge leans
+        there by so much that a cell's own entry may be a sixth of what first order makes it.
+        """
+        film, dx = self.film.held_where(~self.free), self.real(self.balance.problem.spacing[0])
+        content = (
+            film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
+            + film.content_by_pressure
+        )
+        own, upstream = (
+            np.zeros_like(content),
+            np.zeros_like(content),
+        )  # of what the eastern faces pass on besides
+        own[1:-1] = (self.lean_own * content)[1:-1] / dx
+        upstream[1:-1] = self.lean_upstream[1:-1] * content[:-2] / dx
+        far = Far(*np.zeros((2, *self.cells), self.real))
+        stencil.centre[:] += self.scale * own
+        stencil.west[1:] -= self.scale[1:] * (upstream[1:] + own[:-1])
+        far.west[2:] += self.scale[2:] * upstream[1:-1]
+        return stencil, far
+
+    def _loosen(self, stencil: Stencil) -> None:
+        """Cells whose unknown is not a pressure hand what they hold to the next cell downstream, and to no other."""
+        past, real, scale = self.balance.problem.past, self.real, self.rows.fluid_scale
+        loose = self.lubricated & ~self.full
+        followed = past is not None and past.followed
+        wedge = real(0.0 if followed else 1.0 / self.balance.problem.spacing[0])
+        own = wedge + real(0.0 if past is None else past.rate)
+        stencil.centre[loose] = (self.surplus_by_oil * own * scale)[loose]
+        stencil.west[1:][loose[:-1]] = (-wedge * self.surplus_by_oil[:-1] * scale[1:])[loose[:-1]]
+        stencil.west[1:][loose[:-1] & ~self.lubricated[1:]] = 0.0
+        stencil.east[:-1][loose[1:]] = 0.0
+        stencil.north[np.roll(loose, -1, axis=1)] = 0.0
+        stencil.south[np.roll(loose, 1, axis=1)] = 0.0
+
+    def _kept(self, past: Past | None) -> Kept | None:
+        """What the first rows of followed oil draw in by the wedge is left out, as in `asperity.ehl.linear_solvers.single_pressure`."""
+        if past is None:
+            return None
+        scaled = self.scale * self.real(past.rate)
+        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+
+    def product(self, d_oil: Field, d_total: Field, d_approach: float) -> tuple[Field, Field]:
+        """Changes of the oil's equations and of touching cells'; of the unknown itself where it is known."""
+        problem = self.balance.problem
+        d_gap = problem.deflection(d_total)
+        if d_approach:
+            d_gap += self.real(d_approach)
+        return self.of_gap(d_oil, d_gap)
+
+    def of_gap(self, d_oil: Field, d_gap: Field) -> tuple[Field, Field]:
+        """The same, of a change of the oil's unknown and that of the gap."""
+        problem = self.balance.problem
+        wet = np.empty(self.cells, self.real)
+        spacing, d_pressure, d_height = (
+            problem.spacing,
+            self.pressure_of(d_oil),
+            problem.filmed(d_gap),
+        )
+        if self.conserves:
+            d_height = (
+                np.where(self.balance.shut, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
+            )
+        reynolds.jacobian_product(
+            self.rows, self.film, self.faces, self.oil, d_pressure, d_height, spacing, 0.0, wet
+        )
+        if self.kept is not None:
+            wet += self.kept.by_gap * d_height + self.kept.by_pressure * d_pressure
+        if self.conserves:
+            rest = transported(
+                problem, self.missing_by_oil * d_oil + self.surplus_by_gap * d_height
+            )
+            d_content = self.content_by_gap * d_height + self.content_by_pressure * d_pressure
+            upwind_at_outlet(problem, d_content, rest)
+            wet += rest * self.scale
+        elif self.leans:
+            d_content = self.content_by_gap * d_gap + self.content_by_pressure * d_pressure
+            wet += added_by_lean(problem, d_content, self.lean_own, self.lean_upstream) * self.scale
+        if self.opening is not None:
+            faces, cells, slopes = self.opening
+            through = (slopes / spacing[0]).astype(self.real) * d_gap.ravel()[cells]
+            for row, sign in ((faces, 1.0), (faces + self.cells[1], -1.0)):
+                np.add.at(wet.ravel(), row, self.real(sign) * through * self.scale.ravel()[row])
+        return wet, d_gap * self.real(self.rows.contact_scale)
+
+    def answer(self, wet: Field) -> Field:
+        """Approximate change of the oil's pressure that answers its rows; touching cells' answer themselves."""
+        blocks, lines = self.inverse
+        change = blocks(wet)
+        if self.follows_wedge:
+            change *= self.real(OVER)
+        return lines(wet, change)
+
+    def total(self, d_oil: Field, d_closed: Field) -> Field:
+        """Change of the total pressure: the oil's in free cells, their own in touching ones."""
+        return np.where(self.free, self.pressure_of(d_oil), d_closed)
+
+    def pressure_of(self, d_oil: Field) -> Field:
+        """Change of the oil's pressure: none where its unknown is no pressure."""
+        return np.where(self.full, d_oil, d_oil.dtype.type(0.0)) if self.conserves else d_oil
+
+
+class _Step:
+    """Newton's step as one vector: of the oil, of the total pressure of touching cells, and of the approach.
+
+    The last equation is the missing load, or nothing where the bodies are held.
+    """
+
+    def __init__(self, linear: MixedLinear) -> None:
+        self.linear, self.problem = linear, linear.balance.problem
+        self.count, self.touching = linear.balance.gap.size, np.flatnonzero(linear.touching)
+        self.moves = self.problem.held is None
+        self.weight = linear.real(1.0 / np.sqrt(self.count))
+        self.bearing = (linear.free & linear.full if linear.conserves else linear.free).astype(
+            linear.real
+        )
+        by_approach = linear.of_gap(
+            np.zeros(linear.cells, linear.real), np.ones(linear.cells, linear.real)
+        )
+        self.response = self._answered(
+            self.joined(np.where(linear.lubricated, by_approach[0], 0.0), by_approach[1], 0.0)
+        )
+        self.whole = self._borne(self.response)
+
+    def joined(self, oil: Field, solid: Field, last: float) -> Field:
+        """A vector of what is known of the oil, of touching cells (both (nx, ny)) and of the load or the approach."""
+        vector = np.empty(self.count + self.touching.size + 1, self.linear.real)
+        vector[: self.count], vector[self.count : -1], vector[-1] = (
+            oil.ravel(),
+            solid.ravel()[self.touching],
+            last,
+        )
+        return vector
+
+    def oil(self, vector: Field) -> Field:
+        """The part of the oil, (nx, ny)."""
+        return vector[: self.count].reshape(self.linear.cells)
+
+    def total(self, vector: Field) -> Field:
+        """Change of the total pressure, (nx, ny): the oil's in free cells, their own in touching ones."""
+        total: Field = self.oil(vector) * self.bearing
+        total.ravel()[self.touching] = vector[self.count : -1]
+        return total
+
+    def product(self, vector: Field) -> Field:
+        """The linearised equations applied to it."""
+        total, rows = self.total(vector), np.empty_like(vector)
+        wet, closed = self.linear.product(self.oil(vector), total, float(vector[-1]))
+        rows[: self.count], rows[self.count : -1] = wet.ravel(), closed.ravel()[self.touching]
+        rows[-1] = self.weight * self.problem.summed(total) if self.moves else vector[-1]
+        return rows
+
+    def precondition(self, rows: Field) -> Field:
+        """About what answers them."""
+        change = self._answered(rows)
+        if self.moves:
+            d_approach = self.linear.real(
+                (self._borne(change) - rows[-1] / self.weight) / self.whole
+            )
+            change -= d_approach * self.response
+            change[-1] = d_approach
+        return change
+
+    def _answered(self, rows: Field) -> Field:
+        change = rows.copy()
+        change[: self.count] = self.linear.answer(self.oil(rows)).ravel()
+        return change
+
+    def _borne(self, vector: Field) -> float:
+        """By how much more the pressures bear."""
+        if self.problem.mirror:
+            return float(self.problem.summed(self.total(vector)))
+        return float(vector[: self.count] @ self.bearing.ravel() + vector[self.count : -1].sum())
+
+
+def flattened(balance: MixedBalance) -> Mask:
+    """Cells that the cap holds closed: no oil that comes lifts them."""
+    closed = balance.gap <= (1.0 + CLOSED_WITHIN) * balance.problem.contact_gap
+    return np.asarray(closed & (balance.solid == CAPPED))
+
+
+def foreseen(balance: MixedBalance) -> MixedBalance:
+    """The same, but that flattened cells without oil are lubricated as far down the stream as oil fills those before.
+
+    A cell is ruptured until oil has come to it: oil that fills a streak of closed cells would go
+    on by one a step.
+    """
+    problem, rows, residual = balance.problem, balance.rows, balance.oil_residual.copy()
+    state, highest = rows.state.copy(), (1.0 + CLOSED_WITHIN) * problem.contact_gap
+    balanced = balance.outflow, rows.fluid_scale
+    load_sharing.fill_streaks(
+        balance.gap, highest, balance.solid, problem.rim, balanced, state, residual
+    )
+    return replace(balance, rows=rows._replace(state=state), oil_residual=residual)
+
+
+def firm(balance: MixedBalance) -> bool:
+    """Whether few cells are nearly closed beside those that are flattened.
+
+    Where many are, films of about the contact film close and open from step to step. How they open
+    at one of them tells little of the next, and blocks of cells that are not alike answer badly
+    when they are summed again and again.
+    """
+    gap, film = balance.gap, balance.problem.contact_gap
+    nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPEN_FROM) * film)
+    return bool(nearly.sum() < NEARLY_CLOSED * flattened(balance).sum())
+
+
+def newton_step(
+    balance: MixedBalance, settled: Mask | None = None, room: Room | None = None
+) -> Pressures:
+    """Changes of all unknowns that meet every linearised equation, and the load, to a tenth.
+
+    How the wedge opens is linearised in cells whose gap has `settled`, where bodies touch firmly,
+    and oil is foreseen in flattened streaks; neither without `settled`. Steps of one grid may
+    share GMRES's `room`.
+    """
+    problem = balance.problem
+    stands = (
+        settled is not None
+        and not problem.conserve
+        and problem.past is None
+        and problem.held is None
+    )
+    if stands:
+        balance = foreseen(balance)
+    settled = settled if stands and firm(balance) else None
+    linear = MixedLinear(balance, settled=settled)
+    real, zero = linear.real, linear.real(0.0)
+    known_oil = np.where(linear.lubricated, 0.0, -balance.oil_residual)
+    known = np.where(balance.solid == CAPPED, -balance.solid_residual, 0.0)
+    known = np.where(linear.free, linear.pressure_of(known_oil) - balance.solid_residual, known)
+    wet, closed = -balance.oil_residual, -balance.solid_residual
+    if np.any(known_oil) or np.any(known):
+        by_known = linear.product(known_oil.astype(real), known.astype(real), 0.0)
+        wet, closed = wet - by_known[0], closed - by_known[1]
+    dx, dy = problem.spacing
+    step = _Step(linear)
+    missing = (
+        -balance.load_error * problem.load / (dx * dy) - problem.summed(known)
+        if step.moves
+        else 0.0
+    )
+    if (
+        step.whole == 0.0
+    ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
+        return Pressures(
+            known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
+        )
+    wanted = step.joined(
+        np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing)
+    )
+    left = LEFT_SMOOTH if linear.follows_wedge else LEFT
+    if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
+        left = LEFT_NEAR
+    solved = gmres(
+        step.product,
+        step.precondition,
+        wanted,
+        tolerance=left,
+        most_steps=MOST_KRYLOV_STEPS,
+        room=room,
+    )
+    d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)
+    d_total = np.where(linear.free, linear.pressure_of(d_oil) - balance.solid_residual, known)
+    d_total.ravel()[step.touching] = solved[step.count : -1]
+    return Pressures(d_oil, d_total, float(solved[-1]))

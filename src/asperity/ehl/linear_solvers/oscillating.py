@@ -1,0 +1,369 @@
+"""A solved contact whose bodies oscillate a little: its linearised equations with the oil's squeeze term, answered.
+
+With every cell held by what decides it, bodies that come closer by e^(iωt) ask for pressures x
+with (J + iΩ S) x = j + iΩ s: J and j are the linearisation of Newton's step in pressure and
+distance, S and s the oil that lubricated cells gain, Ω = ω a/u. One complex GMRES, preconditioned
+by Newton's own approximate inverse of J; but oil too stiff to flow carries its film along, so that
+its gap is as good as known, and it answers together with what touches. Dimensionless; the
+roughness stands.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from asperity.core.arrays import Field, Mask
+from asperity.ehl.deflection import Deflection
+from asperity.ehl.linear_solvers.gmres import Shifted, gmres
+from asperity.ehl.linear_solvers.mixed import MixedLinear
+from asperity.ehl.linear_solvers.single_pressure import Linear
+from asperity.ehl.models.mixed import MixedBalance
+from asperity.ehl.models.single_pressure import Balance
+from asperity.kernels.load_sharing import FREE
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
+
+MOST_STEPS = 200  # of GMRES at a time ...
+AT_A_TIME = (
+    3e-5  # ... which leave no less of what was left before: about what single precision can tell
+)
+MOST_ROUNDS = 12
+STUCK = (
+    0.3  # share left by a round in single precision, above which the next is taken in double ...
+)
+ASKED = 1.5  # ... times what it was asked to leave, where that is more
+# flow under a cell's own pressure over what the wedge carries on of its film, below which oil is
+# stiff
+STIFF = 1.0
+
+Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
+
+
+class Answer(NamedTuple):
+    """Complex amplitudes of the oil's and the total pressure, (nx, ny), per change of approach, bodies coming closer.
+
+    `left` is the share of the equations that was left, `steps` those of GMRES, `unknowns` the
+    equations' own.
+    """
+
+    oil: Waves
+    total: Waves
+    left: float
+    steps: int
+    unknowns: Waves
+
+
+class _Equations(Protocol):
+    """A model's linearised equations over one vector of unknowns."""
+
+    size: int
+    real: Any  # the precision of all
+
+    def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
+        """Rows of J and of S for a change of the unknowns and of the approach."""
+
+    def answer(self, rows: Field) -> Field:
+        """Unknowns that about answer rows of J."""
+
+    def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
+        """Oil's and total pressure, (nx, ny)."""
+
+    def bearing(self) -> Field:
+        """Weight of each unknown in the sum of the total pressure."""
+
+
+class _OnePressure:
+    """One pressure for oil and asperities."""
+
+    def __init__(self, balance: Balance, real: Any) -> None:
+        self.real, self.linear = real, Linear(balance, dtype=real)
+        self.unknown, self.cells, self.size = (
+            balance.unknown,
+            balance.problem.cells,
+            balance.gap.size,
+        )
+        self.deflection = balance.problem.deflection
+        film, wet = balance.film, balance.rows.state == LUBRICATED
+        scale = np.where(wet, balance.rows.fluid_scale, 0.0)
+        nothing = np.zeros_like(scale)
+        self.by_gap = (nothing if film is None else scale * film.content_by_gap).astype(real)
+        self.by_pressure = (nothing if film is None else scale * film.content_by_pressure).astype(
+            real
+        )
+
+    def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
+        d_pressure = vector.reshape(self.cells)
+        d_gap = self.deflection(d_pressure) + self.real(d_approach)
+        rows = self.linear.of_gap(d_pressure, d_gap)
+        stored = self.by_gap * d_gap + self.by_pressure * d_pressure
+        return np.where(self.unknown, rows, d_pressure).ravel(), stored.ravel()
+
+    def answer(self, rows: Field) -> Field:
+        return self.linear(rows.reshape(self.cells)).ravel()
+
+    def pressures(self, vector: Waves) -> tuple[Waves, Waves]:
+        pressure = vector.reshape(self.cells)
+        return pressure, pressure
+
+    def bearing(self) -> Field:
+        return np.ones(self.size, self.real)
+
+
+class _TwoPressures:
+    """The oil's pressure in every cell and, after these, the total one of touching cells."""
+
+    def __init__(self, balance: MixedBalance, real: Any) -> None:
+        self.real, self.linear = real, (linear := MixedLinear(balance, real, closely=True))
+        self.cells, self.count = linear.cells, balance.gap.size
+        self.touching = np.flatnonzero(linear.touching)
+        self.size = self.count + self.touching.size
+        self.deflection = balance.problem.deflection
+        scale = np.where(linear.lubricated, balance.rows.fluid_scale, 0.0)
+        self.by_gap = (scale * balance.film.content_by_gap).astype(real)
+        self.by_pressure = (scale * balance.film.content_by_pressure).astype(real)
+        self.own, self.stiff = real(1.0 / linear.rows.contact_scale), self._stiff()
+        self.weights = self._weights()
+        self.lifted = 1.0 / self.weights
+
+    @cached_property
+    def patch(self) -> tuple[slice, Deflection] | None:
+        """Lines whose cells answer together, made when first asked for."""
+        return self._patch()
+
+    def _split(self, vector: Any) -> tuple[Any, Any]:
+        closed = np.zeros(self.count, vector.dtype)
+        closed[self.touching] = vector[self.count :]
+        return vector[: self.count].reshape(self.cells), closed.reshape(self.cells)
+
+    def _joined(self, oil: Field, closed: Field) -> Field:
+        return np.concatenate([oil.ravel(), closed.ravel()[self.touching]])
+
+    def product(self, vector: Field, d_approach: float) -> tuple[Field, Field]:
+        d_oil, closed = self._split(vector)
+        d_total = self.linear.total(d_oil, closed)
+        d_gap = self.deflection(d_total) + self.real(d_approach)
+        wet, gap_rows = self.linear.of_gap(d_oil, d_gap)
+        stored = self.by_gap * d_gap + self.by_pressure * d_oil
+        rows = self._joined(np.where(self.linear.lubricated, wet, d_oil), gap_rows)
+        rows *= self.weights
+        kept = np.zeros_like(rows)
+        np.multiply(stored.ravel(), self.weights[: self.count], out=kept[: self.count])
+        return rows, kept
+
+    def answer(self, rows: Field) -> Field:
+        """As in Newton's step, but that cells whose gap is known answer together: here none of them changes sides."""
+        wet, gap_rows = self._split(rows * self.lifted)
+        oil, closed = self.linear.answer(wet), gap_rows * self.own
+        if self.patch is not None:
+            lines, deflection = self.patch
+            stiff = self.stiff[lines]
+            together = deflection.undone(np.where(stiff, self.own * oil[lines], closed[lines]))
+            oil[lines] = np.where(stiff, together, oil[lines])
+            closed[lines] = together
+        return self._joined(oil, closed)
+
+    def _stiff(self) -> Mask:
+        """Free cells whose film is carried along, whatever their pressure: neither flow nor compressed oil undoes it.
+
+        Lines alone would take each of them to give way by itself.
+        """
+        film, problem = self.linear.balance.film, self.linear.balance.problem
+        dx, dy = problem.spacing
+        flow = film.mobility * (2.0 / dx**2 + 2.0 / dy**2) + film.content_by_pressure / dx
+        carried = film.content_by_gap / (dx * self.linear.rows.contact_scale)
+        return np.asarray(self.linear.free & self.linear.lubricated & (flow < STIFF * carried))
+
+    def _patch(self) -> tuple[slice, Deflection] | None:
+        """The lines with cells whose gap is known, and how these give way; None where there are none."""
+        (lines,) = np.nonzero((self.stiff | self.linear.touching).any(axis=1))
+        if not lines.size:
+            return None
+        if self.deflection.mirror:
+            return slice(None), self.deflection
+        span = slice(int(lines[0]), int(lines[-1]) + 1)
+        return span, self.deflection.among(span.stop - span.start)
+
+    def _weights(self) -> Field:
+        """Of the rows: a touching cell's oil counts by what flows on from it, as free cells' does, not by its pressure.
+
+        Nothing but the small compressibility and flow of its film tells that pressure, and nobody
+        asks for it.
+        """
+        wide = self.linear.balance.problem.spacing[0] * self.linear.rows.contact_scale
+        scale = self.linear.balance.rows.fluid_scale
+        closed = self.linear.touching & self.linear.lubricated
+        wet = np.where(closed, np.minimum(1.0, wide / np.where(closed, scale, 1.0)), 1.0)
+        return self._joined(wet.astype(self.real), np.ones(self.cells, self.real))
+
+    def pressures(self, vector: Waves) -> tuple[Any, Any]:
+        oil, closed = self._split(vector)
+        return oil, np.where(self.linear.free, oil, closed)
+
+    def bearing(self) -> Field:
+        return self._joined(self.linear.free.astype(self.real), np.ones(self.cells, self.real))
+
+
+class Oscillating:
+    """A balance ready to be shaken at any number of frequencies.
+
+    GMRES goes in single precision, in rounds; what a round leaves is measured in double. A contact
+    on one line of cells is cheap, and stiffer than single precision bears: double throughout.
+    """
+
+    def __init__(self, balance: Balance | MixedBalance) -> None:
+        one_line = balance.problem.cells[1] == 1
+        self.exact = _equations(balance, np.float64)
+        self.rough = self.exact if one_line else _equations(balance, np.float32)
+        self.by_approach = self.exact.product(np.zeros(self.exact.size), 1.0)
+
+    def answer(self, frequency: float, *, tolerance: float, start: Answer | None = None) -> Answer:
+        """Pressures that a unit approach makes at the dimensionless angular frequency Ω, to a share `tolerance`.
+
+        `start` is an answer at the same frequency: of another one the oil's lag would stay.
+        """
+        steps, solver = 0, self.rough
+        rows, stored = self.by_approach
+        wanted = rows + 1j * frequency * stored
+        size = float(np.linalg.norm(wanted))
+        vector, left, share = np.zeros(self.exact.size, complex), wanted, 1.0
+        if start is not None:
+            vector = start.unknowns
+            left, share = self._left(wanted, vector, frequency, size)
+        for _ in range(MOST_ROUNDS):
+            if share <= tolerance:
+                break
+            leaving = max(tolerance / share, AT_A_TIME)
+            change, taken = _solved(solver, left, frequency, leaving)
+            left, now = self._left(wanted, vector + change, frequency, size)
+            steps += taken
+            if now > min(max(STUCK, ASKED * leaving), 1.0) * share:
+                if solver is self.exact:
+                    break
+                solver = self.exact
+            if now < share:
+                vector, share = vector + change, now
+            else:
+                left, share = self._left(wanted, vector, frequency, size)
+        return Answer(*self.exact.pressures(vector), share, steps, vector)
+
+    def sweep(self, frequency: float) -> Shifted:
+        """The answer at Ω = `frequency` on its way, one round of GMRES whose Ω may move."""
+        equations = self.rough
+        kind = np.result_type(equations.real, np.complex64)
+        return Shifted(
+            lambda vector: _both(equations, vector),
+            lambda vector: np.asarray(_each_part(equations.answer, vector)),
+            (self.by_approach[0].astype(kind), self.by_approach[1].astype(kind)),
+            self.bearing,
+            frequency,
+            MOST_STEPS,
+        )
+
+    def swept(self, sweep: Shifted) -> Answer:
+        """Where a sweep has come to; what it leaves is measured in double."""
+        rows, stored = self.by_approach
+        vector = sweep.answer().astype(complex)
+        wanted = rows + 1j * sweep.frequency * stored
+        _, share = self._left(wanted, vector, sweep.frequency, float(np.linalg.norm(wanted)))
+        return Answer(*self.exact.pressures(vector), share, sweep.count, vector)
+
+    @cached_property
+    def bearing(self) -> Field:
+        """Weights of the unknowns in the sum of the total pressure."""
+        return self.rough.bearing()
+
+    def _left(
+        self, wanted: Waves, vector: Waves, frequency: float, size: float
+    ) -> tuple[Waves, float]:
+        """What of the equations is left, and its share of all."""
+        left = wanted - _product(self.exact, vector, frequency)
+        return left, float(np.linalg.norm(left)) / size
+
+
+def _equations(balance: Balance | MixedBalance, real: Any) -> _Equations:
+    return (
+        _TwoPressures(balance, real)
+        if isinstance(balance, MixedBalance)
+        else _OnePressure(balance, real)
+    )
+
+
+def _solved(
+    equations: _Equations, wanted: Waves, frequency: float, tolerance: float
+) -> tuple[Waves, int]:
+    """The unknowns that answer, but for a share `tolerance`, in the equations' own precision; and the steps it took."""
+    steps = 0
+
+    def product(vector: Waves) -> Waves:
+        nonlocal steps
+        steps += 1
+        return _product(equations, vector, frequency)
+
+    def precondition(vector: Waves) -> Waves:
+        return np.asarray(_each_part(equations.answer, vector))
+
+    kind = np.result_type(equations.real, np.complex64)
+    scale = float(np.linalg.norm(wanted))
+    found = gmres(
+        product,
+        precondition,
+        (wanted / scale).astype(kind),
+        tolerance=tolerance,
+        most_steps=MOST_STEPS,
+    )
+    return np.asarray(scale * found, dtype=complex), steps
+
+
+def _product(equations: _Equations, vector: Waves, frequency: float) -> Waves:
+    rows, stored = _both(equations, vector)
+    return np.asarray(rows + vector.dtype.type(1j * frequency) * stored)
+
+
+def _each_part(operator: Callable[[Field], Any], vector: Waves) -> Any:
+    """A real linear operator on a complex vector."""
+    real, imaginary = (
+        operator(np.ascontiguousarray(vector.real)),
+        operator(np.ascontiguousarray(vector.imag)),
+    )
+    both = np.empty(real.shape, vector.dtype)
+    both.real, both.imag = real, imaginary
+    return both
+
+
+def _both(equations: _Equations, vector: Waves) -> tuple[Waves, Waves]:
+    """Rows of J and of S for complex changes of the unknowns."""
+    parts = [
+        equations.product(np.ascontiguousarray(part), 0.0) for part in (vector.real, vector.imag)
+    ]
+    rows, stored = np.empty(vector.size, vector.dtype), np.empty(vector.size, vector.dtype)
+    (rows.real, stored.real), (rows.imag, stored.imag) = parts
+    return rows, stored
+
+
+def at_cap(balance: Balance | MixedBalance) -> bool:
+    """Whether the cap decides any cell, of the oil's or of the bodies' pressure."""
+    capped = balance.rows.state == CAPPED
+    return bool(
+        np.any(capped | (balance.solid == CAPPED) if isinstance(balance, MixedBalance) else capped)
+    )
+
+
+def elastic(balance: Balance | MixedBalance) -> Balance | MixedBalance:
+    """The balance with its capped cells elastic, as they are once they have yielded and are shaken below that load.
+
+    Where the bodies overlap they stay together; where oil at the cap parts them it is oil like any
+    other.
+    """
+    state = balance.rows.state
+    closed: Mask = balance.in_contact
+    if isinstance(balance, MixedBalance):
+        solid = np.where(closed, np.int8(TOUCHING), np.int8(FREE))
+        solid = np.where(balance.solid == CAPPED, solid, balance.solid)
+        oil = np.where(state == CAPPED, np.int8(LUBRICATED), state)
+        return replace(balance, solid=solid, rows=balance.rows._replace(state=oil))
+    shaken = np.where(closed | (balance.film is None), np.int8(TOUCHING), np.int8(LUBRICATED))
+    return replace(
+        balance, rows=balance.rows._replace(state=np.where(state == CAPPED, shaken, state))
+    )

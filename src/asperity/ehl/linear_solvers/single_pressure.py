@@ -1,0 +1,316 @@
+"""A contact's equations linearised, and a cheap approximate inverse of that, both in single precision.
+
+Newton's step is only wanted to a tenth, and what it leaves is measured in double precision: single
+changes neither the answer nor the steps, and halves what has to be moved through memory.
+"""
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from asperity.core.arrays import Field
+from asperity.ehl.deflection import BETWEEN
+from asperity.ehl.models.single_pressure import Balance, Past
+from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
+from asperity.kernels.multigrid import Nest
+from asperity.kernels.reynolds import LUBRICATED, Faces, Film
+from asperity.kernels.stencils import Far, Stencil
+
+MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors, where it has one more
+FEWEST_PAIRED = 12  # cells along an axis that nested blocks still halve
+TURNS = 2  # of blocks and lines, on each of them
+LEAST_PIVOT = 0.02  # of a row's nearest entries, where it may vanish
+LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
+
+
+class Kept(NamedTuple):
+    """What lubricated cells store, as it stands in their scaled equations: by a change of gap and of pressure."""
+
+    by_gap: Field
+    by_pressure: Field
+
+
+class Linear:
+    """The linearisation of a balance: `product` applies it, a call answers a residual by a change of pressure.
+
+    The approximate inverse has two parts. Aggregated onto blocks of cells and factored, the
+    five-point stencil of the lubricated cells removes what is slow and smooth (thick, low-pressure
+    valleys); zebra line relaxation along x removes the rest.
+    """
+
+    def __init__(self, balance: Balance, *, storing: float = 0.0, dtype: Any = np.float32) -> None:
+        self.balance, self.dtype = balance, dtype
+        self.cells = balance.problem.cells
+        self.unknown = balance.unknown
+        self.pressure = balance.pressure.astype(dtype)
+        scale = balance.rows.fluid_scale.astype(dtype)
+        self.rows = balance.rows._replace(fluid_scale=scale)
+        self.film = (
+            None if balance.film is None else Film(*(part.astype(dtype) for part in balance.film))
+        )
+        self.faces = None if balance.faces is None else single_faces(balance.faces, dtype)
+        self.storing, self.kept = storing, self._kept(balance.problem.past, storing)
+        if (
+            self.film is not None
+            and balance.problem.past is not None
+            and balance.problem.past.followed
+        ):
+            self.film = self.film.followed
+        self.stencil = self._stencil()
+        self.lines = LineRelaxation(self.stencil)
+        if self.film is not None:
+            self.blocks = Blocks(
+                self.stencil, np.where(balance.rows.state == LUBRICATED, 1.0 / scale, dtype(0.0))
+            )
+
+    def product(self, d_pressure: Field, d_approach: float) -> Field:
+        """The linearised equations applied to a change of pressure and approach."""
+        problem = self.balance.problem
+        d_gap = problem.deflection(d_pressure)
+        d_gap += self.dtype(d_approach)
+        return self.of_gap(d_pressure, d_gap)
+
+    def of_gap(self, d_pressure: Field, d_gap: Field) -> Field:
+        """The same, of a change of pressure and that of the gap."""
+        problem = self.balance.problem
+        if self.film is None or self.faces is None:
+            touching = self.rows.state == reynolds.TOUCHING
+            return np.where(touching, d_gap * self.dtype(self.rows.contact_scale), d_pressure)
+        out, d_gap = np.empty(self.cells, self.dtype), problem.filmed(d_gap)
+        reynolds.jacobian_product(
+            self.rows,
+            self.film,
+            self.faces,
+            self.pressure,
+            d_pressure,
+            d_gap,
+            problem.spacing,
+            self.storing,
+            out,
+        )
+        if self.kept is not None:
+            out += self.kept.by_gap * d_gap
+            out += self.kept.by_pressure * d_pressure
+        return out
+
+    def __call__(self, residual: Field) -> Field:
+        """Approximate change of pressure that answers a residual, both (nx, ny); none in cells that know theirs."""
+        change = np.zeros(self.cells, self.dtype) if self.film is None else self.blocks(residual)
+        return self.lines(residual, change)
+
+    def _kept(self, past: Past | None, storing: float) -> Kept | None:
+        """What the kernels leave to be added; they store for followed oil nothing.
+
+        What the first two rows then draw in by the wedge is left out: so far from the contact the
+        pressure gradient's flow is all that a change of pressure changes.
+        """
+        if past is None or self.film is None:
+            return None
+        rate = self.dtype(past.rate + (storing if past.followed else 0.0))
+        scaled = np.where(
+            self.rows.state == LUBRICATED, self.rows.fluid_scale * rate, self.dtype(0.0)
+        )
+        return Kept(scaled * self.film.content_by_gap, scaled * self.film.content_by_pressure)
+
+    def _stencil(self) -> Stencil:
+        stencil = Stencil(*np.empty((5, *self.cells), self.dtype))
+        nothing = np.zeros(self.cells, self.dtype)
+        film = self.film or Film(*[nothing] * 8)
+        faces = self.faces or Faces(
+            nothing, nothing, nothing, nothing, nothing, nothing, nothing[0], nothing[0]
+        )
+        problem = self.balance.problem
+        near = problem.deflection.near
+        stencils.local_stencil(self.rows, film, faces, near, problem.spacing, self.storing, stencil)
+        if self.kept is not None:
+            own, neighbour = (self.dtype(near[k] - near[3]) for k in (0, 1))
+            stencil.centre[:] += self.kept.by_gap * own + self.kept.by_pressure
+            stencil.west[:] += self.kept.by_gap * neighbour
+            stencil.east[:] += self.kept.by_gap * neighbour
+        turn_back(stencil, problem.mirror)
+        return stencil
+
+
+def turn_back(stencil: Stencil, mirror: int) -> None:
+    """Couple the last line of cells to what is on its side of the mirror, where there is one, in place."""
+    if mirror:
+        image = stencil.centre if mirror == BETWEEN else stencil.south
+        image[:, -1] += stencil.north[:, -1]
+        stencil.north[:, -1] = 0.0
+
+
+class LineRelaxation:
+    """Zebra relaxation of a stencil of five points, or seven with `far` ones: its x lines are solved exactly.
+
+    Even, odd and even ones in turn. Lines of five are not dominated by their centres.
+    """
+
+    def __init__(self, stencil: Stencil, far: Far | None = None) -> None:
+        nx, ny = stencil.centre.shape
+        nothing = np.empty((0, 0), stencil.centre.dtype)
+        self.stencil, self.far = stencil, far or Far(nothing, nothing)
+        for parity in (0, 1):
+            near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
+            beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
+            lines = line_relaxation.Lines(*near, *beyond)
+            line_relaxation.factor_lines(
+                stencil, self.far, parity, LEAST_PIVOT if far else 0.0, lines
+            )
+            if parity:
+                self.odd = lines
+            else:
+                self.even = lines
+
+    def __call__(self, residual: Field, change: Field) -> Field:
+        """`change`, improved in place so that it better answers the residual, both (nx, ny)."""
+        line_relaxation.relax_zebra(self.stencil, self.far, self.even, self.odd, residual, change)
+        return change
+
+
+class SingularFactor(ArithmeticError):
+    """Linearised equations that have no solution, or no single one."""
+
+
+class Blocks:
+    """A five-point stencil, its rows times `weight`, summed over blocks of cells and factored by sparse LU."""
+
+    def __init__(self, stencil: Stencil, weight: Field) -> None:
+        self.weight, (nx, ny) = weight, weight.shape
+        self.block = _block(nx), _block(ny)
+        self.cells = -(-nx // self.block[0]), -(-ny // self.block[1])
+        coarse = Stencil(*np.empty((5, *self.cells)))
+        line_relaxation.aggregate_stencil(stencil, weight, self.block, coarse)
+        self.pattern = five_point_pattern(self.cells)
+        self.factors = self.pattern.factored(coarse)
+
+    def __call__(self, residual: Field) -> Field:
+        """The change, one number a block, that answers a residual; none in cells without weight."""
+        coarse, change = np.empty(self.cells), np.zeros_like(self.weight)
+        line_relaxation.restrict(residual, self.weight, self.block, coarse)
+        line_relaxation.prolong(
+            self.pattern.solve(self.factors, coarse), self.weight, self.block, change
+        )
+        return change
+
+
+class NestedBlocks:
+    """The same summed over blocks of two by two again and again, relaxed on each grid, and inverted on the last."""
+
+    def __init__(self, stencil: Stencil, weight: Field) -> None:
+        self.weight = weight
+        self.nest = _nest(weight.shape, weight.dtype)
+        if not multigrid.nest_blocks(stencil, weight, LEAST_PIVOT, self.nest):
+            raise SingularFactor("the last of nested grids has no inverse")
+
+    def __call__(self, residual: Field) -> Field:
+        """The change, one number a block, that answers a residual; none in cells without weight."""
+        change = np.zeros_like(self.weight)
+        multigrid.answer_nested(self.nest, residual, self.weight, TURNS, change)
+        return change
+
+
+def _nest(cells: tuple[int, int], dtype: Any) -> Nest:
+    """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
+    grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
+    while max(grids[-1]) >= FEWEST_PAIRED:
+        nx, ny = (-(-n // 2) if n >= FEWEST_PAIRED else n for n in grids[-1])
+        grids.append((nx, ny))
+    starts = np.cumsum(
+        [(0, 0, 0), *((nx * ny, nx * ((ny + 1) // 2), nx * (ny // 2)) for nx, ny in grids)], axis=0
+    )
+    count, even, odd = starts[-1]
+    places = np.concatenate([grids, starts[:-1]], axis=1)
+    cells_of, last = (count,), grids[-1][0] * grids[-1][1]
+    shapes = [(5, count), cells_of, cells_of, (5, even), (5, odd), cells_of, cells_of, (last, last)]
+    return Nest._make([places, *(np.empty(shape, dtype) for shape in shapes)])
+
+
+def _block(cells: int) -> int:
+    """How many cells along an axis the factored grid puts into one."""
+    smallest = 1 if cells < 32 else 2 if cells < 128 else 4
+    return max(smallest, -(-cells // MOST_COARSE_CELLS))
+
+
+def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
+    """In another precision; what would become denormal in it is none."""
+    least = LEAST * float(max(faces.east.max(), faces.north.max()))
+    *parts, inlet, wedge, behind = faces
+    single = np.empty((len(parts), *faces.east.shape), dtype)
+    for part, out in zip(parts, single, strict=True):
+        reynolds.in_precision_of(out, part, least)
+    return Faces._make(
+        [*single, np.where(inlet > least, inlet, 0.0).astype(dtype), wedge.astype(dtype), behind]
+    )
+
+
+class _Pattern(NamedTuple):
+    """Where the entries of a five-point matrix on `cells` go, its rows and columns put in an order of little fill."""
+
+    cells: tuple[int, int]
+    order: Any
+    position: Any
+    rows: Any
+    columns: Any
+
+    def factored(self, stencil: Stencil) -> Any:
+        """LU factors of the stencil's matrix."""
+        count = self.order.size
+        entries = np.stack([part.ravel() for part in stencil]).ravel()
+        values = np.bincount(self.position, weights=entries, minlength=self.rows.size + 1)[:-1]
+        matrix = scipy.sparse.csc_array((values, self.rows, self.columns), shape=(count, count))
+        # small panels: these matrices are too sparse for the dense blocks that SuperLU looks for
+        try:
+            return scipy.sparse.linalg.splu(
+                matrix,
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                relax=1,
+                panel_size=1,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError as error:
+            raise SingularFactor(str(error)) from None
+
+    def solve(self, factors: Any, wanted: Field) -> Field:
+        """What the factored matrix turns into `wanted`, (cx, cy)."""
+        solved = np.empty(self.order.size)
+        solved[self.order] = factors.solve(wanted.ravel()[self.order])
+        return solved.reshape(self.cells)
+
+
+@lru_cache(maxsize=16)
+def five_point_pattern(cells: tuple[int, int]) -> _Pattern:
+    """The pattern of a grid, found once."""
+    index = np.arange(cells[0] * cells[1]).reshape(cells)
+    nowhere = np.full((1, cells[1]), -1)
+    columns = np.stack(
+        [
+            index,
+            np.concatenate([nowhere, index[:-1]]),
+            np.concatenate([index[1:], nowhere]),
+            np.roll(index, -1, 1),
+            np.roll(index, 1, 1),
+        ]
+    ).reshape(5, -1)
+    rows = np.broadcast_to(index.ravel(), columns.shape)
+    there = columns >= 0
+    shape = (index.size, index.size)
+    model = scipy.sparse.csc_array(
+        (np.where(columns == rows, 5.0, -1.0)[there], (rows[there], columns[there])), shape=shape
+    )
+    fill = scipy.sparse.linalg.splu(
+        model, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    order = np.argsort(fill.perm_c)
+    place = np.empty(index.size, int)
+    place[order] = np.arange(index.size)
+    keys = np.where(there, place[columns] * index.size + place[rows], -1).ravel()
+    entries, position = np.unique(keys[there.ravel()], return_inverse=True)
+    full = np.full(keys.size, entries.size)  # couplings across the ends go nowhere
+    full[there.ravel()] = position
+    starts = np.searchsorted(entries, np.arange(index.size + 1) * index.size)
+    return _Pattern(
+        cells, order, full, (entries % index.size).astype(np.int32), starts.astype(np.int32)
+    )

@@ -1,0 +1,1 @@
+"""Discretised contact models: residuals and linearisation."""

@@ -1,0 +1,495 @@
+"""The mixed-EHL problem on one grid, dimensionless: what each cell asks for, and its semismooth linearisation.
+
+Every cell obeys one of four equations, each written so that it grows with the cell's own pressure
+P: ruptured P, touching (H - H_c)/k, lubricated R/J, capped P - P_cap; phi = max(min(P, (H -
+H_c)/k, R/J), P - P_cap) = 0. R is the cell's net oil outflow, J its derivative, k the compliance
+of near cells, H_c the gap that counts as contact.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from asperity.core.arrays import Field, Mask
+from asperity.ehl.deflection import THROUGH, Deflection, deflection
+from asperity.ehl.grid_transfer import averaged, interpolated, mirrored
+from asperity.ehl.load_shares import within_ellipse
+from asperity.ehl.roller_profile import Along
+from asperity.kernels import reynolds
+from asperity.kernels.reynolds import (
+    CAPPED,
+    LUBRICATED,
+    RUPTURED,
+    TOUCHING,
+    Faces,
+    Film,
+    Liquid,
+    Rows,
+)
+from asperity.lubricant import Lubricant
+
+CLOSED_WITHIN = 0.01  # of the contact film
+AS_GOOD_AS = 1e-6  # relative, of both sides of Y = 0: nothing beside what is left unsolved
+# weights of the next and the upstream cell in the wedge; the more accurate ones do not converge on
+# all rough surfaces
+THIRD_ORDER, SECOND_ORDER, FIRST_ORDER = (0.375, 0.125), (0.0, 0.5), (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """Shape and compliance of the smooth bodies.
+
+    The gap grows as X^2/2 + `flatness` Y^2/2, or on a roller by its drop `along` it; `compliance`
+    scales the half-space's deflection, V = compliance times the integral of P/distance; `aspect`
+    is the Hertz contact's half-width across over along rolling (infinite for a line); `periodic`
+    tells whether the contact repeats in y.
+    """
+
+    flatness: float
+    compliance: float
+    aspect: float
+    periodic: bool
+    along: Along | None = None
+
+    def gap(self, x: Field, y: Field) -> Field:
+        """Gap at H0 = 0, shape (x, y)."""
+        across = self.flatness * (y**2 / 2.0) if self.along is None else self.along.drop(y)
+        return np.asarray((x**2 / 2.0)[:, None] + across)
+
+    def hertz(self, x: Field, y: Field) -> Field:
+        """Pressure of the smooth, dry contact, that of a roller by slices, shape (x, y)."""
+        if self.along is None:
+            across = y / self.aspect
+            return np.asarray(np.sqrt(np.maximum(1.0 - (x**2)[:, None] - across**2, 0.0)))
+        load = np.where(self.along.beyond(y), 0.0, self.along.load(y))
+        return np.asarray(np.sqrt(np.maximum(load - (x**2)[:, None], 0.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """What a step in time adds to the oil's balance: `rate` times its content now, and `source` from before, (nx, ny).
+
+    `followed` oil is balanced along its way, so that `source` holds the wedge too (unless oil is
+    conserved, not in the first two rows of cells, which it has no way to). `leant` is then by how
+    much the wedge, second order, leant back a cell and a step before, and `upstream` the content
+    there; None where the source is of second order already.
+    """
+
+    rate: float
+    source: Field
+    followed: bool
+    upstream: Field | None = None
+    leant: Field | None = None
+
+    @property
+    def on_one_line(self) -> "Past":
+        """The same where nothing varies along y, on the first line of cells."""
+        parts = (
+            None if part is None else part[:, :1]
+            for part in (self.source, self.upstream, self.leant)
+        )
+        source, upstream, leant = parts
+        assert source is not None
+        return Past(self.rate, source, self.followed, upstream, leant)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A contact on one grid, in the solver's units.
+
+    `form` is the bodies' own shape and `roughness` what stands out of it, shape (nx, ny); `load`
+    the wanted sum of P dX dY; `p_cap` and `contact_gap` bound P above and H below; `speed` is the
+    speed number. For the oil's laws `p_scale` [Pa] turns P into pascals and `sliding`/H is the
+    shear rate [1/s]; `viscosity_factor` is what warmth leaves of the viscosity, shape (nx, ny),
+    None for all of it. A contact that does not repeat in y is bounded by lines of cells at ambient
+    pressure, a roller by all beyond its ends. `accurate` takes the third-order wedge and
+    logarithmic mean mobilities. `conserve` lets no oil appear or vanish. `past` is None where
+    nothing moves but the oil. `held` tells of the cells, (nx, ny), whose pressures are given, and
+    the distance of the bodies with them. Where `mirror` is not 0, cells are those up to the plane
+    Y = 0, BETWEEN two lines of cells or THROUGH the last one, and what lies behind it is their
+    image.
+    """
+
+    form: Form
+    roughness: Field
+    lower: tuple[float, float]
+    spacing: tuple[float, float]
+    load: float
+    p_cap: float
+    contact_gap: float
+    speed: float
+    sliding: float
+    p_scale: float
+    lubricant: Lubricant | None
+    viscosity_factor: Field | None = None
+    accurate: bool = False
+    conserve: bool = False
+    past: Past | None = None
+    held: Mask | None = None
+    mirror: int = 0
+
+    @property
+    def cells(self) -> tuple[int, int]:
+        """(nx, ny)."""
+        nx, ny = self.roughness.shape
+        return nx, ny
+
+    @property
+    def all_cells(self) -> tuple[int, int]:
+        """The same with those behind a mirror."""
+        nx, ny = self.cells
+        return nx, 2 * ny + 1 - self.mirror if self.mirror else ny
+
+    def whole(self, field: Any) -> Any:
+        """A field, (nx', ny'), with its image behind the mirror, of this grid or a coarser one."""
+        return mirrored(field, 2 * field.shape[1] + 1 - self.mirror) if self.mirror else field
+
+    def brought(self, field: Field, *, cubic: bool = False) -> Field:
+        """A coarser grid's field on this one, (nx, ny), by lines or cubics."""
+        finer = interpolated(self.whole(field), self.all_cells, cubic=cubic)
+        return np.ascontiguousarray(finer[:, : self.cells[1]])
+
+    def summed(self, field: Field) -> Any:
+        """Of a field, (nx, ny), over all cells of the contact, those behind a mirror too."""
+        total = field.sum()
+        return (
+            total
+            if not self.mirror
+            else 2.0 * total - (field[:, -1].sum() if self.mirror == THROUGH else 0.0)
+        )
+
+    @property
+    def mean_pressure(self) -> float:
+        """Over the whole grid."""
+        (nx, ny), (dx, dy) = self.all_cells, self.spacing
+        return self.load / (nx * ny * dx * dy)
+
+    @property
+    def unmirrored(self) -> "Problem":
+        """The same contact on all its cells."""
+        if not self.mirror:
+            return self
+        factor = self.viscosity_factor
+        return replace(
+            self,
+            roughness=self.whole(self.roughness),
+            viscosity_factor=None if factor is None else self.whole(factor),
+            mirror=0,
+        )
+
+    @property
+    def x(self) -> Field:
+        """Cell centres along rolling in Hertz half-widths, shape (nx,)."""
+        return np.asarray(self.lower[0] + (np.arange(self.cells[0]) + 0.5) * self.spacing[0])
+
+    @property
+    def y(self) -> Field:
+        """Cell centres across rolling in Hertz half-widths, shape (ny,)."""
+        return np.asarray(self.lower[1] + (np.arange(self.cells[1]) + 0.5) * self.spacing[1])
+
+    @cached_property
+    def undeformed(self) -> Field:
+        """Gap of the rough bodies before they deform, at H0 = 0, shape (nx, ny)."""
+        return np.asarray(self.form.gap(self.x, self.y) - self.roughness)
+
+    @cached_property
+    def rim(self) -> Mask:
+        """Lines of cells along x that are held at ambient pressure, shape (ny,)."""
+        held = np.zeros(self.cells[1], dtype=bool)
+        if not self.form.periodic:
+            held[[0] if self.mirror else [0, -1]] = True
+        if self.form.along is not None:
+            held |= self.form.along.beyond(self.y)
+        return held
+
+    @cached_property
+    def _nearest(self) -> np.ndarray | None:
+        """Of each line of cells the nearest one on the roller; None where there are no ends."""
+        if self.form.along is None:
+            return None
+        inside = np.flatnonzero(~self.rim)
+        return np.asarray(inside[np.abs(np.arange(self.cells[1])[:, None] - inside).argmin(axis=1)])
+
+    @cached_property
+    def _ends(self) -> Mask:
+        """Lines of cells behind which, towards larger y, a roller ends or begins, shape (ny,)."""
+        changes = self.rim != np.roll(self.rim, -1)
+        return np.asarray(changes & (self.form.along is not None))
+
+    def filmed(self, gap: Field) -> Field:
+        """A gap, or its change, as the oil has it: beyond a roller's ends that at the ends, where it flows out."""
+        return gap if self._nearest is None else gap[:, self._nearest]
+
+    @property
+    def deflection(self) -> Deflection:
+        """The elastic half-space on this grid."""
+        return deflection(
+            self.cells, self.spacing, self.form.compliance, self.form.periodic, self.mirror
+        )
+
+    @property
+    def softness(self) -> float:
+        """Compliance of a cell to its own pressure, less that of one far off."""
+        near = self.deflection.near
+        return float(near[0] - near[3])
+
+    @property
+    def uniform(self) -> bool:
+        """Whether nothing varies along y, so that one line of cells tells all."""
+        fields = (
+            [self.roughness]
+            if self.viscosity_factor is None
+            else [self.roughness, self.viscosity_factor]
+        )
+        return self.form.periodic and all(bool(np.all(field == field[:, :1])) for field in fields)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the half of smooth bodies' contact up to Y = 0 tells all."""
+        if self.form.periodic or self.form.along is not None or np.any(self.roughness):
+            return False
+        (_, ny), dy, factor = self.cells, self.spacing[1], self.viscosity_factor
+        even = factor is None or bool(
+            np.allclose(factor, factor[:, ::-1], rtol=AS_GOOD_AS, atol=0.0)
+        )
+        return even and abs(2.0 * self.lower[1] + ny * dy) < AS_GOOD_AS * dy
+
+    def coarsened(self, cells: tuple[int, int]) -> "Problem":
+        """The same contact on a grid of fewer cells; fields are averaged over each cell.
+
+        A mirror stays in the middle of a line or between two, for which a line may be one more or
+        fewer.
+        """
+        (nx, ny), (dx, dy) = self.all_cells, self.spacing
+        half = -(-cells[1] // 2)
+        cells, kept = (
+            (cells, cells[1]) if not self.mirror else ((cells[0], 2 * half + 1 - self.mirror), half)
+        )
+        roughness, factor = self.whole(self.roughness), self.viscosity_factor
+        return replace(
+            self,
+            roughness=averaged(roughness, cells)[:, :kept],
+            viscosity_factor=None
+            if factor is None
+            else averaged(self.whole(factor), cells)[:, :kept],
+            spacing=(dx * (nx / cells[0]), dy * (ny / cells[1])),
+        )
+
+    def zone(self, share: float = 1.0) -> Mask:
+        """Cells within `share` of the smooth dry contact's half-widths, at least the middle ones, shape (nx, ny)."""
+        if self.form.along is not None:
+            return self.form.along.zone(self.x, self.y, share, self.spacing)
+        return within_ellipse(self.x, self.y, (share, share * self.form.aspect), self.spacing)
+
+    def load_error(self, pressure: Field) -> float:
+        """By how much a pressure carries more than the load, relative."""
+        dx, dy = self.spacing
+        return float(self.summed(pressure) * dx * dy / self.load - 1.0)
+
+    def evaluate(self, pressure: Field, approach: float) -> "Balance":
+        """What is left of every equation at a pressure and a rigid approach H0."""
+        gap = self.undeformed + self.deflection(pressure)
+        gap += approach
+        contact_scale = 1.0 / self.softness
+        touching = (gap - self.contact_gap) * contact_scale
+        if self.lubricant is None:
+            film, faces, outflow, fluid_scale = (
+                None,
+                None,
+                np.zeros_like(pressure),
+                np.ones_like(pressure),
+            )
+            residual, state = touching.copy(), np.full(pressure.shape, TOUCHING, dtype=np.int8)
+        else:
+            film, faces, outflow, fluid_scale = self.flow(
+                pressure, gap, self.lubricant, THIRD_ORDER if self.accurate else SECOND_ORDER
+            )
+            fluid = outflow * fluid_scale
+            wet = fluid < touching
+            residual = np.minimum(fluid, touching)
+            state = np.where(wet, np.int8(LUBRICATED), np.int8(TOUCHING))
+        ruptured = pressure < residual
+        residual[ruptured] = pressure[ruptured]
+        state[ruptured] = RUPTURED
+        capped = pressure - self.p_cap > residual
+        residual[capped] = pressure[capped] - self.p_cap
+        state[capped] = CAPPED
+        rim = self.rim
+        residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
+        if film is not None:  # pressing overlapping bodies together moves no film
+            film = film.held_where((touching <= 0.0) & (state != LUBRICATED))
+        return Balance(
+            self,
+            pressure,
+            gap,
+            residual,
+            Rows(state, fluid_scale, contact_scale),
+            film,
+            faces,
+            outflow,
+        )
+
+    def flow(
+        self,
+        pressure: Field,
+        gap: Field,
+        oil: Lubricant,
+        wedge: tuple[float, float],
+        least_mobility: float = 0.0,
+    ) -> tuple[Film, Faces, Field, Field]:
+        """Film, faces, net outflow of each cell and the inverse of its derivative, of an oil pressure and a gap."""
+        pascals = pressure * self.p_scale
+        gap = self.filmed(gap)
+        height = np.maximum(gap, self.contact_gap)
+        viscosity = oil.viscosity(pascals)
+        if self.viscosity_factor is not None:
+            viscosity = viscosity * self.viscosity_factor
+        liquid = Liquid(
+            oil.density(pascals) / oil.density.rho0,
+            oil.density.slope(pascals) * (self.p_scale / oil.density.rho0),
+            viscosity,
+            oil.viscosity.log_slope(pascals) * self.p_scale,
+            *oil.rheology.thinning(viscosity * self.sliding / height),
+        )
+        ambient = height[[0, -1]] ** 3 / self.speed
+        if self.viscosity_factor is not None:
+            ambient /= self.viscosity_factor[[0, -1]]
+        film = Film._make([*np.empty((6, *self.cells)), ambient, 3.0 * ambient / height[[0, -1]]])
+        least = least_mobility * self.contact_gap**3
+        reynolds.fill_film(liquid, height, oil.viscosity.eta0 / self.speed, least, film)
+        east, east_by_own, east_by_next, north, north_by_own, north_by_next = np.empty(
+            (6, *self.cells)
+        )
+        faces = Faces(
+            east,
+            east_by_own,
+            east_by_next,
+            north,
+            north_by_own,
+            north_by_next,
+            inlet=np.empty(self.cells[1]),
+            wedge=np.array(wedge),
+            behind=self.cells[1] - self.mirror if self.mirror else 0,
+        )
+        mobility = film.mobility
+        log_mobility = (
+            np.log(np.maximum(mobility, np.finfo(float).tiny)) if self.accurate else mobility
+        )
+        reynolds.face_mobilities(film, log_mobility, self.accurate, self._ends, faces)
+        dx, dy = self.spacing
+        outflow, diagonal = np.empty_like(pressure), np.empty_like(pressure)
+        entering = self.entering(gap)
+        near = self.deflection.near
+        if self.past is None:
+            reynolds.net_outflow(pressure, film.content, faces, entering, dx, dy, outflow)
+            reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
+        else:
+            self._move(self.past, pressure, film, faces, entering, outflow, diagonal)
+        return film, faces, outflow, 1.0 / diagonal
+
+    def entering(self, gap: Field) -> Field:
+        """Content that the surfaces carry in, shape (ny,): the inlet is at ambient pressure, where density is 1."""
+        x, dx = self.x[0], self.spacing[0]
+        ahead = np.maximum(
+            gap[0] + ((x - dx) ** 2 - x**2) / 2.0, self.contact_gap
+        )  # one cell before the inlet
+        if self.conserve:  # upwind
+            return np.asarray(ahead)
+        return np.asarray(0.5 * (ahead + np.maximum(gap[0], self.contact_gap)))
+
+    def _move(
+        self,
+        past: Past,
+        pressure: Field,
+        film: Film,
+        faces: Faces,
+        entering: Field,
+        outflow: Field,
+        diagonal: Field,
+    ) -> None:
+        """Fill in the net outflow and its diagonal of a contact in which more moves than the oil."""
+        (dx, dy), near, content = self.spacing, self.deflection.near, film.content
+        if past.followed:
+            nothing = np.zeros_like(content)
+            reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
+            reynolds.fluid_diagonal(film.followed, faces, near, dx, dy, diagonal)
+            outflow[0] -= entering / dx
+            if (
+                not self.conserve
+            ):  # else all oil is followed, the first cell's from before the inlet
+                outflow[0] += content[0] / dx
+                outflow[1] += (1.0 + faces.wedge[1]) * (content[1] - content[0]) / dx
+        else:
+            reynolds.net_outflow(pressure, content, faces, entering, dx, dy, outflow)
+            reynolds.fluid_diagonal(film, faces, near, dx, dy, diagonal)
+        outflow += past.rate * content + past.source
+        # less what far cells would answer too, as in a cell that touches: stored oil is as stiff as
+        # that
+        diagonal += past.rate * (film.content_by_gap * self.softness + film.content_by_pressure)
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """A problem evaluated at one pressure: gap, residual phi, and what linearisation needs."""
+
+    problem: Problem
+    pressure: Field
+    # may be negative where a cap lets the bodies overlap: the depth of plastic flattening
+    gap: Field
+    residual: Field
+    rows: Rows
+    film: Film | None
+    faces: Faces | None
+    outflow: Field  # net oil outflow per cell area
+
+    @property
+    def load_error(self) -> float:
+        """Relative."""
+        return self.problem.load_error(self.pressure)
+
+    @property
+    def height(self) -> Field:
+        """Gap between the bodies, no less than the contact film, (nx, ny)."""
+        return np.maximum(self.gap, self.problem.contact_gap)
+
+    @property
+    def content(self) -> Field:
+        """Oil over each cell, (nx, ny); the contact has to have some."""
+        assert self.film is not None
+        return self.film.content
+
+    @property
+    def residual_rms(self) -> float:
+        """Root mean square of phi, as a share of p_h."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def oil_pressure(self) -> Field:
+        """What drives the oil, (nx, ny): in this model the one pressure there is."""
+        return self.pressure
+
+    @property
+    def parted(self) -> Mask:
+        """Cells in which a film parts the bodies, or a cavity."""
+        return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == RUPTURED))
+
+    @property
+    def yielded(self) -> Mask:
+        """Cells at the cap."""
+        return np.asarray(self.rows.state == CAPPED)
+
+    @property
+    def in_contact(self) -> Mask:
+        """Cells where the bodies touch: gap closed to the contact film, or flattened below it.
+
+        Within 1 %, because oil leaves a contact at just that film and may keep it for many cells.
+        """
+        closed = self.gap <= (1.0 + CLOSED_WITHIN) * self.problem.contact_gap
+        return np.asarray((self.rows.state == TOUCHING) | closed)
+
+    @property
+    def unknown(self) -> Mask:
+        """Cells whose pressure the linear system decides; ruptured and capped cells know theirs."""
+        return np.asarray((self.rows.state == LUBRICATED) | (self.rows.state == TOUCHING))

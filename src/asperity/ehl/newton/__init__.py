@@ -1,0 +1,1 @@
+"""Semismooth Newton iterations of each contact model."""

@@ -1,0 +1,1 @@
+"""Solution strategies: initial guesses and grid continuation."""

@@ -1,0 +1,408 @@
+"""The way from a guess on the coarsest grid to the solution on the finest, and the decision when to stop."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.contact.conditions import ContactConditions
+from asperity.core.arrays import Field, Mask
+from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.load_shares import CENTRE, area_share, carried_share
+from asperity.ehl.models.single_pressure import Problem
+from asperity.ehl.newton.single_pressure import Step, newton
+from asperity.ehl.outcome import (
+    ATTEMPTS,
+    CONSERVING,
+    Convergence,
+    Figures,
+    GridError,
+    Iteration,
+    Options,
+    SolveStatus,
+)
+from asperity.ehl.problem_setup import coarser_all_along
+from asperity.ehl.scales import Scales
+from asperity.lubricant import Lubricant
+from asperity.surface import Surface
+
+Progress = Callable[[Iteration], None]
+
+COARSE_TOLERANCE = 1e-3  # a coarse solution only has to be a good start
+MOST_COARSE_ITERATIONS = 40
+MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
+ONWARDS, BACK = (
+    2.5,
+    1.5,
+)  # of the difference to the coarser grid: how far a rough contact's figures may yet go
+AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
+UNRESOLVED = (
+    2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
+)
+BY_TWO_ORDERS = 0.85  # share of all this where both orders of the wedge are known, and tell more
+KEPT_ON, KEPT_BACK, KEPT_UNRESOLVED = (
+    2.0,
+    0.5,
+    1.0,
+)  # the same of the load share, where three grids are known too
+# of the same, of what is read off a roller's ends: their error falls with the cell, not its square
+OF_ENDS = 3.0
+NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
+SCATTER = 0.03  # of a figure of the ends, below which differences say nothing of where they go
+NEXT_TO_NOTHING = (
+    1e-2  # what is left of a start, below which steps have not strayed yet by many times that
+)
+ASTRAY = (
+    10.0  # times what a start leaves: steps of the accurate wedge that leave more began too far off
+)
+FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
+
+
+class Search:
+    """The way from a guess on the coarsest grid to the solution on the finest, all steps of it on record."""
+
+    def __init__(self, options: Options, gap_scale: float, progress: Progress | None) -> None:
+        self.options, self.gap_scale, self.progress = options, gap_scale, progress
+        self.history: list[Iteration] = []
+        self.figures: list[Figures] = []  # a grid each, since the last climb began
+        self.by_first_order: Figures | None = (
+            None  # on the finest grid, where the search passed a first-order wedge
+        )
+        self.cell = 0.0  # of the finest grid along x, in half-widths
+        self.iteration_error: Figures | None = None
+        self.smooth, self.order = (
+            False,
+            1 if options.model == CONSERVING else 2,
+        )  # bodies, and wedge
+        self.lost = False
+        self.work, self.most_work = 0.0, np.inf  # cells of all steps
+
+    @property
+    def discretisation_error(self) -> GridError | None:
+        """From the last grids; see `grid_error`."""
+        return grid_error(
+            self.figures,
+            smooth=self.smooth,
+            cell=self.cell,
+            by_first_order=self.by_first_order,
+            order=self.order,
+        )
+
+    @property
+    def given_up(self) -> bool:
+        """Whether all the work that the search may take is done."""
+        return self.work >= self.most_work
+
+    def settled(self, tolerance: float, *, of_load: bool = True) -> bool:
+        """Whether the last step met the tolerance in residual, change and, `of_load`, load."""
+        last = self.history[-1]
+        return max(last.residual, last.load_error if of_load else 0.0, last.change) < tolerance
+
+    def climb(
+        self, levels: Sequence[Problem], pressure: Field, approach: float, *, held: bool
+    ) -> Step:
+        """Solve on grid after grid, from the last, coarsest one to the first."""
+        options, self.figures, self.smooth = self.options, [], not np.any(levels[0].roughness)
+        self.cell = levels[0].spacing[0]
+        for problem in reversed(levels):
+            coarsest, finest = problem is levels[-1], problem is levels[0]
+            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            if problem.cells != pressure.shape:
+                pressure = problem.brought(pressure)
+            if held:
+                step = self.position(problem, pressure, approach, tolerance, from_outside=coarsest)
+            else:
+                most = (
+                    options.max_iterations
+                    if finest
+                    else min(options.max_iterations, MOST_COARSE_ITERATIONS)
+                )
+                steps = newton(problem, pressure, approach)
+                step = self.run(
+                    problem, steps, tolerance, most, stray=ASTRAY if problem.accurate else np.inf
+                )
+                if (
+                    problem.accurate
+                    and step.number < most
+                    and not (self.settled(tolerance) or self.lost)
+                ):  # astray
+                    pressure, approach = self.nearer(problem, pressure, approach)
+                    step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
+                if coarsest and not finest and not self.settled(FAR_OFF):
+                    # a capped contact answers its approach too unevenly for Newton
+                    found = self.position(problem, pressure, approach, tolerance, from_outside=True)
+                    step = found if self.settled(FAR_OFF) else step
+            pressure, approach = step.balance.pressure, step.approach
+            if coarser_all_along(problem, levels[0]):
+                self.figures.append(self._figures(step))
+        return step
+
+    def nearer(self, problem: Problem, pressure: Field, approach: float) -> tuple[Field, float]:
+        """A start for the accurate wedge by a step or two with the sturdy one; as it was, where these lead nowhere."""
+        sturdy = replace(problem, accurate=False)
+        step = self.run(sturdy, newton(sturdy, pressure, approach), FAR_OFF, MOST_COARSE_ITERATIONS)
+        return (
+            (step.balance.pressure, step.approach)
+            if self.settled(FAR_OFF)
+            else (pressure, approach)
+        )
+
+    def run(
+        self,
+        problem: Problem,
+        steps: Iterator[Step],
+        tolerance: float,
+        most: int,
+        *,
+        of_load: bool = True,
+        stray: float = np.inf,
+        after: Step | None = None,
+    ) -> Step:
+        """Take steps until they meet the tolerance, `of_load` too, or there have been too many.
+
+        Or until what is left is `stray` times what was left at first: `after` the step that they
+        go on from, if any.
+        """
+        step = next(steps)
+        before = after or step
+        astray = stray * max(before.balance.residual_rms, NEXT_TO_NOTHING)
+        while True:
+            self._record(problem, step)
+            self.lost = step.number > 0 and not np.isfinite(step.change)
+            if (
+                self.settled(tolerance, of_load=of_load)
+                or step.number >= most
+                or self.lost
+                or self.given_up
+            ):
+                break
+            if step.balance.residual_rms > astray:
+                break
+            before, step = step, next(steps)
+        self.iteration_error = self._figures(step).off(self._figures(before))
+        return step
+
+    def position(
+        self,
+        problem: Problem,
+        pressure: Field,
+        approach: float,
+        tolerance: float,
+        *,
+        from_outside: bool,
+    ) -> Step:
+        """The contact held at approach after approach until it carries the load: slower, but each is a simple problem.
+
+        The load falls as the bodies part; the approach is bracketed, then found by false position
+        (Illinois).
+        """
+        roughness = float(np.std(problem.roughness))
+        stride = max(0.5, 0.5 * roughness) if from_outside else max(0.05, 0.05 * roughness)
+        approach += 2.0 * roughness if from_outside else 0.0
+        bracket: dict[
+            bool, tuple[float, float]
+        ] = {}  # by whether too much is carried: approach and load error
+        last_side, left = None, self.options.max_iterations
+        while True:
+            most = min(left, MOST_HELD_ITERATIONS)
+            step = self.run(
+                problem,
+                newton(problem, pressure, approach, held=True),
+                tolerance,
+                most,
+                of_load=False,
+            )
+            left -= max(step.number, 1)
+            pressure, error = step.balance.pressure, step.balance.load_error
+            if left <= 0 or self.lost or self.settled(tolerance):
+                return step
+            side = error > 0.0
+            bracket[side] = approach, error
+            if len(bracket) < 2:
+                approach += stride if side else -stride
+                stride *= 1.5
+                continue
+            if side == last_side:  # the other end is standing still: give it less weight
+                bracket[not side] = bracket[not side][0], 0.5 * bracket[not side][1]
+            last_side = side
+            (near, too_much), (apart, too_little) = bracket[True], bracket[False]
+            share = min(max(too_much / (too_much - too_little), 0.02), 0.98)
+            approach = near + share * (apart - near)
+
+    def solution(
+        self,
+        step: Step,
+        surface: Surface,
+        conditions: ContactConditions,
+        lubricant: Lubricant | None,
+        *,
+        seconds: float,
+        attempt: str = ATTEMPTS[0],
+        start: ContactSolution | None = None,
+        viscosity_factor: Field | None = None,
+    ) -> ContactSolution:
+        """Where the search ended, in SI on the surface's grid, whether it was solved on one line of it or on all.
+
+        A warm `start` hands on what its cells' size may have done only where it is of the same
+        contact, but for heat.
+        """
+        discretisation = self.discretisation_error
+        if start is not None:
+            alike = replace(start.options, max_iterations=self.options.max_iterations)
+            same = (start.conditions, start.lubricant, alike) == (
+                conditions,
+                lubricant,
+                self.options,
+            )
+            same = (
+                same
+                and start.grid == surface.grid
+                and np.array_equal(start.surface.heights, surface.heights)
+            )
+            discretisation = start.convergence.discretisation_error if same else None
+        scales, balance, lines = (
+            Scales.of(conditions, lubricant),
+            step.balance,
+            surface.grid.cells[1],
+        )
+        stopped = SolveStatus.STALLED if self.lost else SolveStatus.OUT_OF_ITERATIONS
+        touching = balance.in_contact & (balance.pressure > 0.0)
+        pressure, height, in_contact = (
+            on_all_lines(balance.problem, part, lines)
+            for part in (balance.pressure, balance.height, touching)
+        )
+        return ContactSolution(
+            conditions=conditions,
+            lubricant=lubricant,
+            surface=surface,
+            options=self.options,
+            pressure=pressure * scales.pressure,
+            gap=height * scales.gap,
+            in_contact=in_contact,
+            rigid_approach=step.approach * scales.gap,
+            convergence=Convergence(
+                status=SolveStatus.CONVERGED if self.settled(self.options.tolerance) else stopped,
+                history=tuple(self.history),
+                tolerance=self.options.tolerance,
+                seconds=seconds,
+                attempt=attempt,
+                iteration_error=self.iteration_error,
+                discretisation_error=discretisation,
+            ),
+            viscosity_factor=viscosity_factor,
+        )
+
+    def _figures(self, step: Step) -> Figures:
+        balance = step.balance
+        touching, whole = balance.in_contact & (balance.pressure > 0.0), balance.problem.whole
+        parts = whole(balance.pressure), whole(touching), whole(balance.height)
+        return figures(balance.problem.unmirrored, *parts, self.gap_scale)
+
+    def _record(self, problem: Problem, step: Step) -> None:
+        balance = step.balance
+        left = balance.residual_rms, abs(balance.load_error), step.change
+        iteration = Iteration(problem.all_cells, step.number, *left)
+        self.history.append(iteration)
+        self.work += problem.roughness.size if step.number > 0 else 0
+        if self.progress:
+            self.progress(iteration)
+
+
+def on_all_lines(problem: Problem, field: Any, lines: int) -> Any:
+    """A field on the part of a contact that tells all, (nx', ny'), on all of so many lines of cells."""
+    whole = problem.whole(field)
+    return np.repeat(whole, lines // whole.shape[1], axis=1)
+
+
+def grid_error(
+    on_grids: Sequence[Figures],
+    *,
+    smooth: bool,
+    cell: float,
+    by_first_order: Figures | None = None,
+    order: int = 2,
+) -> GridError | None:
+    """90 % intervals from the last grids; None for one grid alone.
+
+    A smooth solution gets Roache's grid convergence index, three times its error: the difference
+    of both where it is of second `order`, three times that where of first. A rough one has no such
+    order. Its figures d apart on the last two grids get 2.5 d the way that they went, 1.5 d the
+    other, and the load share 2.4 of the squared cell (`cell`, in half-widths) either way: what a
+    hundred contacts of the wide sample take to hold four times the cells (`benchmarks.intervals`).
+    A roller's edge pressure and end film get 3 d, and up to ten times that where d does not shrink
+    as grids get finer. d is no less than a quarter of the difference between the grids before,
+    lest two grids agree by chance, and no less than what the second-order wedge did to the first
+    order's figures on the finest grid; where that is known, 0.85 of all this will do. The load
+    share, where three grids are known too, gets 2 d the way that it went, 0.5 d the other and one
+    of the squared cell. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
+    """
+    if len(on_grids) < 2:
+        return None
+    *before, coarse, fine = on_grids
+    nothing, apart = fine.off(fine), fine.off(coarse)
+    figures_of_ends = (
+        (name, [getattr(each, name) for each in on_grids]) for name in ("edge_pressure", "end_film")
+    )
+    ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
+    if before:
+        apart = apart.at_least(coarse.off(before[-1]).times(AGREEMENT))
+    if smooth:
+        return GridError(
+            **asdict(replace(apart if order > 1 else apart.times(3.0), **ends)), lean=nothing
+        )
+    share = 1.0
+    if by_first_order is not None:
+        apart, share = apart.at_least(fine.off(by_first_order)), BY_TWO_ORDERS
+    half = apart.times(0.5 * share * (ONWARDS + BACK)).plus(
+        replace(nothing, clr=share * UNRESOLVED * cell**2)
+    )
+    lean = apart.times(0.5 * share * (ONWARDS - BACK)).signed(fine.minus(coarse))
+    if by_first_order is not None and before:
+        half = replace(
+            half, clr=0.5 * (KEPT_ON + KEPT_BACK) * apart.clr + KEPT_UNRESOLVED * cell**2
+        )
+        lean = replace(
+            lean, clr=math.copysign(0.5 * (KEPT_ON - KEPT_BACK) * apart.clr, fine.clr - coarse.clr)
+        )
+    return GridError(
+        **asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0))
+    )
+
+
+def ends_error(on_grids: Sequence[float]) -> float:
+    """Half the 90 % interval of a figure of a roller's ends, on finer and finer grids; see `grid_error`."""
+    *before, coarse, fine = on_grids
+    apart, factor = abs(fine - coarse), OF_ENDS
+    if before:
+        earlier = abs(coarse - before[-1])
+        if apart > SCATTER * abs(fine):
+            shrinks = min(apart / earlier, 1.0) if earlier > 0.0 else 1.0
+            factor *= min(max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0), NO_LIMIT)
+        apart = max(apart, AGREEMENT * earlier)
+    return factor * apart
+
+
+def figures(
+    problem: Problem, pressure: Field, touching: Mask, gap: Field, gap_scale: float
+) -> Figures:
+    """The first figures of dimensionless fields; lengths in the unit of `gap_scale`."""
+    along, ends = problem.form.along, {}
+    if along is not None:
+        dome, film = (
+            along.at_ends(problem.y, of)
+            for of in (along.dome(problem.x, pressure, problem.spacing[0]), gap.min(axis=0))
+        )
+        if dome.size:
+            ends = {
+                "edge_pressure": float(dome.max()) * problem.p_scale,
+                "end_film": float(film.min()) * gap_scale,
+            }
+    return Figures(
+        **ends,
+        car=area_share(touching, problem.zone()),
+        clr=carried_share(pressure, touching),
+        h_min=float(gap.min()) * gap_scale,
+        h_central=float(gap[problem.zone(CENTRE)].mean()) * gap_scale,
+    )

@@ -1,5 +1,0 @@
-"""A case let move, step after step, and how a mass vibrates on it."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

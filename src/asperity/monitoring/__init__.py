@@ -1,0 +1,5 @@
+"""Condition monitoring: recordings to trend, wear stage, alarm and notification."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,210 @@
+"""Whether a folder is a set of data that others can use: recordings of a contact with its surfaces before and after.
+
+The layout is that of docs/project/call-for-data.md. Recordings, maps and the case are read by
+those who read them everywhere; nothing is computed of them here.
+"""
+
+import csv
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from asperity.case import Case, load_case
+from asperity.core.errors import BadInput
+from asperity.monitoring.checks import check_recordings
+from asperity.surface import read_surface
+
+STATED = "set.toml"
+KEYS = ("title", "authors", "licence", "case", "recordings", "sensor", "maps_before", "maps_after")
+COLUMNS = ("file", "time_h", "load_n", "speed_m_s", "oil_temperature_c")
+OPEN = ("CC0-1.0", "CC-BY-4.0", "CC-BY-SA-4.0", "ODbL-1.0", "PDDL-1.0", "ODC-By-1.0")
+LEAST_RATE, LEAST_S = 20_000.0, 10.0  # Hz, s
+LEAST_STEPS = 3  # of load, and of speed
+PIXELS = 10  # of a map across the contact, at least
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """What a folder holds of a set, and what is missing: a sentence each."""
+
+    folder: Path
+    title: str
+    recordings: int
+    maps: int
+    missing: tuple[str, ...]
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is such a set."""
+        return not self.missing
+
+    def verdict(self) -> str:
+        """In one sentence."""
+        if self.whole:
+            return f"{self.folder} is a set that others can use: {self.recordings} recordings, {self.maps} maps."
+        more = f", and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
+        return f"{self.folder} is no such set yet: {self.missing[0]}{more}."
+
+    def scalars(self) -> dict[str, Any]:
+        """As `check --set DIR --json` gives it."""
+        return {
+            "verdict": self.verdict(),
+            "whole": self.whole,
+            "title": self.title,
+            "recordings": self.recordings,
+            "maps": self.maps,
+            "missing": list(self.missing),
+        }
+
+
+def check_set(folder: Path) -> DataSet:
+    """Read everything that a folder's set.toml names, and say what is missing.
+
+    Raises
+    ------
+    BadInput
+        for what is no folder, and for one without a set.toml that can be read.
+    """
+    stated = _stated(folder)
+    missing = [f"{STATED} does not state {key}" for key in KEYS if key not in stated]
+    if stated.get("licence") not in (None, *OPEN):
+        missing.append(f"its licence {stated['licence']} is none of {', '.join(OPEN)}")
+    case = _case(folder, stated, missing)
+    rows = _table(folder, stated, missing)
+    maps = [
+        (key, name)
+        for key in ("maps_before", "maps_after")
+        for name in _names(stated, key, missing)
+    ]
+    missing += _of_steps(rows)
+    missing += _of_recordings(folder, rows, case)
+    for _, name in maps:
+        missing += _of_map(folder, name, case)
+    bodies = Counter(key for key, _ in maps)
+    if maps and bodies["maps_before"] != bodies["maps_after"]:
+        missing.append("maps before and after are not of the same number of bodies")
+    return DataSet(folder, str(stated.get("title", "")), len(rows), len(maps), tuple(missing))
+
+
+def _stated(folder: Path) -> dict[str, Any]:
+    if not folder.is_dir():
+        raise BadInput(f"{folder} is not a folder; name the folder that holds {STATED}")
+    try:
+        return tomllib.loads((folder / STATED).read_text("utf-8"))
+    except FileNotFoundError:
+        raise BadInput(
+            f"{folder} has no {STATED}; the documentation's call for data shows one"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadInput(f"{folder / STATED} cannot be read as TOML: {error}") from None
+
+
+def _inside(folder: Path, name: object) -> Path:
+    """A file that the set names; one outside the folder would be missing for everybody else."""
+    path = (folder / str(name)).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise BadInput(f"{name} lies outside the set; put it into the folder")
+    return path
+
+
+def _case(folder: Path, stated: dict[str, Any], missing: list[str]) -> Case | None:
+    if "case" not in stated:
+        return None
+    try:
+        return load_case(_inside(folder, stated["case"]))
+    except BadInput as error:
+        missing.append(f"the case: {error}")
+        return None
+
+
+def _names(stated: dict[str, Any], key: str, missing: list[str]) -> list[str]:
+    names = stated.get(key, [])
+    if not isinstance(names, list) or (key in stated and not names):
+        missing.append(f"{key} must be a list of files, one of each body")
+        return []
+    return [str(name) for name in names]
+
+
+def _table(folder: Path, stated: dict[str, Any], missing: list[str]) -> list[dict[str, str]]:
+    """Rows of the table of recordings; none where it cannot be used."""
+    if "recordings" not in stated:
+        return []
+    try:
+        with _inside(folder, stated["recordings"]).open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (BadInput, OSError, UnicodeDecodeError, csv.Error) as error:
+        missing.append(f"the table {stated['recordings']} cannot be read ({error})")
+        return []
+    absent = [name for name in COLUMNS if not rows or name not in rows[0]]
+    if absent:
+        missing.append(f"the table {stated['recordings']} has no column {', '.join(absent)}")
+        return []
+    for number, row in enumerate(rows, 2):
+        for name in COLUMNS[1:]:
+            if not _is_number(row[name]):
+                missing.append(
+                    f"line {number} of {stated['recordings']}: {name} must be a number, got {row[name]!r}"
+                )
+                return []
+    return rows
+
+
+def _is_number(text: str | None) -> bool:
+    try:
+        return float(text or "") < float("inf")
+    except ValueError:
+        return False
+
+
+def _of_steps(rows: list[dict[str, str]]) -> Iterator[str]:
+    """Too few steps of load and speed, and nothing repeated."""
+    if not rows:
+        return
+    for name in ("load_n", "speed_m_s"):
+        steps = {float(row[name]) for row in rows}
+        if len(steps) < LEAST_STEPS:
+            yield f"{name} has {len(steps)} steps where {LEAST_STEPS} are asked for"
+    if max(Counter((float(row["load_n"]), float(row["speed_m_s"])) for row in rows).values()) < 2:
+        yield "no load and speed were recorded twice"
+
+
+def _of_recordings(folder: Path, rows: list[dict[str, str]], case: Case | None) -> Iterator[str]:
+    """Files that are not there, cannot be read or used, are too slow or too short, or are no accelerations."""
+    for row in rows:
+        try:
+            path = _inside(folder, row["file"])
+        except BadInput as error:
+            yield str(error)
+            continue
+        checks = check_recordings([path], case=case)
+        yield from (reason for _, reason in checks.refused)
+        for recording, quality in checks.checked:
+            if recording.rate_hz < LEAST_RATE:
+                yield f"{row['file']}: sampled at {recording.rate_hz:g} Hz where {LEAST_RATE:g} are asked for"
+            if quality.duration_s < LEAST_S:
+                yield f"{row['file']}: {quality.duration_s:.3g} s long where {LEAST_S:g} are asked for"
+            if not recording.comparable:
+                yield f"{row['file']}: no acceleration (unit {recording.unit or 'not stated'})"
+            yield from (f"{row['file']}: {fault}" for fault in quality.faults)
+
+
+def _of_map(folder: Path, name: str, case: Case | None) -> Iterator[str]:
+    """A map that cannot be read, is a profile, too coarse or too small for the contact."""
+    try:
+        measured = read_surface(_inside(folder, name))
+    except BadInput as error:
+        yield str(error)
+        return
+    if measured.uniform is not None:
+        yield f"{name} is a profile; an areal map is asked for"
+    if case is None:
+        return
+    width = 2.0 * case.conditions.hertz.half_widths[0]
+    pixel, size = max(measured.grid.spacing), min(measured.grid.extent)
+    if pixel > width / PIXELS:
+        yield f"{name}: pixels of {1e6 * pixel:.3g} um, coarser than a tenth of the contact's {1e6 * width:.3g} um"
+    if size < width:
+        yield f"{name}: {1e6 * size:.3g} um wide, less than the contact's {1e6 * width:.3g} um"

@@ -1,0 +1,183 @@
+"""NumPy's .npy and .npz: rows of samples, rate and unit as scalars beside them in the .npz."""
+
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, BinaryIO, TypeAlias
+
+import numpy as np
+
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.third_party import first_line
+from asperity.recording.model import Channel, Contents
+from asperity.recording.reader import MOST_CHANNELS, REMEDY, columns, facts_in, refused_as
+
+_SMALL = 64  # samples: what is shorter describes the others
+_LARGEST_HEADER = 1 << 16
+Header: TypeAlias = tuple[
+    tuple[int, ...], bool, np.dtype[Any]
+]  # shape, whether in Fortran's order, type
+
+
+def is_npy(head: bytes) -> bool:
+    """Whether a file is one array."""
+    return head.startswith(b"\x93NUMPY")
+
+
+def is_npz(head: bytes) -> bool:
+    """Whether a file is an archive, as .npz is."""
+    return head.startswith(b"PK\x03\x04")
+
+
+def read_npy(path: Path) -> Contents:
+    """One row, several along the longer axis, or the fields of a structured array."""
+    notes: list[str] = []
+    with refused_as(path, "no readable .npy file"):
+        with path.open("rb") as file:
+            shape, fortran, dtype = _header(file)
+            offset = file.tell()
+        there = max(path.stat().st_size - offset, 0) // dtype.itemsize
+        if there < int(np.prod(shape, dtype=object)):
+            rows = there // max(1, int(np.prod(shape[1:], dtype=object)))
+            if fortran or rows < 2:
+                raise UnreadableFile(f"{path.name} is cut short; {REMEDY}")
+            notes.append(f"cut short: {rows} of {shape[0]} samples are there")
+            shape = (rows, *shape[1:])
+    array = _Stored(path, dtype, offset, shape, fortran)
+    return Contents(format="npy", channels=list(_of_array(path, array, notes)), notes=notes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """An array in a file, mapped for each slice anew: pages that stay mapped would count as memory."""
+
+    path: Path
+    dtype: np.dtype[Any]
+    offset: int
+    shape: tuple[int, ...]
+    fortran: bool
+    name: str | None = None  # of a field
+
+    def __getitem__(self, where: Any) -> Any:
+        mapped = np.memmap(
+            self.path, self.dtype, "r", self.offset, self.shape, "F" if self.fortran else "C"
+        )
+        return np.array(mapped[where] if self.name is None else mapped[self.name][where])
+
+
+def _of_array(path: Path, array: _Stored, notes: list[str]) -> Iterator[Channel]:
+    if array.dtype.names:
+        for name in array.dtype.names:
+            if (
+                array.dtype[name].kind in "iuf"
+                and len(array.shape) == 1
+                and not array.dtype[name].shape
+            ):
+                yield from columns(name, replace(array, name=name), notes)
+    elif array.dtype.kind in "iuf":
+        yield from columns(path.stem, array, notes)
+
+
+def read_npz(path: Path) -> Contents:
+    """Each array is a channel or several; scalars named fs, dt, unit ... tell about them."""
+    notes: list[str] = []
+    around: dict[str, Any] = {}
+    arrays: list[tuple[str, Header]] = []
+    with refused_as(path, "no readable .npz file"), zipfile.ZipFile(path) as archive:
+        for member in archive.namelist():
+            if not member.endswith(".npy"):
+                continue
+            with archive.open(member) as file:
+                shape, fortran, dtype = _header(file)
+                count = int(np.prod(shape, dtype=object))
+                name = member.removesuffix(".npy")
+                if count <= _SMALL and dtype.kind in "iufUSM":
+                    data = file.read(count * dtype.itemsize)
+                    around[name] = np.frombuffer(data, dtype, count).reshape(shape)
+                elif dtype.kind in "iuf":
+                    arrays.append((member, (shape, fortran, dtype)))
+    facts = facts_in(
+        path.name,
+        {key: value.item() if value.size == 1 else value for key, value in around.items()},
+    )
+    channels = [
+        replace(channel, **facts)
+        for member, header in arrays
+        for channel in _of_member(path, member, header, notes)
+    ]
+    return Contents(format="npz", channels=channels, notes=notes)
+
+
+def _of_member(path: Path, member: str, header: Header, notes: list[str]) -> Iterator[Channel]:
+    """A member of the archive, unpacked piece by piece: it cannot be sliced."""
+    shape, fortran, dtype = header
+    name = member.removesuffix(".npy")
+    long = [n for n in shape if n != 1]
+    if len(long) > 2 or not long:
+        return
+    samples, count = max(long), min(long) if len(long) == 2 else 1
+    rows_last = (len(long) == 2) and (
+        (long[0] == samples) == fortran
+    )  # each channel lies in one piece
+    if count > MOST_CHANNELS:
+        raise UnreadableFile(
+            f"{path.name} holds {name} of {shape}: no recording; give one row a channel"
+        )
+    for k in range(count):
+        first, stride = (k * samples, 1) if rows_last else (k, count)
+        blocks = partial(_unpacked, path, member, dtype, (first, stride, samples), notes)
+        yield Channel(
+            name=name if count == 1 else f"{name}[{k + 1}]", blocks=blocks, samples=samples
+        )
+
+
+def _unpacked(
+    path: Path,
+    member: str,
+    dtype: np.dtype[Any],
+    where: tuple[int, int, int],
+    notes: list[str],
+    size: int,
+) -> Iterator[Field]:
+    first, stride, samples = where
+    done = 0
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(member) as file:
+            _header(file)
+            left = (first if stride == 1 else 0) * dtype.itemsize
+            while left > 0:
+                left -= len(file.read(min(left, 1 << 20))) or left
+            while done < samples:
+                wanted = min(size, samples - done) * stride * dtype.itemsize
+                data = file.read(wanted)
+                whole = len(data) // (stride * dtype.itemsize)
+                if whole == 0:
+                    break
+                values = np.frombuffer(data, dtype, whole * stride)
+                done += whole
+                yield (values if stride == 1 else values[first::stride]).astype(np.float64)
+    except (zipfile.BadZipFile, OSError, ValueError, EOFError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        if done == 0:
+            raise UnreadableFile(
+                f"{path.name} cannot be unpacked ({first_line(error)}); {REMEDY}"
+            ) from error
+    if done < samples:
+        notes.append(f"damaged after sample {done} of {samples}; what comes before was read")
+
+
+def _header(file: BinaryIO | Any) -> Header:
+    version = np.lib.format.read_magic(file)
+    read = (
+        np.lib.format.read_array_header_1_0
+        if version == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
+    shape, fortran, dtype = read(file, max_header_size=_LARGEST_HEADER)
+    if dtype.hasobject:
+        raise ValueError("it holds Python objects")
+    if any(n < 0 for n in shape) or dtype.itemsize == 0:
+        raise ValueError(f"its shape is {shape}")
+    return shape, fortran, dtype

@@ -1,0 +1,212 @@
+"""What several formats share: finding rate, unit and start among named values, and arrays as channels."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.core.arrays import Field
+from asperity.core.errors import UnreadableFile
+from asperity.core.third_party import first_line
+from asperity.recording.model import Channel
+from asperity.recording.units import RATE_NAMES, START_NAMES, STEP_NAMES, UNIT_NAMES, stated
+
+MOST_CHANNELS = 512  # more columns than that are a matrix, or a damaged file's
+REMEDY = "copy or export it again"
+
+
+@contextmanager
+def refused_as(path: Path, what: str) -> Iterator[None]:
+    """Refuse a file of which a library complains, saying `what` it is: no readable HDF5 file, for one."""
+    try:
+        yield
+    except UnreadableFile:
+        raise
+    except Exception as error:
+        raise UnreadableFile(f"{path.name} is {what} ({first_line(error)}); {REMEDY}") from error
+
+
+def facts_in(name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """`rate_hz`, `rate_source`, `unit`, `started` of a channel, as far as named values state them.
+
+    Raises
+    ------
+    UnreadableFile
+        for several rates that differ, or one that is no rate.
+    """
+    rates: dict[str, float] = {}
+    for key, value in stated(attributes.items(), RATE_NAMES | STEP_NAMES):
+        number = _number(value)
+        if number is None:
+            continue
+        if not 0.0 < number < 1e12:
+            raise UnreadableFile(
+                f"{name} states {key} = {number:g}, which is no sampling rate or step; {REMEDY}"
+            )
+        rates[key] = number if stated([(key, value)], RATE_NAMES) else 1.0 / number
+    facts: dict[str, Any] = {}
+    if rates:
+        key, rate = next(iter(rates.items()))
+        other = next((k for k, r in rates.items() if abs(r / rate - 1.0) > 1e-4), None)
+        if other is not None:
+            raise UnreadableFile(
+                f"{name} states two sampling rates, {key} and {other}; give it without one of them"
+            )
+        facts |= {"rate_hz": whole_rate(rate, 1e-9), "rate_source": f"file ({key})"}
+    for _, value in stated(attributes.items(), UNIT_NAMES):
+        text = _text(value)
+        if text:
+            facts["unit"] = text
+    for _, value in stated(attributes.items(), START_NAMES):
+        started = parse_time(value)
+        if started is not None:
+            facts["started"] = started
+    return facts
+
+
+def whole_rate(rate: float, rounding: float) -> float:
+    """The whole number of hertz, where just one lies within the relative `rounding` of what the file printed."""
+    whole = float(round(rate))
+    return whole if whole > 0.0 and abs(whole / rate - 1.0) <= rounding < 0.5 / rate else rate
+
+
+def parse_time(value: Any) -> datetime | None:
+    """A time as files write it, in UTC where it states its zone; None for what is none."""
+    if isinstance(value, datetime):
+        return _in_utc(value)
+    if isinstance(value, np.datetime64):
+        seconds = value.astype("datetime64[us]").astype(object)
+        return seconds if isinstance(seconds, datetime) else None
+    text = (_text(value) or "").strip()
+    for form in _TIMES:
+        try:
+            return datetime.strptime(text, form)
+        except ValueError:
+            continue
+    try:
+        return _in_utc(datetime.fromisoformat(text))
+    except (ValueError, OverflowError):
+        return None
+
+
+def _in_utc(time: datetime) -> datetime:
+    """Without its zone: across a change of clocks local times stand still or jump."""
+    return time if time.tzinfo is None else time.astimezone(UTC).replace(tzinfo=None)
+
+
+_TIMES = (
+    "%Y.%m.%d.%H.%M.%S",  # IMS file names
+    "%H:%M:%S.%f %d %b %Y",  # CETR
+    "%H:%M:%S %d %b %Y",
+    "%d %b %Y %H:%M:%S",
+    "%d-%b-%y %H:%M:%S",  # UFF
+    "%d-%b-%Y %H:%M:%S",
+    "%d.%m.%Y %H:%M:%S",
+    "%d.%m.%Y %H:%M:%S.%f",
+    "%d.%m.%Y %H:%M:%S,%f",
+    "%d.%m.%Y %H:%M",
+    "%d.%m.%y %H:%M:%S",
+    "%m/%d/%Y %I:%M:%S %p",  # who writes AM and PM writes the month first
+    "%m/%d/%Y %I:%M:%S.%f %p",
+    "%m/%d/%Y %I:%M %p",
+    "%Y/%m/%d %H:%M:%S.%f",
+    "%Y/%m/%d %H:%M:%S",
+)
+
+
+def _number(value: Any) -> float | None:
+    try:
+        array = np.asarray(value.decode() if isinstance(value, bytes) else value)
+        return float(array.reshape(-1)[0]) if array.size == 1 else None
+    except (TypeError, ValueError, UnicodeDecodeError):
+        return None
+
+
+def _text(value: Any) -> str | None:
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(-1)[0]
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", errors="replace")
+    return value.strip() if isinstance(value, str) and value.strip() else None
+
+
+Reader = Callable[[int, int], Any]  # first sample, one after the last -> those samples
+
+
+def sliced(
+    read: Reader, samples: int, notes: list[str], name: str
+) -> Callable[[int], Iterator[Field]]:
+    """Blocks of an array that can be sliced; what lies behind damage is left out, and noted."""
+
+    def blocks(size: int) -> Iterator[Field]:
+        for first in range(0, samples, size):
+            try:
+                block = np.asarray(
+                    read(first, min(first + size, samples)), dtype=np.float64
+                ).reshape(-1)
+            except Exception as error:
+                if first == 0:
+                    raise UnreadableFile(
+                        f"{name} cannot be read ({first_line(error)}); {REMEDY}"
+                    ) from error
+                notes.append(
+                    f"damaged after sample {first} of {samples}; what comes before was read"
+                )
+                return
+            yield block
+            if block.size == 0:
+                return
+
+    return blocks
+
+
+def columns(
+    name: str, array: Any, notes: list[str], *, labels: list[str] | None = None, **facts: Any
+) -> Iterator[Channel]:
+    """The channels of an array that can be sliced: one row, or several along its shorter axis.
+
+    Raises
+    ------
+    UnreadableFile
+        for more than two axes, or too many channels.
+    """
+    shape = tuple(int(n) for n in array.shape if n != 1) or (int(np.prod(array.shape)),)
+    if len(shape) > 2 or 0 in shape:
+        return
+    along = int(np.argmax(array.shape))
+    if len(shape) == 1:
+
+        def read(i: int, j: int) -> Any:
+            return array[
+                tuple(slice(i, j) if axis == along else 0 for axis in range(len(array.shape)))
+            ]
+
+        yield Channel(
+            name=name, blocks=sliced(read, shape[0], notes, name), samples=shape[0], **facts
+        )
+        return
+    count = min(shape)
+    if count > MOST_CHANNELS or len(array.shape) != 2:
+        raise UnreadableFile(
+            f"{name} is an array of {shape[0]} x {shape[1]}: no recording; give one row a channel"
+        )
+    for k in range(count):
+        label = labels[k] if labels and len(labels) == count else f"{name}[{k + 1}]"
+
+        def read_one(i: int, j: int, k: int = k) -> Any:
+            return array[i:j, k] if along == 0 else array[k, i:j]
+
+        yield Channel(
+            name=label,
+            blocks=sliced(read_one, max(shape), notes, label),
+            samples=max(shape),
+            **facts,
+        )
+
+
+def numeric(array: Any) -> bool:
+    """Whether an array holds real numbers."""
+    return getattr(getattr(array, "dtype", None), "kind", "?") in "iuf"

@@ -1,0 +1,272 @@
+"""Exhibits of a wear history: curves over hours, both bodies' surfaces before and after, CRF beside the paper's."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.core.arrays import Field
+from asperity.core.quantities import quantity
+from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM
+from asperity.report.base import Exhibit
+from asperity.report.drawing import display, legend_below, name_axes, panels_in_rows
+from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium
+from asperity.simulation import WearHistory
+from asperity.surface import Surface, bearing_curve
+
+COLOURS = (BLUE, VERMILION, GREEN)
+STROKES = ("-", "--", ":")
+PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # over hours: the axis, and its curves
+    ("sq_m", ("sq_m", "sq_1_m", "sq_2_m")),
+    ("sk_m", ("sk_m", "spk_m", "svk_m")),
+    ("ssk", ("ssk",)),
+    ("sku", ("sku",)),
+    ("share", ("clr", "car")),
+    ("film_thickness_m", ("h_mean_m", "h_central_m")),
+    ("friction_coefficient", ("friction_coefficient",)),
+    ("flash_temperature_max_k", ("flash_temperature_max_k",)),
+    ("worn_depth_m", ("worn_depth_1_m", "worn_depth_2_m")),
+    ("crfa", ("crfa",)),
+)
+NAMES = ("First body", "Second body")
+
+
+class Worn(NamedTuple):
+    """A body's track before and after, and which body it is."""
+
+    name: str
+    before: Surface
+    after: Surface
+
+
+def worn_bodies(history: WearHistory) -> tuple[Worn, ...]:
+    """The bodies that were rough, or have lost anything."""
+    before, after = history.before, history.after
+    pairs = ((before.first, after.first), (before.second, after.second))
+    return tuple(
+        Worn(name, *pair)
+        for name, pair in zip(NAMES, pairs, strict=True)
+        if any(np.ptp(one.heights) for one in pair)
+    )
+
+
+def curves(history: WearHistory) -> Exhibit:
+    """Roughness, shares, film, friction, heat, worn depth and CRFA over hours, with their intervals."""
+    table = history.table
+    panels = [panel for panel in PANELS if bool(table[panel[1][0]].notna().any())]
+
+    def draw(medium: Medium) -> Figure:
+        rows = -(-len(panels) // 2)
+        figure = Figure(figsize=(medium.double, 2.3 * rows), layout="constrained")
+        for number, (side, keys) in enumerate(panels, 1):
+            axes = figure.add_subplot(rows, 2, number)
+            for key, colour, stroke in zip(keys, COLOURS, STROKES, strict=False):
+                if key != keys[0] and not np.any(table[key].to_numpy(float)):
+                    continue  # of a body that is smooth
+                _draw_over_hours(axes, history, key, colour, stroke)
+            if len(axes.get_lines()) > 1:
+                low, high = axes.get_ylim()
+                axes.set_ylim(low, high + 0.25 * (high - low))  # room for the key
+                axes.legend(loc="upper right", ncols=3)
+            axes.set_ylabel(quantity(side).label)
+            axes.set_xlabel(quantity("hours").axis)
+        return figure
+
+    by_k = " Lightly shaded: the interval of the wear coefficient; it ends where the history would have to be longer."
+    return Exhibit(
+        "over-hours",
+        draw,
+        "Over hours of running, a point a jump. Shaded about CLR: 90 % of its mean over a jump's positions."
+        + (by_k if history.scaled_by is not None else ""),
+        "Roughness parameters, load and area shares, film, friction, flash temperature, worn depth and CRFA over hours",
+    )
+
+
+def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, stroke: str) -> None:
+    hours, factor = history.table["hours"].to_numpy(float), quantity(key).factor
+    label = quantity(key).short if quantity(key).symbol else quantity(key).title
+    axes.plot(hours, factor * history.table[key].to_numpy(float), stroke, color=colour, label=label)
+    if key == "clr":
+        low, high = (
+            factor * history.table[end].to_numpy(float) for end in ("clr_mean_low", "clr_mean_high")
+        )
+        axes.fill_between(hours, low, high, color=colour, alpha=0.3, linewidth=0)
+    band = history.with_k(key)
+    if band is not None:
+        axes.fill_between(
+            hours,
+            factor * band["low"],
+            factor * band["high"],
+            color=colour,
+            alpha=0.12,
+            linewidth=0,
+        )
+    axes.set_xlim(0.0, hours[-1])
+
+
+def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
+    """CRF over hours and over Sq; of the paper's contact, what the paper prints beside it."""
+
+    def draw(medium: Medium) -> Figure:
+        table = history.table
+        figure = Figure(figsize=(medium.double, 3.2), layout="constrained")
+        left, right = panels_in_rows(figure, 2)
+        hours, sq = table["hours"].to_numpy(float), display("sq_m", table["sq_m"].to_numpy(float))
+        crf, low, high = (
+            table[key].to_numpy(float) for key in ("crf_hz", "crf_low_hz", "crf_high_hz")
+        )
+        least, most = (
+            table[key].to_numpy(float) for key in ("crf_mean_low_hz", "crf_mean_high_hz")
+        )
+        for axes, x, key in ((left, hours, "hours"), (right, sq, "sq_m")):
+            axes.fill_between(
+                x,
+                least,
+                most,
+                color=BLUE,
+                alpha=0.3,
+                linewidth=0,
+                label="90 % of the mean over positions",
+            )
+            if np.isfinite(low).any():
+                axes.fill_between(
+                    x,
+                    low,
+                    high,
+                    color=BLUE,
+                    alpha=0.1,
+                    linewidth=0,
+                    label="90 % with scatter and grid",
+                )
+            axes.plot(x, crf, color=BLUE, label="this contact")
+            axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
+        right.plot(sq[:1], crf[:1], "o", color=BLUE, markersize=4, label="new")
+        stages = history.stages
+        if stages is not None and stages.found:
+            left.axvspan(
+                *stages.interval, color=GREY, alpha=0.2, linewidth=0, label="break of stages"
+            )
+            left.axvline(stages.split, color=GREY)
+        if papers:
+            ends = SAMPLES_SQ_UM[0], SAMPLES_SQ_UM[-1]
+            right.plot(
+                ends,
+                CRF_ENDS_HZ,
+                "D",
+                color=VERMILION,
+                markersize=4.5,
+                label="printed: first and last ring",
+            )
+            for end in CRF_ENDS_HZ:
+                left.axhline(end, color=VERMILION, linestyle=DASHED, linewidth=0.9)
+            rings = right.get_ylim()[0]
+            right.plot(
+                SAMPLES_SQ_UM,
+                np.full(len(SAMPLES_SQ_UM), rings),
+                "|",
+                color=VERMILION,
+                label="Sq of the rings",
+            )
+        handles, names = [], []
+        for axes in (left, right):
+            for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+                if name not in names:
+                    handles.append(handle)
+                    names.append(name)
+        legend_below(figure, 3, handles=handles, labels=names)
+        return figure
+
+    beside = (
+        " Red: what the paper prints, the CRF of its smoothest and roughest ring (Figure 8 draws the others without "
+        "numbers) and the Sq of its twelve rings; 0.54 µm is new, 0.87 µm has run for ten hours."
+        if papers
+        else ""
+    )
+    return Exhibit(
+        "resonance",
+        draw,
+        "Contact resonance of the mean contact, by the case's coupling, over hours and over the roughness of both "
+        f"bodies.{beside}",
+        "CRF over hours and over Sq",
+    )
+
+
+def surfaces(body: Worn) -> Exhibit:
+    """Maps of a body's track before and after, and what it has lost."""
+
+    def draw(medium: Medium) -> Figure:
+        grid = body.before.grid
+        figure = Figure(figsize=(medium.double, 3.3), layout="constrained")
+        panels = panels_in_rows(figure, 3, sharey=True)
+        height = quantity("height_m")
+        lost = body.before.heights - body.after.heights
+        shown_after = body.after.heights + lost.mean()
+        both = np.stack([body.before.heights, shown_after])
+        reach = height.factor * float(np.percentile(np.abs(both), 99.5)) or 1.0
+        extent = (0.0, display("surface_x_m", grid.extent[0]), 0.0, display("y_m", grid.extent[1]))
+        shown: list[tuple[str, Field, dict[str, Any]]] = [
+            ("new", body.before.heights, {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
+            ("after", shown_after, {"cmap": "cividis", "vmin": -reach, "vmax": reach}),
+            (
+                "lost",
+                lost,
+                {"cmap": "inferno", "vmin": min(0.0, height.factor * float(lost.min()))},
+            ),
+        ]
+        for axes, (name, heights, style) in zip(panels, shown, strict=True):
+            image = axes.imshow(
+                height.factor * heights.T,
+                origin="lower",
+                extent=extent,
+                aspect="auto",
+                interpolation="none",
+                **style,
+            )
+            axes.set(title=f"{body.name}, {name}", xlabel=quantity("surface_x_m").axis)
+            if name != "new":
+                title = quantity("worn_depth_m").label if name == "lost" else height.label
+                figure.colorbar(image, ax=axes, label=title, extend="both")
+        panels[0].set_ylabel(quantity("y_m").axis)
+        return figure
+
+    return Exhibit(
+        f"surface-{body.name.split()[0].lower()}",
+        draw,
+        f"{body.name}: its track new and after, in the same colours and each about its own mean, and what it has lost.",
+        f"Maps of the {body.name.lower()}'s heights before and after, and of the depth lost",
+    )
+
+
+def profiles(bodies: Sequence[Worn]) -> Exhibit:
+    """A profile along rolling through the middle, and the bearing curve, of each body before and after."""
+
+    def draw(medium: Medium) -> Figure:
+        figure = Figure(figsize=(medium.double, 2.7 * len(bodies) + 0.3), layout="constrained")
+        places = figure.subplots(len(bodies), 2, squeeze=False, width_ratios=(2, 1))
+        for (along, curve), body in zip(places, bodies, strict=True):
+            x = display("surface_x_m", body.before.grid.x - body.before.grid.lower[0])
+            for name, surface, colour in (("new", body.before, GREY), ("after", body.after, BLUE)):
+                row = display("height_m", surface.heights[:, surface.heights.shape[1] // 2])
+                along.plot(x, row, color=colour, linewidth=1.0, label=name)
+                bearing = bearing_curve(surface.heights)
+                curve.plot(
+                    display("material_ratio", bearing.share),
+                    display("height_m", bearing.height),
+                    color=colour,
+                )
+            name_axes(along, "surface_x_m", "height_m", title=f"{body.name}: profile along rolling")
+            along.set_xlim(0.0, float(x[-1]))
+            name_axes(curve, "material_ratio", "height_m", title="Bearing curve")
+            curve.set_xlim(0.0, 100.0)
+        legend_below(figure, 2, handles=places[0][0].get_lines())
+        return figure
+
+    return Exhibit(
+        "profiles",
+        draw,
+        "Profiles through the middle of each track, from its first mean line, and the bearing curves of all heights, "
+        "each about its own mean.",
+        "Profiles and bearing curves of both bodies before and after",
+    )

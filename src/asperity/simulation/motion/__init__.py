@@ -1,0 +1,1 @@
+"""Roughness moving through the contact, step by step."""

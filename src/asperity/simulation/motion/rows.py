@@ -1,0 +1,103 @@
+"""A step of a history as a row: what is read off the contact, by the keys of the catalogue."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.case import Case
+from asperity.core.errors import BadInput
+from asperity.core.quantities import quantity, read
+from asperity.coupling import oscillator
+from asperity.ehl import ContactSolution, ContactState
+from asperity.solution import Friction, friction
+from asperity.transient import Snapshot
+
+Row = dict[str, float | int | bool]
+
+STATE = (
+    "car",
+    "car_domain",
+    "clr",
+    "capped_oil_load_ratio",
+    "sq_m",
+    "h_min_m",
+    "h_central_m",
+    "h_mean_m",
+    "p_max_pa",
+    "reynolds_residual",
+    "load_error",
+    "mass_flux_imbalance",
+)
+COLUMNS = (
+    "time_s",
+    *STATE,
+    "contact_force_n",
+    "friction_coefficient",
+    "friction_asperity_part",
+    "friction_oil_part",
+    "friction_power_w",
+    "flow_power_w",
+    "heat_j",
+    "elastic_energy_j",
+    "rigid_approach_m",
+    "resonance_hz",
+    "track_sq_m",
+    "flattened_m",
+    "newton_steps",
+    "converged",
+)
+WARMING = ("friction_power_w", "flow_power_w")
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """What the catalogue's sources name of a step."""
+
+    snapshot: Snapshot
+    case: Case
+    friction: Friction
+
+    @property
+    def solution(self) -> ContactSolution:
+        return self.snapshot.solution
+
+    @property
+    def state(self) -> ContactState:
+        return self.snapshot.state
+
+    @property
+    def contact_force(self) -> float:
+        return self.state.clr * self.case.conditions.load
+
+    @property
+    def resonance_hz(self) -> float:
+        model = self.case.vibration
+        if model is None or model.needs_solution:
+            return math.nan
+        try:
+            return oscillator(self.state, self.case.conditions, model).natural_frequency_hz
+        except BadInput:  # nothing touches: there is no spring
+            return math.nan
+
+
+def step_row(snapshot: Snapshot, case: Case, before: Row | None) -> Row:
+    """The line of the table; equal steps give equal lines, so what computing took is not in it."""
+    rubbing = friction(
+        snapshot.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
+    )
+    numbers = read(_Step(snapshot, case, rubbing), map(quantity, COLUMNS))
+    numbers["heat_j"] = 0.0
+    row: Row = {"step": snapshot.number}
+    row |= {key: math.nan if numbers[key] is None else numbers[key] for key in COLUMNS}
+    if before is not None:
+        warming = sum(float(end[key]) for end in (before, row) for key in WARMING)
+        row["heat_j"] = before["heat_j"] + 0.5 * warming * (snapshot.time - before["time_s"])
+    return row
+
+
+def mean_state(means: Any) -> ContactState:
+    """A contact state of a row of means; it has no lambda ratio."""
+    fields: dict[str, Any] = {
+        quantity(key).source.removeprefix("state."): float(means[key]) for key in STATE
+    }
+    return ContactState(**fields, lambda_ratio=None)

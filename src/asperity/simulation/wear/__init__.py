@@ -1,0 +1,1 @@
+"""Wear of a contact over hours, jump by jump."""

@@ -1,0 +1,174 @@
+"""A moment of a wearing contact as a row: roughness of both bodies, what they have lost, and the contact over it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import scipy
+
+from asperity.case import Case
+from asperity.core.errors import BadInput
+from asperity.coupling import excitation, oscillator, resonance_at
+from asperity.ehl import ContactState, Sides, Uncertainty
+from asperity.results import one_surface
+from asperity.simulation.wear.contact import Solved
+from asperity.surface import Surface, height_parameters
+
+Row = dict[str, float | int]
+
+LEVEL = 0.95  # of Student's distribution: 90 % lie between both of its ends
+RESONANCE = {  # end of an interval of CRF: that of CLR
+    "crf_low_hz": "clr_low",
+    "crf_high_hz": "clr_high",
+    "crf_mean_low_hz": "clr_mean_low",
+    "crf_mean_high_hz": "clr_mean_high",
+}
+LEAST_SQ = 1e-15  # [m] below which heights are rounding, and have no shape
+
+ROUGHNESS = {  # column: field of HeightParameters
+    "sq_m": "sq",
+    "sa_m": "sa",
+    "ssk": "ssk",
+    "sku": "sku",
+    "sk_m": "sk",
+    "spk_m": "spk",
+    "svk_m": "svk",
+}
+STATE = {  # field of ContactState: its column
+    "clr": "clr",
+    "car": "car",
+    "car_domain": "car_domain",
+    "capped_oil_load_ratio": "capped_oil_load_ratio",
+    "h_min": "h_min_m",
+    "h_central": "h_central_m",
+    "h_mean": "h_mean_m",
+    "p_max": "p_max_pa",
+    "contact_slope": "contact_slope",
+    "sq": "sq_m",
+}
+
+
+def of_body(key: str, body: int) -> str:
+    """The column of one body's number: `sq_1_m` of `sq_m`."""
+    stem, mark, unit = key.rpartition("_")
+    return f"{stem}_{body + 1}_{unit}" if mark and unit in ("m", "m3") else f"{key}_{body + 1}"
+
+
+def roughness(surfaces: tuple[Surface, Surface]) -> Row:
+    """Sq, Sa, Ssk, Sku, Sk, Spk and Svk of each body, and of both as they lie on one another at first.
+
+    Where one has less of a track, as it stands still, it is repeated along the other's. What is
+    smooth to rounding has no skewness.
+    """
+    first, second = surfaces
+    longer = max(surfaces, key=lambda surface: surface.grid.cells[0]).grid
+    both = Surface(
+        np.resize(first.heights, longer.cells) + np.resize(second.heights, longer.cells)[:, ::-1],
+        longer,
+    )
+    row: Row = {}
+    for surface, name in ((first, 0), (second, 1), (both, None)):
+        parameters = height_parameters(surface)
+        rough = parameters.sq > LEAST_SQ
+        for key, field in ROUGHNESS.items():
+            known = rough or key not in ("ssk", "sku")
+            row[key if name is None else of_body(key, name)] = (
+                float(getattr(parameters, field)) if known else math.nan
+            )
+    return row
+
+
+def load_share(solved: Sequence[Solved]) -> Uncertainty:
+    """CLR over the positions: the cells' part, and how far a further position's may lie from the mean."""
+    shares = [one.state.clr for one in solved]
+    own = [one.state.error.clr for one in solved if one.state.error is not None]
+
+    def mean(sides: list[Sides | None]) -> Sides | None:
+        known = [both for both in sides if both is not None]
+        below, above = (
+            np.mean(known, axis=0) if known and len(known) == len(sides) else (math.nan, math.nan)
+        )
+        return None if math.isnan(below) else (float(below), float(above))
+
+    value, scatter = (shares[0], None) if len(shares) < 2 else one_surface(shares, share=True)
+    return Uncertainty(
+        value=float(np.mean(shares)) if len(shares) > 1 else value,
+        iteration=mean([one.iteration for one in own]),
+        grid=mean([one.grid for one in own]),
+        surfaces=scatter,
+        range=(0.0, 1.0),
+    )
+
+
+def contact_row(case: Case, solved: Sequence[Solved], sq: float) -> Row:
+    """What the mean contact is like, with 90 % intervals of its load share and resonance: whole, and of the mean alone.
+
+    `sq` [m] is that of the tracks, the form that wear gave them left out.
+    """
+    share = load_share(solved)
+    low, high = share.interval or (math.nan, math.nan)
+    flashes = [one.flash_temperature for one in solved]
+    row: Row = {"sq_m": sq}
+    for name, key in STATE.items():
+        values = [value for one in solved if (value := getattr(one.state, name)) is not None]
+        if name != "sq":
+            row[key] = float(np.mean(values)) if values else math.nan
+    shares = [one.state.clr for one in solved]
+    off = float(np.std(shares, ddof=1)) / math.sqrt(len(shares)) if len(shares) > 1 else math.nan
+    reach = off * float(scipy.special.stdtrit(max(len(shares) - 1, 1), LEVEL))
+    of_mean = max(0.0, row["clr"] - reach), min(1.0, row["clr"] + reach)
+    row |= {
+        "clr_low": low,
+        "clr_high": high,
+        "clr_mean_low": of_mean[0] if len(shares) > 1 else math.nan,
+        "clr_mean_high": of_mean[1] if len(shares) > 1 else math.nan,
+        "friction_coefficient": float(np.mean([one.friction_coefficient for one in solved])),
+        "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
+    }
+    return row | _resonance(case, row, off)
+
+
+def _resonance(case: Case, row: Row, off: float) -> Row:
+    """Of the mean contact's oscillator, and the height of its line, in closed form; `off` of the mean CLR."""
+    nothing = dict.fromkeys(("crf_hz", "crf_std_hz", *RESONANCE, "crfa"), math.nan)
+    model, conditions, state = case.vibration, case.conditions, state_of_row(row)
+    if model is None or model.needs_solution:
+        return nothing
+    try:
+        spring = oscillator(state, conditions, model)
+        below = excitation(state, conditions, model)
+    except (
+        BadInput
+    ):  # nothing touches, or nothing is rough: there is no spring, or nothing that excites it
+        return nothing
+    own = np.array(spring.natural_frequency_hz)
+
+    def at(clr: float) -> float:
+        known = (
+            None
+            if math.isnan(clr)
+            else resonance_at(min(max(clr, 0.0), 1.0), state, conditions, model)
+        )
+        return math.nan if known is None else known
+
+    return {
+        "crf_hz": float(own),
+        "crf_std_hz": 0.5 * (at(state.clr + off) - at(state.clr - off)),
+        **{key: at(row[share]) for key, share in RESONANCE.items()},
+        "crfa": float(spring.gain(own) * below.density(own, model.rate_hz)),
+    }
+
+
+def state_of_row(row: Mapping[str, Any]) -> ContactState:
+    """The mean contact of a row, for what vibrates on it; how it was solved is not in it."""
+    known: dict[str, Any] = {name: float(row[key]) for name, key in STATE.items()}
+    slope = known.pop("contact_slope")
+    return ContactState(
+        **known,
+        lambda_ratio=None,
+        reynolds_residual=0.0,
+        load_error=0.0,
+        mass_flux_imbalance=0.0,
+        contact_slope=None if math.isnan(slope) else slope,
+    )

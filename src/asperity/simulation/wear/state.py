@@ -1,0 +1,97 @@
+"""What a wearing contact has come to between two jumps: all that the next one needs, and its way to and from arrays."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from asperity.core.arrays import Field
+from asperity.surface import MovingSurfaces
+from asperity.wear import State
+
+Arrays = dict[str, npt.NDArray[Any]]
+Both = tuple[Field, Field]
+FIELDS = ("worn", "flattened", "changed", "rates")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Worn:
+    """Both bodies' tracks at the beginning of a jump; maps in each body's own frame [m].
+
+    `number` of the jump and its `time` [s]; `worn` what the law of removal took off, `flattened`
+    what was pressed flat, `changed` what mechanisms added (or, negative, took). `booked` is what
+    `worn` must be of volume [m^3], k times asperity load times sliding distance; `mechanical` what
+    mechanisms took. `rates` [m/s] and `seconds` of the jump before, for the comparison of two
+    jumps with one; `error` of Sq, relative, that it has summed up to; `longest` [s] that
+    mechanisms let the next jump take. `facts` of the jump and `states` of mechanisms, by name and
+    body.
+    """
+
+    number: int = 0
+    time: float = 0.0
+    worn: Both
+    flattened: Both
+    changed: Both
+    rates: Both
+    seconds: float = 0.0
+    booked: tuple[float, float] = (0.0, 0.0)
+    mechanical: tuple[float, float] = (0.0, 0.0)
+    error: float = 0.0
+    longest: float = math.inf
+    facts: Mapping[str, float] = field(default_factory=dict)
+    states: Mapping[str, State] = field(default_factory=dict)
+
+    @classmethod
+    def begin(cls, surfaces: MovingSurfaces) -> "Worn":
+        """Nothing lost."""
+        nothing = (np.zeros(surfaces.first.grid.cells), np.zeros(surfaces.second.grid.cells))
+        return cls(worn=nothing, flattened=nothing, changed=nothing, rates=nothing)
+
+    def lowered(self, body: int) -> Field:
+        """How much lower a body's track is than at first [m]."""
+        return np.asarray(self.worn[body] + self.flattened[body] - self.changed[body])
+
+    def arrays(self) -> Arrays:
+        """As arrays by name."""
+        arrays: Arrays = {
+            f"{name}_{body}": getattr(self, name)[body] for name in FIELDS for body in (0, 1)
+        }
+        numbers = (
+            self.number,
+            self.time,
+            self.seconds,
+            self.error,
+            self.longest,
+            *self.booked,
+            *self.mechanical,
+        )
+        arrays["numbers"] = np.array(numbers)
+        for name, value in self.facts.items():
+            arrays[f"fact:{name}"] = np.array(value)
+        for name, state in self.states.items():
+            arrays |= {f"state:{name}:{key}": value for key, value in state.items()}
+        return arrays
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]]) -> "Worn":
+        """What `arrays` made."""
+        number, time, seconds, error, longest, *volumes = map(float, arrays["numbers"])
+        states: dict[str, dict[str, npt.NDArray[Any]]] = {}
+        for name, value in arrays.items():
+            if name.startswith("state:"):
+                mechanism, _, key = name.removeprefix("state:").partition(":")
+                states.setdefault(mechanism, {})[key] = value
+        facts = {
+            name.removeprefix("fact:"): float(value)
+            for name, value in arrays.items()
+            if name.startswith("fact:")
+        }
+        maps: dict[str, Any] = {name: (arrays[f"{name}_0"], arrays[f"{name}_1"]) for name in FIELDS}
+        begun = cls(
+            **maps, number=int(number), time=time, seconds=seconds, error=error, longest=longest
+        )
+        booked, mechanical = (volumes[0], volumes[1]), (volumes[2], volumes[3])
+        return replace(begun, booked=booked, mechanical=mechanical, facts=facts, states=states)

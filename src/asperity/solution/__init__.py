@@ -1,0 +1,5 @@
+"""Results of a solved contact: load shares, friction, temperature, stress, stiffness."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

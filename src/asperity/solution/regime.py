@@ -1,0 +1,199 @@
+"""The regime card: what kind of contact a solution is of, and how far its film is from the fits that hold there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.core.quantities import quantity
+from asperity.ehl import (
+    ContactSolution,
+    FilmNumbers,
+    Regime,
+    film_fits,
+    film_numbers,
+    flooded_inlet,
+    hertz_zone,
+    inlet_length,
+    least_film,
+    lubrication_regime,
+)
+from asperity.ehl.film_formulas import Place
+from asperity.ehl.grid_design import FEWEST_IN_INLET
+from asperity.ehl.load_shares import CENTRE
+
+_NUMBERS = {  # key in the catalogue -> field
+    "speed_number": "speed",
+    "load_number": "load",
+    "material_number": "material",
+    "moes_load": "moes_load",
+    "moes_oil": "moes_oil",
+}
+FAR = 0.25  # of a film from every fit of its kind; their authors claim 5 to 15 %
+PARTED = 3.0  # film ratio from which a rough contact's film is that of the smooth one
+
+
+@dataclass(frozen=True, slots=True)
+class FittedFilm:
+    """A film by a published fit and as solved [m], and what is solved over the fit, less 1.
+
+    Where the fit is about an oil that cannot be compressed, `solved` is what the film would be at
+    ambient density.
+    """
+
+    source: str
+    place: Place
+    film: float
+    solved: float
+
+    @property
+    def deviation(self) -> float:
+        """How much thicker the solved film is, as a share of the fit's."""
+        return self.solved / self.film - 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegimeCard:
+    """What kind of contact it is.
+
+    Half-widths a and b [m] (a alone for a line contact), Hertz's largest pressure [Pa], E' [Pa],
+    the dimensionless numbers, the regime, and the fits that hold there; the last three None and
+    empty for a dry contact. `fits` is empty too for a contact narrower across rolling than along
+    it, which none of them is about.
+    """
+
+    half_width: float
+    half_width_across: float | None
+    hertz_pressure: float
+    effective_modulus: float
+    numbers: FilmNumbers | None
+    regime: Regime | None
+    fits: tuple[FittedFilm, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it, SI, by the catalogue's keys; None where there is none."""
+        return {
+            "half_width_m": self.half_width,
+            "half_width_across_m": self.half_width_across,
+            "hertz_pressure_pa": self.hertz_pressure,
+            "effective_modulus_pa": self.effective_modulus,
+            **{
+                key: None if self.numbers is None else getattr(self.numbers, name)
+                for key, name in _NUMBERS.items()
+            },
+            "regime": self.regime,
+            "fits": [
+                {
+                    "source": fit.source,
+                    "place": fit.place,
+                    "film_m": fit.film,
+                    "solved_m": fit.solved,
+                    "film_deviation": fit.deviation,
+                }
+                for fit in self.fits
+            ],
+        }
+
+    def rows(self) -> list[tuple[str, str]]:
+        """What kind of contact, Hertz's zone, the numbers, and the films by fit, each named and in display units."""
+        shown = self.to_dict()
+        pair = [quantity("half_width_m").named(self.half_width)]
+        if self.half_width_across is not None:
+            pair.append(f"across rolling {quantity('half_width_m').text(self.half_width_across)}")
+        hertz = [
+            *pair,
+            *(
+                quantity(key).named(shown[key])
+                for key in ("hertz_pressure_pa", "effective_modulus_pa")
+            ),
+        ]
+        rows = [("Hertz zone", ", ".join(hertz))]
+        if self.numbers is None:
+            return rows
+        numbers = ", ".join(quantity(key).named(shown[key]) for key in _NUMBERS)
+        rows += [("regime", str(self.regime)), ("dimensionless numbers", numbers)]
+        film, deviation = quantity("film_thickness_m"), quantity("film_deviation")
+        rows += [
+            (
+                f"fitted {fit.place} film, {fit.source}",
+                f"{film.text(fit.film)}; solved {film.text(fit.solved)}, {deviation.text(fit.deviation)}",
+            )
+            for fit in self.fits
+        ]
+        return rows
+
+
+def regime_card(solution: ContactSolution) -> RegimeCard:
+    """The regime card of a solved contact."""
+    conditions, lubricant, hertz = (
+        solution.conditions,
+        solution.lubricant,
+        solution.conditions.hertz,
+    )
+    a, b = hertz.half_widths
+    regime = None if lubricant is None else lubrication_regime(conditions, lubricant)
+    central, density = _central(
+        solution, at_the_peak=regime in ("isoviscous-rigid", "piezoviscous-rigid")
+    )
+    solved = {"central": central, "least": float(solution.gap.min())}
+    return RegimeCard(
+        half_width=a,
+        half_width_across=None if conditions.long else b,
+        hertz_pressure=hertz.p_max,
+        effective_modulus=conditions.pair.effective_modulus,
+        numbers=None if lubricant is None else film_numbers(conditions, lubricant),
+        regime=regime,
+        fits=()
+        if lubricant is None
+        else tuple(
+            FittedFilm(
+                fit.source,
+                fit.place,
+                fit.film,
+                solved[fit.place] * (density if fit.incompressible else 1.0),
+            )
+            for fit in film_fits(conditions, lubricant)
+        ),
+    )
+
+
+def far_from_fits(solution: ContactSolution) -> str | None:
+    """A sentence where the central film of a contact without asperities in it is far from every fit that holds."""
+    conditions, lubricant, sq = solution.conditions, solution.lubricant, solution.surface.sq
+    if (
+        lubricant is None
+        or solution.in_contact.any()
+        or least_film(conditions, lubricant) < PARTED * sq
+    ):
+        return None
+    central = [fit for fit in regime_card(solution).fits if fit.place == "central"]
+    if not central or min(abs(fit.deviation) for fit in central) <= FAR:
+        return None
+    nearest = min(central, key=lambda fit: abs(fit.deviation))
+    length, cell = inlet_length(conditions, lubricant), solution.grid.spacing[0]
+    flooded, begins = flooded_inlet(conditions, lubricant, missing=0.05), -solution.grid.lower[0]
+    reason = (
+        f"the grid has {length / cell:.2g} cells across the inlet"
+        if length < FEWEST_IN_INLET * cell
+        else "the inlet starves it"
+        if begins < flooded
+        else "the grid is fine enough and the inlet flooded: the fit may not hold for these bodies and this oil"
+    )
+    return (
+        f"The central film of {nearest.solved * 1e6:.3g} um is {100.0 * abs(nearest.deviation):.0f} % "
+        f"{'above' if nearest.deviation > 0.0 else 'below'} the nearest fit's {nearest.film * 1e6:.3g} um "
+        f"({nearest.source}): {reason}."
+    )
+
+
+def _central(solution: ContactSolution, *, at_the_peak: bool) -> tuple[float, float]:
+    """Central film [m], and the oil's density there over the ambient one.
+
+    Mean over the middle tenth of the Hertz zone; between bodies that stay rigid the film under the
+    highest pressure, which is what fits call central there.
+    """
+    middle = hertz_zone(solution.conditions, solution.grid, CENTRE)
+    if at_the_peak:
+        middle = solution.pressure == solution.pressure.max()
+    film, oil = float(solution.gap[middle].mean()), solution.lubricant
+    if oil is None:
+        return film, 1.0
+    return film, float(oil.density(solution.pressure[middle]).mean()) / oil.density.rho0

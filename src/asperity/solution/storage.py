@@ -1,0 +1,112 @@
+"""A contact solution read back from disk, every number as it was; `ContactSolution.save` writes it."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.contact.grid import Grid
+from asperity.contact.rollers import RollerShape
+from asperity.core.errors import UnreadableFile
+from asperity.core.storage import read_netcdf
+from asperity.ehl import (
+    ContactSolution,
+    Convergence,
+    Figures,
+    GridError,
+    Iteration,
+    Oil,
+    Options,
+    SolveStatus,
+)
+from asperity.ehl.contact_solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, OIL, STEPS
+from asperity.lubricant import make_lubricant
+from asperity.surface import Surface
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def load_solution(path: str | Path) -> ContactSolution:
+    """Read a solution back, every number as it was.
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is missing, damaged, or not a run of asperity.
+    """
+    path, remedy = Path(path), "solve its case again"
+    dataset = read_netcdf(path, remedy)
+    if "asperity_format" not in dataset.attrs:
+        raise UnreadableFile(f"{path} is netCDF but not a run of asperity; solve a case to get one")
+    if dataset.attrs["asperity_format"] != FORMAT:
+        raise UnreadableFile(
+            f"{path} has run format {dataset.attrs['asperity_format']}, this asperity reads format {FORMAT}; {remedy}"
+        )
+    try:
+        return _solution(dataset)
+    except (ValueError, KeyError, TypeError, RuntimeError, AttributeError):
+        raise UnreadableFile(f"{path} is damaged or not a run of asperity; {remedy}") from None
+
+
+def _solution(dataset: "xarray.Dataset") -> ContactSolution:
+    described = {name: json.loads(dataset.attrs[name]) for name in DESCRIBED}
+    conditions, lubricant, grid = described["conditions"], described["lubricant"], described["grid"]
+    pair = ElasticPair(**{name: tuple(value) for name, value in conditions.pop("pair").items()})
+    if conditions.get("shape"):
+        conditions["shape"] = RollerShape(**conditions["shape"])
+    conditions = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in conditions.items()
+    }
+    steps = [dataset[name].values.tolist() for name in STEPS]
+    history = tuple(
+        Iteration((nx, ny), number, residual, load_error, change)
+        for number, nx, ny, residual, load_error, change in zip(*steps, strict=True)
+    )
+    pressure, gap, heights = (
+        dataset[name].values for name in ("pressure", "gap", "surface_height")
+    )
+    return ContactSolution(
+        conditions=ContactConditions(pair=pair, **conditions),
+        lubricant=None if lubricant is None else make_lubricant(lubricant),
+        surface=Surface(heights, Grid(**{name: tuple(value) for name, value in grid.items()})),
+        options=Options(**described["options"]),
+        pressure=pressure,
+        gap=gap,
+        in_contact=dataset["in_contact"].values.astype(bool),
+        rigid_approach=float(dataset["rigid_approach"].values),
+        convergence=_convergence(described["convergence"], history),
+        viscosity_factor=dataset["viscosity_factor"].values
+        if "viscosity_factor" in dataset
+        else None,
+        oil=_oil(dataset),
+        versions=described["versions"],
+        attributes={
+            str(name): value
+            for name, value in dataset.attrs.items()
+            if name not in (*HEADINGS, *DESCRIBED)
+        },
+    )
+
+
+def _oil(dataset: "xarray.Dataset") -> Oil | None:
+    if not set(OIL) <= set(dataset.variables):
+        return None
+    return Oil(**{part: dataset[name].values for name, part in OIL.items()})
+
+
+def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> Convergence:
+    rest: dict[str, Any] = {
+        name: value for name, value in described.items() if name not in ("status", *ERRORS)
+    }
+    errors: dict[str, Any] = dict.fromkeys(ERRORS)
+    if described.get("iteration_error"):
+        errors["iteration_error"] = Figures(**described["iteration_error"])
+    if described.get("discretisation_error"):
+        half = described["discretisation_error"]
+        lean = Figures(
+            **(half.pop("lean", None) or dict.fromkeys(half, 0.0))
+        )  # of a run that knew none
+        errors["discretisation_error"] = GridError(**half, lean=lean)
+    return Convergence(**rest, **errors, status=SolveStatus(described["status"]), history=history)

@@ -1,0 +1,329 @@
+"""What the contact does to the material below it: the stress tensor, von Mises stress, and where it is largest.
+
+The half-space is elastic and smooth: stresses above yield mean that the material yields, not what
+it carries then. Residual stresses, and the change of pressure that traction between unlike bodies
+brings, are left out.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from asperity.contact.conditions import ContactConditions
+from asperity.contact.grid import FEWEST_CELLS, Grid
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.ehl import ContactSolution
+from asperity.solution.stress_influence import COMPONENTS, Tractions
+
+DEPTHS = 16  # where none are given, the surface among them
+DEEPEST = 2.5  # Hertz half-widths
+CORE = 0.1  # Hertz half-widths below which the cell size has no say
+HERTZ_CELLS = 96  # across the smooth contact; its largest stress is then right to 0.1 %
+REFINEMENTS = 3  # depths looked at between the given ones for the largest stress, at most
+CLOSE = 0.001  # depths nearer to one another than twice this share are not told apart
+
+
+@dataclass(frozen=True, slots=True)
+class StressTensor:
+    """Components of the stress [Pa], tension positive, of one shape; z points into the body."""
+
+    xx: Field
+    yy: Field
+    zz: Field
+    xy: Field
+    yz: Field
+    xz: Field
+
+    @property
+    def von_mises(self) -> Field:
+        """sqrt(3 J2) [Pa]."""
+        return np.asarray(np.sqrt(3.0 * self._second_invariant))
+
+    @property
+    def max_shear(self) -> Field:
+        """Half the difference of the largest and the smallest principal stress [Pa], Tresca's measure.
+
+        In double precision: where two principal stresses are equal, Lode's angle has half of the
+        digits.
+        """
+        xx, yy, zz, xy, yz, xz = (
+            np.asarray(getattr(self, name), dtype=float) for name in COMPONENTS
+        )
+        mean = (xx + yy + zz) / 3.0
+        x, y, z = xx - mean, yy - mean, zz - mean
+        third = x * y * z + 2.0 * xy * yz * xz - x * yz**2 - y * xz**2 - z * xy**2
+        second = StressTensor(xx, yy, zz, xy, yz, xz)._second_invariant
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cosine = np.where(second > 0.0, 1.5 * np.sqrt(3.0) * third / second**1.5, 1.0)
+        angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0  # Lode's
+        return np.asarray(np.sqrt(second) * np.sin(angle + np.pi / 3.0))
+
+    @property
+    def _second_invariant(self) -> Field:
+        apart = (self.xx - self.yy) ** 2 + (self.yy - self.zz) ** 2 + (self.zz - self.xx) ** 2
+        return np.asarray(apart / 6.0 + self.xy**2 + self.yz**2 + self.xz**2)
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """A largest stress [Pa], and where it is [m]: depth below the surface, and the cell centre above it."""
+
+    value: float
+    depth: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SubsurfaceStress:
+    """Stresses in one body of a contact.
+
+    `depths` [m], shape (nz,), growing; `von_mises` [Pa], shape (nx, ny, nz), below the cell
+    centres of `grid`; `peak` is the largest von Mises stress and `shear_peak` the largest shear
+    stress (half the difference of principal stresses), each sought at the depths and, by
+    parabolas, between them; `core` is the largest von Mises stress at least `core_depth` [m] deep.
+    Where pressure and traction end suddenly, as at the edge of a capped asperity, `peak` has no
+    bound but the cell size, and `core` hardly knows it. `body` is 1 or 2.
+    """
+
+    grid: Grid
+    depths: Field
+    von_mises: Field
+    peak: Peak
+    shear_peak: Peak
+    core: Peak
+    core_depth: float
+    body: int
+    poisson_ratio: float
+    tractions: Tractions = field(repr=False)
+
+    @property
+    def largest(self) -> Field:
+        """The largest von Mises stress of the depths below each cell [Pa], shape (nx, ny)."""
+        return np.asarray(self.von_mises.max(axis=2))
+
+    @property
+    def depth_of_largest(self) -> Field:
+        """The depth of `largest` [m], shape (nx, ny)."""
+        return np.asarray(self.depths[self.von_mises.argmax(axis=2)])
+
+    @property
+    def row(self) -> int:
+        """Index along y of the cells above `peak`."""
+        return int(np.argmin(np.abs(self.grid.y - self.peak.y)))
+
+    @cached_property
+    def section(self) -> StressTensor:
+        """The whole tensor in the plane along rolling through `peak`, shape (nx, nz)."""
+        levels = [
+            self.tractions.stresses(float(depth), self.poisson_ratio)[:, :, self.row]
+            for depth in self.depths
+        ]
+        return StressTensor(*np.stack(levels, axis=-1))
+
+    def at(self, depth: float) -> StressTensor:
+        """The whole tensor at any depth [m], 0 included, shape (nx, ny).
+
+        Raises
+        ------
+        BadInput
+            for a depth above the surface.
+        """
+        (checked,) = _checked_depths(np.array([depth]))
+        return StressTensor(
+            *self.tractions.stresses(float(checked), self.poisson_ratio, keep=False)
+        )
+
+
+def subsurface_stress(
+    solution: ContactSolution,
+    *,
+    shear: Field | None = None,
+    depths: Field | None = None,
+    body: int = 1,
+) -> SubsurfaceStress:
+    """Stresses below a solved contact.
+
+    Parameters
+    ----------
+    shear : traction along x that the surface of body 1 feels [Pa], shape (nx, ny), such as `friction(...).shear`; body
+        2 feels the opposite. None for a contact without friction
+    depths : where to work stresses out [m], 0 or more, growing; None takes `default_depths`
+    body : 1 or 2; z points into it
+
+    Raises
+    ------
+    BadInput
+        for a shear of another shape than the pressure, depths that do not grow or lie above the surface, or no body.
+    """
+    if body not in (1, 2):
+        raise BadInput(f"body must be 1 or 2, got {body!r}")
+    if shear is not None and body == 2:
+        shear = -shear
+    return stress_below(
+        solution.pressure,
+        shear,
+        solution.grid,
+        default_depths(solution.conditions, solution.grid) if depths is None else depths,
+        poisson_ratio=solution.conditions.pair.poisson_ratios[body - 1],
+        body=body,
+        core_depth=CORE * _half_width(solution.conditions),
+    )
+
+
+def hertz_stress(
+    conditions: ContactConditions, depths: Field, *, body: int = 1
+) -> SubsurfaceStress:
+    """Stresses below the smooth, dry, frictionless contact of the same conditions, on a grid of its own."""
+    line = conditions.long
+    (a, b), cells = conditions.hertz.half_widths, HERTZ_CELLS
+    reach = (1.25 * a, a if line else 1.25 * b)
+    grid = Grid(
+        (cells, FEWEST_CELLS if line else cells), (-reach[0], -reach[1]), reach, (False, line)
+    )
+    inside = (
+        1.0
+        - (grid.x[:, None] / a) ** 2
+        - (0.0 if line else (grid.y / b) ** 2)
+        + np.zeros(grid.cells)
+    )
+    pressure = conditions.hertz.p_max * np.sqrt(np.maximum(inside, 0.0))
+    ratio = conditions.pair.poisson_ratios[body - 1]
+    core = CORE * _half_width(conditions)
+    return stress_below(
+        pressure, None, grid, depths, poisson_ratio=ratio, body=body, core_depth=core
+    )
+
+
+def _half_width(conditions: ContactConditions) -> float:
+    widths = conditions.hertz.half_widths
+    return widths[0] if conditions.long else min(widths)
+
+
+def default_depths(conditions: ContactConditions, grid: Grid) -> Field:
+    """The surface, the core's depth, and 14 in equal ratios from half a cell along x to 2.5 half-widths [m]."""
+    half_width, first = _half_width(conditions), 0.5 * grid.spacing[0]
+    below = np.geomspace(first, max(DEEPEST * half_width, 10.0 * first), DEPTHS - 2)
+    return np.unique(np.concatenate([[0.0, CORE * half_width], below]))
+
+
+def stress_below(
+    pressure: Field,
+    shear: Field | None,
+    grid: Grid,
+    depths: Field,
+    *,
+    poisson_ratio: float,
+    body: int = 1,
+    core_depth: float = 0.0,
+) -> SubsurfaceStress:
+    """Stresses below a pressure and a traction along x, both [Pa] and of shape (nx, ny), constant over each cell.
+
+    Raises
+    ------
+    BadInput
+        for fields that do not fit the grid, or depths that do not grow or lie above the surface.
+    """
+    for name, given in (("pressure", pressure), ("shear", shear)):
+        if given is not None and given.shape != grid.cells:
+            raise BadInput(
+                f"{name} must have the grid's shape {grid.cells}, got {given.shape}; make it on that grid"
+            )
+    depths = _checked_depths(depths)
+    tractions = Tractions.of(grid, pressure, shear)
+    levels: _Levels = {}
+
+    def look(depth: float, *, keep: bool = False) -> Field:
+        tensor = StressTensor(*tractions.stresses(depth, poisson_ratio, keep=keep))
+        von_mises = tensor.von_mises
+        levels[depth] = _peaks(tensor, von_mises, depth, grid)
+        return von_mises
+
+    von_mises = np.stack([look(float(depth), keep=True) for depth in depths], axis=-1)
+    core_depth = max(core_depth, float(depths[0]))
+    if core_depth not in levels:
+        look(core_depth)
+    core, _, shear_peak = (
+        _largest(levels, measure, below, grid.spacing[0], look)
+        for measure, below in ((0, core_depth), (0, 0.0), (1, 0.0))
+    )
+    peak = max(
+        (level[0] for level in levels.values()), key=lambda one: one.value
+    )  # of all depths looked at by now
+    return SubsurfaceStress(
+        grid=grid,
+        depths=depths,
+        von_mises=von_mises,
+        peak=peak,
+        shear_peak=shear_peak,
+        core=core,
+        core_depth=core_depth,
+        body=body,
+        poisson_ratio=poisson_ratio,
+        tractions=tractions,
+    )
+
+
+def _checked_depths(depths: Field) -> Field:
+    depths = np.atleast_1d(np.asarray(depths, dtype=float))
+    if depths.ndim != 1 or depths.size == 0 or not np.isfinite(depths).all() or depths.min() < 0.0:
+        raise BadInput(
+            f"depths must be a row of lengths from 0 m (the surface) on, got {depths}; correct them"
+        )
+    if np.any(np.diff(depths) <= 0.0):
+        raise BadInput(f"depths must grow, got {depths}; sort them and leave out what is double")
+    return depths
+
+
+_Levels = dict[
+    float, tuple[Peak, Peak]
+]  # by depth: the largest von Mises stress, the largest shear stress
+
+
+def _peaks(tensor: StressTensor, von_mises: Field, depth: float, grid: Grid) -> tuple[Peak, Peak]:
+    # the shear stress lies between a half and 1/sqrt(3) of von Mises'
+    few = von_mises >= np.sqrt(0.75) * von_mises.max()
+    shear = np.zeros_like(von_mises)
+    shear[few] = StressTensor(*(getattr(tensor, name)[few] for name in COMPONENTS)).max_shear
+    first, second = (_peak(stress, depth, grid) for stress in (von_mises, shear))
+    return first, second
+
+
+def _peak(stress: Field, depth: float, grid: Grid) -> Peak:
+    i, j = np.unravel_index(stress.argmax(), stress.shape)
+    return Peak(float(stress[i, j]), depth, float(grid.x[i]), float(grid.y[j]))
+
+
+def _largest(
+    levels: _Levels, measure: int, below: float, cell: float, look: Callable[[float], object]
+) -> Peak:
+    """The largest of a measure from a depth on, sought between depths by parabolas through the highest of them.
+
+    Within a depth of less than a cell along x nothing is sought: there the cells decide.
+    """
+    for _ in range(REFINEMENTS):
+        depths = sorted(depth for depth in levels if depth >= below)
+        values = [levels[depth][measure].value for depth in depths]
+        top = int(np.argmax(values))
+        if not 0 < top < len(depths) - 1 or depths[top + 1] - depths[top - 1] < cell:
+            break
+        around = slice(top - 1, top + 2)
+        shift = depths[
+            top
+        ]  # depths grow in equal ratios, which a logarithm takes out; the surface needs a shift
+        a, b, c = np.log(np.array(depths[around]) + shift)
+        fa, fb, fc = values[around]
+        left, right = (b - a) * (fb - fc), (b - c) * (fb - fa)
+        if left == right:  # level
+            break
+        vertex = b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right)
+        if min(abs(vertex - a), abs(vertex - b), abs(vertex - c)) < CLOSE:
+            break
+        look(float(np.exp(vertex) - shift))
+    return max(
+        (level[measure] for depth, level in levels.items() if depth >= below),
+        key=lambda peak: peak.value,
+    )

@@ -1,0 +1,339 @@
+"""The stresses in an elastic half-space below tractions that are constant over cells: convolutions by FFT.
+
+z points into the body. Pressure p gives σ_zz = -p on the surface, a traction q that pulls the body
+along x gives σ_xz = -q. Where y does not repeat, the kernels are the closed forms for a loaded
+rectangle, padded with zeros both ways. Where y repeats, its wavenumber 0 is the closed form for a
+loaded strip, and the others are the half-space's exact answer to waves, summed over the aliases
+that a traction constant over each cell excites. Knows no contact.
+
+All follow from three harmonic functions of a point load, φ = 1/(2πr), χ = -log(r + z)/2π, ψ = (z
+log(r + z) - r)/2π, of transforms e/α, e/α², e/α³ with e = exp(-αz), α² = m² + n². Source: A. E. H.
+Love, Phil. Trans. A 228 (1929) 377; S. Liu, Q. Wang, J. Tribol. 124 (2002) 36, derived anew here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from asperity.contact.grid import Grid
+from asperity.core.arrays import Field
+
+Waves = npt.NDArray[np.complexfloating[Any, Any]]
+
+COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+# Which components change sign when x (y) does, under pressure and under traction along x.
+ODD_IN_X = ((False, False, False, True, False, True), (True, True, True, False, True, False))
+ODD_IN_Y = (False, False, False, True, True, False)
+
+CACHED_CELLS = 2**17  # grids up to here keep their kernels: at most 3 MB a depth at 256 x 256
+DEEP, SHALLOW = 3.5, 1.25  # in cells: below, no aliases are felt; above, too many
+QUIET = 1e-8  # what an image of the padded domain, or a wave at its depth, may still exert
+NEARBY = 1.25  # periods along x from a loaded cell, beyond which its images make it a strip
+
+
+@dataclass(frozen=True, slots=True)
+class Tractions:
+    """Transformed tractions on a grid: pressure, and the pull along x on the body (None where there is none).
+
+    In single precision, like the kernels: 1e-6 of a stress, for half the time and memory.
+    """
+
+    grid: Grid
+    pressure: Waves
+    shear: Waves | None
+
+    @classmethod
+    def of(cls, grid: Grid, pressure: Field, shear: Field | None) -> "Tractions":
+        """From fields [Pa], shape (nx, ny)."""
+        return cls(
+            grid, _transformed(pressure, grid), None if shear is None else _transformed(shear, grid)
+        )
+
+    def stresses(self, depth: float, poisson_ratio: float, *, keep: bool = True) -> Field:
+        """σ_xx, σ_yy, σ_zz, σ_xy, σ_yz, σ_xz [Pa] below every cell's centre, shape (6, nx, ny)."""
+        (nx, ny), (_, repeats) = self.grid.cells, self.grid.periodic
+        influence = _kept_influence if keep and nx * ny <= CACHED_CELLS else _influence
+        kernels = influence(self.grid.cells, self.grid.spacing, repeats, depth, poisson_ratio)
+        felt = kernels.shape[
+            -1
+        ]  # columns of wavenumbers along y; the transform back takes the others as zeros
+        stresses = np.empty((6, nx, ny), np.float32)
+        for component, out in enumerate(stresses):
+            waves = np.zeros((2 * nx, felt), self.pressure.dtype)
+            for traction, kernel, odd in zip(
+                (self.pressure, self.shear), kernels, ODD_IN_X, strict=True
+            ):
+                if traction is not None:
+                    turn = np.complex64(1j ** (odd[component] + ODD_IN_Y[component]))
+                    _accumulate(waves, kernel[component], odd[component], turn * traction[:, :felt])
+            along_x = scipy.fft.ifft(waves, axis=0, overwrite_x=True)[:nx]
+            out[:] = scipy.fft.irfft(along_x, n=ny if repeats else 2 * ny, axis=1)[:, :ny]
+        return stresses
+
+
+def _transformed(field: Field, grid: Grid) -> Waves:
+    (nx, ny), (_, repeats) = grid.cells, grid.periodic
+    field = field.astype(np.float32)
+    return np.asarray(
+        scipy.fft.fft(scipy.fft.rfft(field, n=ny if repeats else 2 * ny, axis=1), n=2 * nx, axis=0)
+    )
+
+
+def _accumulate(waves: Waves, kernel: Field, odd: bool, traction: Waves) -> None:
+    """Add kernel times traction; the kernel knows wavenumbers 0 to Nyquist along x, the others mirror them."""
+    nx = kernel.shape[0] - 1
+    waves[: nx + 1] += kernel * traction[: nx + 1]
+    mirrored = kernel[nx - 1 : 0 : -1] * traction[nx + 1 :]
+    waves[nx + 1 :] += -mirrored if odd else mirrored
+
+
+def _influence(
+    cells: tuple[int, int],
+    spacing: tuple[float, float],
+    periodic: bool,
+    depth: float,
+    poisson_ratio: float,
+) -> Field:
+    """Transformed kernels at one depth, shape (traction, component, nx + 1, wavenumbers along y that reach it).
+
+    Transforms are divided by i for each axis in which their kernel is odd, which leaves them real.
+    """
+    nu = poisson_ratio
+    if not periodic:
+        rectangles = _rectangles(cells, spacing, depth, nu).astype(np.float32)
+        return _to_waves(_to_waves(rectangles, axis=-1), axis=-2)
+    kernels: Field
+    if depth < SHALLOW * max(spacing):
+        kernels = _below_surface(cells, spacing, nu) + _images(cells, spacing, depth, nu)
+    else:
+        kernels = _waves(cells, spacing, depth, nu)
+    kernels[..., 0] = _to_waves(_strips(cells[0], spacing[0], depth, nu)[..., None], axis=-2)[
+        ..., 0
+    ]
+    felt = int(np.flatnonzero(kernels.any(axis=(0, 1, 2)))[-1]) + 1
+    return kernels[..., :felt].astype(np.float32)
+
+
+_kept_influence = lru_cache(maxsize=32)(_influence)
+
+
+def clear_kernels() -> None:
+    """Forget the kernels kept so far: 50 MB after one contact of 256 x 256 cells that does not repeat."""
+    _kept_influence.cache_clear()
+    _below_surface.cache_clear()
+
+
+# Loaded rectangles and strips
+# ----------------------------------------------------------------------------------------
+
+
+def _rectangles(
+    cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float
+) -> Field:
+    """Stresses at cells 0, 1, ... along x and y from a loaded cell 0, shape (traction, component, nx + 1, ny + 1).
+
+    Each line is the double integral over x and y of what stands behind it; what depends on one of
+    them alone is dropped, as it cancels between the rectangle's corners.
+    """
+    z = depth
+    x, y = ((np.arange(count + 2) - 0.5) * step for count, step in zip(cells, spacing, strict=True))
+    x, y = x[:, None], y[None, :]
+    xx, yy, zz, xy = x * x, y * y, z * z, x * y
+    r = np.sqrt(xx + yy + zz)
+    in_xz, in_yz, sunk = xx + zz, yy + zz, r + z
+    turned = xy * (xx + yy) / sunk
+    angle_x = np.arctan2(turned, xx * r + yy * z)  # -2π ∂xx χ
+    angle_y = np.arctan2(turned, yy * r + xx * z)  # -2π ∂yy χ
+    angle_z = angle_x + angle_y  # -2π ∂z φ
+    log_x, log_y = (
+        np.arcsinh(x / np.sqrt(in_yz)),
+        np.arcsinh(y / np.sqrt(in_xz)),
+    )  # 2π ∂y φ, 2π ∂x φ
+    across_x, across_y = z * xy / (r * in_xz), z * xy / (r * in_yz)  # -2π z ∂xx φ, -2π z ∂yy φ
+    corners = (
+        # pressure
+        -angle_x - 2.0 * nu * angle_y + across_x,  # ∂xx χ - z ∂xx φ + 2ν ∂yy χ
+        -angle_y - 2.0 * nu * angle_x + across_y,  # ∂yy χ - z ∂yy φ + 2ν ∂xx χ
+        -angle_z - across_x - across_y,  # ∂z φ - z ∂zz φ
+        -(1.0 - 2.0 * nu) * np.log(sunk) - z / r,  # (1 - 2ν) ∂xy χ - z ∂xy φ
+        zz * x / (r * in_yz),  # -z ∂yz φ
+        zz * y / (r * in_xz),  # -z ∂xz φ
+        # traction along x
+        2.0 * log_y
+        + z * y * (xx - r * z) / (r * sunk * in_xz)
+        + 2.0 * nu * y / sunk,  # 2∂x φ + z∂xxx χ - 2ν∂xyy ψ
+        -z * y / (r * sunk) + 2.0 * nu * (log_y - y / sunk),  # z ∂xyy χ - 2ν ∂xxx ψ
+        zz * y / (r * in_xz),  # -z ∂xz φ
+        log_x - x * (2.0 * nu + z / r) / sunk,  # ∂y φ + 2ν ∂xxy ψ + z ∂xxy χ
+        -z / r,  # -z ∂xy φ
+        -angle_z + across_x,  # ∂z φ - z ∂xx φ
+    )
+    differences = np.empty((12, cells[0] + 1, cells[1] + 1))
+    for corner, out in zip(corners, differences, strict=True):
+        along = np.diff(corner, axis=1)
+        np.subtract(along[1:], along[:-1], out=out)
+    differences /= 2.0 * np.pi
+    return differences.reshape(2, 6, cells[0] + 1, cells[1] + 1)
+
+
+def _strips(count: int, dx: float, depth: float, nu: float) -> Field:
+    """Stresses at cells 0, 1, ... along x below a strip that reaches to infinity along y, shape (2, 6, nx + 1)."""
+    x, z = (np.arange(count + 2) - 0.5) * dx, depth
+    square = x * x + z * z
+    angle, beside, below = np.arctan2(x, z), z * x / square, z * z / square
+    nothing = np.zeros_like(x)
+    edges = np.stack(
+        [
+            -angle + beside,
+            -2.0 * nu * angle,
+            -angle - beside,
+            nothing,
+            nothing,
+            below,
+            -np.log(square) - below,
+            -nu * np.log(square),
+            below,
+            nothing,
+            nothing,
+            -angle + beside,
+        ]
+    )
+    return (np.diff(edges, axis=-1) / np.pi).reshape(2, 6, count + 1)
+
+
+@lru_cache(maxsize=2)
+def _below_surface(cells: tuple[int, int], spacing: tuple[float, float], nu: float) -> Field:
+    """What few images leave out of the kernels at small depths: the same as a little deeper, where waves are summed.
+
+    Close to the surface the sum over aliases is long; but what sets a shallow depth apart from a
+    deeper one fades so fast along the surface that the nearest images hold all of it.
+    """
+    near = SHALLOW * max(spacing)
+    return _waves(cells, spacing, near, nu) - _images(cells, spacing, near, nu)
+
+
+def _images(cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float) -> Field:
+    """Transformed kernels of a loaded cell and its three nearest images along y, shape as of `_waves`."""
+    (nx, ny), (dx, dy) = cells, spacing
+    reach = min(nx, int(NEARBY * ny * dy / dx) + 1)
+    rectangles = _rectangles((reach, 2 * ny), spacing, depth, nu)
+    kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
+    for traction, component in np.ndindex(2, 6):
+        given, odd = rectangles[traction, component], ODD_IN_Y[component]
+        ahead, behind = given[:, :ny] + given[:, ny:-1], given[:, ny:0:-1] + given[:, :ny:-1]
+        waves = scipy.fft.rfft(ahead - behind if odd else ahead + behind, axis=1)
+        kernels[traction, component, : reach + 1] = waves.imag if odd else waves.real
+    return _to_waves(kernels, axis=-2)
+
+
+# Waves
+# ---------------------------------------------------------------------------------------------------------------
+
+
+def _waves(cells: tuple[int, int], spacing: tuple[float, float], depth: float, nu: float) -> Field:
+    """Transformed kernels of cells that repeat along y, shape (traction, component, nx + 1, ny//2 + 1); depth > 0.
+
+    The column of wavenumber 0 along y is left at zero.
+    """
+    (nx, ny), (dx, dy) = cells, spacing
+    kernels = np.zeros((2, 6, nx + 1, ny // 2 + 1))
+    for wrap, columns in _wraps(cells, spacing):
+        along = np.arange(wrap * nx // 2 + 1) * (2.0 * np.pi / (wrap * nx * dx))
+        across = columns * (2.0 * np.pi / (ny * dy))
+        felt = -np.log(QUIET) / depth
+        columns, across, along = columns[across < felt], across[across < felt], along[along < felt]
+        if columns.size == 0:
+            continue
+        found = np.zeros((2, 6, wrap * nx // 2 + 1, columns.size))
+        found[..., : along.size, :] = _aliased(along, across, spacing, depth, nu)
+        if (
+            wrap > 2
+        ):  # taken on a longer domain, whose images are far away, and cut to the padded one
+            found = _to_waves(_to_cells(found)[..., : nx + 1, :], axis=-2)
+        kernels[..., columns] = found
+    return kernels
+
+
+def _wraps(
+    cells: tuple[int, int], spacing: tuple[float, float]
+) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
+    """Wavenumbers along y that need a domain of `wrap` lengths for its images along x, e^(-q (wrap - 1) L), to fade."""
+    (nx, ny), (dx, dy) = cells, spacing
+    columns = np.arange(1, ny // 2 + 1)
+    lengths = 1.0 - np.log(QUIET) * ny * dy / (2.0 * np.pi * columns * nx * dx)
+    wraps = np.maximum(2 * np.ceil(lengths / 2.0).astype(int), 2)
+    for wrap in np.unique(wraps):
+        yield int(wrap), columns[wraps == wrap]
+
+
+def _aliased(
+    along: Field, across: Field, spacing: tuple[float, float], depth: float, nu: float
+) -> Field:
+    """Answer to unit waves, averaged over cells, shape (traction, component, wavenumbers along x, along y)."""
+    (dx, dy), z = spacing, depth
+    aliases = [(0, 0)]
+    if depth < DEEP * max(spacing):
+        aliases = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+    total = np.zeros((12, along.size, across.size))
+    for i, j in aliases:
+        m, n = along[:, None] + 2.0 * np.pi * i / dx, across[None, :] + 2.0 * np.pi * j / dy
+        if max(np.abs(m).min(), np.abs(n).min()) * z > -np.log(QUIET):
+            continue
+        alpha = np.hypot(m, n)
+        c, s = m / alpha, n / alpha
+        cc, ss, cs, deep = c * c, s * s, c * s, alpha * z
+        wave = np.exp(-deep) * np.sinc(m * dx / (2.0 * np.pi)) * np.sinc(n * dy / (2.0 * np.pi))
+        slow = wave * (1.0 - deep)
+        waves = (
+            # pressure
+            -cc * slow - 2.0 * nu * ss * wave,
+            -ss * slow - 2.0 * nu * cc * wave,
+            -(1.0 + deep) * wave,
+            cs * (slow - 2.0 * nu * wave),
+            deep * s * wave,
+            deep * c * wave,
+            # traction along x
+            c * (2.0 - deep * cc + 2.0 * nu * ss) * wave,
+            c * (2.0 * nu * cc - deep * ss) * wave,
+            deep * c * wave,
+            s * (1.0 - (2.0 * nu + deep) * cc) * wave,
+            -deep * cs * wave,
+            (deep * cc - 1.0) * wave,
+        )
+        for out, term in zip(total, waves, strict=True):
+            out += term
+    return total.reshape(2, 6, along.size, across.size)
+
+
+def _to_waves(kernels: Field, axis: int) -> Field:
+    """Transform kernels at cells 0, 1, ... n to wavenumbers 0, 1, ... n of the even or odd sequence of 2n cells."""
+    odd_axes = ODD_IN_X if axis == -2 else (ODD_IN_Y, ODD_IN_Y)
+    return _by_parity(kernels, axis, odd_axes, scipy.fft.dct, scipy.fft.dst)
+
+
+def _to_cells(waves: Field) -> Field:
+    """The inverse of `_to_waves` along x."""
+    return _by_parity(waves, -2, ODD_IN_X, scipy.fft.idct, scipy.fft.idst)
+
+
+def _by_parity(
+    values: Field,
+    axis: int,
+    odd: tuple[tuple[bool, ...], ...],
+    even_transform: Any,
+    odd_transform: Any,
+) -> Field:
+    out = np.zeros_like(values)
+    inner = (slice(None), slice(1, -1)) if axis == -1 else (slice(1, -1), slice(None))
+    for traction, component in np.ndindex(2, 6):
+        given = values[traction, component]
+        if odd[traction][component]:
+            out[traction, component][inner] = -odd_transform(given[inner], type=1, axis=axis)
+        else:
+            out[traction, component] = even_transform(given, type=1, axis=axis)
+    return out

@@ -1,0 +1,105 @@
+"""Samples of a unit cube and what moves an outcome over them, by SALib: Morris' effects, Sobol's variances."""
+
+import math
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from asperity.core.arrays import Field
+from asperity.core.errors import AsperityError, BadInput
+
+SensitivityMethod = Literal["morris", "sobol"]
+SIZES: dict[SensitivityMethod, int] = {
+    "morris": 12,
+    "sobol": 64,
+}  # trajectories; base samples, a power of two
+MEASURES: dict[SensitivityMethod, dict[str, str]] = {  # and what SALib calls them
+    "morris": {name: name for name in ("mu", "mu_star", "mu_star_conf", "sigma")},
+    "sobol": {"s1": "S1", "s1_conf": "S1_conf", "st": "ST", "st_conf": "ST_conf"},
+}
+LEVELS = 4  # places a factor of Morris' design can take
+CONFIDENCE = 0.95  # of SALib's intervals
+RESAMPLING = 1  # seed of their bootstrap; SALib takes 0 for none
+FEWEST_BLOCKS = 2  # of the sample, that effects can be told from
+ROUNDING = 1e-9  # relative difference that nothing has made
+
+
+class SampleDesign(NamedTuple):
+    """Points to evaluate, as shares 0 to 1 of each factor's range, shape (points, factors).
+
+    Runs of `block` points stand or fall together: without one of them the rest says nothing.
+    """
+
+    method: SensitivityMethod
+    shares: Field
+    block: int
+
+
+def sample_design(
+    method: SensitivityMethod, factors: int, size: int, seed: int = 0
+) -> SampleDesign:
+    """Morris' trajectories or Saltelli's sample over the unit cube; `BadInput` for a size that cannot be."""
+    try:
+        import SALib  # noqa: F401
+    except ModuleNotFoundError:
+        raise BadInput("sensitivity needs SALib; pip install 'asperity[study]'") from None
+    if size < 2:
+        counted = "trajectories" if method == "morris" else "samples"
+        raise BadInput(f"{counted} must be 2 or more, got {size}; {SIZES[method]} is the default")
+    if method == "morris":
+        from SALib.sample import morris
+
+        return SampleDesign(
+            method,
+            morris.sample(_problem(factors), size, num_levels=LEVELS, seed=seed),
+            factors + 1,
+        )
+    if size & (size - 1):
+        nearest = 2 ** round(math.log2(size))
+        raise BadInput(
+            f"samples of the method sobol must be a power of two, got {size}; take {nearest}"
+        )
+    from SALib.sample import sobol
+
+    shares = sobol.sample(_problem(factors), size, calc_second_order=False, seed=seed)
+    return SampleDesign(method, shares, factors + 2)
+
+
+def indices(design: SampleDesign, outcome: Field) -> dict[str, Field]:
+    """Each factor's effect on an outcome of shape (points,), by SALib; blocks that hold a nan are left out.
+
+    Returns `mu`, `mu_star`, `mu_star_conf`, `sigma`, or `s1`, `s1_conf`, `st`, `st_conf`, of shape
+    (factors,); `AsperityError` if fewer than two blocks are left.
+    """
+    whole = np.isfinite(outcome.reshape(-1, design.block)).all(axis=1)
+    if np.count_nonzero(whole) < FEWEST_BLOCKS:
+        raise AsperityError(
+            "too many contacts failed to say what moves the curves; narrow the ranges"
+        )
+    kept = np.repeat(whole, design.block)
+    values, shares = outcome[kept], design.shares[kept]
+    names = MEASURES[design.method]
+    if np.ptp(values) <= ROUNDING * np.abs(values).max():
+        return {name: np.zeros(shares.shape[1]) for name in names}
+    problem = _problem(shares.shape[1])
+    if design.method == "morris":
+        from SALib.analyze import morris
+
+        analysed = morris.analyze(
+            problem, shares, values, num_levels=LEVELS, conf_level=CONFIDENCE, seed=RESAMPLING
+        )
+    else:
+        from SALib.analyze import sobol
+
+        analysed = sobol.analyze(
+            problem, values, calc_second_order=False, conf_level=CONFIDENCE, seed=RESAMPLING
+        )
+    return {name: np.asarray(analysed[salib], dtype=float) for name, salib in names.items()}
+
+
+def _problem(factors: int) -> dict[str, Any]:
+    return {
+        "num_vars": factors,
+        "names": [f"x{i}" for i in range(factors)],
+        "bounds": [[0.0, 1.0]] * factors,
+    }
