@@ -83,23 +83,21 @@ FORBIDDEN = {
     ],
 }
 FORBIDDEN_AS_A_WHOLE = {"one", "ones", "each", "thing", "things", "what"}
-FORBIDDEN_FUNCTIONS = set(
-    [
-        "of",
-        "at",
-        "along",
-        "beside",
-        "each",
-        "places",
-        "before",
-        "after",
-        "below",
-        "above",
-        "into",
-        "onto",
-        "by",
-    ]
-)
+FORBIDDEN_FUNCTIONS = {
+    "of",
+    "at",
+    "along",
+    "beside",
+    "each",
+    "places",
+    "before",
+    "after",
+    "below",
+    "above",
+    "into",
+    "onto",
+    "by",
+}
 OPENINGS = re.compile(
     r"(?:What|Whether|Where|How|Who|Whom|Whose|Which|Why|When|As|Of|Made|Told|None)\b"
 )
