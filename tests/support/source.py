@@ -50,15 +50,15 @@ def imports_inside_functions(tree: ast.Module) -> list[ast.stmt]:
 
 
 def faces() -> dict[str, types.ModuleType]:
-    """The modules that outside code imports from: every folder's face, and the modules that lie in no folder."""
-    names = [path.parent.name for path in PACKAGE.glob("*/__init__.pyi")] + [
-        path.stem for path in PACKAGE.glob("*.py")
+    """The modules that outside code imports from: every room's face, and the modules of rooms without one."""
+    names = [path.parent.name for path in PACKAGE.glob("*/__init__.pyi")]
+    names += [
+        f"{room}.{path.stem}"
+        for room in ("core", "contact")
+        for path in (PACKAGE / room).glob("*.py")
+        if path.stem != "__init__"
     ]
-    return {
-        name: importlib.import_module(f"asperity.{name}")
-        for name in sorted(names)
-        if not name.startswith("_")
-    }
+    return {name: importlib.import_module(f"asperity.{name}") for name in sorted(names)}
 
 
 def exported(face: types.ModuleType) -> dict[str, Any]:

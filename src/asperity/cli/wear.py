@@ -7,6 +7,7 @@ import typer
 
 from asperity import case, report, simulation
 from asperity import surface as surfaces
+from asperity import wear as wear_laws
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
@@ -25,7 +26,6 @@ from asperity.cli.output import Block, columns, progress, show, span, table, wri
 from asperity.core.errors import BadInput
 from asperity.core.processes import cores
 from asperity.core.quantities import quantity
-from asperity.wear import fit_wear_coefficient, read_friction_trace
 
 if TYPE_CHECKING:
     from asperity.simulation import WearHistory, WearProgress
@@ -160,8 +160,8 @@ def _fit(
     second_load: float | None,
     second_distance: float | None,
 ) -> "FittedWear":
-    trace = read_friction_trace(record, load=load, track_radius=track_radius)
-    return fit_wear_coefficient(
+    trace = wear_laws.read_friction_trace(record, load=load, track_radius=track_radius)
+    return wear_laws.fit_wear_coefficient(
         trace, profile, second_load=second_load, second_distance=second_distance
     )
 

@@ -11,12 +11,12 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
+from asperity import solution as postprocessing
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.hertz import line_stiffness, point_stiffness
 from asperity.core.errors import BadInput, articled
 from asperity.core.quantities import Parameter, Parametric
 from asperity.ehl import ContactSolution, ContactState
-from asperity.solution import dynamic_stiffness, roller_depth, tangent_stiffness
 
 FILM_EXPONENT = 0.13  # h ~ load^-0.13: Dowson and Higginson's film of a line contact
 # γ in K = F/(γ Sq): S. Akarapu, T. Sharp, M. O. Robbins, Phys. Rev. Lett. 106 (2011) 204301
@@ -103,7 +103,7 @@ class HertzLine(_LineApproach, StiffnessLaw):
             conditions.line_length,
             conditions.radius_along_rolling,
             conditions.pair.reduced_modulus,
-            self.reference_depth or roller_depth(conditions),
+            self.reference_depth or postprocessing.roller_depth(conditions),
         )
 
 
@@ -145,7 +145,9 @@ class Tangent(_LineApproach, StiffnessLaw):
 
     def of(self, solution: ContactSolution) -> float:
         """dF/dδ of a solved contact [N/m]."""
-        return tangent_stiffness(solution, reference_depth=self.reference_depth).total
+        return postprocessing.tangent_stiffness(
+            solution, reference_depth=self.reference_depth
+        ).total
 
     def at_full_load(self, conditions: ContactConditions) -> StiffnessLaw:
         """That of the smooth, dry contact: a tangent belongs to its own load share."""
@@ -270,7 +272,7 @@ class ContactDamping(DampingLaw):
                 "damping law contact needs the solved contact; solve the case, or take another law"
             )
         frequency_hz = float(np.sqrt(stiffness / mass) / (2.0 * np.pi))
-        own = dynamic_stiffness(solution, frequency_hz).damping_ratio
+        own = postprocessing.dynamic_stiffness(solution, frequency_hz).damping_ratio
         if own + damping_ratio <= 0.0:
             raise BadInput(
                 f"the contact's oil feeds a vibration of {frequency_hz:.0f} Hz (damping ratio {own:.2g}) more than the "

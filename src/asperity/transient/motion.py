@@ -5,7 +5,7 @@ derivative, d(ρh)/dt + u d(ρh)/dx = D(ρh)/Dt. A step of one cell follows the 
 by the backward difference (3 m_i^n - 4 m_(i-1)^(n-1) + m_(i-2)^(n-2))/(2 Δt): second order,
 nothing is smeared, and where nothing moves it is the snapshot's own wedge. Steps of other lengths
 difference time and wedge apart. Steps are yielded; keeping them, and deciding when to stop, is
-left to others (`asperity.history`).
+left to others (`asperity.simulation.motion`).
 """
 
 import time

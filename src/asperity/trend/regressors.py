@@ -1,7 +1,7 @@
 """What load, speed and temperature explain of an indicator, learned from how both change from recording to recording.
 
 Which conditions there are, and how much of each an indicator may follow, is said by
-`asperity.tracking`.
+`asperity.monitoring`.
 """
 
 from collections.abc import Sequence

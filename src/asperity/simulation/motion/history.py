@@ -59,7 +59,7 @@ class History:
     """A contact over time.
 
     `table` has a row a step, step 0 the start: `step`, `heat_j` (friction's and the flow's, summed
-    over time by the trapezoidal rule) and the columns of `history.rows`, which the catalogue of
+    over time by the trapezoidal rule) and the columns of `simulation.motion.rows`, which the catalogue of
     quantities describes; `resonance_hz` is nan without an oscillator. `seconds` is what computing
     took this time, of `computed` steps; `folder` where it is kept, `memory` what the next step
     needs to know, `remarks` what the folder's files have to say of themselves.
