@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity import coupling, ehl
+from asperity import solution as postprocessing
 from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput
@@ -26,7 +27,6 @@ from asperity.lubricant import OilSheet
 from asperity.monitoring.files import Place
 from asperity.monitoring.reading import Reading
 from asperity.recording import OPERATING
-from asperity.solution import contact_state
 from asperity.trend import Condition
 
 ZERO_CELSIUS = 273.15
@@ -248,7 +248,7 @@ def _resonance(case: Case) -> float:
     solution = ehl.solve_contact(
         case.conditions, case.lubricant, case.surface(), options=case.options
     )
-    state = contact_state(solution)
+    state = postprocessing.contact_state(solution)
     return coupling.oscillator(
         state, case.conditions, case.vibration, solution=solution
     ).natural_frequency_hz

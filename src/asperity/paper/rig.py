@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 
 from asperity import ehl
+from asperity import solution as postprocessing
 from asperity.case import Case
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
@@ -43,7 +44,6 @@ from asperity.paper.rig_recording import (
     contact_line,
     draw_background,
 )
-from asperity.solution import contact_state
 
 RigTrend = Literal["knee", "smooth", "constant"]
 RecordingFormat = Literal["h5", "wav"]
@@ -309,7 +309,7 @@ def _solved(case: Case, sq: float, model: VibrationModel) -> tuple[ContactState,
     solution = ehl.solve_contact(
         rough.conditions, rough.lubricant, rough.surface(), options=rough.options
     )
-    state = contact_state(solution)
+    state = postprocessing.contact_state(solution)
     if state.clr <= 0.0 or state.car <= 0.0:
         raise BadInput(
             f"{case.source}: no asperity touches at Sq {sq * 1e6:.2f} um, and a rig without contact has no truth to "
