@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check bench docs installed release attacks clean
+.PHONY: demo test quick check bench docs installed release attacks clean
 .DEFAULT_GOAL := demo
 
 demo: $(READY)
@@ -12,6 +12,9 @@ demo: $(READY)
 
 test: $(READY)
 	$(BIN)/python -m pytest -n auto
+
+quick: $(READY)
+	$(BIN)/python -m pytest -n auto -q -m "not slow" tests/unit
 
 check: $(READY)
 	$(BIN)/ruff check .
