@@ -33,7 +33,6 @@ EXCEPTIONS = {  # what is right but of none of these kinds
     '["Rx", "Ry"]': "stands for two lengths",
     "linspace(0, fs/2, n/2)": "of another program",
     "NUMBA_CACHE_DIR": "a variable of the environment, of numba",
-    "bullet_land.x3p": "among the developers' data",
     "milled_1.opd": "among the developers' data",
     "ground_lay.plu": "among the developers' data",
     "build/robustness.csv": "written by a benchmark",
