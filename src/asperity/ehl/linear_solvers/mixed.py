@@ -43,7 +43,7 @@ from asperity.ehl.models.single_pressure import CLOSED_WITHIN, Past
 from asperity.kernels import load_sharing, reynolds, stencils
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
-from asperity.kernels.stencils import Far, Stencil
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 LEFT = 0.1  # share to which the linearised equations are left ...
 LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
@@ -114,7 +114,7 @@ class MixedLinear:
         if self.leans and settled is not None and not self.follows_oil:
             self.opening = opening_slopes(balance, settled)
         if self.follows_oil:
-            self.film = self.film.followed
+            self.film = self.film.without_wedge
         self.closely = closely and self.leans
 
     @cached_property
@@ -132,13 +132,16 @@ class MixedLinear:
             stencil, far
         )
 
-    def _stencil(self) -> tuple[Stencil, Far | None]:
+    def _stencil(self) -> tuple[Stencil, OuterNeighbours | None]:
         problem, stencil = self.balance.problem, Stencil(*np.empty((5, *self.cells), self.real))
         state = np.where(self.lubricated, np.int8(LUBRICATED), np.int8(RUPTURED))
-        rows, film = self.rows._replace(state=state), self.film.held_where(~self.free)
+        rows, film = self.rows._replace(state=state), self.film.with_fixed_gap(~self.free)
         own, far = 1.0 / self.rows.contact_scale, None
         if self.follows_wedge:
-            far, near = Far(*np.empty((2, *self.cells), self.real)), problem.deflection.near
+            far, near = (
+                OuterNeighbours(*np.empty((2, *self.cells), self.real)),
+                problem.deflection.near,
+            )
             stencils.wedge_stencil(
                 rows,
                 film,
@@ -161,13 +164,13 @@ class MixedLinear:
             self._loosen(stencil)
         return stencil, far
 
-    def _leaning(self, stencil: Stencil) -> tuple[Stencil, Far]:
+    def _leaning(self, stencil: Stencil) -> tuple[Stencil, OuterNeighbours]:
         """The stencil and what it has of cells further upstream, with the wedge leaning.
 
         Beside closed cells films thin many times over from one cell to the next. The wedge leans
         there by so much that a cell's own entry may be a sixth of what first order makes it.
         """
-        film, dx = self.film.held_where(~self.free), self.real(self.balance.problem.spacing[0])
+        film, dx = self.film.with_fixed_gap(~self.free), self.real(self.balance.problem.spacing[0])
         content = (
             film.content_by_gap * self.real(1.0 / self.rows.contact_scale)
             + film.content_by_pressure
@@ -178,7 +181,7 @@ class MixedLinear:
         )  # of what the eastern faces pass on besides
         own[1:-1] = (self.lean_own * content)[1:-1] / dx
         upstream[1:-1] = self.lean_upstream[1:-1] * content[:-2] / dx
-        far = Far(*np.zeros((2, *self.cells), self.real))
+        far = OuterNeighbours(*np.zeros((2, *self.cells), self.real))
         stencil.centre[:] += self.scale * own
         stencil.west[1:] -= self.scale[1:] * (upstream[1:] + own[:-1])
         far.west[2:] += self.scale[2:] * upstream[1:-1]
@@ -226,8 +229,9 @@ class MixedLinear:
             d_height = (
                 np.where(self.balance.shut, self.real(0.0), d_gap) + self.growth_by_oil * d_oil
             )
+        change = reynolds.PressureChange(d_pressure, d_height)
         reynolds.jacobian_product(
-            self.rows, self.film, self.faces, self.oil, d_pressure, d_height, spacing, 0.0, wet
+            self.rows, self.film, self.faces, self.oil, change, spacing, 0.0, wet
         )
         if self.kept is not None:
             wet += self.kept.by_gap * d_height + self.kept.by_pressure * d_pressure
@@ -353,7 +357,7 @@ def foreseen(balance: MixedBalance) -> MixedBalance:
     problem, rows, residual = balance.problem, balance.rows, balance.oil_residual.copy()
     state, highest = rows.state.copy(), (1.0 + CLOSED_WITHIN) * problem.contact_gap
     balanced = balance.outflow, rows.fluid_scale
-    load_sharing.fill_streaks(
+    load_sharing.extend_lubrication(
         balance.gap, highest, balance.solid, problem.rim, balanced, state, residual
     )
     return replace(balance, rows=rows._replace(state=state), oil_residual=residual)

@@ -14,9 +14,9 @@ from asperity.core.arrays import Field
 from asperity.ehl.deflection import BETWEEN
 from asperity.ehl.models.single_pressure import Balance, Past
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
-from asperity.kernels.multigrid import Nest
+from asperity.kernels.multigrid import GridHierarchy
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
-from asperity.kernels.stencils import Far, Stencil
+from asperity.kernels.stencils import OuterNeighbours, Stencil
 
 MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors, where it has one more
 FEWEST_PAIRED = 12  # cells along an axis that nested blocks still halve
@@ -57,7 +57,7 @@ class Linear:
             and balance.problem.past is not None
             and balance.problem.past.followed
         ):
-            self.film = self.film.followed
+            self.film = self.film.without_wedge
         self.stencil = self._stencil()
         self.lines = LineRelaxation(self.stencil)
         if self.film is not None:
@@ -84,8 +84,7 @@ class Linear:
             self.film,
             self.faces,
             self.pressure,
-            d_pressure,
-            d_gap,
+            reynolds.PressureChange(d_pressure, d_gap),
             problem.spacing,
             self.storing,
             out,
@@ -147,14 +146,14 @@ class LineRelaxation:
     Even, odd and even ones in turn. Lines of five are not dominated by their centres.
     """
 
-    def __init__(self, stencil: Stencil, far: Far | None = None) -> None:
+    def __init__(self, stencil: Stencil, far: OuterNeighbours | None = None) -> None:
         nx, ny = stencil.centre.shape
         nothing = np.empty((0, 0), stencil.centre.dtype)
-        self.stencil, self.far = stencil, far or Far(nothing, nothing)
+        self.stencil, self.far = stencil, far or OuterNeighbours(nothing, nothing)
         for parity in (0, 1):
             near = np.empty((5, nx, (ny + 1 - parity) // 2), stencil.centre.dtype)
             beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
-            lines = line_relaxation.Lines(*near, *beyond)
+            lines = line_relaxation.LineFactors(*near, *beyond)
             line_relaxation.factor_lines(
                 stencil, self.far, parity, LEAST_PIVOT if far else 0.0, lines
             )
@@ -201,17 +200,17 @@ class NestedBlocks:
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight = weight
         self.nest = _nest(weight.shape, weight.dtype)
-        if not multigrid.nest_blocks(stencil, weight, LEAST_PIVOT, self.nest):
+        if not multigrid.build_hierarchy(stencil, weight, LEAST_PIVOT, self.nest):
             raise SingularFactor("the last of nested grids has no inverse")
 
     def __call__(self, residual: Field) -> Field:
         """The change, one number a block, that answers a residual; none in cells without weight."""
         change = np.zeros_like(self.weight)
-        multigrid.answer_nested(self.nest, residual, self.weight, TURNS, change)
+        multigrid.apply_hierarchy(self.nest, residual, self.weight, TURNS, change)
         return change
 
 
-def _nest(cells: tuple[int, int], dtype: Any) -> Nest:
+def _nest(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
     """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
     grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
     while max(grids[-1]) >= FEWEST_PAIRED:
@@ -224,7 +223,7 @@ def _nest(cells: tuple[int, int], dtype: Any) -> Nest:
     places = np.concatenate([grids, starts[:-1]], axis=1)
     cells_of, last = (count,), grids[-1][0] * grids[-1][1]
     shapes = [(5, count), cells_of, cells_of, (5, even), (5, odd), cells_of, cells_of, (last, last)]
-    return Nest._make([places, *(np.empty(shape, dtype) for shape in shapes)])
+    return GridHierarchy._make([places, *(np.empty(shape, dtype) for shape in shapes)])
 
 
 def _block(cells: int) -> int:
@@ -239,7 +238,7 @@ def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
     *parts, inlet, wedge, behind = faces
     single = np.empty((len(parts), *faces.east.shape), dtype)
     for part, out in zip(parts, single, strict=True):
-        reynolds.in_precision_of(out, part, least)
+        reynolds.convert_precision(out, part, least)
     return Faces._make(
         [*single, np.where(inlet > least, inlet, 0.0).astype(dtype), wedge.astype(dtype), behind]
     )

@@ -29,7 +29,7 @@ import numpy as np
 from asperity.core.arrays import Codes, Field, Mask
 from asperity.ehl.models.single_pressure import CLOSED_WITHIN, FIRST_ORDER, THIRD_ORDER, Problem
 from asperity.kernels import load_sharing
-from asperity.kernels.load_sharing import FREE, Borne, Bounds
+from asperity.kernels.load_sharing import FREE, CellState, ContactBounds
 from asperity.kernels.reynolds import (
     CAPPED,
     LUBRICATED,
@@ -38,7 +38,7 @@ from asperity.kernels.reynolds import (
     Faces,
     Film,
     Rows,
-    leaning_outflow,
+    limited_outflow,
 )
 from asperity.lubricant import Lubricant
 
@@ -195,7 +195,7 @@ def _evaluate(
     signed, pressure, approach = unknowns
     assert problem.lubricant is not None
     closed, scale = problem.contact_gap, 1.0 / problem.softness
-    bounds = Bounds(closed, scale, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap)
+    bounds = ContactBounds(closed, scale, (1.0 + CLOSED_WITHIN) * closed, problem.p_cap)
     oil = np.clip(signed, 0.0, problem.p_cap)
     height = np.maximum(gap, closed) + _growth(problem, signed) if problem.conserve else gap
     film, faces, outflow, fluid_scale = _flow(problem, oil, height, problem.lubricant)
@@ -210,24 +210,26 @@ def _evaluate(
         outflow += transported(problem, surplus)
         upwind_at_outlet(problem, film.content, outflow)
 
-    cells = Borne(signed, oil, pressure, gap, outflow, np.empty_like(gap))
-    load_sharing.own_outflows(film, faces, _carried(problem), *problem.spacing, cells.own_outflow)
+    cells = CellState(signed, oil, pressure, gap, outflow, np.empty_like(gap))
+    load_sharing.outflow_by_pressure(
+        film, faces, _carried(problem), *problem.spacing, cells.own_outflow
+    )
     freed = np.zeros(gap.shape, dtype=bool) if freed is None else freed
     lifted, sunk, shut = np.empty((3, *gap.shape), dtype=bool)
-    if load_sharing.lift(cells, bounds, lifted) and may_lift:
+    if load_sharing.mark_opening(cells, bounds, lifted) and may_lift:
         unknowns = Pressures(
             np.where(lifted & (pressure > oil), pressure, signed), pressure, approach
         )
         return _evaluate(problem, unknowns, gap, second_order, freed | lifted, may_lift=False)
     solid, solid_residual = np.empty(gap.shape, dtype=np.int8), np.empty_like(gap)
-    if load_sharing.settle(cells, bounds, lifted, freed, solid, solid_residual, sunk):
+    if load_sharing.fill_contact_rows(cells, bounds, lifted, freed, solid, solid_residual, sunk):
         lacking = np.where(sunk, film.content_by_gap * (gap - closed), 0.0)
         outflow += transported(problem, lacking) + added_by_lean(problem, lacking, lean, lean)
-    load_sharing.shut_in(cells, bounds, solid, sunk, fluid_scale, shut)
+    load_sharing.mark_sealed(cells, bounds, solid, sunk, fluid_scale, shut)
     oil_residual, state = np.empty_like(gap), np.empty(gap.shape, dtype=np.int8)
     if surplus_by_oil is None:
-        load_sharing.refilled(cells, bounds, fluid_scale, oil_residual, state)
-        load_sharing.hold_film(shut, film)
+        load_sharing.fill_oil_rows(cells, bounds, fluid_scale, oil_residual, state)
+        load_sharing.fix_film_gap(shut, film)
     else:
         # a cell closed to the contact film holds next to no oil: what it lacks counts as what would
         # lift it
@@ -241,7 +243,7 @@ def _evaluate(
             np.int8
         )
         pressed = signed > problem.p_cap  # opened by the oil, not by the bodies' distance
-        load_sharing.hold_film(shut & ~pressed, film)
+        load_sharing.fix_film_gap(shut & ~pressed, film)
         stiff = pressed & (film.log_mobility_by_gap == 0.0)
         film = film._replace(
             log_mobility_by_gap=np.where(stiff, -3.0 / height, film.log_mobility_by_gap)
@@ -315,7 +317,9 @@ def _lean(problem: Problem, content: Field, gap: Field) -> Field:
     even, and its content the oil's density.
     """
     closed, lean = problem.contact_gap, np.empty_like(content)
-    load_sharing.lean(content, _upstream(problem, content), gap, closed, OPEN_FROM * closed, lean)
+    load_sharing.limiter(
+        content, _upstream(problem, content), gap, closed, OPEN_FROM * closed, lean
+    )
     return lean
 
 
@@ -326,7 +330,7 @@ def lean_slopes(balance: MixedBalance, dtype: Any) -> tuple[Field, Field]:
     """
     content = balance.film.content
     own, by_upstream = np.empty((2, *content.shape), dtype)
-    load_sharing.lean_slopes(
+    load_sharing.limiter_slopes(
         balance.lean, content, _upstream(balance.problem, content), own, by_upstream
     )
     return own, by_upstream
@@ -375,7 +379,7 @@ def added_by_lean(problem: Problem, content: Field, own: Field, upstream: Field)
     if _followed(problem):
         return own * content * content.dtype.type(1.0 / problem.spacing[0])
     added = np.empty_like(content)
-    leaning_outflow(content, own, upstream, problem.spacing[0], added)
+    limited_outflow(content, own, upstream, problem.spacing[0], added)
     return added
 
 

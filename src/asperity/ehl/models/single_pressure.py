@@ -319,7 +319,7 @@ class Problem:
         rim = self.rim
         residual[:, rim], state[:, rim] = pressure[:, rim], RUPTURED
         if film is not None:  # pressing overlapping bodies together moves no film
-            film = film.held_where((touching <= 0.0) & (state != LUBRICATED))
+            film = film.with_fixed_gap((touching <= 0.0) & (state != LUBRICATED))
         return Balance(
             self,
             pressure,
@@ -414,7 +414,7 @@ class Problem:
         if past.followed:
             nothing = np.zeros_like(content)
             reynolds.net_outflow(pressure, nothing, faces, nothing[0], dx, dy, outflow)
-            reynolds.fluid_diagonal(film.followed, faces, near, dx, dy, diagonal)
+            reynolds.fluid_diagonal(film.without_wedge, faces, near, dx, dy, diagonal)
             outflow[0] -= entering / dx
             if (
                 not self.conserve
