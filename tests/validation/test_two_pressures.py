@@ -11,8 +11,9 @@ from benchmarks.chosen_grids import samples
 from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
+from asperity.ehl.controls import INITIAL_GUESS, MIXED_LINEAR_SOLVER, PLASTIC_DRY
 from asperity.ehl.grid_design import auto_grid
-from asperity.ehl.linear_solvers.mixed import FEWEST_NESTED, MixedLinear, firm, foreseen
+from asperity.ehl.linear_solvers.mixed import MixedLinear, firm, foreseen
 from asperity.ehl.load_shares import carried_share
 from asperity.ehl.models import plastic_dry as dry
 from asperity.ehl.models.mixed import Pressures, evaluate
@@ -130,7 +131,7 @@ def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
     levels = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )
-    monkeypatch.setattr(starts, "DRY", 1e-5)
+    monkeypatch.setattr(starts, "INITIAL_GUESS", replace(INITIAL_GUESS, dry_tolerance=1e-5))
     with monkeypatch.context() as before:
         before.setattr(starts, "roughly_dry", lambda _, *start: (*start[:2], False))
         expected = [dry_start(level) for level in levels]
@@ -148,7 +149,7 @@ def test_a_dry_start_by_sets_of_cells_is_newtons(sq, monkeypatch):
 def test_a_dry_start_that_sets_of_cells_do_not_find_is_found_all_the_same(monkeypatch):
     problem = contact_problem(contact(hardness=2e9), barus(), rough(grid((64, 64)), 1e-6), MIXED)
     expected = dry_start(problem)
-    monkeypatch.setattr(dry, "MOST_SETS", 1)
+    monkeypatch.setattr(dry, "PLASTIC_DRY", replace(PLASTIC_DRY, max_active_sets=1))
     found = dry_start(problem)
     assert found[1] != expected[1]
     assert found[1] == pytest.approx(expected[1], abs=0.01)
@@ -419,6 +420,6 @@ def test_blocks_are_nested_where_bodies_touch_firmly_and_not_where_films_are_nea
         rng=np.random.default_rng(sample.seed),
     )
     hard = solve_contact(sample.conditions, sample.oil, surface)
-    assert min(*soft.grid.cells, *grid.cells) >= FEWEST_NESTED
+    assert min(*soft.grid.cells, *grid.cells) >= MIXED_LINEAR_SOLVER.min_multigrid_cells
     assert firm(balance_of(soft))
     assert not firm(balance_of(hard))

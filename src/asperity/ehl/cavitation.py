@@ -15,13 +15,8 @@ import scipy
 
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput, NotConverged, require_positive
+from asperity.ehl.controls import RIGID_FILM
 from asperity.lubricant import Barus, DensityLaw, Incompressible, ViscosityLaw
-
-MOST_STEPS = 200
-LONGEST_STEP = 1.0  # change of a viscosity's logarithm in one cell and one Newton step
-PATIENCE = 4  # steps without progress before they are halved ...
-SHORTEST_SHARE = 0.1  # ... down to this
-TOLERANCE = 1e-11  # of the flow: what a cell may lose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +84,7 @@ def solve_film(
     ends: tuple[float, float] = (0.0, 0.0),
     sides: tuple[float, float] | None = None,
     inflow_content: float = 1.0,
-    tolerance: float = TOLERANCE,
+    tolerance: float = RIGID_FILM.tolerance,
     strict: bool = True,
 ) -> FilmSolution:
     """Pressure and content of the oil in a given gap, no oil lost.
@@ -155,13 +150,15 @@ def _balanced(channel: "Channel", tolerance: float) -> tuple[Field, "Flows", flo
     while True:
         flows = channel.flows(signed)
         residual = float(np.max(np.abs(flows.outflow)) / flows.through)
-        if residual < tolerance or steps == MOST_STEPS or not np.isfinite(residual):
+        if residual < tolerance or steps == RIGID_FILM.max_steps or not np.isfinite(residual):
             return signed, flows, residual, steps
         idle += 1
         if residual < 0.9 * best:
             best, idle, share = residual, 0, min(1.0, 1.5 * share)
-        elif idle == PATIENCE:  # cells that flip to and fro settle in shorter steps
-            best, idle, share = residual, 0, max(0.5 * share, SHORTEST_SHARE)
+        elif (
+            idle == RIGID_FILM.stagnation_iterations
+        ):  # cells that flip to and fro settle in shorter steps
+            best, idle, share = residual, 0, max(0.5 * share, RIGID_FILM.min_damping)
         signed = signed + share * channel.limited(signed, -_solved(flows))
         steps += 1
 
@@ -222,7 +219,7 @@ class Channel:
             self.viscosity.log_slope(np.maximum(signed, 0.0) * self.pressure_scale)
             * self.pressure_scale
         )
-        longest = LONGEST_STEP / np.maximum(steep, 1e-12)
+        longest = RIGID_FILM.max_log_viscosity_step / np.maximum(steep, 1e-12)
         return np.clip(change, -longest - np.abs(signed), longest + 1.0)
 
     def _cells(self, signed: Field) -> Cells:

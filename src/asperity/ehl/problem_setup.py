@@ -6,6 +6,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
+from asperity.ehl.controls import GRID_CONTINUATION
 from asperity.ehl.deflection import BETWEEN, THROUGH
 from asperity.ehl.film_formulas import central_film, least_films
 from asperity.ehl.grid_design import FEWEST_BESIDE, FEWEST_COARSE_CELLS, inlet_length
@@ -15,8 +16,6 @@ from asperity.ehl.roller_profile import Along
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
-
-FEWEST_IN_COARSE_INLET = 2.0
 
 
 def contact_problem(
@@ -122,7 +121,7 @@ def levels_in_reach(
     most = (
         inlet_length(conditions, lubricant)
         / conditions.hertz.half_widths[0]
-        / FEWEST_IN_COARSE_INLET
+        / GRID_CONTINUATION.min_coarse_inlet_cells
     )
     return [level for number, level in enumerate(levels) if number < 2 or level.spacing[0] <= most]
 

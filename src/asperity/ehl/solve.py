@@ -11,6 +11,7 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import GRID_CONTINUATION
 from asperity.ehl.film_formulas import central_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
@@ -18,13 +19,12 @@ from asperity.ehl.newton.single_pressure import Step, newton
 from asperity.ehl.outcome import ATTEMPTS, PAPER, Options
 from asperity.ehl.problem_setup import contact_problem, first_guess, least_part, levels_in_reach
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.grid_continuation import COARSE_TOLERANCE, Progress, Search
+from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import solve_mixed
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
 RIGID = 30.0  # half-widths on which a film bears, from where rollers are refused
-ELASTIC_TO = 0.1  # of the tolerance that a step of Newton's then has to meet
 
 
 def solve_contact(
@@ -141,10 +141,16 @@ class ElasticSearch(Search):
         )
         for problem in reversed(levels):
             finest = problem is levels[0]
-            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            tolerance = (
+                options.tolerance
+                if finest
+                else max(GRID_CONTINUATION.coarse_tolerance, options.tolerance)
+            )
             if problem.cells != pressure.shape:
                 pressure = problem.brought(pressure)
-            pressure, near, met = elastic_contact(problem, pressure, ELASTIC_TO * tolerance)
+            pressure, near, met = elastic_contact(
+                problem, pressure, GRID_CONTINUATION.elastic_tolerance * tolerance
+            )
             if not met:
                 return super().climb(levels, start, approach, held=False)
             step = self.run(

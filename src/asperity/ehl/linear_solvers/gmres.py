@@ -13,19 +13,12 @@ from typing import Any
 import numpy as np
 import scipy
 
+from asperity.ehl.controls import KRYLOV
+
 Vector = np.ndarray[Any, Any]
 Operator = Callable[[Any], Vector]
 
-FEW = 7  # vectors that there is room for at first
-CANCELLED = (
-    0.5  # share of a vector left by orthogonalising it, below which that is done once more ...
-)
-NEARLY_CANCELLED = (
-    0.1  # ... where all of it stays in this precision, and little is asked of the last digits
-)
 ADJOINT = 2  # what BLAS calls the conjugate transpose
-# what a step leaves of what was left, below which that tells where to go on, and not the step
-FALLING = 0.9
 
 
 class Room:
@@ -69,7 +62,7 @@ def gmres(
     if norm == 0.0:
         return np.zeros_like(wanted)
     room = room or Room()
-    basis, corrections = room.rows(min(FEW, most_steps) + 1, wanted)
+    basis, corrections = room.rows(min(KRYLOV.initial_vectors, most_steps) + 1, wanted)
     triangle = np.zeros((most_steps, most_steps), exact)
     turns = np.zeros(
         (most_steps, 2), exact
@@ -92,7 +85,7 @@ def gmres(
         ):  # out of this precision's range: what is known already has to do
             step -= 1
             break
-        if length < CANCELLED * before:
+        if length < KRYLOV.reorthogonalise * before:
             overlaps = (known @ new.conj()).conj()
             new -= overlaps @ known
             column, length = column + overlaps, _length(new)
@@ -191,7 +184,7 @@ class Shifted:
             return False
         self.corrections[self.count], self.stored[self.count] = correction, stored
         self.sums.append(complex(correction @ self.bearing))
-        self.count, self.falls = self.count + 1, _length(self.rest) < FALLING * before
+        self.count, self.falls = self.count + 1, _length(self.rest) < KRYLOV.stagnation * before
         return True
 
     def move(self, frequency: float) -> None:
@@ -225,7 +218,7 @@ class Shifted:
             new = self.times(-1.0, known, overlaps, beta=1.0, y=new, overwrite_y=True)
             column += overlaps
             length = _length(new)
-            if length >= NEARLY_CANCELLED * before:
+            if length >= KRYLOV.reorthogonalise_shifted * before:
                 break
         else:
             length = _length(new)

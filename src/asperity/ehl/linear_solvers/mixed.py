@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import MIXED_LINEAR_SOLVER
 from asperity.ehl.linear_solvers.gmres import Room, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
     Blocks,
@@ -44,20 +45,6 @@ from asperity.kernels import load_sharing, reynolds, stencils
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Film, Rows
 from asperity.kernels.stencils import OuterNeighbours, Stencil
-
-LEFT = 0.1  # share to which the linearised equations are left ...
-LEFT_SMOOTH = 0.05  # ... of smooth bodies, whose steps are few and nearly straight
-LEFT_NEAR, NEAR = (
-    1e-3,
-    1e-3,
-)  # ... from so little left on, of followed oil that may not be lost: met far closer
-OVER = 2.0  # blocks are too stiff against slow modes, whose slope they have in their borders alone
-MOST_KRYLOV_STEPS = 60
-FEWEST_NESTED = (
-    64  # cells along both axes from which on blocks are nested, where bodies touch firmly
-)
-NEARLY_CLOSED = 0.1  # of the flattened cells: fewer are nearly closed where bodies touch firmly
-LONGEST_STEP = 0.5  # of p_h, where nothing answers the load but the distance of the bodies
 
 
 class MixedLinear:
@@ -124,7 +111,7 @@ class MixedLinear:
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         alike = (
             not self.follows_wedge
-            and min(self.cells) >= FEWEST_NESTED
+            and min(self.cells) >= MIXED_LINEAR_SOLVER.min_multigrid_cells
             and (self.closely or firm(self.balance))
         )
         blocks = (NestedBlocks if alike else Blocks)(stencil, weight)
@@ -257,7 +244,7 @@ class MixedLinear:
         blocks, lines = self.inverse
         change = blocks(wet)
         if self.follows_wedge:
-            change *= self.real(OVER)
+            change *= self.real(MIXED_LINEAR_SOLVER.coarse_relaxation)
         return lines(wet, change)
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
@@ -372,7 +359,7 @@ def firm(balance: MixedBalance) -> bool:
     """
     gap, film = balance.gap, balance.problem.contact_gap
     nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPEN_FROM) * film)
-    return bool(nearly.sum() < NEARLY_CLOSED * flattened(balance).sum())
+    return bool(nearly.sum() < MIXED_LINEAR_SOLVER.max_nearly_closed * flattened(balance).sum())
 
 
 def newton_step(
@@ -414,20 +401,32 @@ def newton_step(
         step.whole == 0.0
     ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
         return Pressures(
-            known_oil, known, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
+            known_oil,
+            known,
+            -MIXED_LINEAR_SOLVER.uncoupled_approach_step
+            * float(np.sign(missing))
+            / balance.rows.contact_scale,
         )
     wanted = step.joined(
         np.where(linear.lubricated, wet, zero), closed, float(step.weight * missing)
     )
-    left = LEFT_SMOOTH if linear.follows_wedge else LEFT
-    if problem.conserve and linear.follows_oil and balance.residual_rms < NEAR:
-        left = LEFT_NEAR
+    left = (
+        MIXED_LINEAR_SOLVER.tolerance_smooth
+        if linear.follows_wedge
+        else MIXED_LINEAR_SOLVER.tolerance
+    )
+    if (
+        problem.conserve
+        and linear.follows_oil
+        and balance.residual_rms < MIXED_LINEAR_SOLVER.conserving_residual
+    ):
+        left = MIXED_LINEAR_SOLVER.tolerance_conserving
     solved = gmres(
         step.product,
         step.precondition,
         wanted,
         tolerance=left,
-        most_steps=MOST_KRYLOV_STEPS,
+        most_steps=MIXED_LINEAR_SOLVER.max_krylov_steps,
         room=room,
     )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), zero)

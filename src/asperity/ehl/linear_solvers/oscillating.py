@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import OSCILLATION
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.linear_solvers.gmres import Shifted, gmres
 from asperity.ehl.linear_solvers.mixed import MixedLinear
@@ -24,19 +25,6 @@ from asperity.ehl.models.mixed import MixedBalance
 from asperity.ehl.models.single_pressure import Balance
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED, LUBRICATED, TOUCHING
-
-MOST_STEPS = 200  # of GMRES at a time ...
-AT_A_TIME = (
-    3e-5  # ... which leave no less of what was left before: about what single precision can tell
-)
-MOST_ROUNDS = 12
-STUCK = (
-    0.3  # share left by a round in single precision, above which the next is taken in double ...
-)
-ASKED = 1.5  # ... times what it was asked to leave, where that is more
-# flow under a cell's own pressure over what the wedge carries on of its film, below which oil is
-# stiff
-STIFF = 1.0
 
 Waves = np.ndarray[Any, np.dtype[np.complexfloating[Any, Any]]]
 
@@ -173,7 +161,11 @@ class _TwoPressures:
         dx, dy = problem.spacing
         flow = film.mobility * (2.0 / dx**2 + 2.0 / dy**2) + film.content_by_pressure / dx
         carried = film.content_by_gap / (dx * self.linear.rows.contact_scale)
-        return np.asarray(self.linear.free & self.linear.lubricated & (flow < STIFF * carried))
+        return np.asarray(
+            self.linear.free
+            & self.linear.lubricated
+            & (flow < OSCILLATION.stiff_flow_ratio * carried)
+        )
 
     def _patch(self) -> tuple[slice, Deflection] | None:
         """The lines with cells whose gap is known, and how these give way; None where there are none."""
@@ -231,14 +223,20 @@ class Oscillating:
         if start is not None:
             vector = start.unknowns
             left, share = self._left(wanted, vector, frequency, size)
-        for _ in range(MOST_ROUNDS):
+        for _ in range(OSCILLATION.max_rounds):
             if share <= tolerance:
                 break
-            leaving = max(tolerance / share, AT_A_TIME)
+            leaving = max(tolerance / share, OSCILLATION.round_tolerance)
             change, taken = _solved(solver, left, frequency, leaving)
             left, now = self._left(wanted, vector + change, frequency, size)
             steps += taken
-            if now > min(max(STUCK, ASKED * leaving), 1.0) * share:
+            if (
+                now
+                > min(
+                    max(OSCILLATION.stagnation, OSCILLATION.stagnation_of_tolerance * leaving), 1.0
+                )
+                * share
+            ):
                 if solver is self.exact:
                     break
                 solver = self.exact
@@ -258,7 +256,7 @@ class Oscillating:
             (self.by_approach[0].astype(kind), self.by_approach[1].astype(kind)),
             self.bearing,
             frequency,
-            MOST_STEPS,
+            OSCILLATION.max_krylov_steps,
         )
 
     def swept(self, sweep: Shifted) -> Answer:
@@ -311,7 +309,7 @@ def _solved(
         precondition,
         (wanted / scale).astype(kind),
         tolerance=tolerance,
-        most_steps=MOST_STEPS,
+        most_steps=OSCILLATION.max_krylov_steps,
     )
     return np.asarray(scale * found, dtype=complex), steps
 

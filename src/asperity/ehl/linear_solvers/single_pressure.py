@@ -11,18 +11,13 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import PRECONDITIONER
 from asperity.ehl.deflection import BETWEEN
 from asperity.ehl.models.single_pressure import Balance, Past
 from asperity.kernels import line_relaxation, multigrid, reynolds, stencils
 from asperity.kernels.multigrid import GridHierarchy
 from asperity.kernels.reynolds import LUBRICATED, Faces, Film
 from asperity.kernels.stencils import OuterNeighbours, Stencil
-
-MOST_COARSE_CELLS = 64  # across the grid that the preconditioner factors, where it has one more
-FEWEST_PAIRED = 12  # cells along an axis that nested blocks still halve
-TURNS = 2  # of blocks and lines, on each of them
-LEAST_PIVOT = 0.02  # of a row's nearest entries, where it may vanish
-LEAST = 1e-30  # of the largest mobility: what is smaller is nothing in single precision
 
 
 class Kept(NamedTuple):
@@ -155,7 +150,7 @@ class LineRelaxation:
             beyond = np.empty((2, *near.shape[1:]), near.dtype) if far else (nothing, nothing)
             lines = line_relaxation.LineFactors(*near, *beyond)
             line_relaxation.factor_lines(
-                stencil, self.far, parity, LEAST_PIVOT if far else 0.0, lines
+                stencil, self.far, parity, PRECONDITIONER.min_pivot if far else 0.0, lines
             )
             if parity:
                 self.odd = lines
@@ -200,21 +195,21 @@ class NestedBlocks:
     def __init__(self, stencil: Stencil, weight: Field) -> None:
         self.weight = weight
         self.nest = _nest(weight.shape, weight.dtype)
-        if not multigrid.build_hierarchy(stencil, weight, LEAST_PIVOT, self.nest):
+        if not multigrid.build_hierarchy(stencil, weight, PRECONDITIONER.min_pivot, self.nest):
             raise SingularFactor("the last of nested grids has no inverse")
 
     def __call__(self, residual: Field) -> Field:
         """The change, one number a block, that answers a residual; none in cells without weight."""
         change = np.zeros_like(self.weight)
-        multigrid.apply_hierarchy(self.nest, residual, self.weight, TURNS, change)
+        multigrid.apply_hierarchy(self.nest, residual, self.weight, PRECONDITIONER.cycles, change)
         return change
 
 
 def _nest(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
     """Room for the grids of nested blocks, down to one that is no wider than it has to be."""
     grids = [(-(-cells[0] // 2), -(-cells[1] // 2))]
-    while max(grids[-1]) >= FEWEST_PAIRED:
-        nx, ny = (-(-n // 2) if n >= FEWEST_PAIRED else n for n in grids[-1])
+    while max(grids[-1]) >= PRECONDITIONER.min_halved_cells:
+        nx, ny = (-(-n // 2) if n >= PRECONDITIONER.min_halved_cells else n for n in grids[-1])
         grids.append((nx, ny))
     starts = np.cumsum(
         [(0, 0, 0), *((nx * ny, nx * ((ny + 1) // 2), nx * (ny // 2)) for nx, ny in grids)], axis=0
@@ -229,12 +224,12 @@ def _nest(cells: tuple[int, int], dtype: Any) -> GridHierarchy:
 def _block(cells: int) -> int:
     """How many cells along an axis the factored grid puts into one."""
     smallest = 1 if cells < 32 else 2 if cells < 128 else 4
-    return max(smallest, -(-cells // MOST_COARSE_CELLS))
+    return max(smallest, -(-cells // PRECONDITIONER.max_coarse_cells))
 
 
 def single_faces(faces: Faces, dtype: Any = np.float32) -> Faces:
     """In another precision; what would become denormal in it is none."""
-    least = LEAST * float(max(faces.east.max(), faces.north.max()))
+    least = PRECONDITIONER.min_mobility * float(max(faces.east.max(), faces.north.max()))
     *parts, inlet, wedge, behind = faces
     single = np.empty((len(parts), *faces.east.shape), dtype)
     for part, out in zip(parts, single, strict=True):

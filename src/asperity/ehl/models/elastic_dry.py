@@ -12,22 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import ELASTIC_DRY
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.single_pressure import Problem
-
-MOST_STEPS = 1000  # of conjugate gradients
-MOST_SETS = 30  # of cells that touch, in one window
-MOST_WINDOWS = 8
-MARGIN = 32  # a window has one in so many of all lines more, on either side, than touch
-LOOSE, TIGHT, EXACT = (
-    0.1,
-    1e-3,
-    1e-4,
-)  # left by conjugate gradients: while cells come and go, after, near the end
-MANY, NEAR = (
-    0.002,
-    1e-6,
-)  # share of cells that come and go; what is left, from which the end is near
 
 
 class _Lines(NamedTuple):
@@ -49,7 +36,10 @@ class _Lines(NamedTuple):
 
     def around(self, touching: Mask) -> tuple["_Lines", slice]:
         """Those that touch, and some more."""
-        margin, lines = self.undeformed.shape[0] // MARGIN, np.flatnonzero(touching.any(axis=1))
+        margin, lines = (
+            self.undeformed.shape[0] // ELASTIC_DRY.window_margin,
+            np.flatnonzero(touching.any(axis=1)),
+        )
         window = slice(max(lines[0] - margin, 0), lines[-1] + 1 + margin)
         undeformed = self.undeformed[window]
         among = self.deflection.among(undeformed.shape[0])
@@ -76,8 +66,8 @@ def elastic_contact(
     whole = _Lines.all_of(problem)
     pressure = np.where(whole.inside, np.maximum(pressure, 0.0), 0.0)
     pressure *= whole.load / pressure.sum()
-    steps = MOST_STEPS
-    for _ in range(MOST_WINDOWS):
+    steps = ELASTIC_DRY.max_krylov_steps
+    for _ in range(ELASTIC_DRY.max_windows):
         gap, approach, left = whole.state(pressure)
         if left < tolerance or steps <= 0:
             break
@@ -94,7 +84,7 @@ def _pressed(
 ) -> tuple[Field, int]:
     """Pressures on some lines, none below 0, and the steps they took: met, or out of steps or sets."""
     steps, before = 0, pressure > 0.0
-    for _ in range(MOST_SETS):
+    for _ in range(ELASTIC_DRY.max_active_sets):
         gap, _, left = lines.state(pressure)
         if left < tolerance or steps >= most_steps:
             break
@@ -104,8 +94,14 @@ def _pressed(
         if np.any(settled != pressure):
             settled[touching] += (lines.load - settled.sum()) / count
             gap = lines.undeformed + lines.deflection(settled)
-        changing = np.count_nonzero(touching != before) > MANY * count
-        share = LOOSE if changing else TIGHT if left > NEAR else EXACT
+        changing = np.count_nonzero(touching != before) > ELASTIC_DRY.changing_share * count
+        share = (
+            ELASTIC_DRY.loose
+            if changing
+            else ELASTIC_DRY.tight
+            if left > ELASTIC_DRY.final_residual
+            else ELASTIC_DRY.exact
+        )
         share = max(share, 0.2 * tolerance / left)
         change, _, taken = levelled(lines.deflection, touching, gap, share, most_steps - steps)
         pressure, before, steps = settled + change, touching, steps + taken

@@ -11,19 +11,9 @@ Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002) 865; I. A. Polonsky,
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import PLASTIC_DRY, STEP_LIMITS
 from asperity.ehl.models.elastic_dry import levelled
 from asperity.ehl.models.single_pressure import Problem
-
-TOLERANCE = 1e-4  # root mean square of the equations, as a share of p_h
-MOST_STEPS = 300
-MOST_SHARINGS = 40  # rounds in which what the bounds cut off is put on other cells
-
-MOST_SETS = 16  # of cells at no bound
-LOOSE, MOST_GRADIENTS = (
-    0.3,
-    60,
-)  # what conjugate gradients leave in each of them, and how many there are
-FURTHEST_APPROACH = 0.3  # in one step, as in `iterate`
 
 
 def roughly_dry(
@@ -41,9 +31,9 @@ def roughly_dry(
         real(1.0 / problem.softness),
     )
     inside, load = np.broadcast_to(~problem.rim, problem.cells), problem.load / (dx * dy)
-    furthest = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
+    furthest = STEP_LIMITS.max_approach_step * max(1.0, float(np.std(problem.roughness)))
     pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0).astype(real)
-    for number in range(MOST_SETS + 1):
+    for number in range(PLASTIC_DRY.max_active_sets + 1):
         touching = (undeformed + deflection(pressure) + real(approach)) * stiffness
         left = np.where(
             inside, np.maximum(np.minimum(pressure, touching), pressure - cap), real(0.0)
@@ -53,19 +43,21 @@ def roughly_dry(
         capped = inside & (pressure - cap > touching)
         free = inside & (pressure > touching) & ~capped
         count = np.count_nonzero(free)
-        if met or number == MOST_SETS or count == 0:
+        if met or number == PLASTIC_DRY.max_active_sets or count == 0:
             break
         bound = np.where(capped, cap, np.where(free, pressure, real(0.0)))
         bound[free] += real((load - bound.sum(dtype=float)) / count)
         gap = undeformed + deflection(bound)
-        change, level, _ = levelled(deflection, free, gap, LOOSE, MOST_GRADIENTS)
+        change, level, _ = levelled(
+            deflection, free, gap, PLASTIC_DRY.linear_tolerance, PLASTIC_DRY.max_krylov_steps
+        )
         pressure = np.clip(bound + change.astype(real), real(0.0), cap)
         approach += float(np.clip(-level - approach, -furthest, furthest))
     return np.where(pressure < cap, pressure.astype(float), problem.p_cap), approach, met
 
 
 def dry_contact(
-    problem: Problem, pressure: Field, *, most_steps: int = MOST_STEPS
+    problem: Problem, pressure: Field, *, most_steps: int = PLASTIC_DRY.max_steps
 ) -> tuple[Field, float, bool]:
     """Pressure (nx, ny) and approach of the dry contact from a first guess, and whether they met the tolerance."""
     deflection, cap = problem.deflection, problem.p_cap
@@ -81,7 +73,7 @@ def dry_contact(
         left = np.where(
             inside, np.maximum(np.minimum(pressure, gap * stiffness), pressure - cap), 0.0
         )
-        met = float(np.sqrt(np.mean(left**2))) < TOLERANCE
+        met = float(np.sqrt(np.mean(left**2))) < PLASTIC_DRY.tolerance
         if met or step == most_steps:
             break
         steepest = np.where(free, gap, 0.0)
@@ -106,7 +98,7 @@ def _carrying(problem: Problem, pressure: Field, inside: Mask) -> Field:
     """The pressure scaled where no bound holds it, so that it carries the load."""
     (dx, dy), cap = problem.spacing, problem.p_cap
     wanted = problem.load / (dx * dy)
-    for _ in range(MOST_SHARINGS):
+    for _ in range(PLASTIC_DRY.max_load_corrections):
         missing = wanted - float(pressure.sum())
         if abs(missing) <= 1e-12 * wanted:
             break

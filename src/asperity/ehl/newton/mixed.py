@@ -7,31 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
+from asperity.ehl.controls import MIXED_NEWTON
 from asperity.ehl.linear_solvers.gmres import Room
 from asperity.ehl.linear_solvers.mixed import newton_step
 from asperity.ehl.linear_solvers.single_pressure import SingularFactor
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.newton.step_limit import StepLimit
+from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED
-
-PATIENCE, PROGRESS = (
-    8,
-    0.9,
-)  # steps without progress, after which halves are taken, or whole ones again
-LEAST_CONTENT = 0.2  # share of its content that a ruptured cell keeps in one step
-BESIDE = 1e-9  # how far beyond a border a cell is put to belong to the other side
-FURTHEST_APPROACH = 0.3  # of a^2/R, or of the roughness where that is more
-CLOSE, AWAY = (
-    0.03,
-    1.5,
-)  # from less left than this (rms, of p_h), a step that leaves so many times as much is halved
-SETTLED = (
-    0.1  # contact films by which a step has moved a gap at most whose opening the next one follows
-)
-SHORTEST_CUT = 0.1  # until it is shorter than this share
 
 
 class _Moves(NamedTuple):
@@ -73,9 +58,8 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
     decides.
     """
     wanted_mean = problem.mean_pressure
-    oil_limit, limit = (StepLimit(np.zeros_like(unknowns.total)) for _ in range(2))
-    furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
-    approach_before, change = 0.0, np.inf
+    oil_limit, limit = (StepLimit(unknowns.total) for _ in range(2))
+    approach_limit, change = ApproachLimit(problem.roughness), np.inf
     lowest, idle, share, astray, room = np.inf, 0, 1.0, False, Room()
     balance, settled = (
         evaluate(problem, unknowns, second_order=second_order),
@@ -91,9 +75,9 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
             return
         change, gap = float(np.mean(np.abs(step.total)) / wanted_mean), balance.gap
         idle += 1
-        if balance.residual_rms < PROGRESS * lowest:
+        if balance.residual_rms < MIXED_NEWTON.required_decrease * lowest:
             lowest, idle = balance.residual_rms, 0
-        elif idle == PATIENCE:
+        elif idle == MIXED_NEWTON.stagnation_iterations:
             lowest, idle, share, astray = balance.residual_rms, 0, 1.5 - share, True
         closed = (
             (balance.solid != FREE)
@@ -103,15 +87,12 @@ def newton(problem: Problem, unknowns: Pressures, *, second_order: bool) -> Iter
         d_oil = np.where(
             closed | (unknowns.oil < 0.0),
             step.oil,
-            oil_limit.limited(step.oil, np.abs(unknowns.oil), 0.0),
+            oil_limit(step.oil, np.abs(unknowns.oil)),
         )
-        d_total = limit.limited(step.total, unknowns.total, 0.0)
-        turned_back = step.approach * approach_before < 0.0 and abs(step.approach) > 0.5 * furthest
-        furthest = 0.5 * furthest if turned_back else min(1.2 * furthest, most)
-        approach_before = step.approach
-        by = Pressures(d_oil, d_total, float(np.clip(step.approach, -furthest, furthest)))
+        d_total = limit(step.total, unknowns.total)
+        by = Pressures(d_oil, d_total, approach_limit(step.approach))
         balance = _led(_Moves(balance, by, share), second_order=second_order)
-        settled = np.abs(balance.gap - gap) < SETTLED * problem.contact_gap
+        settled = np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
 
 
 def _led(moves: _Moves, *, second_order: bool) -> MixedBalance:
@@ -121,7 +102,11 @@ def _led(moves: _Moves, *, second_order: bool) -> MixedBalance:
     while True:
         unknowns, freed = moves.taken(cut)
         balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
-        if left >= CLOSE or balance.residual_rms <= AWAY * left or cut <= SHORTEST_CUT:
+        if (
+            left >= MIXED_NEWTON.line_search_residual
+            or balance.residual_rms <= MIXED_NEWTON.max_residual_growth * left
+            or cut <= MIXED_NEWTON.min_damping
+        ):
             return balance
         cut *= 0.5
 
@@ -134,8 +119,10 @@ def _moved(balance: MixedBalance, step: Field) -> Field:
         return np.clip(signed, 0.0, cap)
     ruptured, pressed = before < 0.0, before > cap
     full = ~ruptured & ~pressed
-    signed = np.where(ruptured, np.maximum(signed, LEAST_CONTENT * (1.0 + before) - 1.0), signed)
+    signed = np.where(
+        ruptured, np.maximum(signed, MIXED_NEWTON.min_content_share * (1.0 + before) - 1.0), signed
+    )
     signed = np.where(ruptured & (signed >= 0.0), 0.0, signed)
-    signed = np.where(full & (signed < 0.0), -BESIDE, signed)
-    signed = np.where(full & (signed > cap), cap * (1.0 + BESIDE), signed)
-    return np.where(pressed & (signed <= cap), cap * (1.0 - BESIDE), signed)
+    signed = np.where(full & (signed < 0.0), -MIXED_NEWTON.state_offset, signed)
+    signed = np.where(full & (signed > cap), cap * (1.0 + MIXED_NEWTON.state_offset), signed)
+    return np.where(pressed & (signed <= cap), cap * (1.0 - MIXED_NEWTON.state_offset), signed)

@@ -13,21 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import SINGLE_PRESSURE_NEWTON, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Operator, gmres
 from asperity.ehl.linear_solvers.single_pressure import Linear
 from asperity.ehl.models.mixed import MixedBalance
 from asperity.ehl.models.single_pressure import Balance, Problem
-
-LONGEST_STEP = 0.5  # of p_h, in one cell and one Newton step ...
-LONGEST_SHARE = (
-    0.5  # ... or this share of the cell's own pressure: sharp elastic asperities reach 100 p_h
-)
-# of a^2/R, or of the roughness where that is more: what a capped contact answers is not linear
-FURTHEST_APPROACH = 0.3
-PATIENCE = 8  # steps without progress before another manner is tried
-EASY = 0.05  # residual below which the time steps grow
-FORCING = 0.1
-MOST_KRYLOV_STEPS = 60
+from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 
 
 class Manner(NamedTuple):
@@ -70,34 +61,28 @@ def newton(
     With the bodies `held` at their approach the load is whatever it becomes.
     """
     wanted_mean = problem.mean_pressure
-    longest: Field = np.full_like(pressure, LONGEST_STEP)
-    before: Field = np.zeros_like(pressure)
-    furthest = most = FURTHEST_APPROACH * max(1.0, float(np.std(problem.roughness)))
-    approach_before = 0.0
+    limit = StepLimit(pressure, initial=STEP_LIMITS.max_pressure_step, bound_reversals=False)
+    approach_limit = ApproachLimit(problem.roughness)
     lowest, idle, tried, change = np.inf, 0, 0, np.inf
     for number in count():
         balance = problem.evaluate(pressure, approach)
         yield Step(number, balance, approach, change)
         manner = MANNERS[tried % len(MANNERS)]
-        storing = manner.storing / problem.spacing[0] * min(1.0, balance.residual_rms / EASY)
+        storing = (
+            manner.storing
+            / problem.spacing[0]
+            * min(1.0, balance.residual_rms / SINGLE_PRESSURE_NEWTON.time_step_residual)
+        )
         d_pressure, d_approach = newton_step(balance, storing=storing, held=held)
         change = float(np.mean(np.abs(d_pressure)) / wanted_mean)
         idle += 1
         if balance.residual_rms < 0.9 * lowest:
             lowest, idle = balance.residual_rms, 0
-        elif idle == PATIENCE:
+        elif idle == SINGLE_PRESSURE_NEWTON.stagnation_iterations:
             lowest, idle, tried = balance.residual_rms, 0, tried + 1
-        turned_back = (d_pressure * before < 0.0) & (np.abs(d_pressure) > longest)
-        most_now = np.maximum(LONGEST_STEP, LONGEST_SHARE * pressure)
-        longest = np.where(turned_back, 0.5 * longest, np.minimum(1.5 * longest, most_now))
-        before = d_pressure
-        pressure = np.clip(
-            pressure + manner.share * np.clip(d_pressure, -longest, longest), 0.0, problem.p_cap
-        )
-        turned_back_bodies = d_approach * approach_before < 0.0 and abs(d_approach) > 0.5 * furthest
-        furthest = 0.5 * furthest if turned_back_bodies else min(1.2 * furthest, most)
-        approach_before = d_approach
-        approach += manner.share * float(np.clip(d_approach, -furthest, furthest))
+        limited = limit(d_pressure, pressure)
+        pressure = np.clip(pressure + manner.share * limited, 0.0, problem.p_cap)
+        approach += manner.share * approach_limit(d_approach)
 
 
 def newton_step(
@@ -129,7 +114,9 @@ def newton_step(
     if (
         total == 0.0
     ):  # every cell is ruptured or capped: only the distance of the bodies can change the load
-        return known_change, -LONGEST_STEP * float(np.sign(missing)) / balance.rows.contact_scale
+        return known_change, -STEP_LIMITS.max_pressure_step * float(
+            np.sign(missing)
+        ) / balance.rows.contact_scale
 
     def product(vector: Field) -> Field:
         d_pressure, d_approach = vector[:-1].reshape(cells), float(vector[-1])
@@ -148,4 +135,10 @@ def newton_step(
 
 
 def _solved(product: Operator, precondition: Operator, wanted: Field) -> Field:
-    return gmres(product, precondition, wanted, tolerance=FORCING, most_steps=MOST_KRYLOV_STEPS)
+    return gmres(
+        product,
+        precondition,
+        wanted,
+        tolerance=SINGLE_PRESSURE_NEWTON.linear_tolerance,
+        most_steps=SINGLE_PRESSURE_NEWTON.max_krylov_steps,
+    )

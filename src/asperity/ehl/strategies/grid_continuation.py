@@ -10,6 +10,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import DISCRETISATION_ERROR, GRID_CONTINUATION
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
@@ -29,35 +30,6 @@ from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 Progress = Callable[[Iteration], None]
-
-COARSE_TOLERANCE = 1e-3  # a coarse solution only has to be a good start
-MOST_COARSE_ITERATIONS = 40
-MOST_HELD_ITERATIONS = 40  # at one distance of the bodies
-ONWARDS, BACK = (
-    2.5,
-    1.5,
-)  # of the difference to the coarser grid: how far a rough contact's figures may yet go
-AGREEMENT = 0.25  # of the difference between the grids before: the least that counts
-UNRESOLVED = (
-    2.4  # of the squared cell, in half-widths: what of the load share no coarser grid foretells
-)
-BY_TWO_ORDERS = 0.85  # share of all this where both orders of the wedge are known, and tell more
-KEPT_ON, KEPT_BACK, KEPT_UNRESOLVED = (
-    2.0,
-    0.5,
-    1.0,
-)  # the same of the load share, where three grids are known too
-# of the same, of what is read off a roller's ends: their error falls with the cell, not its square
-OF_ENDS = 3.0
-NO_LIMIT = 10.0  # times that, of what grows as fast from grid to grid as before
-SCATTER = 0.03  # of a figure of the ends, below which differences say nothing of where they go
-NEXT_TO_NOTHING = (
-    1e-2  # what is left of a start, below which steps have not strayed yet by many times that
-)
-ASTRAY = (
-    10.0  # times what a start leaves: steps of the accurate wedge that leave more began too far off
-)
-FAR_OFF = 0.1  # a coarse solution that misses by more is no start at all
 
 
 class Search:
@@ -108,7 +80,11 @@ class Search:
         self.cell = levels[0].spacing[0]
         for problem in reversed(levels):
             coarsest, finest = problem is levels[-1], problem is levels[0]
-            tolerance = options.tolerance if finest else max(COARSE_TOLERANCE, options.tolerance)
+            tolerance = (
+                options.tolerance
+                if finest
+                else max(GRID_CONTINUATION.coarse_tolerance, options.tolerance)
+            )
             if problem.cells != pressure.shape:
                 pressure = problem.brought(pressure)
             if held:
@@ -117,11 +93,15 @@ class Search:
                 most = (
                     options.max_iterations
                     if finest
-                    else min(options.max_iterations, MOST_COARSE_ITERATIONS)
+                    else min(options.max_iterations, GRID_CONTINUATION.max_coarse_iterations)
                 )
                 steps = newton(problem, pressure, approach)
                 step = self.run(
-                    problem, steps, tolerance, most, stray=ASTRAY if problem.accurate else np.inf
+                    problem,
+                    steps,
+                    tolerance,
+                    most,
+                    stray=GRID_CONTINUATION.divergence if problem.accurate else np.inf,
                 )
                 if (
                     problem.accurate
@@ -130,10 +110,10 @@ class Search:
                 ):  # astray
                     pressure, approach = self.nearer(problem, pressure, approach)
                     step = self.run(problem, newton(problem, pressure, approach), tolerance, most)
-                if coarsest and not finest and not self.settled(FAR_OFF):
+                if coarsest and not finest and not self.settled(GRID_CONTINUATION.failed_residual):
                     # a capped contact answers its approach too unevenly for Newton
                     found = self.position(problem, pressure, approach, tolerance, from_outside=True)
-                    step = found if self.settled(FAR_OFF) else step
+                    step = found if self.settled(GRID_CONTINUATION.failed_residual) else step
             pressure, approach = step.balance.pressure, step.approach
             if coarser_all_along(problem, levels[0]):
                 self.figures.append(self._figures(step))
@@ -142,10 +122,15 @@ class Search:
     def nearer(self, problem: Problem, pressure: Field, approach: float) -> tuple[Field, float]:
         """A start for the accurate wedge by a step or two with the sturdy one; as it was, where these lead nowhere."""
         sturdy = replace(problem, accurate=False)
-        step = self.run(sturdy, newton(sturdy, pressure, approach), FAR_OFF, MOST_COARSE_ITERATIONS)
+        step = self.run(
+            sturdy,
+            newton(sturdy, pressure, approach),
+            GRID_CONTINUATION.failed_residual,
+            GRID_CONTINUATION.max_coarse_iterations,
+        )
         return (
             (step.balance.pressure, step.approach)
-            if self.settled(FAR_OFF)
+            if self.settled(GRID_CONTINUATION.failed_residual)
             else (pressure, approach)
         )
 
@@ -167,7 +152,7 @@ class Search:
         """
         step = next(steps)
         before = after or step
-        astray = stray * max(before.balance.residual_rms, NEXT_TO_NOTHING)
+        astray = stray * max(before.balance.residual_rms, GRID_CONTINUATION.min_residual)
         while True:
             self._record(problem, step)
             self.lost = step.number > 0 and not np.isfinite(step.change)
@@ -206,7 +191,7 @@ class Search:
         ] = {}  # by whether too much is carried: approach and load error
         last_side, left = None, self.options.max_iterations
         while True:
-            most = min(left, MOST_HELD_ITERATIONS)
+            most = min(left, GRID_CONTINUATION.max_fixed_iterations)
             step = self.run(
                 problem,
                 newton(problem, pressure, approach, held=True),
@@ -347,24 +332,42 @@ def grid_error(
     )
     ends = {name: ends_error(found) for name, found in figures_of_ends if None not in found}
     if before:
-        apart = apart.at_least(coarse.off(before[-1]).times(AGREEMENT))
+        apart = apart.at_least(coarse.off(before[-1]).times(DISCRETISATION_ERROR.min_difference))
     if smooth:
         return GridError(
             **asdict(replace(apart if order > 1 else apart.times(3.0), **ends)), lean=nothing
         )
     share = 1.0
     if by_first_order is not None:
-        apart, share = apart.at_least(fine.off(by_first_order)), BY_TWO_ORDERS
-    half = apart.times(0.5 * share * (ONWARDS + BACK)).plus(
-        replace(nothing, clr=share * UNRESOLVED * cell**2)
-    )
-    lean = apart.times(0.5 * share * (ONWARDS - BACK)).signed(fine.minus(coarse))
+        apart, share = (
+            apart.at_least(fine.off(by_first_order)),
+            DISCRETISATION_ERROR.two_order_share,
+        )
+    half = apart.times(
+        0.5 * share * (DISCRETISATION_ERROR.forward + DISCRETISATION_ERROR.backward)
+    ).plus(replace(nothing, clr=share * DISCRETISATION_ERROR.load_share_per_cell * cell**2))
+    lean = apart.times(
+        0.5 * share * (DISCRETISATION_ERROR.forward - DISCRETISATION_ERROR.backward)
+    ).signed(fine.minus(coarse))
     if by_first_order is not None and before:
         half = replace(
-            half, clr=0.5 * (KEPT_ON + KEPT_BACK) * apart.clr + KEPT_UNRESOLVED * cell**2
+            half,
+            clr=0.5
+            * (DISCRETISATION_ERROR.load_share_forward + DISCRETISATION_ERROR.load_share_backward)
+            * apart.clr
+            + DISCRETISATION_ERROR.load_share_per_cell_three * cell**2,
         )
         lean = replace(
-            lean, clr=math.copysign(0.5 * (KEPT_ON - KEPT_BACK) * apart.clr, fine.clr - coarse.clr)
+            lean,
+            clr=math.copysign(
+                0.5
+                * (
+                    DISCRETISATION_ERROR.load_share_forward
+                    - DISCRETISATION_ERROR.load_share_backward
+                )
+                * apart.clr,
+                fine.clr - coarse.clr,
+            ),
         )
     return GridError(
         **asdict(replace(half, **ends)), lean=replace(lean, **dict.fromkeys(ends, 0.0))
@@ -374,13 +377,16 @@ def grid_error(
 def ends_error(on_grids: Sequence[float]) -> float:
     """Half the 90 % interval of a figure of a roller's ends, on finer and finer grids; see `grid_error`."""
     *before, coarse, fine = on_grids
-    apart, factor = abs(fine - coarse), OF_ENDS
+    apart, factor = abs(fine - coarse), DISCRETISATION_ERROR.end_factor
     if before:
         earlier = abs(coarse - before[-1])
-        if apart > SCATTER * abs(fine):
+        if apart > DISCRETISATION_ERROR.end_scatter * abs(fine):
             shrinks = min(apart / earlier, 1.0) if earlier > 0.0 else 1.0
-            factor *= min(max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0), NO_LIMIT)
-        apart = max(apart, AGREEMENT * earlier)
+            factor *= min(
+                max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0),
+                DISCRETISATION_ERROR.max_end_growth,
+            )
+        apart = max(apart, DISCRETISATION_ERROR.min_difference * earlier)
     return factor * apart
 
 

@@ -6,20 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import GRID_CONTINUATION, INITIAL_GUESS
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.models.plastic_dry import dry_contact, roughly_dry
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.strategies.grid_continuation import COARSE_TOLERANCE
 from asperity.ehl.strategies.local_refinement import smoothed
-
-DRY = 1e-2  # what the dry contact of bodies that yield is met to: oil moves it far more
-HIGH = 2.0  # asperities, over the root mean square of the roughness
-MOST_GRADIENTS, MOST_DRY = (
-    60,
-    20,
-)  # steps by conjugate gradients, and then Newton's, for the dry contact
 
 
 class Lubricated(NamedTuple):
@@ -54,11 +47,11 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
     if coarser is not None:
         guess = problem.brought(coarser.total)
     if np.all(guess < problem.p_cap):
-        pressure, approach, met = elastic_contact(dry, guess, COARSE_TOLERANCE)
+        pressure, approach, met = elastic_contact(dry, guess, GRID_CONTINUATION.coarse_tolerance)
         if met and np.all(pressure < problem.p_cap):
             return pressure, approach
     near = _just_touching(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
-    pressure, approach, met = roughly_dry(dry, guess, near, DRY)
+    pressure, approach, met = roughly_dry(dry, guess, near, INITIAL_GUESS.dry_tolerance)
     if met:
         return pressure, approach
     if coarser is not None:
@@ -66,7 +59,7 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
         if met:
             return step.balance.pressure, step.approach
         guess = problem.form.hertz(problem.x, problem.y)
-    pressure, approach, met = dry_contact(dry, guess, most_steps=MOST_GRADIENTS)
+    pressure, approach, met = dry_contact(dry, guess, most_steps=INITIAL_GUESS.max_gradient_steps)
     if not met:
         step, _ = _settled(dry, pressure, approach)
         pressure, approach = step.balance.pressure, step.approach
@@ -76,16 +69,16 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
 def _just_touching(dry: Problem, pressure: Field) -> float:
     """The approach at which only high asperities touch, under the smooth bodies' pressure."""
     smooth = dry.form.gap(dry.x, dry.y) + dry.deflection(pressure)
-    return HIGH * float(np.std(dry.roughness)) - float(smooth.min())
+    return INITIAL_GUESS.first_asperities * float(np.std(dry.roughness)) - float(smooth.min())
 
 
 def _settled(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
     """Where Newton's steps lead, and whether that is near enough for a start."""
     for step in newton(dry, pressure, approach):
         left = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if left < DRY or step.number == MOST_DRY:
+        if left < INITIAL_GUESS.dry_tolerance or step.number == INITIAL_GUESS.max_newton_steps:
             break
-    return step, left < DRY
+    return step, left < INITIAL_GUESS.dry_tolerance
 
 
 def handed_up(problem: Problem, unknowns: Pressures) -> Pressures:

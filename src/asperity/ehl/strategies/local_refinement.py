@@ -13,21 +13,12 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
+from asperity.ehl.controls import LOCAL_REFINEMENT
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
 
 Box = tuple[slice, slice]
-
-LEAVING = 0.05  # of the largest residual: cells that belong into the box ...
-MOST_OF_IT = 0.5  # ... if they leave this share of all, in squares
-LARGEST = 0.25  # share of the grid's cells that is still worth while
-NOTHING_LEFT = 1e-3  # a start that leaves less needs none
-AROUND, HELD = (
-    6,
-    2,
-)  # cells around the ones that leave most, and of these the outer ones that are held
-MET, MOST_STEPS = 0.03, 8  # share of what the box has left at first, and steps to get there
 
 
 def smoothed(problem: Problem, unknowns: Pressures) -> Pressures:
@@ -50,7 +41,11 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
         elif left < least:
             assert isinstance(step.balance, MixedBalance)
             least, best = left, step.balance.unknowns
-        if least < MET * first or step.number == MOST_STEPS or not np.isfinite(left):
+        if (
+            least < LOCAL_REFINEMENT.target * first
+            or step.number == LOCAL_REFINEMENT.max_steps
+            or not np.isfinite(left)
+        ):
             break
     return best.oil, best.total
 
@@ -58,16 +53,21 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
 def _boxes(balance: MixedBalance) -> list[Box]:
     """Around the cells that leave most; none where these are many, or leave little."""
     problem, left = balance.problem, np.abs(balance.oil_residual)
-    worst = left > LEAVING * left.max()
+    worst = left > LOCAL_REFINEMENT.worst_residual * left.max()
     share = float((left[worst] ** 2).sum() / max((left**2).sum(), np.finfo(float).tiny))
-    if balance.residual_rms < NOTHING_LEFT or share < MOST_OF_IT:
+    if (
+        balance.residual_rms < LOCAL_REFINEMENT.min_residual
+        or share < LOCAL_REFINEMENT.min_residual_share
+    ):
         return []
     if problem.form.periodic:
         worst = np.broadcast_to(worst.any(axis=1, keepdims=True), worst.shape)
-    groups, _ = scipy.ndimage.label(scipy.ndimage.maximum_filter(worst, 2 * AROUND + 1))
+    groups, _ = scipy.ndimage.label(
+        scipy.ndimage.maximum_filter(worst, 2 * LOCAL_REFINEMENT.margin + 1)
+    )
     boxes: list[Box] = scipy.ndimage.find_objects(groups)  # type: ignore[assignment]
     size = sum((x.stop - x.start) * (y.stop - y.start) for x, y in boxes)
-    return boxes if size < LARGEST * left.size else []
+    return boxes if size < LOCAL_REFINEMENT.max_box_share * left.size else []
 
 
 def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
@@ -76,9 +76,17 @@ def _within(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
     (x, y), (dx, dy) = problem.lower, problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
     held = np.ones(start.total.shape, dtype=bool)
-    inner, mirror = slice(HELD, -HELD), problem.mirror if across.stop == problem.cells[1] else 0
+    inner, mirror = (
+        slice(LOCAL_REFINEMENT.fixed_margin, -LOCAL_REFINEMENT.fixed_margin),
+        problem.mirror if across.stop == problem.cells[1] else 0,
+    )
     held[
-        inner, slice(None) if problem.form.periodic else slice(HELD, None) if mirror else inner
+        inner,
+        slice(None)
+        if problem.form.periodic
+        else slice(LOCAL_REFINEMENT.fixed_margin, None)
+        if mirror
+        else inner,
     ] = False
     factor = problem.viscosity_factor
     part = replace(

@@ -12,6 +12,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.ehl.contact_solution import ContactSolution, Oil
+from asperity.ehl.controls import GRID_CONTINUATION, MIXED_SEARCH, TIME_MARCHING
 from asperity.ehl.load_shares import carried_share
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, may_lean
 from asperity.ehl.models.single_pressure import Past, Problem
@@ -28,43 +29,13 @@ from asperity.ehl.problem_setup import (
     smooth_film,
 )
 from asperity.ehl.scales import Scales
-from asperity.ehl.strategies.grid_continuation import (
-    COARSE_TOLERANCE,
-    FAR_OFF,
-    MOST_COARSE_ITERATIONS,
-    Progress,
-    Search,
-    on_all_lines,
-)
+from asperity.ehl.strategies.grid_continuation import Progress, Search, on_all_lines
 from asperity.ehl.strategies.initial_guess import Lubricated, dry_start, handed_up, on_a_roller
 from asperity.ehl.strategies.local_refinement import smoothed
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
 
 CLIMB, STURDY = ATTEMPTS[:2]
-MOST_BETWEEN_ENDS = 60  # accurate steps on a roller's finest grid: sharp ends take the sturdier way
-# of as many steps as are allowed on a roller's finest grid: all steps, on all grids, of all ways
-MOST_WORK = 1.25
-MOST_BESIDE = 60  # Newton steps on the coarser grid that only tells the error
-ROUGHLY = 1e-2  # what the first-order wedge is met to before the second-order one
-MOST_ROUGHLY = 80
-MOST_AT_ONCE = 40
-MOST_BACK = 20  # steps from the second-order wedge's solution to the first-order one
-TOLD = 0.2  # of what these have made of the load share: a step that moves it by less is the last
-# steps of the second-order wedge that lead from a coarser grid's solution to what is met roughly
-MOST_NEAR = 12
-BALANCED = (
-    1e-6  # oil that cells may lose and gain, in sum, over the throughflow, where none may be lost
-)
-LAST_LENGTH = 3.0  # half-widths that oil moves at least in the last step of time
-SHORTEST = 0.05  # step of time, over the first one that was tried
-LEAP = 10.0  # from a long step of time that was easy to the next one
-MOST_TURNS, STEPS_A_TURN = 4, 2  # of a smooth contact on a coarse grid
-IN_TIME = 5e-2  # what a step of time is met to ...
-MOST_A_STEP, MOST_IN_TIME = 10, 60  # ... in so many of Newton's, and how many there are
-STRAY = 10.0  # times what was left at first: from there steps seldom come back
-LED_NOWHERE = 1e-2  # a smooth contact's coarse solution that misses by more
-THIN = 1.0  # film ratio below which the dry contact is the nearer start
 
 
 def solve_mixed(
@@ -85,7 +56,9 @@ def solve_mixed(
     finest = least_part(whole)
     search = MixedSearch(options, scales.gap, progress)
     if conditions.geometry == "roller":
-        search.most_work = MOST_WORK * options.max_iterations * finest.roughness.size
+        search.most_work = (
+            MIXED_SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
+        )
     if start is not None:
         way, step = CLIMB, search.go_on(finest, pressures_of(start, finest, scales))
     else:
@@ -118,7 +91,9 @@ def _ways(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]
     """What is tried, one after the other, on a film [m] of the bodies if they were smooth."""
     if not np.any(surface.heights):
         return (FROM_DRY, CLIMB, STURDY) if film < contact_film else (CLIMB, STURDY)
-    return (FROM_DRY, CLIMB) if film < THIN * surface.sq else (CLIMB, FROM_DRY)
+    return (
+        (FROM_DRY, CLIMB) if film < MIXED_SEARCH.dry_film_ratio * surface.sq else (CLIMB, FROM_DRY)
+    )
 
 
 class MixedSearch(Search):
@@ -130,7 +105,7 @@ class MixedSearch(Search):
         """Whether the last step met the tolerance, and the one of the whole solve with all oil accounted for."""
         closely = tolerance <= self.options.tolerance
         return super().settled(tolerance, of_load=of_load) and not (
-            closely and self.imbalance > BALANCED
+            closely and self.imbalance > MIXED_SEARCH.max_imbalance
         )
 
     def solution(
@@ -184,7 +159,7 @@ class MixedSearch(Search):
 
     def go_on(self, problem: Problem, unknowns: Pressures) -> Step:
         """From a neighbouring solution: second order at once, or if that leads nowhere as from afar."""
-        most = min(self.options.max_iterations, MOST_AT_ONCE)
+        most = min(self.options.max_iterations, MIXED_SEARCH.max_second_order_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, most
         )
@@ -199,13 +174,27 @@ class MixedSearch(Search):
         order.
         """
         tolerance, most = self._wanted(problem, coarsely=coarsely, near=True)
-        roughly, soon = max(ROUGHLY, tolerance), min(MOST_AT_ONCE, most)
+        roughly, soon = (
+            max(MIXED_SEARCH.first_order_tolerance, tolerance),
+            min(MIXED_SEARCH.max_second_order_iterations, most),
+        )
         if may_lean(problem):
             steps = newton(problem, unknowns, second_order=True)
-            step = self.run(problem, steps, roughly, min(MOST_NEAR, soon), stray=STRAY)
+            step = self.run(
+                problem,
+                steps,
+                roughly,
+                min(MIXED_SEARCH.max_restart_iterations, soon),
+                stray=MIXED_SEARCH.divergence,
+            )
             if self.settled(roughly) and not self.settled(tolerance):
                 step = self.run(
-                    problem, steps, tolerance, step.number + soon, stray=STRAY, after=step
+                    problem,
+                    steps,
+                    tolerance,
+                    step.number + soon,
+                    stray=MIXED_SEARCH.divergence,
+                    after=step,
                 )
             if self.settled(tolerance):
                 if not coarsely:
@@ -218,8 +207,12 @@ class MixedSearch(Search):
         tolerance, most = self.options.tolerance, self.options.max_iterations
         if not coarsely:
             return tolerance, most
-        roughly = COARSE_TOLERANCE if problem.accurate or near else 0.5 * ROUGHLY
-        return max(roughly, tolerance), min(MOST_BESIDE, most)
+        roughly = (
+            GRID_CONTINUATION.coarse_tolerance
+            if problem.accurate or near
+            else 0.5 * MIXED_SEARCH.first_order_tolerance
+        )
+        return max(roughly, tolerance), min(MIXED_SEARCH.max_error_grid_iterations, most)
 
     def refined(self, problem: Problem, step: Step) -> tuple[str, Step]:
         """A sturdy solution of smooth bodies led on to the accurate wedge and its way; or as it is, if that fails."""
@@ -228,7 +221,7 @@ class MixedSearch(Search):
             problem,
             newton(problem, _reached(step), second_order=False),
             self.options.tolerance,
-            MOST_AT_ONCE,
+            MIXED_SEARCH.max_second_order_iterations,
         )
         if self.settled(self.options.tolerance):
             self.figures[-1] = self._figures(better)
@@ -255,27 +248,35 @@ class MixedSearch(Search):
         tolerance, most = self._wanted(problem, coarsely=coarsely)
         if problem.conserve or not problem.accurate:
             step = self.march(problem, unknowns, length)
-            if not self.settled(IN_TIME) and not last:
+            if not self.settled(TIME_MARCHING.tolerance) and not last:
                 return step
-            if not self.settled(IN_TIME) and problem.conserve:
+            if not self.settled(TIME_MARCHING.tolerance) and problem.conserve:
                 step = self.refilled(problem, unknowns, length)
-            unknowns = _reached(step) if self.settled(IN_TIME) else unknowns
+            unknowns = _reached(step) if self.settled(TIME_MARCHING.tolerance) else unknowns
         if problem.accurate and problem.form.along is not None:
-            most = min(most, MOST_BETWEEN_ENDS)
+            most = min(most, MIXED_SEARCH.max_roller_iterations)
         if not may_lean(problem):
             return self.run(problem, newton(problem, unknowns, second_order=False), tolerance, most)
-        roughly = max(ROUGHLY, tolerance)
+        roughly = max(MIXED_SEARCH.first_order_tolerance, tolerance)
         steps = newton(problem, unknowns, second_order=False)
-        step = self.run(problem, steps, roughly, min(most, MOST_ROUGHLY), stray=STRAY)
+        step = self.run(
+            problem,
+            steps,
+            roughly,
+            min(most, MIXED_SEARCH.max_first_order_iterations),
+            stray=MIXED_SEARCH.divergence,
+        )
         if not self.settled(roughly):  # too much was left to the last: closer now
-            unknowns = _reached(self.march(problem, unknowns, length, met=ROUGHLY))
+            unknowns = _reached(
+                self.march(problem, unknowns, length, met=MIXED_SEARCH.first_order_tolerance)
+            )
             step = self.run(
                 problem,
                 newton(problem, unknowns, second_order=False),
                 roughly,
-                min(most, MOST_ROUGHLY),
+                min(most, MIXED_SEARCH.max_first_order_iterations),
             )
-        if not self.settled(FAR_OFF):
+        if not self.settled(GRID_CONTINUATION.failed_residual):
             return step
         self.by_first_order = self._figures(step)
         return self.run(
@@ -283,7 +284,12 @@ class MixedSearch(Search):
         )
 
     def march(
-        self, problem: Problem, unknowns: Pressures, first: float, *, met: float = IN_TIME
+        self,
+        problem: Problem,
+        unknowns: Pressures,
+        first: float,
+        *,
+        met: float = TIME_MARCHING.tolerance,
     ) -> Step:
         """Towards what stands still in steps of time, longer and longer ones, each from where the last led.
 
@@ -292,25 +298,31 @@ class MixedSearch(Search):
         no step is short enough.
         """
         length, content = first, evaluate(problem, unknowns, second_order=False).content
-        most = min(MOST_A_STEP, self.options.max_iterations)
-        for _ in range(MOST_IN_TIME):
+        most = min(TIME_MARCHING.max_newton_steps, self.options.max_iterations)
+        for _ in range(TIME_MARCHING.max_steps):
             led = replace(problem, past=_kept_for(problem, length, content))
-            step = self.run(led, newton(led, unknowns, second_order=False), met, most, stray=STRAY)
+            step = self.run(
+                led,
+                newton(led, unknowns, second_order=False),
+                met,
+                most,
+                stray=MIXED_SEARCH.divergence,
+            )
             if self.settled(met):
                 unknowns, content = _reached(step), step.balance.content
-                if length >= LAST_LENGTH:
+                if length >= TIME_MARCHING.final_length:
                     break
                 length *= (
-                    (LEAP if length >= 1.0 else 3.0)
+                    (TIME_MARCHING.growth if length >= 1.0 else 3.0)
                     if step.number <= 2
                     else 2.0
                     if step.number <= 4
                     else 1.2
                 )
-            elif length < SHORTEST * first:
+            elif length < TIME_MARCHING.min_length * first:
                 break
             else:  # what was left of the steps before may be what goes round: closer from now on
-                length, met = 0.25 * length, min(met, ROUGHLY)
+                length, met = 0.25 * length, min(met, MIXED_SEARCH.first_order_tolerance)
         return step
 
     def refilled(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
@@ -319,7 +331,11 @@ class MixedSearch(Search):
             np.clip(unknowns.oil, 0.0, problem.p_cap), unknowns.total, unknowns.approach
         )
         step = self.march(replace(problem, conserve=False), start, length)
-        return self.march(problem, _reached(step), length) if self.settled(IN_TIME) else step
+        return (
+            self.march(problem, _reached(step), length)
+            if self.settled(TIME_MARCHING.tolerance)
+            else step
+        )
 
     def climb_from(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
@@ -345,10 +361,10 @@ class MixedSearch(Search):
                 )
             else:
                 step = self.coarsely(problem, unknowns)
-            if self.smooth and not self.settled(LED_NOWHERE):
+            if self.smooth and not self.settled(MIXED_SEARCH.smooth_coarse_residual):
                 self.figures, unknowns, before = [], None, None
                 continue
-            if problem is not levels[0] and not self.settled(ROUGHLY):
+            if problem is not levels[0] and not self.settled(MIXED_SEARCH.first_order_tolerance):
                 self.figures = []  # a start, but no solution to compare with
             elif coarser_all_along(problem, levels[0]):
                 self.figures.append(self._figures(step))
@@ -360,16 +376,16 @@ class MixedSearch(Search):
 
     def coarsely(self, problem: Problem, unknowns: Pressures) -> Step:
         """A start for the next finer grid; of smooth bodies by a few steps, then the worst cells, in turns."""
-        tolerance = max(COARSE_TOLERANCE, self.options.tolerance)
+        tolerance = max(GRID_CONTINUATION.coarse_tolerance, self.options.tolerance)
         steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
-        for _ in range(MOST_TURNS if problem.accurate else 0):
-            step = self.run(problem, steps, tolerance, STEPS_A_TURN)
+        for _ in range(MIXED_SEARCH.max_smooth_turns if problem.accurate else 0):
+            step = self.run(problem, steps, tolerance, MIXED_SEARCH.steps_per_turn)
             if self.settled(tolerance):
                 return step
-            if step.balance.residual_rms < ROUGHLY:
+            if step.balance.residual_rms < MIXED_SEARCH.first_order_tolerance:
                 break
             steps = newton(problem, smoothed(problem, _reached(step)), second_order=False)
-        return self.run(problem, steps, tolerance, MOST_COARSE_ITERATIONS)
+        return self.run(problem, steps, tolerance, GRID_CONTINUATION.max_coarse_iterations)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
         """From bodies that carry all the load themselves, on grid after grid.
@@ -388,12 +404,14 @@ class MixedSearch(Search):
             else:
                 step = self.at_once(problem, start, coarsely=not finest, last=False)
             if before is not None and not self.settled(
-                FAR_OFF
+                GRID_CONTINUATION.failed_residual
             ):  # what oil changed on the coarser grid was no start
                 step = self.finish(
                     problem, dry, coarsely=not finest, length=2.0 * problem.spacing[0]
                 )
-            if finest or self.settled(max(ROUGHLY, self.options.tolerance)):
+            if finest or self.settled(
+                max(MIXED_SEARCH.first_order_tolerance, self.options.tolerance)
+            ):
                 if coarser_all_along(problem, levels[0]):
                     self.figures.append(self._figures(step))
                 before = Lubricated(dry, _reached(step))
@@ -414,7 +432,9 @@ class MixedSearch(Search):
         if len(levels) == 1 or len(self.figures) != 1 or not coarser_all_along(levels[1], finest):
             return
         beside = MixedSearch(
-            replace(self.options, max_iterations=MOST_BESIDE), self.gap_scale, self.progress
+            replace(self.options, max_iterations=MIXED_SEARCH.max_error_grid_iterations),
+            self.gap_scale,
+            self.progress,
         )
         beside.from_dry(levels[1:2])
         self.history = [*beside.history, *self.history]
@@ -460,10 +480,16 @@ def _kept_for(problem: Problem, length: float, content: Field) -> Past:
 def _back_to_first_order(problem: Problem, step: Step) -> Step:
     """From the second-order wedge's solution to the first-order one, met roughly, or as far as steps move the load."""
     told = back = step
-    for back in islice(newton(problem, _reached(step), second_order=False), MOST_BACK + 1):
+    for back in islice(
+        newton(problem, _reached(step), second_order=False),
+        MIXED_SEARCH.max_backward_iterations + 1,
+    ):
         if back.number > 0:
             moved, all_of_it = (abs(_clr(back) - _clr(other)) for other in (told, step))
-            if back.balance.residual_rms < ROUGHLY or moved < TOLD * all_of_it:
+            if (
+                back.balance.residual_rms < MIXED_SEARCH.first_order_tolerance
+                or moved < MIXED_SEARCH.backward_tolerance * all_of_it
+            ):
                 break
             told = back
     return back
